@@ -1,0 +1,87 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# The one entry point: sets the workspace up, enters it, tests it. `./baxter.sh help` says how.
+
+LAB_ROOT=$(cd -P "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
+export LAB_ROOT
+
+# shellcheck source=tools/environment.bash
+source "$LAB_ROOT/tools/environment.bash"
+
+usage() {
+    cat <<'TEXT'
+Usage: ./baxter.sh [MODE] [COMMAND…]
+
+  sim [COMMAND…]        the simulator on this machine (also: local; the default). Without a command: a shell.
+                        A ROS_MASTER_URI that names this machine and another port is kept: several labs side by side.
+  HOST [COMMAND…]       a robot, by host name or IP address. ROS_IP is found from the route to it;
+                        ROS_IP or ROS_HOSTNAME, if you have set one, wins.
+  setup                 install and build what is missing; runs by itself the first time anything is used
+  test [NAMES] [--long] lint, unit tests and rostests. NAMES: packages, test files, or pytest arguments such as -k
+  doctor [HOST]         look for what is wrong with master, network, clock, build, Python and robot, and say the fix
+  help                  this text
+
+  ./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch
+  ./baxter.sh sim rosrun baxter_tools enable_robot.py -e
+TEXT
+}
+
+# Replace this process by a command in the workspace's environment, or by a shell with the lab's prompt.
+enter() {
+    if [[ $# -gt 0 ]]; then
+        exec "$@"
+    elif [[ -t 0 ]]; then
+        exec bash --rcfile "$LAB_ROOT/tools/shell.bashrc" -i
+    else
+        exec bash
+    fi
+}
+
+main() {
+    local mode=${1:-sim}
+    [[ $# -gt 0 ]] && shift
+    case $mode in
+        help | -h | --help)
+            usage
+            ;;
+        setup)
+            exec bash "$LAB_ROOT/tools/setup.bash" "$@"
+            ;;
+        doctor)
+            # Reports on a workspace that may be half built, so it sets nothing up.
+            # A host that does not resolve, or has no route, is for the doctor to name.
+            if [[ $# -gt 0 ]]; then use_robot "$1" 2>/dev/null || export ROS_MASTER_URI=http://$1:11311; fi
+            use_build_if_there
+            if ! command -v python3 >/dev/null; then
+                echo "There is no python3 on this machine yet. fix: ./baxter.sh setup"
+                exit 1
+            fi
+            exec python3 "$LAB_ROOT/tools/doctor.py"
+            ;;
+        test)
+            bring_up_to_date --strict || exit
+            use_loopback
+            use_build || exit
+            exec python3 "$LAB_ROOT/tools/run_tests.py" "$@"
+            ;;
+        sim | local | localhost | 127.*)
+            bring_up_to_date || exit
+            use_loopback
+            use_build || exit
+            enter "$@"
+            ;;
+        -*)
+            echo "baxter.sh: unknown option '$mode'" >&2
+            usage >&2
+            exit 2
+            ;;
+        *)
+            use_robot "$mode" || exit
+            bring_up_to_date || exit
+            use_build || exit
+            enter "$@"
+            ;;
+    esac
+}
+
+main "$@"

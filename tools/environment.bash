@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# The workspace's environment, as functions. Sourced by baxter.sh; LAB_ROOT names the workspace.
+
+DEFAULT_MASTER_URI=http://localhost:11311
+
+# host_of URI: the host in http://host:port/
+host_of() {
+    local rest=${1#*://}
+    rest=${rest%%/*}
+    echo "${rest%:*}"
+}
+
+# is_loopback HOST: does the name or address mean this machine, and only this machine?
+is_loopback() {
+    case $1 in
+        localhost | 127.* | '[::1]' | ::1) return 0 ;;
+        *) return 1 ;;
+    esac
+}
+
+# Simulator on this machine: everything announces itself as localhost and so listens on 127.0.0.1 only.
+use_loopback() {
+    if [[ -z ${ROS_MASTER_URI:-} ]] || ! is_loopback "$(host_of "$ROS_MASTER_URI")"; then
+        ROS_MASTER_URI=$DEFAULT_MASTER_URI
+    fi
+    unset ROS_IP
+    export ROS_MASTER_URI ROS_HOSTNAME=localhost
+}
+
+# use_robot HOST: a master on another machine, which must be able to call us back at the address we announce.
+use_robot() {
+    local host=$1 address source_address
+    address=$(getent ahostsv4 "$host" | awk '{ print $1; exit }')
+    if [[ -z $address ]]; then
+        echo "baxter.sh: '$host' is neither a command of this script (try ./baxter.sh help) nor a host name or" \
+             "IPv4 address that this machine can resolve. Add the robot to /etc/hosts or give its address." >&2
+        return 2
+    fi
+    export ROS_MASTER_URI=http://$host:11311
+    # A loopback name is left over from sim mode, and no robot could call it.
+    if [[ -n ${ROS_HOSTNAME:-} ]] && is_loopback "$ROS_HOSTNAME"; then unset ROS_HOSTNAME; fi
+    if [[ -n ${ROS_IP:-} ]] && is_loopback "$ROS_IP"; then unset ROS_IP; fi
+    if [[ -n ${ROS_IP:-}${ROS_HOSTNAME:-} ]]; then
+        return 0
+    fi
+    source_address=$(ip -4 route get "$address" 2>/dev/null | sed -n 's/.* src \([0-9.]*\).*/\1/p')
+    if [[ -z $source_address ]]; then
+        echo "baxter.sh: no route to $host ($address). Connect to the robot's network, or set ROS_IP yourself." >&2
+        return 2
+    fi
+    export ROS_IP=$source_address
+}
+
+# Everything whose change makes an earlier set-up stale, as one hash. The workspace's own path counts too:
+# virtual environments and catkin build folders cannot be moved.
+fingerprint() {
+    {
+        echo "$LAB_ROOT"
+        cd "$LAB_ROOT" && find requirements*.txt tools/*.txt tools/setup.bash src \
+            \( -name meshes -o -name __pycache__ -o -name .git \) -prune -o \
+            -type f \( -name package.xml -o -name CMakeLists.txt -o -name setup.py -o -name '*.msg' -o -name '*.srv' \
+                -o -name '*.action' -o -name '*.cfg' -o -name '*.xacro' -o -path '*/env-hooks/*' \
+                -o -name 'requirements*.txt' -o -path 'tools/*' \) -print0 | sort -z | xargs -0 sha256sum
+    } | sha256sum
+}
+
+# bring_up_to_date [--strict]: set up what is missing or stale. Where an earlier build is there to work with, a failure
+# does not lock anybody out of it (a student's package that does not configure needs a shell to be mended in),
+# unless --strict asks for an error.
+bring_up_to_date() {
+    local state=$LAB_ROOT/.baxter now status=0
+    now=$(fingerprint)
+    if [[ -f $state/done && -f $LAB_ROOT/devel/setup.bash && -x $LAB_ROOT/.venv/bin/python3 ]] &&
+        [[ $(<"$state/done") == "$now" ]]; then
+        return 0
+    fi
+    if [[ ${1:-} == --strict ]] || ! has_earlier_build || [[ ! -f $state/failed || $(<"$state/failed") != "$now" ]]; then
+        # Set-up talks on standard error: the output of a command in this environment belongs to the command.
+        bash "$LAB_ROOT/tools/setup.bash" >&2 </dev/null || status=$?
+        if [[ $status -eq 0 ]]; then return 0; fi
+        if [[ $status -eq 130 || ${1:-} == --strict ]] || ! has_earlier_build; then return "$status"; fi
+        # What failed once fails again; not every command has to wait for it.
+        printf '%s\n' "$now" >"$state/failed"
+    fi
+    echo "baxter.sh: set-up has failed; going on with the build from before. ./baxter.sh setup tries again." >&2
+}
+
+has_earlier_build() {
+    [[ -f $LAB_ROOT/.baxter/build.stamp && -f $LAB_ROOT/devel/setup.bash && -x $LAB_ROOT/.venv/bin/python3 ]]
+}
+
+# Take on the environment of the built workspace; its hooks put the virtual environment first in PATH.
+use_build() {
+    # What another workspace left behind would be chained in front of ours.
+    unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH PYTHONPATH PYTHONHOME ROS_DISTRO
+    # shellcheck disable=SC1091
+    source "$LAB_ROOT/devel/setup.bash"
+}
+
+use_build_if_there() {
+    if [[ -f $LAB_ROOT/devel/setup.bash ]]; then use_build; fi
+}

@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From facts to findings: one function for each thing that goes wrong in a lab. Pure: no clock, no network, no ROS."""
+
+from dataclasses import dataclass
+from enum import Enum
+from urllib.parse import urlparse
+
+from lab_doctor.facts import Facts
+
+# tf refuses to look up transforms this far in the future or the past of its buffer; well before that, arms lag visibly.
+MAX_CLOCK_OFFSET_S = 0.25
+# Topics that exactly one node may publish: two simulators, or a simulator on the robot's own master.
+SIMULATOR_TOPICS = ("/clock", "/robot/joint_states")
+# The kernel hands out ports from this range (net.ipv4.ip_local_port_range) to whoever does not ask for a certain one.
+FIREWALL_LINE = (
+    "sudo nft 'table inet lab { chain input { type filter hook input priority 0; "
+    'iifname != "lo" tcp dport { 11311, 32768-60999 } ct state new drop; }; }\''
+)
+START_LINE = "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch"
+
+
+class Level(Enum):
+    OK = "ok"
+    NOTE = "note"
+    WRONG = "WRONG"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found; fix says what to type, and is empty where there is nothing to mend."""
+
+    topic: str
+    level: Level
+    what: str
+    fix: str = ""
+
+
+def is_loopback(host: str) -> bool:
+    return host in ("localhost", "::1") or host.startswith("127.")
+
+
+def master_host(facts: Facts) -> str:
+    return urlparse(facts.variables.get("ROS_MASTER_URI", "")).hostname or ""
+
+
+def _entry(facts: Facts) -> str:
+    """The command that enters the workspace for this master."""
+    host = master_host(facts)
+    return "./baxter.sh sim" if is_loopback(host) else f"./baxter.sh {host}"
+
+
+def check_build(facts):
+    if not facts.is_built:
+        yield Finding("build", Level.WRONG, "the workspace is not built", "./baxter.sh setup")
+    elif facts.is_fresh is False:
+        what = "packages, messages or requirements have changed since the last set-up"
+        yield Finding("build", Level.WRONG, what, "./baxter.sh setup")
+    else:
+        yield Finding("build", Level.OK, f"{facts.root} is built and up to date")
+
+
+def check_python(facts):
+    python = facts.python
+    if python is None:
+        yield Finding("python", Level.WRONG, "python3 did not finish importing what nodes import", "./baxter.sh setup")
+        return
+    expected = f"{facts.root}/.venv/bin/python3"
+    if python.executable != expected:
+        what = f"nodes run on {python.executable or 'no python3'}, not on {expected}"
+        yield Finding("python", Level.WRONG, what, "./baxter.sh setup, then enter with ./baxter.sh")
+        return
+    for module, error in python.errors.items():
+        yield Finding("python", Level.WRONG, f"cannot import {module}: {error}", "./baxter.sh setup")
+    numpy = python.versions.get("numpy", "")
+    if numpy and int(numpy.split(".")[0]) >= 2:
+        what = f"numpy is {numpy}; cv_bridge, transforms3d and pybullet here need numpy 1"
+        yield Finding("python", Level.WRONG, what, "pip uninstall numpy, then ./baxter.sh setup")
+    elif not python.errors:
+        yield Finding("python", Level.OK, f"{expected}, numpy {numpy}")
+
+
+def check_network(facts):
+    """ROS_MASTER_URI, ROS_HOSTNAME, ROS_IP: can others call us back at the address that we announce?"""
+    uri = facts.variables.get("ROS_MASTER_URI", "")
+    parts = urlparse(uri)
+    try:
+        port = parts.port
+    except ValueError:
+        port = None
+    if parts.scheme != "http" or not parts.hostname or not port:
+        what = f"ROS_MASTER_URI is '{uri}', which is not of the form http://HOST:PORT"
+        yield Finding("network", Level.WRONG, what, "export ROS_MASTER_URI=http://localhost:11311, or ./baxter.sh HOST")
+        return
+    robot = parts.hostname
+    name = facts.variables.get("ROS_HOSTNAME", "")
+    ip = facts.variables.get("ROS_IP", "")
+    if name and ip:
+        what = f"ROS_HOSTNAME={name} and ROS_IP={ip} are both set; ROS uses ROS_HOSTNAME"
+        yield Finding("network", Level.NOTE, what, "unset the one that you do not mean")
+    variable, announced = ("ROS_HOSTNAME", name) if name else ("ROS_IP", ip)
+    if robot in facts.addresses and facts.addresses[robot][0] is None:
+        what = f"the master's host name {robot} does not resolve"
+        fix = f"add a line 'ADDRESS {robot}' to /etc/hosts, or ./baxter.sh ADDRESS"
+        yield Finding("network", Level.WRONG, what, fix)
+    if not announced:
+        what = "neither ROS_IP nor ROS_HOSTNAME is set: nodes announce this machine's name, and others must resolve it"
+        yield Finding("network", Level.NOTE, what, f"{_entry(facts)} sets the right one")
+        return
+    address, is_ours = facts.addresses.get(announced, (None, False))
+    if is_loopback(announced) and not is_loopback(robot):
+        what = f"{variable}={announced}, but the master is on {robot}, which cannot call this machine by that name"
+        yield Finding("network", Level.WRONG, what, f"unset {variable}, then {_entry(facts)}")
+    elif address is None:
+        what = f"{variable}={announced} does not resolve to an address: messages will not arrive"
+        yield Finding("network", Level.WRONG, what, f"unset {variable}, then {_entry(facts)}")
+    elif not is_ours:
+        what = f"{variable}={announced} is {address}, which is no address of this machine: messages will not arrive"
+        yield Finding("network", Level.WRONG, what, f"unset {variable}, then {_entry(facts)}")
+    else:
+        yield Finding("network", Level.OK, f"{variable}={announced} is this machine")
+
+
+def check_master(facts):
+    uri = facts.variables.get("ROS_MASTER_URI", "")
+    if facts.master is None:
+        yield Finding("master", Level.WRONG, f"{uri} did not answer in time", _master_fix(facts))
+    elif facts.master.error:
+        yield Finding("master", Level.WRONG, f"{uri} does not answer: {facts.master.error}", _master_fix(facts))
+    else:
+        yield Finding("master", Level.OK, f"{uri} answers")
+
+
+def _master_fix(facts):
+    host = master_host(facts)
+    if is_loopback(host):
+        return f"start the lab: {START_LINE}"
+    return f"is {host} on, and does `ping {host}` answer? For the simulator on this machine: ./baxter.sh sim"
+
+
+def _master_answers(facts):
+    return facts.master is not None and not facts.master.error
+
+
+def check_clock(facts):
+    if not _master_answers(facts):
+        return
+    offset = facts.master.clock_offset_s
+    if offset is not None and abs(offset) > MAX_CLOCK_OFFSET_S:
+        ahead = "ahead of" if offset > 0 else "behind"
+        what = f"the clock of {master_host(facts)} is {abs(offset):.1f} s {ahead} this one's: tf will refuse its data"
+        fix = "let both follow one time server: sudo timedatectl set-ntp true, or chrony"
+        yield Finding("clock", Level.WRONG, what, fix)
+    topics = facts.topics
+    if topics is None or topics.error:
+        return
+    if facts.master.use_sim_time and not topics.clock_messages:
+        what = "use_sim_time is true and nothing arrives on /clock: every node that sleeps or waits hangs"
+        fix = f"start the simulator ({START_LINE}), or without one: rosparam set use_sim_time false"
+        yield Finding("clock", Level.WRONG, what, fix)
+    elif facts.master.use_sim_time and not topics.clock_advanced:
+        what = "simulation time stands still: the simulator is paused"
+        yield Finding("clock", Level.WRONG, what, "rosservice call /gazebo/unpause_physics")
+    elif facts.master.use_sim_time:
+        yield Finding("clock", Level.OK, "simulation time advances")
+    elif topics.clock_messages:
+        what = "a simulator publishes /clock, but use_sim_time is not set: nodes mix two kinds of time"
+        yield Finding("clock", Level.WRONG, what, "rosparam set use_sim_time true, and start the nodes again")
+    else:
+        yield Finding("clock", Level.OK, "wall time")
+
+
+def check_simulators(facts):
+    if not _master_answers(facts):
+        return
+    for topic in SIMULATOR_TOPICS:
+        nodes = facts.master.publishers.get(topic, [])
+        if len(nodes) > 1:
+            what = f"{len(nodes)} nodes publish {topic}: {', '.join(sorted(nodes))}"
+            fix = f"keep one of them and stop the others: rosnode kill {sorted(nodes)[-1]}"
+            yield Finding("simulator", Level.WRONG, what, fix)
+    for node in facts.master.dead_nodes:
+        what = f"{node} is registered at the master and does not answer: it died without signing off"
+        yield Finding("simulator", Level.WRONG, what, "rosnode cleanup (answer y), or stop the lab and start it again")
+
+
+def check_robot(facts):
+    if not _master_answers(facts) or facts.topics is None:
+        return
+    state = facts.topics.robot_state
+    if facts.topics.error:
+        yield Finding("robot", Level.WRONG, f"cannot listen: {facts.topics.error}", "./baxter.sh setup")
+    elif state is None:
+        what = "nothing arrives on /robot/state: no robot and no simulator, or none that can call this machine"
+        yield Finding("robot", Level.WRONG, what, f"mend what is wrong above, or start the lab: {START_LINE}")
+    elif state["stopped"]:
+        what = "the robot was stopped (emergency stop, or enable_robot.py -S)"
+        fix = "release the stop button, then rosrun baxter_tools enable_robot.py -r, and -e"
+        yield Finding("robot", Level.WRONG, what, fix)
+    elif state["error"]:
+        what = "the robot reports an error"
+        yield Finding("robot", Level.WRONG, what, "rosrun baxter_tools enable_robot.py -r, then -e")
+    elif not state["enabled"]:
+        what = "the robot is not enabled: it ignores motion commands"
+        yield Finding("robot", Level.NOTE, what, "rosrun baxter_tools enable_robot.py -e")
+    else:
+        yield Finding("robot", Level.OK, "enabled")
+
+
+def check_ports(facts):
+    """Only where everything is meant to stay on this machine; with a robot, it has to reach us."""
+    if not is_loopback(master_host(facts)) or facts.listeners is None:
+        return
+    if not facts.listeners:
+        yield Finding("ports", Level.OK, "no ROS process listens beyond this machine")
+        return
+    names = ", ".join(f"{one.process} ({one.address}:{one.port})" for one in facts.listeners)
+    what = f"open to other machines: {names}. docs/security.md says why"
+    yield Finding("ports", Level.NOTE, what, FIREWALL_LINE)
+
+
+def check_display(facts):
+    if not facts.display:
+        what = "DISPLAY is not set: rviz cannot start, and the lab goes on without its window"
+        yield Finding("display", Level.NOTE, what, "work in a desktop session, or log in with ssh -X")
+
+
+CHECKS = (
+    check_build,
+    check_python,
+    check_network,
+    check_master,
+    check_clock,
+    check_simulators,
+    check_robot,
+    check_ports,
+    check_display,
+)
+
+
+def examine(facts: Facts) -> list[Finding]:
+    return [finding for check in CHECKS for finding in check(facts)]

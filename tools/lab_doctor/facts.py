@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the doctor knows: plain data, gathered by probe.py, judged by checks.py. None: could not be found out."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Master:
+    """What the ROS master says. error is empty where it answered."""
+
+    error: str = ""
+    use_sim_time: bool = False
+    publishers: dict[str, list[str]] = field(default_factory=dict)  # topic -> nodes
+    # Of the nodes that run a simulator: those that are registered and do not answer.
+    dead_nodes: list[str] = field(default_factory=list)
+    clock_offset_s: float | None = None  # the master's host minus this machine
+
+
+@dataclass(frozen=True)
+class Topics:
+    """What came in on the robot's topics while we listened."""
+
+    clock_messages: int = 0
+    clock_advanced: bool = False
+    robot_state: dict[str, bool | int] | None = None  # fields of baxter_core_msgs/AssemblyState
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class PythonFacts:
+    """The Python that runs nodes: its path, the version of each import, and the error of each that failed."""
+
+    executable: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+    errors: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Listener:
+    """A process that accepts connections from other machines."""
+
+    process: str
+    pid: int
+    address: str
+    port: int
+
+
+@dataclass(frozen=True)
+class Facts:
+    root: str
+    variables: dict[str, str]
+    # host name or address -> (address it resolves to or None, does that address belong to this machine?)
+    addresses: dict[str, tuple[str | None, bool]] = field(default_factory=dict)
+    master: Master | None = None
+    topics: Topics | None = None
+    is_built: bool = False
+    is_fresh: bool | None = None
+    python: PythonFacts | None = None
+    listeners: list[Listener] | None = None
+    display: str = ""

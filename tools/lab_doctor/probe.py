@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gather the facts, all at the same time, each with a deadline: a doctor that hangs on a dead network is no help."""
+
+import contextlib
+import http.client
+import json
+import re
+import shutil
+import socket
+import subprocess
+import threading
+import time
+import xmlrpc.client
+from email.utils import parsedate_to_datetime
+from pathlib import Path
+from urllib.parse import urlparse
+
+from lab_doctor.checks import SIMULATOR_TOPICS, is_loopback
+from lab_doctor.facts import Facts, Listener, Master, PythonFacts, Topics
+
+DEADLINE_S = 4.0
+CALL_TIMEOUT_S = 1.0
+CALLER_ID = "/lab_doctor"
+# Debian's roscpp nodes, and rospy nodes, carry their node name on the command line when roslaunch starts them.
+ROS_PROCESS = re.compile(r"__name:=|rosmaster|roscore|roslaunch|rosrun|/lib/(tf2?|rviz|robot_state_publisher|rosout)")
+MODULES = ("rospy", "pybullet", "numpy", "transforms3d", "tf2_ros")
+
+
+def gather(root: Path, variables: dict[str, str]) -> Facts:
+    """Facts about the workspace at root and the ROS that the variables point to; takes at most DEADLINE_S."""
+    ros = {name: variables.get(name, "") for name in ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_IP")}
+    host = urlparse(ros["ROS_MASTER_URI"]).hostname or ""
+    hosts = {name for name in (host, ros["ROS_HOSTNAME"], ros["ROS_IP"]) if name}
+    questions = {
+        "master": lambda: ask_master(ros["ROS_MASTER_URI"]),
+        "topics": lambda: listen(root, ros["ROS_MASTER_URI"]),
+        "is_fresh": lambda: is_fresh(root),
+        "python": ask_python,
+        "listeners": list_listeners,
+        **{f"address of {name}": lambda name=name: resolve(name) for name in hosts},
+    }
+    answers = answer_all(questions, DEADLINE_S)
+    return Facts(
+        root=str(root),
+        variables=ros,
+        addresses={name: answers.get(f"address of {name}") or (None, False) for name in hosts},
+        master=answers.get("master"),
+        topics=answers.get("topics"),
+        is_built=(root / "devel" / "setup.bash").is_file(),
+        is_fresh=answers.get("is_fresh"),
+        python=answers.get("python"),
+        listeners=answers.get("listeners"),
+        display=variables.get("DISPLAY", ""),
+    )
+
+
+def answer_all(questions, timeout_s: float) -> dict:
+    """name -> answer of every question answered in time; one that raises has no answer. Threads that hang are left."""
+    answers = {}
+
+    def answer(name, question):
+        with contextlib.suppress(Exception):  # no answer: the checks say what that means
+            answers[name] = question()
+
+    threads = [threading.Thread(target=answer, args=item, daemon=True) for item in questions.items()]
+    deadline = time.monotonic() + timeout_s
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(max(0.0, deadline - time.monotonic()))
+    return dict(answers)
+
+
+def resolve(name: str) -> tuple[str | None, bool]:
+    """(IPv4 address of a name or None, is it this machine's?): only own addresses can be bound to."""
+    try:
+        address = socket.gethostbyname(name)
+    except OSError:
+        return None, False
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((address, 0))
+        except OSError:
+            return address, False
+    return address, True
+
+
+class _Transport(xmlrpc.client.Transport):
+    def make_connection(self, host):
+        connection = super().make_connection(host)
+        connection.timeout = CALL_TIMEOUT_S
+        return connection
+
+
+def _proxy(uri):
+    return xmlrpc.client.ServerProxy(uri, transport=_Transport())
+
+
+def ask_master(uri: str) -> Master:
+    master = _proxy(uri)
+    try:
+        _, _, (publishers, _, _) = master.getSystemState(CALLER_ID)
+        code, _, use_sim_time = master.getParam(CALLER_ID, "/use_sim_time")
+    except (OSError, xmlrpc.client.Error, http.client.HTTPException, ValueError) as error:
+        return Master(error=str(error) or type(error).__name__)
+    by_topic = dict(publishers)
+    simulators = {node for topic in SIMULATOR_TOPICS for node in by_topic.get(topic, [])}
+    host = urlparse(uri).hostname
+    return Master(
+        use_sim_time=code == 1 and bool(use_sim_time),
+        publishers=by_topic,
+        dead_nodes=sorted(node for node in simulators if not _node_answers(master, node)),
+        clock_offset_s=None if is_loopback(host) else clock_offset_s(uri),
+    )
+
+
+def _node_answers(master, node):
+    try:
+        _, _, node_uri = master.lookupNode(CALLER_ID, node)
+        _proxy(node_uri).getPid(CALLER_ID)
+    except (OSError, xmlrpc.client.Error, http.client.HTTPException):
+        return False
+    return True
+
+
+def clock_offset_s(uri: str, timeout_s: float = 1.5) -> float | None:
+    """Clock of the master's host minus ours [s], from the Date line of its answers.
+
+    Date counts whole seconds; asking until it changes shows where a second begins. None if it does not in time.
+    """
+    parts = urlparse(uri)
+    first = None
+    deadline = time.monotonic() + timeout_s
+    while time.monotonic() < deadline:
+        connection = http.client.HTTPConnection(parts.hostname, parts.port, timeout=CALL_TIMEOUT_S)
+        try:
+            before = time.time()
+            connection.request("GET", "/")
+            date = connection.getresponse().headers["Date"]
+            middle = (before + time.time()) / 2
+        except OSError:
+            return None
+        finally:
+            connection.close()
+        if date is None:
+            return None
+        if first is not None and date != first:
+            return parsedate_to_datetime(date).timestamp() - middle
+        first = date
+        time.sleep(0.01)
+    return None
+
+
+def listen(root: Path, uri: str) -> Topics:
+    """What arrives on /clock and /robot/state within two seconds; heard by a process that has ROS.
+
+    Raises OSError where there is no master: rospy would wait for one.
+    """
+    _proxy(uri).getPid(CALLER_ID)
+    script = root / "tools" / "lab_doctor" / "listen.py"
+    command = [shutil.which("python3") or "python3", str(script)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S)
+    if done.returncode != 0:
+        return Topics(error=(done.stderr.strip().splitlines() or ["no reason given"])[-1])
+    return Topics(**json.loads(done.stdout.splitlines()[-1]))
+
+
+def is_fresh(root: Path) -> bool:
+    """Does the fingerprint of the last set-up still fit? baxter.sh's own function says."""
+    script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; [[ $(<"$1/.baxter/done") == "$(fingerprint)" ]]'
+    return subprocess.run(["bash", "-c", script, "fresh", str(root)], capture_output=True).returncode == 0
+
+
+def ask_python() -> PythonFacts:
+    """Which Python a node gets, and whether it finds what nodes need."""
+    executable = shutil.which("python3") or ""
+    program = (
+        "import importlib, json\n"
+        "versions, errors = {}, {}\n"
+        f"for name in {MODULES!r}:\n"
+        "    try:\n"
+        "        versions[name] = str(getattr(importlib.import_module(name), '__version__', ''))\n"
+        "    except Exception as error:\n"
+        "        errors[name] = f'{type(error).__name__}: {error}'\n"
+        # PyPI's rospkg imports well and finds none of the packages that Debian's knows.
+        "try:\n"
+        "    import rospkg\n"
+        "    rospkg.RosPack().get_path('rospy')\n"
+        "except Exception as error:\n"
+        "    errors['rospkg'] = f'it finds no ROS packages ({type(error).__name__})'\n"
+        "print(json.dumps([versions, errors]))\n"
+    )
+    done = subprocess.run([executable, "-c", program], capture_output=True, text=True, timeout=DEADLINE_S)
+    versions, errors = json.loads(done.stdout.splitlines()[-1])
+    return PythonFacts(executable, versions, errors)
+
+
+def list_listeners() -> list[Listener]:
+    """ROS processes of ours that listen on an address other than loopback."""
+    done = subprocess.run(["ss", "-Hltnp"], capture_output=True, text=True, timeout=CALL_TIMEOUT_S, check=True)
+    return parse_listeners(done.stdout, _command_line)
+
+
+def _command_line(pid):
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+    except OSError:
+        return ""
+
+
+def parse_listeners(text: str, command_line) -> list[Listener]:
+    """Lines of `ss -Hltnp` -> ROS processes open beyond loopback. command_line: pid -> its command line."""
+    found = []
+    for line in text.splitlines():
+        columns = line.split()
+        process = re.search(r'"([^"]+)",pid=(\d+)', line)
+        if len(columns) < 4 or process is None:
+            continue
+        address, _, port = columns[3].rpartition(":")
+        pid = int(process[2])
+        command = command_line(pid)
+        if address.startswith(("127.", "[::1]")) or not ROS_PROCESS.search(command):
+            continue
+        node = re.search(r"__name:=(\S+)", command)
+        found.append(Listener(node[1] if node else process[1], pid, address, int(port)))
+    return found

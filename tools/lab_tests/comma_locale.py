@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A locale that writes 0,5 for 0.5: what it takes to run the unit tests once under it.
+
+This module is also a pytest plugin. Python itself starts with LC_NUMERIC=C; a window toolkit, or a C library that calls
+setlocale(), changes that for the whole process, and from then on strtod() in C code stops at the point in "0.5".
+"""
+
+import locale
+import os
+import subprocess
+from pathlib import Path
+
+NAME = "de_DE.UTF-8"
+
+
+def environment(folder: Path) -> dict[str, str]:
+    """Variables for a child process; the locale is compiled into folder if the folder does not have it yet.
+
+    Raises OSError or subprocess.CalledProcessError where localedef or its sources are missing.
+    """
+    target = folder / NAME
+    if not (target / "LC_NUMERIC").is_file():
+        folder.mkdir(parents=True, exist_ok=True)
+        # localedef is content to warn about tokens it does not know, and then exits 1 although it wrote the locale.
+        command = ["localedef", "--no-archive", "-c", "-i", "de_DE", "-f", "UTF-8", str(target)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if not (target / "LC_NUMERIC").is_file():
+            raise subprocess.CalledProcessError(done.returncode, command, done.stdout, done.stderr)
+    return {**os.environ, "LOCPATH": str(folder), "LC_ALL": NAME}
+
+
+def pytest_configure(config):
+    locale.setlocale(locale.LC_ALL, "")
+    if locale.localeconv()["decimal_point"] != ",":
+        raise RuntimeError(f"locale {NAME} is not in force: {locale.setlocale(locale.LC_ALL)}")

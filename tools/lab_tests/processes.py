@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Processes that a test started: known by a variable in their environment, which every child inherits."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+MARKER = "LAB_TEST_RUN"
+
+
+def marked(value: str) -> dict[int, str]:
+    """pid -> command line of all living processes, but this one, whose environment says MARKER=value."""
+    needle = f"{MARKER}={value}".encode()
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit() or int(entry.name) == os.getpid():
+            continue
+        try:
+            if needle in (entry / "environ").read_bytes().split(b"\0"):
+                command = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+                if command:  # a zombie has none
+                    found[int(entry.name)] = command
+        except OSError:
+            continue  # it ended while we looked, or belongs to somebody else
+    return found
+
+
+def wait_until_gone(value: str, timeout_s: float) -> dict[int, str]:
+    """What is still alive after at most timeout_s."""
+    deadline = time.monotonic() + timeout_s
+    while (alive := marked(value)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return alive
+
+
+def kill_all(value: str):
+    """End every marked process, and what it starts meanwhile."""
+    for _ in range(5):
+        alive = marked(value)
+        if not alive:
+            return
+        for pid in alive:
+            try:
+                os.kill(pid, signal.SIGKILL)
+            except ProcessLookupError:
+                pass
+        time.sleep(0.05)

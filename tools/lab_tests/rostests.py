@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Run one .test file through rostest: own master, own log and result folders, a time limit, nothing left behind."""
+
+import contextlib
+import os
+import random
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import uuid
+from pathlib import Path
+
+from lab_tests import processes
+from lab_tests.discovery import Rostest
+from lab_tests.results import Tally, failure, read_rostest_results
+
+TIME_LIMIT_S = 240.0
+LONG_TIME_LIMIT_S = 1200.0
+# roslaunch gives a node 15 s after SIGINT and 2 s after SIGTERM before it kills it.
+STOP_TIMEOUT_S = 20.0
+LEFTOVER_GRACE_S = 2.0
+OUTPUT_LINES_SHOWN = 80
+
+
+def free_port() -> int:
+    """A port that nobody listens on, below those (32768 up) that the kernel could hand to another lab meanwhile."""
+    while True:
+        port = random.randrange(20000, 30000)
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+
+
+def run(test: Rostest, work_folder: Path, time_limit_s: float | None = None) -> Tally:
+    """Run it and count. work_folder is emptied first; logs and results stay in it for who wants to look."""
+    if time_limit_s is None:
+        time_limit_s = LONG_TIME_LIMIT_S if test.is_long else TIME_LIMIT_S
+    shutil.rmtree(work_folder, ignore_errors=True)
+    (work_folder / "results").mkdir(parents=True)
+    run_id = uuid.uuid4().hex
+    environment = {
+        **os.environ,
+        processes.MARKER: run_id,
+        # rostest opens a master on a free port of its own. This one answers nobody, so that a process which does not
+        # take rostest's word for the master finds none, rather than the lab that somebody has running.
+        "ROS_MASTER_URI": f"http://localhost:{free_port()}",
+        "ROS_HOSTNAME": "localhost",
+        "ROS_LOG_DIR": str(work_folder / "log"),
+        "ROS_TEST_RESULTS_DIR": str(work_folder / "results"),
+    }
+    output = work_folder / "output.txt"
+    timed_out = False
+    with output.open("wb") as stream:
+        # The results of rostest --text are not to be trusted (it exits 0 when tests fail), the XML files are.
+        child = subprocess.Popen(
+            ["rostest", str(test.path)],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            child.wait(time_limit_s)
+        except subprocess.TimeoutExpired:
+            timed_out = True
+            _stop(child)
+        except BaseException:  # Ctrl-C: take the test's processes along
+            _stop(child)
+            processes.kill_all(run_id)
+            raise
+    tally = Tally()
+    leftovers = processes.wait_until_gone(run_id, LEFTOVER_GRACE_S)
+    processes.kill_all(run_id)
+    if timed_out:
+        tally.add(failure(f"{test.path.name}: not finished after {time_limit_s:.0f} s"))
+    else:
+        tally.add(read_rostest_results(work_folder / "results"))
+        if child.returncode != 0 and tally.failed == 0:
+            tally.add(failure(f"{test.path.name}: rostest ended with exit code {child.returncode}"))
+        if leftovers:
+            listing = "\n".join(f"  {pid}: {command}" for pid, command in sorted(leftovers.items()))
+            tally.add(failure(f"{test.path.name}: left processes behind (killed now):\n{listing}"))
+    if tally.failed:
+        lines = output.read_text(errors="replace").splitlines()
+        tail = "\n".join(lines[-OUTPUT_LINES_SHOWN:])
+        tally.details.append(f"output of {test.path.name} (logs in {work_folder}):\n{tail}")
+    return tally
+
+
+def _stop(child):
+    """End rostest the way Ctrl-C does, so that it can end its nodes; then by force."""
+    for sign in (signal.SIGINT, signal.SIGKILL):
+        try:
+            os.killpg(child.pid, sign)
+            child.wait(STOP_TIMEOUT_S)
+            return
+        except ProcessLookupError:
+            return
+        except subprocess.TimeoutExpired:
+            print(f"rostest does not stop on {signal.Signals(sign).name}", file=sys.stderr)

@@ -1,0 +1,276 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Install and build what the workspace needs, step by step; what is there already is left alone.
+# Needs bash, apt and coreutils only: on a minimal Debian everything else is what this script installs.
+set -uo pipefail
+
+export LAB_ROOT
+LAB_ROOT=$(cd -P "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+# shellcheck source=environment.bash
+source "$LAB_ROOT/tools/environment.bash"
+# shellcheck source=stand_ins.bash
+source "$LAB_ROOT/tools/stand_ins.bash"
+cd "$LAB_ROOT" || exit 1
+
+STATE=$LAB_ROOT/.baxter
+LOGS=$STATE/logs
+VENV=$LAB_ROOT/.venv
+NOETIC=/opt/ros/noetic/setup.bash
+DESCRIPTION=$LAB_ROOT/src/baxter/baxter_common/baxter_description
+GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
+STEPS=(apt venv pip meshes build urdf kernels)
+# Python packages with compiled inner loops: `python3 -m NAME` fills their cache.
+COMPILED=(baxter_sim_kinematics)
+declare -A TITLES=(
+    [apt]="Debian packages"
+    [venv]="virtual environment"
+    [pip]="Python packages"
+    [meshes]="Baxter's meshes"
+    [build]="catkin_make"
+    [urdf]="baxter.urdf"
+    [kernels]="compiled inner loops"
+)
+
+# --- running and reporting --------------------------------------------------------------------------------------------
+
+step_name="" step_log="" note=""
+
+# run COMMAND…: run it with all output in the step's log; on failure show the log's end and leave.
+run() {
+    printf '\n$ %s\n' "$*" >>"$step_log"
+    local watcher="" status=0
+    if [[ -t 1 ]]; then
+        watch_log &
+        watcher=$!
+    fi
+    "$@" >>"$step_log" 2>&1 </dev/null 9>&- || status=$?
+    if [[ -n $watcher ]]; then
+        kill "$watcher" 2>/dev/null
+        wait "$watcher" 2>/dev/null
+        printf '\r\033[K'
+    fi
+    if [[ $status -ne 0 ]]; then
+        fail "$status" "$*"
+    fi
+}
+
+# The last line of the log, kept up to date on the terminal: somebody is waiting.
+watch_log() {
+    exec 9>&-
+    trap 'exit 0' TERM
+    local columns
+    columns=$(tput cols 2>/dev/null || echo 80)
+    while sleep 0.5; do
+        printf '\r\033[K      %.*s' $((columns - 8)) "$(tail -n 1 "$step_log" | tr -d '\r' | cut -c 1-300)"
+    done
+}
+
+# fail STATUS COMMAND
+fail() {
+    {
+        echo
+        echo "Set-up failed in step '${TITLES[$step_name]}' (exit code $1)."
+        echo "  command: $2"
+        echo "  log:     $step_log"
+        echo "The log ends with:"
+        tail -n 20 "$step_log" | sed 's/^/  | /'
+    } >&2
+    exit "$1"
+}
+
+# refuse REASON: a step that cannot even start.
+refuse() {
+    echo "$1" >>"$step_log"
+    echo >&2
+    echo "Set-up cannot go on in step '${TITLES[$step_name]}': $1" >&2
+    exit 1
+}
+
+# A step does its work only if its stamp does not hold the given key; step_done writes it.
+stamp_is() { [[ -f $STATE/$step_name.stamp && $(<"$STATE/$step_name.stamp") == "$1" ]]; }
+stamp() { printf '%s\n' "$1" >"$STATE/$step_name.stamp"; }
+hash_of() { sha256sum "$@" 2>/dev/null | sha256sum; }
+
+# --- the steps --------------------------------------------------------------------------------------------------------
+
+missing_packages() {
+    local have
+    # Two columns: name, and "ros" where an installed ROS provides it. Comments and blank lines drop out.
+    mapfile -t wanted < <(sed 's/#.*//' tools/apt_packages.txt |
+        awk -v noetic="$([[ -f $NOETIC ]] && echo 1)" 'NF && !(noetic && $2 == "ros") { print $1 }')
+    have=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}\n' "${wanted[@]}" 2>/dev/null | sed -n 's/^ii *//p')
+    comm -23 <(printf '%s\n' "${wanted[@]}" | sort) <(sort <<<"$have")
+}
+
+step_apt() {
+    local missing as_root=()
+    mapfile -t missing < <(missing_packages)
+    if [[ ${#missing[@]} -eq 0 ]]; then
+        note="all there"
+        return
+    fi
+    command -v apt-get >/dev/null || refuse "this machine has no apt-get; install these yourself: ${missing[*]}"
+    if [[ $EUID -ne 0 ]]; then
+        command -v sudo >/dev/null || refuse "not root, and no sudo. As root: apt-get install ${missing[*]}"
+        # Ask for the password here, where it can be seen: the commands below write to the log.
+        sudo -v || refuse "sudo was refused. As root: apt-get install ${missing[*]}"
+        as_root=(sudo)
+    fi
+    run "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update
+    run "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"
+    note="${#missing[@]} asked for"
+}
+
+# A usable environment is Debian's Python's, sees Debian's packages, and was made in this very folder.
+venv_is_ours() {
+    [[ -x $VENV/bin/pip ]] && head -n 1 "$VENV/bin/pip" | grep -qF "$VENV/bin/python" &&
+        grep -qx 'include-system-site-packages = true' "$VENV/pyvenv.cfg" &&
+        "$VENV/bin/python3" -c 'import sys; sys.exit(sys.base_prefix != "/usr" or sys.prefix != sys.argv[1])' "$VENV"
+}
+
+step_venv() {
+    if venv_is_ours 2>/dev/null; then
+        note="all there"
+        return
+    fi
+    # Always Debian's Python: rospy is installed for that one, whatever comes first in PATH.
+    run /usr/bin/python3 -m venv --clear --system-site-packages "$VENV"
+    rm -f "$STATE/pip.stamp"
+}
+
+step_pip() {
+    local key
+    key=$(hash_of requirements.txt requirements-nodeps.txt)
+    # Comes in with somebody's own `pip install`, and hides Debian's: requirements-nodeps.txt says what breaks.
+    if compgen -G "$VENV/lib/python3*/site-packages/rospkg" >/dev/null; then
+        run "$VENV/bin/python3" -m pip uninstall -y rospkg
+    fi
+    if stamp_is "$key"; then
+        note="all there"
+        return
+    fi
+    run "$VENV/bin/python3" -m pip install --progress-bar off -r requirements.txt
+    run "$VENV/bin/python3" -m pip install --progress-bar off --no-deps -r requirements-nodeps.txt
+    # PyPI's xacro command knows neither --inorder nor where ROS 1 packages lie; ours does, and is what people call.
+    if [[ -f src/compat/xacro/xacro ]]; then
+        run ln -sf ../../src/compat/xacro/xacro "$VENV/bin/xacro"
+    fi
+    stamp "$key"
+}
+
+# The vendor's meshes come with example-robot-data; copies, so that `catkin_make install` installs files and not links.
+step_meshes() {
+    local source key
+    source=$(compgen -G "$VENV/lib/python3*/site-packages/cmeel.prefix/share/example-robot-data/robots/baxter_description/meshes")
+    [[ -d $source ]] || refuse "example-robot-data in $VENV has no Baxter meshes; delete $VENV and run ./baxter.sh setup"
+    if [[ ! -d $DESCRIPTION || ! -d $GRIPPERS ]]; then
+        note="skipped: no baxter_description or rethink_ee_description in src/"
+        return
+    fi
+    key=$(hash_of requirements-nodeps.txt)
+    if stamp_is "$key" && [[ -d $DESCRIPTION/meshes/torso && -d $GRIPPERS/meshes/electric_gripper ]]; then
+        note="all there"
+        return
+    fi
+    run rm -rf "$DESCRIPTION/meshes" "$GRIPPERS/meshes"
+    run mkdir -p "$DESCRIPTION/meshes" "$GRIPPERS/meshes"
+    local part
+    for part in "$source"/*; do
+        if [[ $(basename "$part") == electric_gripper ]]; then
+            run cp -r "$part" "$GRIPPERS/meshes/"
+        else
+            run cp -r "$part" "$DESCRIPTION/meshes/"
+        fi
+    done
+    stamp "$key"
+}
+
+step_build() {
+    local key
+    leave_out_stand_ins "$LAB_ROOT" "${NOETIC%/*}/share" /usr/share
+    key="$LAB_ROOT $(cd src && find . -name meshes -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
+        -o -name setup.py -o -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name '*.cfg' \
+        -o -name CATKIN_IGNORE -o -path '*/env-hooks/*' \) -print0 | sort -z | xargs -0 sha256sum | sha256sum)"
+    if stamp_is "$key" && [[ -f devel/setup.bash && -f build/CMakeCache.txt ]]; then
+        note="up to date"
+        return
+    fi
+    # A build folder made elsewhere makes CMake refuse, so a moved or copied workspace starts afresh.
+    if [[ -f build/CMakeCache.txt ]] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$LAB_ROOT/src" build/CMakeCache.txt; then
+        run rm -rf build devel
+    fi
+    # With the virtual environment's Python, installed executables get a first line that finds its packages.
+    run catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3"
+    stamp "$key"
+    note="$(find src -name CATKIN_IGNORE -prune -o -name package.xml -print | wc -l) packages"
+}
+
+# The lab prints this file; nothing at run time reads it.
+step_urdf() {
+    local folder=$DESCRIPTION/urdf key
+    if [[ ! -f $folder/baxter.urdf.xacro || ! -d src/compat/xacro ]]; then
+        note="skipped: no baxter.urdf.xacro or compat/xacro in src/"
+        return
+    fi
+    key=$(find src -name '*.xacro' -type f -print0 | sort -z | xargs -0 sha256sum | sha256sum)
+    if stamp_is "$key" && [[ -s $folder/baxter.urdf ]]; then
+        note="up to date"
+        return
+    fi
+    run bash -c 'source "$1/tools/environment.bash" && use_build &&
+        rosrun xacro xacro --inorder "$2/baxter.urdf.xacro" >"$2/baxter.urdf.part" &&
+        mv "$2/baxter.urdf.part" "$2/baxter.urdf"' expand "$LAB_ROOT" "$folder"
+    stamp "$key"
+}
+
+# Compiling takes some ten seconds; left to the first launch, that launch would look as if it hung.
+step_kernels() {
+    local package
+    # What is in the cache already is not compiled again: numba sees to that.
+    for package in "${COMPILED[@]}"; do
+        run bash -c 'source "$1/tools/environment.bash" && use_build && python3 -m "$2"' compile "$LAB_ROOT" "$package"
+    done
+}
+
+# --- main -------------------------------------------------------------------------------------------------------------
+
+case $LAB_ROOT in
+    *[[:space:]]*)
+        echo "Set-up cannot go on: catkin does not build in a folder whose path has spaces: '$LAB_ROOT'." >&2
+        echo "Move the workspace, for example to ~/ros_ws, and try again." >&2
+        exit 1
+        ;;
+esac
+
+mkdir -p "$LOGS"
+# One set-up at a time: a launch and a node started together on a fresh clone must not both build.
+exec 9>"$STATE/lock"
+if ! flock -n 9; then
+    echo "Another set-up is at work here; waiting for it…"
+    flock 9
+    if [[ -f $STATE/done && $(<"$STATE/done") == "$(fingerprint)" ]]; then exit 0; fi
+fi
+
+# Nothing of another Python, workspace or virtual environment may leak into the build. Debian's own tools come first.
+unset PYTHONPATH PYTHONHOME VIRTUAL_ENV CMAKE_PREFIX_PATH ROS_PACKAGE_PATH ROS_DISTRO PKG_CONFIG_PATH
+export PATH=$VENV/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin:$PATH
+if [[ -f $NOETIC ]]; then
+    set +u
+    # shellcheck disable=SC1090
+    source "$NOETIC"
+    set -u
+fi
+
+started=$SECONDS
+rm -f "$STATE/done" "$STATE/failed"
+echo "Setting up $LAB_ROOT"
+for index in "${!STEPS[@]}"; do
+    step_name=${STEPS[index]} step_log=$LOGS/${STEPS[index]}.log note="" step_started=$SECONDS
+    printf '%s\n' "# ${TITLES[$step_name]}, $(date)" >"$step_log"
+    printf '[%d/%d] %s …\n' $((index + 1)) ${#STEPS[@]} "${TITLES[$step_name]}"
+    "step_$step_name"
+    printf '[%d/%d] %s: %s (%d s)\n' $((index + 1)) ${#STEPS[@]} "${TITLES[$step_name]}" "${note:-done}" \
+        $((SECONDS - step_started))
+done
+fingerprint >"$STATE/done"
+echo "Set-up finished in $((SECONDS - started)) s."

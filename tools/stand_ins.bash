@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Packages of ours that stand in for what Debian's ROS lacks. Sourced by set-up.
+
+STAND_INS=(
+    src/bullet_gazebo/gazebo_msgs
+    src/ros_control/control_msgs
+    src/ros_control/controller_manager_msgs
+    src/compat/xacro
+    src/compat/rqt_plot
+)
+
+# leave_out_stand_ins ROOT SHARE…: where an installed ROS (its share folders) has a package of that name, hide ours from
+# catkin and rospack by a file CATKIN_IGNORE; take the file away where it has none.
+leave_out_stand_ins() {
+    local root=$1 folder share installed
+    shift
+    for folder in "${STAND_INS[@]}"; do
+        [[ -d $root/$folder ]] || continue
+        installed=""
+        for share in "$@"; do
+            if [[ -f $share/${folder##*/}/package.xml ]]; then installed=$share; fi
+        done
+        if [[ -n $installed ]]; then
+            echo "made by set-up: $installed has this package" >"$root/$folder/CATKIN_IGNORE"
+        else
+            rm -f "$root/$folder/CATKIN_IGNORE"
+        fi
+    done
+}
