@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Colours for the material names that Gazebo's descriptions use, red, green, blue, alpha from 0 to 1.
+
+Names that stand for a texture or an effect there get a plain colour of the same kind.
+"""
+
+_PLAIN = {
+    "Black": (0.05, 0.05, 0.05),
+    "Blue": (0.1, 0.1, 0.9),
+    "BlueGlow": (0.1, 0.1, 1.0),
+    "DarkGray": (0.25, 0.25, 0.25),
+    "DarkGrey": (0.25, 0.25, 0.25),
+    "Gold": (0.85, 0.65, 0.15),
+    "Gray": (0.6, 0.6, 0.6),
+    "Green": (0.1, 0.75, 0.1),
+    "GreenGlow": (0.1, 1.0, 0.1),
+    "Grey": (0.6, 0.6, 0.6),
+    "Indigo": (0.33, 0.0, 0.5),
+    "LightWood": (0.80, 0.66, 0.46),
+    "Orange": (1.0, 0.45, 0.05),
+    "Purple": (0.65, 0.1, 0.75),
+    "Red": (0.9, 0.1, 0.1),
+    "RedBright": (1.0, 0.05, 0.05),
+    "RedGlow": (1.0, 0.1, 0.1),
+    "SkyBlue": (0.3, 0.65, 0.95),
+    "Turquoise": (0.1, 0.85, 0.85),
+    "White": (1.0, 1.0, 1.0),
+    "WhiteGlow": (1.0, 1.0, 1.0),
+    "Wood": (0.62, 0.44, 0.26),
+    "WoodFloor": (0.66, 0.50, 0.32),
+    "WoodPallet": (0.70, 0.56, 0.36),
+    "Yellow": (0.95, 0.85, 0.1),
+    "YellowGlow": (1.0, 0.95, 0.1),
+    "ZincYellow": (0.97, 0.95, 0.2),
+}
+
+#: "Gazebo/Red" and its like -> rgba.
+MATERIALS = {"Gazebo/" + name: (*rgb, 1.0) for name, rgb in _PLAIN.items()}

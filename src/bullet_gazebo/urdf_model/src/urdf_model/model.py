@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""URDF elements as plain dataclasses. Lengths in m, angles in rad, masses in kg, inertias in kg m^2."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .errors import UrdfError
+
+MOVABLE_TYPES = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class Box:
+    size: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Along z, centred at the origin."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Sphere:
+    radius: float
+
+
+@dataclass(frozen=True)
+class Mesh:
+    filename: str  # as written: package://, file:// or a path
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Flat, facing +z of its frame: in collisions the half space below it, in visuals a sheet of ``size``.
+
+    No URDF element; floors and SDF models bring it.
+    """
+
+    size: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass
+class Shape:
+    """One visual or collision element: its geometry at ``origin`` (4x4, in the link's frame)."""
+
+    geometry: Any
+    origin: np.ndarray
+    name: str = ""
+    colour: tuple[float, float, float, float] | None = None  # rgba, visuals only
+    link: str = ""  # the link it was written in
+
+
+@dataclass
+class Inertial:
+    """Mass, centre of mass (3,) and inertia (3, 3) about the centre of mass; both in the axes of the link's frame."""
+
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+
+
+@dataclass
+class Limit:
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    effort: float | None = None
+
+
+@dataclass(frozen=True)
+class Mimic:
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Surface:
+    """How a link's collisions touch others. None: not said."""
+
+    friction: float | None = None  # Coulomb's mu
+    stiffness: float | None = None  # N/m
+    damping: float | None = None  # N s/m
+    restitution: float | None = None  # 0 to 1
+
+
+@dataclass
+class Link:
+    name: str
+    inertial: Inertial | None = None
+    visuals: list[Shape] = field(default_factory=list)
+    collisions: list[Shape] = field(default_factory=list)
+    line: int = 0
+    surface: Surface | None = None
+    gravity: bool = True  # False: it has no weight
+
+
+@dataclass
+class Joint:
+    name: str
+    type: str
+    parent: str
+    child: str
+    origin: np.ndarray  # 4x4, the joint's frame (at position 0) in the parent's
+    axis: np.ndarray  # (3,), unit, in the joint's frame
+    limit: Limit = field(default_factory=Limit)
+    mimic: Mimic | None = None
+    damping: float = 0.0  # N m s/rad or N s/m
+    friction: float = 0.0  # N m or N
+    line: int = 0
+    # 4x4, the child's frame in the joint's. In a URDF they are one; an SDF joint may sit elsewhere in its child.
+    child_offset: np.ndarray = field(default_factory=lambda: np.eye(4))
+
+    @property
+    def movable(self):
+        return self.type in MOVABLE_TYPES
+
+
+@dataclass(frozen=True)
+class TransmissionJoint:
+    name: str
+    hardware_interfaces: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Transmission:
+    name: str
+    type: str
+    joints: tuple[TransmissionJoint, ...]
+    reductions: tuple[float, ...]  # mechanicalReduction of each actuator
+    actuators: tuple[str, ...]
+
+
+@dataclass
+class Robot:
+    """A parsed robot description. Dictionaries keep the order of the document."""
+
+    name: str
+    links: dict[str, Link]
+    joints: dict[str, Joint]
+    root: str
+    transmissions: list[Transmission] = field(default_factory=list)
+    gazebo: list[Any] = field(default_factory=list)  # <gazebo> elements, untouched (lxml)
+    warnings: list[str] = field(default_factory=list)
+    # 4x4, the root link's frame in the model's, which is what a pose in the world refers to. One in a URDF, not in SDF.
+    root_origin: np.ndarray = field(default_factory=lambda: np.eye(4))
+
+    def movable_joints(self):
+        """Return the joints that move (revolute, continuous, prismatic), in document order."""
+        return [joint for joint in self.joints.values() if joint.movable]
+
+    def parent_joint(self, link):
+        """Return the joint whose child is ``link``, or None for the root."""
+        return self._by_child().get(link)
+
+    def children(self, link):
+        """Return the joints whose parent is ``link``, in document order."""
+        return [joint for joint in self.joints.values() if joint.parent == link]
+
+    def chain(self, base, tip):
+        """Return the joints (fixed ones too) that lead from link ``base`` down to link ``tip``.
+
+        Raises UrdfError when a link is unknown or ``tip`` does not hang below ``base``.
+        """
+        for name in (base, tip):
+            if name not in self.links:
+                raise UrdfError(
+                    "robot '%s' has no link '%s'; its links are %s" % (self.name, name, ", ".join(sorted(self.links)))
+                )
+        by_child = self._by_child()
+        joints, link = [], tip
+        while link != base:
+            joint = by_child.get(link)
+            if joint is None:
+                raise UrdfError("link '%s' of robot '%s' does not hang below link '%s'" % (tip, self.name, base))
+            joints.append(joint)
+            link = joint.parent
+        return joints[::-1]
+
+    def _by_child(self):
+        return {joint.child: joint for joint in self.joints.values()}

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Write a merged robot as URDF text, for those who draw it: bodies, joints, shapes and colours, nothing else."""
+
+import numpy as np
+from lxml import etree
+
+from .model import Box, Cylinder, Mesh, Plane, Sphere
+from .transforms import pose_matrix
+
+_SHEET_M = 0.002  # how thick a plane is drawn
+
+
+def drawing_urdf(merged):
+    """Return URDF text whose bodies and movable joints are those of ``merged`` (a MergedRobot), in the same order.
+
+    Planes become thin boxes that face the same way. Joint limits are left out: whoever draws is told positions.
+    """
+    robot = etree.Element("robot", name=merged.name)
+    for link in merged.links.values():
+        element = etree.SubElement(robot, "link", name=link.name)
+        for tag, shapes in (("visual", link.visuals), ("collision", link.collisions)):
+            for shape in shapes:
+                _add_shape(etree.SubElement(element, tag), shape)
+    for joint in merged.joints.values():
+        # A revolute joint without limits is a continuous one.
+        kind = "continuous" if joint.type == "revolute" else joint.type
+        element = etree.SubElement(robot, "joint", name=joint.name, type=kind)
+        etree.SubElement(element, "parent", link=joint.parent)
+        etree.SubElement(element, "child", link=joint.child)
+        _add_origin(element, joint.origin)
+        etree.SubElement(element, "axis", xyz=_words(joint.axis))
+        if kind == "prismatic":
+            etree.SubElement(element, "limit", lower="0", upper="0", effort="0", velocity="0")
+    return etree.tostring(robot, encoding="unicode")
+
+
+def _add_shape(element, shape):
+    geometry, origin = shape.geometry, shape.origin
+    if isinstance(geometry, Plane):
+        origin = origin @ pose_matrix((0.0, 0.0, -_SHEET_M / 2.0))
+        geometry = Box((*geometry.size, _SHEET_M))
+    _add_origin(element, origin)
+    holder = etree.SubElement(element, "geometry")
+    if isinstance(geometry, Box):
+        etree.SubElement(holder, "box", size=_words(geometry.size))
+    elif isinstance(geometry, Cylinder):
+        etree.SubElement(holder, "cylinder", radius=repr(geometry.radius), length=repr(geometry.length))
+    elif isinstance(geometry, Sphere):
+        etree.SubElement(holder, "sphere", radius=repr(geometry.radius))
+    elif isinstance(geometry, Mesh):
+        etree.SubElement(holder, "mesh", filename=geometry.filename, scale=_words(geometry.scale))
+    if shape.colour is not None:
+        material = etree.SubElement(element, "material", name="")
+        etree.SubElement(material, "color", rgba=_words(shape.colour))
+
+
+def _add_origin(element, matrix):
+    etree.SubElement(element, "origin", xyz=_words(matrix[:3, 3]), rpy=_words(_rpy(matrix)))
+
+
+def _rpy(matrix):
+    """Return fixed-axis roll, pitch, yaw [rad] of a rotation; where pitch is a right angle, roll is taken as zero."""
+    level = float(np.hypot(matrix[0, 0], matrix[1, 0]))
+    pitch = float(np.arctan2(-matrix[2, 0], level))
+    if level < 1e-9:
+        return 0.0, pitch, float(np.arctan2(-matrix[0, 1], matrix[1, 1]))
+    return float(np.arctan2(matrix[2, 1], matrix[2, 2])), pitch, float(np.arctan2(matrix[1, 0], matrix[0, 0]))
+
+
+def _words(values):
+    return " ".join(repr(float(value)) for value in values)
