@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""SDF models and worlds as plain data: each model becomes a ``urdf_model.Robot``. Knows neither ROS nor physics."""
+
+from .document import SdfError
+from .folders import ModelFolders, description_file
+from .lights import Light
+from .model import SdfModel, parse_sdf_model
+from .world import SdfWorld, parse_sdf_world
+
+__all__ = [
+    "Light",
+    "ModelFolders",
+    "SdfError",
+    "SdfModel",
+    "SdfWorld",
+    "description_file",
+    "parse_sdf_model",
+    "parse_sdf_world",
+]

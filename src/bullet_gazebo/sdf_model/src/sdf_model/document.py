@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One SDF file or text: its XML, its numbers, and what in it is wrong or not understood, by file and line."""
+
+import math
+
+import numpy as np
+from lxml import etree
+
+from urdf_model.transforms import pose_matrix
+
+ROOT_TAGS = ("sdf", "gazebo")
+_TRUE, _FALSE = ("true", "1"), ("false", "0")
+
+
+class SdfError(ValueError):
+    """A description that cannot be used: its text names file and line, what was found and what is right."""
+
+
+class Notes:
+    """What was not understood, from one file or several."""
+
+    def __init__(self):
+        self._lines = {}  # what -> file -> lines
+
+    def add(self, what, source, line):
+        """Note that ``what`` stands in ``line`` of ``source`` and is left out."""
+        self._lines.setdefault(what, {}).setdefault(source, []).append(line)
+
+    def warning(self):
+        """Return one line that names everything noted, or "" where nothing was."""
+        parts = []
+        for what, files in self._lines.items():
+            places = ("%s line %s" % (source, ", ".join(map(str, lines))) for source, lines in files.items())
+            parts.append("%s (%s)" % (what, "; ".join(places)))
+        return "not understood and left out: %s" % ", ".join(parts) if parts else ""
+
+
+class Document:
+    """The XML of one file, with accessors that complain in one line.
+
+    :param xml: str or bytes
+    :param source: names the text in messages; a path where there is one
+    :param folder: what relative file names refer to, or None
+    :param notes: Notes
+    """
+
+    def __init__(self, xml, source, folder, notes):
+        self.source = str(source)
+        self.folder = folder
+        self.notes = notes
+        data = xml.encode() if isinstance(xml, str) else xml
+        # No entities, no network: descriptions arrive over services, from anybody.
+        parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=False)
+        try:
+            self.root = etree.fromstring(data.strip(), parser)
+        except etree.XMLSyntaxError as error:
+            raise SdfError("%s is not well-formed XML: %s" % (self.source, error)) from None
+        if self.root is None or self.root.tag not in ROOT_TAGS:
+            found = "nothing" if self.root is None else "<%s>" % self.root.tag
+            raise SdfError("%s is not an SDF: its root element is %s, expected <sdf>" % (self.source, found))
+        self.version = self._version()
+
+    def _version(self):
+        text = self.root.get("version", "1.6")
+        try:
+            return tuple(int(word) for word in text.split("."))
+        except ValueError:
+            raise self.error(self.root, "version='%s' is no version; expected one such as 1.6" % text) from None
+
+    def error(self, element, text):
+        """Return an SdfError with file and line."""
+        return SdfError("%s, line %s: %s" % (self.source, element.sourceline, text))
+
+    def note(self, element, what=None):
+        """Note that an element is not understood."""
+        self.notes.add(what or element.tag, self.source, element.sourceline)
+
+    def children(self, element):
+        """Return the child elements, without processing instructions."""
+        return [child for child in element if isinstance(child.tag, str)]
+
+    def note_unknown(self, element, known):
+        """Note each child whose tag is not in ``known``. Elements of other name spaces are nobody's business here."""
+        for child in self.children(element):
+            if child.tag not in known and ":" not in child.tag and "}" not in child.tag:
+                self.note(child)
+
+    def name(self, element):
+        """Return the attribute ``name``."""
+        name = (element.get("name") or "").strip()
+        if not name:
+            raise self.error(element, "<%s> has no name" % element.tag)
+        return name
+
+    def text(self, element, tag, default=None):
+        """Return the stripped text of a child; without ``default`` it must be there."""
+        child = element.find(tag)
+        text = "" if child is None else (child.text or "").strip()
+        if not text and default is None:
+            raise self.error(element, "<%s> has no <%s>" % (element.tag, tag))
+        return text or default
+
+    def flag(self, element, tag, default=False):
+        """Return the truth of a child."""
+        text = self.text(element, tag, "").lower()
+        if not text:
+            return default
+        if text not in _TRUE + _FALSE:
+            raise self.error(element.find(tag), "<%s> is '%s', expected true or false" % (tag, text))
+        return text in _TRUE
+
+    def number(self, element, tag, default=None):
+        """Return the number in a child, or ``default``."""
+        child = element.find(tag)
+        return default if child is None else self.numbers(child, 1)[0]
+
+    def vector(self, element, tag, default):
+        """Return the numbers (tuple) in a child, as many as ``default`` has."""
+        child = element.find(tag)
+        return tuple(default) if child is None else self.numbers(child, len(default))
+
+    def positive(self, element, tag, count):
+        """Return ``count`` positive numbers in a child that must be there."""
+        child = element.find(tag)
+        if child is None:
+            raise self.error(element, "<%s> has no <%s>" % (element.tag, tag))
+        values = self.numbers(child, count)
+        if min(values) <= 0.0:
+            raise self.error(child, "<%s> is '%s', expected positive numbers" % (tag, child.text.strip()))
+        return values
+
+    def numbers(self, element, count):
+        """Return the ``count`` finite numbers in the element itself."""
+        text = (element.text or "").strip()
+        try:
+            values = tuple(float(word) for word in text.split())
+        except ValueError:
+            values = ()
+        if len(values) != count or not all(math.isfinite(value) for value in values):
+            raise self.error(
+                element, "<%s> is '%s', expected %d number%s" % (element.tag, text, count, "s" * (count > 1))
+            )
+        return values
+
+    def pose(self, element):
+        """Return the 4x4 matrix of the child <pose> (x y z [m], roll pitch yaw), identity where there is none."""
+        child = element.find("pose")
+        if child is None or not (child.text or "").strip():
+            return np.eye(4)
+        rotation_format = child.get("rotation_format", "euler_rpy")
+        if rotation_format != "euler_rpy":
+            raise self.error(child, "rotation_format='%s' is not supported; use euler_rpy" % rotation_format)
+        values = np.array(self.numbers(child, 6))
+        if (child.get("degrees") or "").lower() in _TRUE:
+            values[3:] = np.radians(values[3:])
+        return pose_matrix(values[:3], values[3:])

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames of one SDF scope (a model or the world), given relative to each other."""
+
+import numpy as np
+
+#: Names that mean the scope's own frame.
+OWN = ("", "__model__", "world", "__root__")
+
+
+class Frames:
+    """Collects named frames, then says where they are in the frame of the scope."""
+
+    def __init__(self, document):
+        self._document = document
+        self._given = {}  # name -> (name of the frame it is given in, 4x4, element)
+        self._found = {}
+
+    def add(self, name, element, default="", pose=None):
+        """Add a frame: the <pose> of ``element``, or ``pose``, in the frame its relative_to names or in ``default``."""
+        if pose is None:
+            child = element.find("pose")
+            pose = self._document.pose(element)
+            if child is not None and child.get("relative_to"):
+                default = child.get("relative_to")
+        self._given[name] = (default, pose, element)
+
+    def __contains__(self, name):
+        return name in OWN or name in self._given
+
+    def where(self, name, element):
+        """Return the 4x4 matrix of frame ``name`` in the scope; ``element`` is who asks, for the message."""
+        return self._where(name, element, ())
+
+    def _where(self, name, element, asked):
+        if name in OWN:
+            return np.eye(4)
+        if name in asked:
+            circle = " -> ".join((*asked, name))
+            raise self._document.error(element, "frame '%s' is given relative to itself: %s" % (name, circle))
+        if name not in self._given:
+            raise self._document.error(
+                element, "frame '%s' does not exist; frames: %s" % (name, ", ".join(self._given) or "none")
+            )
+        if name not in self._found:
+            base, pose, giver = self._given[name]
+            self._found[name] = self._where(base, giver, (*asked, name)) @ pose
+        return self._found[name]

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What stands in a <link>: inertia, shapes, surfaces, materials."""
+
+from pathlib import Path
+
+import numpy as np
+
+from urdf_model import Box, Cylinder, Inertial, Link, Mesh, Plane, Shape, Sphere, Surface
+from urdf_model.materials import MATERIALS
+from urdf_model.transforms import pose_matrix
+
+from .lights import colour
+
+# Elements that say nothing about how a lab's world moves or looks here.
+_QUIET = ("enable_wind", "must_be_base_link", "laser_retro", "max_contacts", "cast_shadows", "meta", "velocity_decay")
+_INERTIA = (("ixx", 0, 0, 1.0), ("ixy", 0, 1, 0.0), ("ixz", 0, 2, 0.0), ("iyy", 1, 1, 1.0), ("iyz", 1, 2, 0.0))
+_INERTIA += (("izz", 2, 2, 1.0),)
+
+
+def read_link(document, element, name):
+    """Return the urdf_model.Link of a <link>, named ``name``, in its own frame."""
+    document.note_unknown(element, ("pose", "inertial", "collision", "visual", "gravity", "self_collide", *_QUIET))
+    if document.flag(element, "self_collide"):
+        document.note(element.find("self_collide"))
+    link = Link(name, _inertial(document, element), line=element.sourceline)
+    link.gravity = document.flag(element, "gravity", True)
+    surfaces = []
+    for child in element.iterchildren("collision"):
+        document.note_unknown(child, ("pose", "geometry", "surface", *_QUIET))
+        shape = _shape(document, child, name)
+        if shape is not None:
+            link.collisions.append(shape)
+            surfaces.append(_surface(document, child))
+    said = [surface for surface in surfaces if surface is not None]
+    if said:
+        link.surface = said[0]
+        if any(surface != said[0] for surface in said):
+            document.note(element, "surfaces of link '%s' that differ from its first" % name)
+    for child in element.iterchildren("visual"):
+        document.note_unknown(child, ("pose", "geometry", "material", "transparency", *_QUIET))
+        shape = _shape(document, child, name)
+        if shape is not None:
+            shape.colour = _material(document, child)
+            link.visuals.append(shape)
+    return link
+
+
+def _inertial(document, link):
+    """Return the Inertial; where nothing is said SDF's defaults, 1 kg and 1 kg m^2."""
+    element = link.find("inertial")
+    if element is None:
+        return Inertial(1.0, np.zeros(3), np.eye(3))
+    document.note_unknown(element, ("pose", "mass", "inertia"))
+    mass = document.number(element, "mass", 1.0)
+    if mass <= 0.0:
+        raise document.error(element, "<mass> is %g kg, expected a positive number" % mass)
+    matrix = np.eye(3)
+    inertia = element.find("inertia")
+    if inertia is not None:
+        for tag, i, j, default in _INERTIA:
+            matrix[i, j] = matrix[j, i] = document.number(inertia, tag, default)
+        if np.linalg.eigvalsh(matrix)[0] < -1e-9 * np.abs(matrix).max():
+            raise document.error(inertia, "<inertia> has a negative principal moment; no body has that")
+    pose = document.pose(element)
+    return Inertial(mass, pose[:3, 3].copy(), pose[:3, :3] @ matrix @ pose[:3, :3].T)
+
+
+def _shape(document, element, link):
+    """Return the Shape of a <visual> or <collision>, or None for a kind that is not understood (which is noted)."""
+    geometry = element.find("geometry")
+    shapes = [] if geometry is None else document.children(geometry)
+    if len(shapes) != 1:
+        raise document.error(
+            element, "<geometry> in a <%s> of link '%s' holds %d shapes, expected 1" % (element.tag, link, len(shapes))
+        )
+    kind, origin = shapes[0], document.pose(element)
+    if kind.tag == "box":
+        found = Box(document.positive(kind, "size", 3))
+    elif kind.tag == "cylinder":
+        found = Cylinder(document.positive(kind, "radius", 1)[0], document.positive(kind, "length", 1)[0])
+    elif kind.tag == "sphere":
+        found = Sphere(document.positive(kind, "radius", 1)[0])
+    elif kind.tag == "plane":
+        size = document.positive(kind, "size", 2) if kind.find("size") is not None else (1.0, 1.0)
+        found = Plane(size)
+        origin = origin @ _turned_to(document, kind)
+    elif kind.tag == "mesh":
+        document.note_unknown(kind, ("uri", "scale"))
+        scale = document.vector(kind, "scale", (1.0, 1.0, 1.0))
+        found = Mesh(_file(document, document.text(kind, "uri")), scale)
+    else:
+        if kind.tag != "empty":
+            document.note(kind)
+        return None
+    return Shape(found, origin, element.get("name", ""), None, link)
+
+
+def _turned_to(document, plane):
+    """Return the 4x4 rotation that takes z to the plane's normal."""
+    normal = np.array(document.vector(plane, "normal", (0.0, 0.0, 1.0)))
+    length = np.linalg.norm(normal)
+    if length < 1e-9:
+        raise document.error(plane.find("normal"), "<normal> is zero; expected a direction such as 0 0 1")
+    x, y, z = normal / length
+    return pose_matrix(rpy=(0.0, float(np.arctan2(np.hypot(x, y), z)), float(np.arctan2(y, x))))
+
+
+def _file(document, uri):
+    """Return a mesh's name so that it can be looked for without knowing which file spoke of it."""
+    if "://" in uri or document.folder is None:
+        return uri
+    return str(Path(document.folder) / uri)
+
+
+def _surface(document, collision):
+    element = collision.find("surface")
+    if element is None:
+        return None
+    found = {}
+    for path, field in (
+        ("friction/ode", (("mu", "friction"),)),
+        ("contact/ode", (("kp", "stiffness"), ("kd", "damping"))),
+        ("bounce", (("restitution_coefficient", "restitution"),)),
+    ):
+        part = element.find(path)
+        for tag, name in field:
+            value = None if part is None else document.number(part, tag)
+            if value is None:
+                continue
+            if value < 0.0:
+                raise document.error(part, "<%s> is %g, expected 0 or more" % (tag, value))
+            found[name] = value
+    return Surface(**found) if found else None
+
+
+def _material(document, visual):
+    """Return rgba of a visual, or None."""
+    element, rgba = visual.find("material"), None
+    if element is not None:
+        script = element.find("script/name")
+        rgba = MATERIALS.get((script.text or "").strip()) if script is not None else None
+        for tag in ("ambient", "diffuse"):
+            rgba = colour(document, element, tag, rgba)
+    clear = document.number(visual, "transparency", 0.0)
+    if clear:
+        rgba = rgba or (0.7, 0.7, 0.7, 1.0)
+        rgba = (*rgba[:3], rgba[3] * min(max(1.0 - clear, 0.0), 1.0))
+    return rgba

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The <model> element, and files that hold one."""
+
+import copy
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from lxml import etree
+
+from urdf_model import Limit, Robot
+
+from .document import Document, Notes
+from .folders import ModelFolders
+from .frames import Frames
+from .lights import Light, read_light
+from .links import read_link
+from .tree import Parts, SdfJoint, build_robot
+
+_QUIET = ("enable_wind", "allow_auto_disable", "meta")
+_MOVABLE = ("revolute", "continuous", "prismatic")
+# A limit beyond this [rad or m] means none; SDF's own default is 1e16.
+_NO_LIMIT = 1e12
+_DEEPEST_INCLUDE = 8
+
+
+@dataclass
+class SdfModel:
+    """A model: the Robot that it is, where it stands (4x4) in what it is part of, and what was not understood."""
+
+    name: str
+    robot: Robot
+    pose: np.ndarray
+    static: bool
+    warning: str = ""
+
+
+def parse_sdf_model(xml, source, folders=None, folder=None):
+    """Return the SdfModel of an SDF text (str or bytes) with one <model>, or with one <include> of a model.
+
+    ``source`` names the text in messages, ``folders`` (ModelFolders) is where included models are looked for, and
+    ``folder`` is what relative file names refer to. ``SdfModel.warning`` names what was not understood.
+    Raises SdfError for what cannot be used.
+    """
+    document = Document(xml, source, folder, Notes())
+    reader = ModelReader(folders or ModelFolders([]))
+    found = [child for child in document.children(document.root) if child.tag in ("model", "include")]
+    if len(found) != 1:
+        held = ", ".join("<%s>" % child.tag for child in document.children(document.root)) or "nothing"
+        raise document.error(document.root, "it holds %s; expected one <model>" % held)
+    document.note_unknown(document.root, ("model", "include"))
+    if found[0].tag == "model":
+        model = reader.model(document, found[0])
+    else:
+        model = reader.included(document, found[0], 0)
+        if not isinstance(model, SdfModel):
+            raise document.error(found[0], "it includes lights only; expected a model")
+    model.warning = document.notes.warning()
+    return model
+
+
+@dataclass
+class Included:
+    """What a file that was included holds beside or instead of a model."""
+
+    lights: list[Light] = field(default_factory=list)
+
+
+class ModelReader:
+    """Reads <model> and <include> elements."""
+
+    def __init__(self, folders):
+        self._folders = folders
+
+    def model(self, document, element, depth=0, static=None):
+        """Return the SdfModel of a <model>. ``static`` overrides what it says itself."""
+        name = document.name(element)
+        parts = self._parts(document, element, "", np.eye(4), depth)
+        return self._finish(document, name, parts, document.pose(element), static)
+
+    def included(self, document, element, depth):
+        """Return the SdfModel that an <include> asks for, or Included for a file without a model."""
+        document.note_unknown(element, ("uri", "name", "pose", "static", "plugin"))
+        inner, model = self._open(document, element, depth)
+        if model is None:
+            return Included([read_light(inner, light, np.eye(4)) for light in inner.root.iterchildren("light")])
+        parts = self._parts(inner, model, "", np.eye(4), depth + 1)
+        parts.gazebo += _plugins(document, element)
+        pose = document.pose(element) if element.find("pose") is not None else inner.pose(model)
+        static = document.flag(element, "static") if element.find("static") is not None else None
+        name = document.text(element, "name", "") or inner.name(model)
+        return self._finish(inner, name, parts, pose, static)
+
+    def _finish(self, document, name, parts, pose, static):
+        if static is not None:
+            parts.static = static
+        robot = build_robot(document, name, parts)
+        if parts.static:
+            said = etree.Element("gazebo")
+            etree.SubElement(said, "static").text = "true"
+            robot.gazebo.append(said)
+        return SdfModel(name, robot, pose, parts.static)
+
+    def _open(self, document, element, depth):
+        """Return (Document, <model> or None) of the file that an <include> names."""
+        uri = document.text(element, "uri")
+        if depth >= _DEEPEST_INCLUDE:
+            raise document.error(element, "include of %s: more than %d files deep; is it in a circle?" % (uri, depth))
+        path = self._folders.find(uri, document.folder)
+        if path is None:
+            looked = ", ".join(map(str, self._folders.folders)) or "no folder"
+            raise document.error(
+                element, "model %s not found; looked in %s; add its folder to GAZEBO_MODEL_PATH" % (uri, looked)
+            )
+        try:
+            content = Path(path).read_bytes()
+        except OSError as error:
+            raise document.error(element, "%s (%s) cannot be read: %s" % (uri, path, error.strerror)) from None
+        inner = Document(content, path, Path(path).parent, document.notes)
+        models = inner.root.findall("model")
+        if len(models) > 1 or not (models or inner.root.findall("light")):
+            raise inner.error(inner.root, "it holds %d <model>, expected one" % len(models))
+        return inner, models[0] if models else None
+
+    def _parts(self, document, element, prefix, origin, depth):
+        """Return the Parts of a model: names begin with ``prefix``, frames are moved by ``origin`` (4x4)."""
+        known = ("pose", "static", "link", "joint", "frame", "model", "include", "plugin", "gazebo", "self_collide")
+        document.note_unknown(element, (*known, *_QUIET))
+        if document.flag(element, "self_collide"):
+            document.note(element.find("self_collide"))
+        if element.get("placement_frame"):
+            document.note(element, "placement_frame of model '%s'" % element.get("name"))
+        parts = Parts(static=document.flag(element, "static"))
+        frames = Frames(document)
+        self._nested(document, element, parts, frames, depth)
+        for link in element.iterchildren("link"):
+            frames.add(document.name(link), link)
+        for frame in element.iterchildren("frame"):
+            frames.add(document.name(frame), frame, frame.get("attached_to", ""))
+        for joint in element.iterchildren("joint"):
+            frames.add(document.name(joint), joint, _end(document, joint, "child"))
+        for link in element.iterchildren("link"):
+            name = document.name(link)
+            if name in parts.links:
+                raise document.error(link, "link '%s' stands twice" % name)
+            parts.links[name] = (read_link(document, link, name), frames.where(name, link))
+        if not parts.links:
+            raise document.error(element, "model '%s' has no <link>" % element.get("name"))
+        names = {joint.name for joint in parts.joints}
+        for joint in element.iterchildren("joint"):
+            read = _joint(document, joint, frames)
+            if read.name in names:
+                raise document.error(joint, "joint '%s' stands twice" % read.name)
+            names.add(read.name)
+            parts.joints.append(read)
+        parts.gazebo += _plugins(document, element)
+        parts.gazebo += [copy.deepcopy(child) for child in element.iterchildren("gazebo")]
+        return _moved(parts, prefix, origin)
+
+    def _nested(self, document, element, parts, frames, depth):
+        """Add the parts of models inside this one to ``parts`` and their frames to ``frames``."""
+        for child in element.iterchildren("model", "include"):
+            if child.tag == "model":
+                inner, model, name = document, child, document.name(child)
+                frames.add(name, child)
+            else:
+                inner, model = self._open(document, child, depth)
+                if model is None:
+                    document.note(child, "lights inside of a model")
+                    continue
+                name = document.text(child, "name", "") or inner.name(model)
+                frames.add(name, child, pose=None if child.find("pose") is not None else inner.pose(model))
+            origin = frames.where(name, child)
+            below = self._parts(inner, model, name + "::", origin, depth + 1)
+            for link_name, (_, frame) in below.links.items():
+                frames.add(link_name, child, pose=frame)
+            parts.links.update(below.links)
+            parts.joints += below.joints
+            parts.gazebo += below.gazebo
+
+
+def _moved(parts, prefix, origin):
+    """Return ``parts`` as they are seen from outside of their model."""
+    if not prefix:
+        return parts
+    links = {}
+    for name, (link, frame) in parts.links.items():
+        link.name = prefix + name
+        links[link.name] = (link, origin @ frame)
+    for joint in parts.joints:
+        joint.name, joint.frame = prefix + joint.name, origin @ joint.frame
+        joint.parent, joint.child = (end if end == "world" else prefix + end for end in (joint.parent, joint.child))
+    return Parts(links, parts.joints, parts.gazebo, parts.static)
+
+
+def _plugins(document, element):
+    """Return the <plugin> elements as a <gazebo> element, the way a URDF has them."""
+    found = element.findall("plugin")
+    if not found:
+        return []
+    holder = etree.Element("gazebo")
+    holder.extend([copy.deepcopy(plugin) for plugin in found])
+    return [holder]
+
+
+def _end(document, joint, role):
+    element = joint.find(role)
+    if element is not None and element.get("link"):
+        return element.get("link").strip()
+    return document.text(joint, role)
+
+
+def _joint(document, element, frames):
+    name, kind = document.name(element), element.get("type", "")
+    document.note_unknown(element, ("parent", "child", "pose", "axis", "physics", "meta"))
+    axis, limit, damping, friction = np.array([0.0, 0.0, 1.0]), Limit(), 0.0, 0.0
+    frame = frames.where(name, element)
+    if kind in _MOVABLE:
+        given = element.find("axis")
+        if given is None:
+            raise document.error(element, "%s joint '%s' has no <axis>" % (kind, name))
+        document.note_unknown(given, ("xyz", "limit", "dynamics", "use_parent_model_frame"))
+        axis = _axis(document, given, name, frame, frames)
+        kind, limit = _limit(document, given, name, kind)
+        dynamics = given.find("dynamics")
+        if dynamics is not None:
+            damping = document.number(dynamics, "damping", 0.0)
+            friction = document.number(dynamics, "friction", 0.0)
+    elif kind != "fixed":
+        if not kind:
+            raise document.error(element, "joint '%s' has no type; known: %s, fixed" % (name, ", ".join(_MOVABLE)))
+        document.note(element, "joint '%s' of type %s, which is held fixed" % (name, kind))
+        kind = "fixed"
+    ends = (_end(document, element, role) for role in ("parent", "child"))
+    return SdfJoint(name, kind, *ends, frame, axis, limit, damping, friction, element)
+
+
+def _axis(document, given, name, frame, frames):
+    """Return the unit axis in the joint's frame, from whichever frame it is written in."""
+    element = given.find("xyz")
+    axis = np.array(document.vector(given, "xyz", (0.0, 0.0, 1.0)))
+    length = np.linalg.norm(axis)
+    if length < 1e-9:
+        raise document.error(element, "axis of joint '%s' is zero; expected a direction such as 0 0 1" % name)
+    axis = axis / length
+    expressed_in = None if element is None else element.get("expressed_in")
+    if expressed_in:
+        in_model = frames.where(expressed_in, element)[:3, :3] @ axis
+    elif document.version < (1, 5) or document.flag(given, "use_parent_model_frame"):
+        in_model = axis
+    else:
+        return axis
+    return frame[:3, :3].T @ in_model
+
+
+def _limit(document, given, name, kind):
+    """Return (type, Limit): a revolute joint without limits is a continuous one."""
+    element = given.find("limit")
+    if element is None:
+        return ("continuous" if kind == "revolute" else kind), Limit()
+    lower = document.number(element, "lower", -math.inf)
+    upper = document.number(element, "upper", math.inf)
+    if lower > upper:
+        raise document.error(element, "joint '%s' has lower limit %g above its upper limit %g" % (name, lower, upper))
+    # Below zero is SDF's way to say: unlimited.
+    values = (document.number(element, tag, -1.0) for tag in ("effort", "velocity"))
+    effort, velocity = (value if value >= 0.0 else None for value in values)
+    if lower <= -_NO_LIMIT and upper >= _NO_LIMIT or kind == "continuous":
+        return ("continuous" if kind == "revolute" else kind), Limit(velocity=velocity, effort=effort)
+    lower, upper = max(lower, -_NO_LIMIT), min(upper, _NO_LIMIT)
+    return kind, Limit(lower, upper, velocity, effort)

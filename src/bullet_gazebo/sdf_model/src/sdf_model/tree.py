@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From links and joints anywhere in a model to the tree that a urdf_model.Robot is."""
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from urdf_model import Joint, Limit, Link, Robot
+from urdf_model.transforms import inverse
+
+WORLD = "world"
+
+
+@dataclass
+class SdfJoint:
+    """A joint as written; frames in the model."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    frame: np.ndarray  # 4x4
+    axis: np.ndarray  # (3,), unit, in the joint's frame
+    limit: Limit
+    damping: float
+    friction: float
+    element: Any
+
+
+@dataclass
+class Parts:
+    """The links and joints of a model and of the models in it. Link frames are 4x4, in the model."""
+
+    links: dict = field(default_factory=dict)  # name -> (Link, 4x4)
+    joints: list = field(default_factory=list)
+    gazebo: list = field(default_factory=list)  # <gazebo> elements, as urdf_model.Robot has them
+    static: bool = False
+
+
+def build_robot(document, name, parts):
+    """Return the Robot of ``parts``.
+
+    A joint may be written from the child's end: it is turned round, so that its position means the same. What a tree
+    cannot have is noted: joints that close a loop are left out, links that nothing joins are held by the root. A model
+    that is welded to the world becomes static.
+    """
+    links = dict(parts.links)
+    free = not parts.static
+    written, root = _without_welds(parts)
+    joined = {}
+    for joint in written:
+        for end in (joint.parent, joint.child):
+            if end == WORLD and WORLD not in links:
+                # First, since it carries the rest; World keeps a root of this name where it is.
+                links = {WORLD: (Link(WORLD), np.eye(4)), **links}
+            if end not in links:
+                raise document.error(
+                    joint.element,
+                    "joint '%s' names link '%s', which does not exist; links: %s"
+                    % (joint.name, end, ", ".join(parts.links)),
+                )
+            joined.setdefault(end, []).append(joint)
+    root = root or _root(links, written)
+    joints, reached, used = {}, {root}, set()
+
+    def hang(start):
+        """Add what is joined to link ``start``, and what is joined to that."""
+        branch = deque([start])
+        while branch:
+            here = branch.popleft()
+            for joint in joined.get(here, ()):
+                if joint.name in used:
+                    continue
+                used.add(joint.name)
+                there = joint.child if joint.parent == here else joint.parent
+                if there in reached:
+                    document.note(joint.element, "joint '%s', which closes a loop" % joint.name)
+                    continue
+                reached.add(there)
+                joints[joint.name] = _joint(links, joint, here, there)
+                branch.append(there)
+
+    hang(root)
+    for link in links:
+        if link in reached:
+            continue
+        reached.add(link)
+        joints["%s_held" % link] = _held(links, root, link)
+        if free:
+            text = "link '%s', which no joint connects: it is held by '%s'" % (link, root)
+            document.notes.add(text, document.source, links[link][0].line)
+        hang(link)
+    place = {joint.name: position for position, joint in enumerate(written)}
+    ordered = sorted(joints.values(), key=lambda joint: place.get(joint.name, len(place)))
+    return Robot(
+        name,
+        {key: link for key, (link, _) in links.items()},
+        {joint.name: joint for joint in ordered},
+        root,
+        gazebo=parts.gazebo,
+        root_origin=links[root][1],
+    )
+
+
+def _without_welds(parts):
+    """Return the joints without those that fix a link in the world, and that link, which then is a static root.
+
+    Only where the world has no other joint; a hinge on the world needs the world as a link.
+    """
+    welds = [joint for joint in parts.joints if WORLD in (joint.parent, joint.child)]
+    anchored = [end for joint in welds for end in (joint.parent, joint.child) if end in parts.links]
+    if WORLD in parts.links or not anchored or any(joint.type != "fixed" for joint in welds):
+        return parts.joints, None
+    parts.static = True
+    return [joint for joint in parts.joints if joint not in welds], anchored[0]
+
+
+def _root(links, joints):
+    """Return the link that the others hang on: the world, or the first one that is nobody's child."""
+    if WORLD in links:
+        return WORLD
+    children = {joint.child for joint in joints}
+    return next((name for name in links if name not in children), next(iter(links)))
+
+
+def _joint(links, joint, parent, child):
+    turned = parent != joint.parent
+    return Joint(
+        joint.name,
+        joint.type,
+        parent,
+        child,
+        inverse(links[parent][1]) @ joint.frame,
+        -joint.axis if turned else joint.axis,
+        joint.limit,
+        damping=joint.damping,
+        friction=joint.friction,
+        line=joint.element.sourceline,
+        child_offset=inverse(joint.frame) @ links[child][1],
+    )
+
+
+def _held(links, root, link):
+    return Joint(
+        "%s_held" % link, "fixed", root, link, inverse(links[root][1]) @ links[link][1], np.array([0.0, 0.0, 1.0])
+    )

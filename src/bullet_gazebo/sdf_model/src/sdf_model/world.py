@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The <world> element: gravity, step size, models, lights."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from .document import Document, Notes, SdfError
+from .folders import ModelFolders
+from .frames import Frames
+from .lights import Light, read_light
+from .model import ModelReader, SdfModel
+
+# What a world says about windows, sound and weather, and about solvers that are not here.
+_QUIET = ("scene", "gui", "audio", "wind", "atmosphere", "magnetic_field", "spherical_coordinates")
+
+
+@dataclass
+class SdfWorld:
+    """What a world file asks for. None: it does not say.
+
+    ``problems`` are parts that cannot be had, one line each; the world goes on without them. ``warning`` names what
+    was not understood.
+    """
+
+    name: str
+    gravity: tuple | None = None  # m/s^2
+    time_step_s: float | None = None
+    models: list[SdfModel] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    warning: str = ""
+
+
+def parse_sdf_world(path, folders=None):
+    """Return the SdfWorld of the file at ``path``. ``folders`` (ModelFolders): where models are looked for.
+
+    Raises SdfError when the file cannot be read or is no world, and for numbers of the world itself that are wrong;
+    what is wrong in a model is in ``SdfWorld.problems``.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise SdfError("world file %s cannot be read: %s" % (path, error.strerror)) from None
+    document = Document(content, path, Path(path).parent, Notes())
+    worlds = document.root.findall("world")
+    if len(worlds) != 1:
+        raise document.error(document.root, "it holds %d <world>, expected one" % len(worlds))
+    return _WorldReader(document, folders or ModelFolders([])).world(worlds[0])
+
+
+class _WorldReader:
+    def __init__(self, document, folders):
+        self._document = document
+        self._models = ModelReader(folders)
+        self._frames = Frames(document)
+        self._world = None
+
+    def world(self, element):
+        document = self._document
+        self._world = SdfWorld(element.get("name", "default"))
+        known = ("gravity", "physics", "include", "model", "light", "frame", "state", *_QUIET)
+        document.note_unknown(element, known)
+        if element.find("gravity") is not None:
+            self._world.gravity = document.vector(element, "gravity", (0.0,) * 3)
+        for child in element.iterchildren("physics"):
+            self._physics(child)
+        for child in element.iterchildren("frame"):
+            self._frames.add(document.name(child), child, child.get("attached_to", ""))
+        for child in document.children(element):
+            if child.tag in ("include", "model", "light"):
+                try:
+                    self._entity(child)
+                except SdfError as error:
+                    self._world.problems.append(str(error))
+        for state in element.iterchildren("state"):
+            self._state(state)
+        self._world.warning = document.notes.warning()
+        return self._world
+
+    def _physics(self, element):
+        document = self._document
+        step = element.find("max_step_size")
+        if step is not None:
+            (value,) = document.numbers(step, 1)
+            if not 1e-5 <= value <= 0.05:
+                raise document.error(step, "max_step_size is %g s, expected 0.00001 to 0.05" % value)
+            self._world.time_step_s = value
+        if element.find("gravity") is not None:  # where older files have it
+            self._world.gravity = document.vector(element, "gravity", (0.0,) * 3)
+        factor = document.number(element, "real_time_factor", 1.0)
+        if factor != 1.0:
+            document.note(element.find("real_time_factor"), "real_time_factor %g: the launch argument decides" % factor)
+
+    def _entity(self, element):
+        document, world = self._document, self._world
+        if element.tag == "light":
+            world.lights.append(read_light(document, element, np.eye(4)))
+            return
+        if element.tag == "model":
+            model = self._models.model(document, element)
+        else:
+            model = self._models.included(document, element, 0)
+        if not isinstance(model, SdfModel):
+            world.lights += model.lights
+            return
+        if any(other.name == model.name for other in world.models):
+            raise document.error(element, "model '%s' stands twice; give this one a <name> of its own" % model.name)
+        pose = element.find("pose")
+        relative_to = "" if pose is None else pose.get("relative_to", "")
+        model.pose = self._frames.where(relative_to, element) @ model.pose
+        self._frames.add(model.name, element, pose=model.pose)
+        world.models.append(model)
+
+    def _state(self, element):
+        """A world that Gazebo has saved says twice where its models are; this is where they were in the end."""
+        poses = {child.get("name"): child for child in element.iterchildren("model")}
+        for model in self._world.models:
+            child = poses.get(model.name)
+            if child is not None and child.find("pose") is not None:
+                model.pose = self._document.pose(child)

@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""SDF models become robots that stand where SDF says."""
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from sdf_model import ModelFolders, SdfError, description_file, parse_sdf_model, parse_sdf_world
+from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, drawing_urdf, merge_fixed, parse_urdf
+from urdf_model.transforms import axis_rotation, pose_matrix, rigid
+
+LINK = '<link name="%s"><pose>%s</pose></link>'
+
+
+def sdf(content, version="1.6", name="m"):
+    return '<sdf version="%s">\n<model name="%s">\n%s\n</model>\n</sdf>' % (version, name, content)
+
+
+def read(content, **options):
+    model = parse_sdf_model(sdf(content, **options), "m.sdf")
+    assert model.warning == ""
+    return model
+
+
+def where(robot, positions=None):
+    """Every link's 4x4 frame in the model, from the merged bodies."""
+    merged = merge_fixed(robot)
+    bodies = {merged.root: np.eye(4)}
+    for joint in merged.joints.values():
+        value = (positions or {}).get(joint.name, 0.0)
+        if joint.type == "prismatic":
+            move = rigid(np.eye(3), joint.axis * value)
+        else:
+            move = rigid(axis_rotation(joint.axis, value), (0, 0, 0))
+        bodies[joint.child] = bodies[joint.parent] @ joint.origin @ move
+    return {name: bodies[frame.link] @ frame.offset for name, frame in merged.frames.items()}
+
+
+def joint(name, parent, child, kind="revolute", pose="0 0 0 0 0 0", axis="<axis><xyz>0 0 1</xyz></axis>"):
+    return '<joint name="%s" type="%s"><parent>%s</parent><child>%s</child><pose>%s</pose>%s</joint>' % (
+        name, kind, parent, child, pose, axis if kind != "fixed" else "")
+
+
+# -- links -----------------------------------------------------------------------------------------
+
+
+def test_a_link_has_its_shapes_inertia_surface_and_colours():
+    model = read("""<static>true</static><link name="l">
+      <inertial><pose>0 0 1 0 0 1.5707963267948966</pose><mass>2</mass>
+        <inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz></inertia></inertial>
+      <gravity>false</gravity>
+      <collision name="c"><pose>1 2 3 0 0 0</pose><geometry><box><size>1 2 3</size></box></geometry>
+        <surface><friction><ode><mu>0.4</mu></ode></friction><contact><ode><kp>1e5</kp><kd>2</kd></ode></contact>
+          <bounce><restitution_coefficient>0.7</restitution_coefficient></bounce></surface></collision>
+      <visual name="a"><geometry><cylinder><radius>1</radius><length>2</length></cylinder></geometry>
+        <material><script><name>Gazebo/Red</name></script></material></visual>
+      <visual name="b"><geometry><sphere><radius>1</radius></sphere></geometry>
+        <material><diffuse>0 1 0 1</diffuse></material><transparency>0.25</transparency></visual>
+      <visual name="d"><geometry><mesh><uri>model://x/y.stl</uri><scale>2 2 2</scale></mesh></geometry></visual>
+    </link>""")
+    link = model.robot.links["l"]
+    assert model.static and not link.gravity
+    assert link.inertial.mass == 2 and link.inertial.centre.tolist() == [0, 0, 1]
+    np.testing.assert_allclose(np.diag(link.inertial.inertia), (2, 1, 2.5))
+    assert link.collisions[0].geometry == Box((1, 2, 3)) and link.collisions[0].origin[:3, 3].tolist() == [1, 2, 3]
+    surface = link.surface
+    assert (surface.friction, surface.stiffness, surface.damping, surface.restitution) == (0.4, 1e5, 2, 0.7)
+    assert [shape.geometry for shape in link.visuals] == [Cylinder(1, 2), Sphere(1), Mesh("model://x/y.stl", (2, 2, 2))]
+    assert [shape.colour for shape in link.visuals] == [(0.9, 0.1, 0.1, 1.0), (0, 1, 0, 0.75), None]
+
+
+def test_a_link_without_inertia_has_the_defaults_of_sdf():
+    inertial = read('<link name="l"/>').robot.links["l"].inertial
+    assert inertial.mass == 1.0 and np.array_equal(inertial.inertia, np.eye(3))
+
+
+def test_a_plane_faces_its_normal():
+    shape, = read('<link name="l"><collision name="c"><geometry><plane><normal>-3 0 4</normal><size>5 6</size></plane>'
+                  "</geometry></collision></link>").robot.links["l"].collisions
+    assert shape.geometry == Plane((5, 6))
+    np.testing.assert_allclose(shape.origin[:3, 2], (-0.6, 0, 0.8), atol=1e-12)
+
+
+def test_meshes_beside_the_file_are_found_from_anywhere(tmp_path):
+    content = '<link name="l"><visual name="v"><geometry><mesh><uri>a/b.stl</uri></mesh></geometry></visual></link>'
+    model = parse_sdf_model(sdf(content), "m.sdf", folder=tmp_path)
+    assert model.robot.links["l"].visuals[0].geometry.filename == str(tmp_path / "a/b.stl")
+
+
+# -- frames and joints -----------------------------------------------------------------------------
+
+
+def test_links_stand_where_their_poses_in_the_model_say():
+    poses = {"a": "1 2 3 0.1 0.2 0.3", "b": "-1 0 0.5 0 1 0", "c": "0 0 2 1 0 0"}
+    content = "".join(LINK % item for item in poses.items())
+    robot = read(content + joint("j", "a", "b", pose="0.3 0.2 0.1 0.5 0.4 0.3") + joint("k", "b", "c", "fixed")).robot
+    found = where(robot)
+    for name, text in poses.items():
+        numbers = [float(word) for word in text.split()]
+        np.testing.assert_allclose(found[name], pose_matrix(numbers[:3], numbers[3:]), atol=1e-12, err_msg=name)
+
+
+def test_a_link_turns_about_its_joint_wherever_that_is():
+    """A door of 1 m with its hinge at the edge: the link's frame is in the middle."""
+    robot = read(LINK % ("frame", "0 0 0 0 0 0") + LINK % ("door", "0.5 0 0 0 0 0")
+                 + joint("hinge", "frame", "door", pose="-0.5 0 0 0 0 0")).robot
+    np.testing.assert_allclose(where(robot, {"hinge": math.pi / 2})["door"][:3, 3], (0, 0.5, 0), atol=1e-12)
+
+
+@pytest.mark.parametrize("version, extra, expected", [
+    ("1.6", "", (0, -1, 0)),  # in the joint's frame, which is turned by 90 degrees about x
+    ("1.4", "", (0, 0, 1)),  # in the model's
+    ("1.6", "<use_parent_model_frame>true</use_parent_model_frame>", (0, 0, 1))])
+def test_an_axis_is_read_in_the_frame_that_the_version_means(version, extra, expected):
+    axis = "<axis><xyz>0 0 1</xyz>%s</axis>" % extra
+    robot = read(LINK % ("a", "0 0 0 0 0 0") + LINK % ("b", "0 0 0 1.5707963267948966 0 0")
+                 + joint("j", "a", "b", "prismatic", axis=axis), version=version).robot
+    moved = where(robot, {"j": 2.0})["b"][:3, 3]
+    np.testing.assert_allclose(moved, 2.0 * np.array(expected), atol=1e-12)
+
+
+def test_an_axis_may_be_expressed_in_a_named_frame():
+    axis = '<axis><xyz expressed_in="turned">0 0 1</xyz></axis>'
+    robot = read('<frame name="turned"><pose>0 0 0 0 1.5707963267948966 0</pose></frame>'
+                 + LINK % ("a", "0 0 0 0 0 0") + LINK % ("b", "0 0 1 0 0 0")
+                 + joint("j", "a", "b", "prismatic", axis=axis), version="1.7").robot
+    np.testing.assert_allclose(where(robot, {"j": 2.0})["b"][:3, 3], (2, 0, 1), atol=1e-12)
+
+
+def test_a_joint_written_from_the_other_end_keeps_its_sign():
+    """Two joints have link c as their child; the tree must turn one of them round."""
+    content = LINK % ("a", "0 0 0 0 0 0") + LINK % ("b", "2 0 0 0 0 0") + LINK % ("c", "1 0 0 0 0 0")
+    robot = read(content + joint("j", "a", "c") + joint("k", "b", "c")).robot
+    assert robot.root == "a" and robot.joints["k"].parent == "c"
+    found = where(robot, {"k": 0.3})
+    relative = np.linalg.inv(found["b"]) @ found["c"]
+    np.testing.assert_allclose(relative[:3, :3], axis_rotation((0, 0, 1), 0.3), atol=1e-12)
+
+
+def test_limits_are_those_written_and_none_where_sdf_means_none():
+    limits = "<axis><xyz>0 0 1</xyz><limit><lower>%s</lower><upper>%s</upper><effort>%s</effort></limit></axis>"
+    content = LINK % ("a", "0 0 0 0 0 0") + LINK % ("b", "0 0 0 0 0 0") + LINK % ("c", "0 0 0 0 0 0")
+    robot = read(content + joint("j", "a", "b", axis=limits % (-1, 2, 3))
+                 + joint("k", "b", "c", axis=limits % ("-1e16", "1e16", -1))).robot
+    first, second = robot.joints["j"], robot.joints["k"]
+    assert (first.type, first.limit.lower, first.limit.upper, first.limit.effort) == ("revolute", -1, 2, 3)
+    assert (second.type, second.limit.lower, second.limit.effort) == ("continuous", None, None)
+
+
+def test_a_model_welded_to_the_world_is_static():
+    model = read(LINK % ("b", "0 0 2 0 0 0") + LINK % ("a", "0 0 1 0 0 0") + joint("weld", "world", "a", "fixed")
+                 + joint("j", "a", "b"))
+    assert model.static and model.robot.root == "a" and list(model.robot.joints) == ["j"]
+    assert where(model.robot)["a"][2, 3] == 1.0
+
+
+def test_a_hinge_on_the_world_has_the_world_for_its_root():
+    robot = read(LINK % ("a", "0 0 1 0 0 0") + joint("hinge", "world", "a")).robot
+    assert robot.root == "world" and where(robot)["a"][2, 3] == 1.0
+
+
+def test_poses_may_be_relative_to_other_frames():
+    robot = read("""<frame name="f"><pose>1 0 0 0 0 0</pose></frame>
+      <link name="a"><pose relative_to="f">0 1 0 0 0 0</pose></link>
+      <link name="b"><pose relative_to="a">0 0 1 0 0 0</pose></link>""" + joint("j", "a", "b", "fixed")).robot
+    assert where(robot)["b"][:3, 3].tolist() == [1, 1, 1]
+
+
+def test_nested_models_are_flattened_with_scoped_names():
+    robot = read('<link name="a"/><model name="arm"><pose>0 0 1 0 0 0</pose><link name="a"><pose>1 0 0 0 0 0</pose>'
+                 '</link><link name="b"/>%s</model>%s'
+                 % (joint("j", "a", "b"), joint("k", "a", "arm::a", "fixed"))).robot
+    assert list(robot.links) == ["arm::a", "arm::b", "a"] and set(robot.joints) == {"arm::j", "k"}
+    assert where(robot)["arm::a"][:3, 3].tolist() == [1, 0, 1]
+
+
+def test_what_a_tree_cannot_have_is_said():
+    content = LINK % ("a", "0 0 0 0 0 0") + LINK % ("b", "1 0 0 0 0 0")
+    loop = parse_sdf_model(sdf(content + joint("j", "a", "b") + joint("k", "a", "b")), "m.sdf")
+    assert "joint 'k', which closes a loop (m.sdf line 3)" in loop.warning
+    loose = parse_sdf_model(sdf(content), "m.sdf")
+    assert "link 'b', which no joint connects: it is held by 'a' (m.sdf line 3)" in loose.warning
+    assert where(loose.robot)["b"][0, 3] == 1.0
+    assert parse_sdf_model(sdf("<static>1</static>" + content), "m.sdf").warning == ""
+    ball = parse_sdf_model(sdf(content + joint("j", "a", "b", "ball")), "m.sdf")
+    assert "joint 'j' of type ball, which is held fixed" in ball.warning
+
+
+# -- what a viewer is given ------------------------------------------------------------------------
+
+
+def test_the_drawing_of_a_model_is_a_urdf_with_the_same_bodies_in_the_same_places():
+    model = read(LINK % ("a", "1 2 3 0.1 0.2 0.3")
+                 + '<link name="b"><pose>-1 0 0.5 0 1.5707963267948966 0</pose>'
+                 '<visual name="v"><pose>0 0 1 0 0 0</pose>'
+                 "<geometry><box><size>1 2 3</size></box></geometry><material><diffuse>1 0 0 1</diffuse></material>"
+                 "</visual></link>" + joint("j", "a", "b", pose="0.3 0.2 0.1 0.5 0.4 0.3"))
+    merged = merge_fixed(model.robot)
+    drawn = merge_fixed(parse_urdf(drawing_urdf(merged)))
+    assert list(drawn.joints) == list(merged.joints) and list(drawn.links) == list(merged.links)
+    np.testing.assert_allclose(drawn.joints["j"].origin, merged.joints["j"].origin, atol=1e-12)
+    shape, = drawn.links["b"].visuals
+    np.testing.assert_allclose(shape.origin, merged.links["b"].visuals[0].origin, atol=1e-12)
+    assert shape.colour == (1, 0, 0, 1)
+
+
+# -- worlds ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def shelf(tmp_path):
+    """Folders with two models, one of which has a model.config that names a newer file."""
+    (tmp_path / "one/can").mkdir(parents=True)
+    (tmp_path / "one/can/model.sdf").write_text(sdf('<pose>0 0 9 0 0 0</pose><link name="l"/>', name="can"))
+    (tmp_path / "two/lamp").mkdir(parents=True)
+    (tmp_path / "two/lamp/new.sdf").write_text(
+        '<sdf version="1.6"><light name="lamp" type="point"><diffuse>1 0 0 1</diffuse></light></sdf>')
+    (tmp_path / "two/lamp/old.sdf").write_text("<sdf/>")
+    (tmp_path / "two/lamp/model.config").write_text(
+        '<model><sdf version="1.4">old.sdf</sdf><sdf version="1.10">new.sdf</sdf></model>')
+    return ModelFolders([tmp_path / "one", tmp_path / "two"])
+
+
+def world(tmp_path, content, folders=None):
+    path = tmp_path / "a.world"
+    path.write_text('<sdf version="1.6">\n<world name="w">\n%s\n</world>\n</sdf>' % content, encoding="utf-8")
+    return parse_sdf_world(path, folders)
+
+
+def test_an_include_brings_models_and_lights(tmp_path, shelf):
+    found = world(tmp_path, """<include><uri>model://can</uri></include>
+      <include><uri>model://can</uri><name>second</name><pose>1 2 3 0 0 0</pose><static>true</static></include>
+      <include><uri>model://lamp</uri></include>""", shelf)
+    assert (found.problems, found.warning) == ([], "")
+    assert [(model.name, model.pose[:3, 3].tolist(), model.static) for model in found.models] == [
+        ("can", [0, 0, 9], False), ("second", [1, 2, 3], True)]
+    assert [(light.name, light.diffuse) for light in found.lights] == [("lamp", (1, 0, 0, 1))]
+
+
+def test_a_saved_state_says_where_the_models_are(tmp_path, shelf):
+    found = world(tmp_path, '<include><uri>model://can</uri></include><state world_name="w"><model name="can">'
+                            "<pose>5 0 0 0 0 0</pose></model></state>", shelf)
+    assert found.models[0].pose[0, 3] == 5.0
+
+
+def test_plugins_of_models_and_includes_are_kept(tmp_path, shelf):
+    found = world(tmp_path, '<include><uri>model://can</uri><plugin name="p" filename="liba.so"><x>1</x></plugin>'
+                            "</include>", shelf)
+    plugin, = [plugin for gazebo in found.models[0].robot.gazebo for plugin in gazebo.findall("plugin")]
+    assert plugin.get("filename") == "liba.so" and plugin.findtext("x") == "1"
+
+
+def test_what_cannot_be_had_is_a_line_and_the_rest_is_there(tmp_path, shelf):
+    found = world(tmp_path, """<include><uri>model://castle</uri></include>
+<include><uri>model://can</uri></include>
+<include><uri>model://can</uri></include>
+<model name="bad"><link name="l"><inertial><mass>0</mass></inertial></link></model>""", shelf)
+    assert [model.name for model in found.models] == ["can"]
+    missing, twice, massless = found.problems
+    assert "a.world, line 3" in missing and "model://castle not found" in missing and "one" in missing
+    assert "GAZEBO_MODEL_PATH" in missing
+    assert "line 5" in twice and "stands twice" in twice and "<name>" in twice
+    assert "line 6" in massless and "<mass> is 0 kg" in massless
+
+
+def test_what_is_not_understood_is_one_warning_with_file_and_lines(tmp_path, shelf):
+    can = shelf.find("model://can")
+    can.write_text(sdf('<link name="l">\n<sensor name="s" type="ray"/></link>', name="can"))
+    found = world(tmp_path, "<road/>\n<actor/>\n<road/>\n<include><uri>model://can</uri></include>\n"
+                            "<scene/><gui/>", shelf)
+    assert found.warning.count("not understood") == 1
+    assert "road (%s line 3, 5)" % (tmp_path / "a.world") in found.warning and "actor (" in found.warning
+    assert "sensor (%s line 4)" % can in found.warning and "scene" not in found.warning
+
+
+def test_an_include_in_a_circle_ends(tmp_path, shelf):
+    shelf.find("model://can").write_text(sdf('<link name="l"/><include><uri>model://can</uri><name>n</name></include>'))
+    found = world(tmp_path, "<include><uri>model://can</uri></include>", shelf)
+    assert len(found.problems) == 1 and "circle" in found.problems[0]
+
+
+def test_a_model_folder_may_lack_its_config(tmp_path, shelf):
+    assert description_file(tmp_path / "one/can").name == "model.sdf"
+    assert description_file(tmp_path / "two/lamp").name == "new.sdf"
+    assert description_file(tmp_path / "nowhere") is None
+    assert shelf.find("can").parent.name == "can" and shelf.find("http://can") is None
+
+
+# -- errors ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("xml, message", [
+    ("<sdf", "m.sdf is not well-formed XML.*line 1"),
+    ("", "m.sdf is not well-formed XML"),
+    ("<robot name='r'/>", "m.sdf is not an SDF: its root element is <robot>, expected <sdf>"),
+    ("<sdf version='1.6'/>", "line 1: it holds nothing; expected one <model>"),
+    ("<sdf version='new'/>", "version='new'"),
+    (sdf(""), "model 'm' has no <link>"),
+    (sdf("<link/>"), "line 3: <link> has no name"),
+    (sdf('<link name="a"/><link name="a"/>'), "link 'a' stands twice"),
+    (sdf('<link name="a"><pose>0 0 1</pose></link>'), "line 3: <pose> is '0 0 1', expected 6 numbers"),
+    (sdf('<link name="a"><pose>0 0 1 0 0 nan</pose></link>'), "expected 6 numbers"),
+    (sdf('<link name="a"><gravity>maybe</gravity></link>'), "<gravity> is 'maybe', expected true or false"),
+    (sdf('<link name="a"><collision name="c"/></link>'), "<geometry> in a <collision> of link 'a' holds 0 shapes"),
+    (sdf('<link name="a"><visual name="c"><geometry><sphere><radius>-1</radius></sphere></geometry></visual></link>'),
+     "<radius> is '-1', expected positive"),
+    (sdf('<link name="a"><visual name="c"><geometry><box/></geometry></visual></link>'), "<box> has no <size>"),
+    (sdf('<link name="a"/>' + joint("j", "a", "b", "fixed")), "frame 'b' does not exist; frames: a, j"),
+    (sdf('<link name="a"/>' + joint("j", "b", "a", "fixed")), "'j' names link 'b', which does not exist; links: a"),
+    (sdf('<link name="a"/><link name="b"/>' + joint("j", "a", "b", axis="")), "revolute joint 'j' has no <axis>"),
+    (sdf('<link name="a"/><link name="b"/>' + joint("j", "a", "b", axis="<axis><xyz>0 0 0</xyz></axis>")), "is zero"),
+    (sdf('<link name="a"><pose relative_to="b"/></link><link name="b"><pose relative_to="a">1 0 0 0 0 0</pose></link>'),
+     "given relative to itself"),
+])
+def test_errors_name_file_line_and_what_is_right(xml, message):
+    with pytest.raises(SdfError, match=message):
+        parse_sdf_model(xml, "m.sdf")
+
+
+def test_a_world_file_needs_a_world(tmp_path):
+    path = tmp_path / "a.world"
+    path.write_text("<sdf version='1.6'/>")
+    with pytest.raises(SdfError, match="a.world, line 1: it holds 0 <world>, expected one"):
+        parse_sdf_world(path)
+    with pytest.raises(SdfError, match="b.world cannot be read"):
+        parse_sdf_world(tmp_path / "b.world")
+
+
+def test_core_loads_without_ros():
+    block = "import sys; sys.modules.update(dict.fromkeys(('rospy', 'roslib', 'geometry_msgs'))); "
+    subprocess.run([sys.executable, "-c", block + "import sdf_model"], check=True)
