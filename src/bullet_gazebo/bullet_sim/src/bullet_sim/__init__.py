@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A PyBullet world of URDF robots: spawn, step, read joints, drive joints. Knows no ROS.
+
+One thread owns a World and all its Models; nothing here locks.
+"""
+
+from . import quiet_pybullet  # noqa: F401  (first: it has an effect on the imports below)
+from .errors import BulletSimError
+from .model import Contact, Model
+from .pose import Pose
+from .shapes import MeshCache, MeshFiles
+from .stand_ins import with_stand_ins
+from .world import World
+
+__all__ = ["BulletSimError", "Contact", "MeshCache", "MeshFiles", "Model", "Pose", "World", "with_stand_ins"]

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Collision shapes, made once and shared: PyBullet leaks a quarter of a megabyte for a mesh that is loaded again."""
+
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pybullet
+
+from urdf_model import Box, Cylinder, Mesh, Plane, Sphere
+from urdf_model.transforms import pose_matrix, quaternion_from_matrix
+
+from .errors import BulletSimError
+
+NO_SHAPE = -1
+# A plane that is tilted, or one of several shapes, becomes a slab of this size [m]: Bullet's own plane goes alone.
+_SLAB_M = (200.0, 200.0, 1.0)
+
+
+class MeshCache:
+    """Meshes in any format that trimesh reads, kept on disk as the Wavefront files that PyBullet reads.
+
+    The file name is a hash of the mesh's content, so a mesh that changes is converted again and copies cost nothing.
+    """
+
+    def __init__(self, folder=None):
+        base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+        self.folder = Path(folder or os.path.join(base, "bullet_sim", "meshes"))
+        self._known = {}  # (path, size, time of change) -> Wavefront file
+
+    def wavefront(self, path):
+        """Return the path of a Wavefront copy of the mesh at ``path``, in metres, z up.
+
+        Raises BulletSimError when the mesh cannot be read.
+        """
+        try:
+            status = os.stat(path)
+            key = (str(path), status.st_size, status.st_mtime_ns)
+            if key not in self._known or not self._known[key].exists():
+                digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:32]
+                target = self.folder / (digest + ".obj")
+                self._known[key] = target if target.exists() else self._convert(path, target)
+        except OSError as error:
+            raise BulletSimError("mesh %s cannot be read: %s" % (path, error.strerror)) from None
+        return str(self._known[key])
+
+    def _convert(self, path, target):
+        import trimesh  # 0.1 s to import, and needed only the first time that a mesh is seen
+
+        try:
+            scene = trimesh.load(str(path), force="scene")
+            mesh = scene.to_geometry() if hasattr(scene, "to_geometry") else scene.dump(concatenate=True)
+            mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        except Exception as error:  # trimesh's loaders raise whatever their format library raises
+            raise BulletSimError("mesh %s cannot be read: %s" % (path, error)) from None
+        if len(mesh.faces) == 0:
+            raise BulletSimError("mesh %s holds no triangles" % path)
+        lines = ["o mesh"]
+        lines += ["v %.9g %.9g %.9g" % tuple(vertex) for vertex in mesh.vertices]
+        lines += ["f %d %d %d" % tuple(face) for face in mesh.faces + 1]
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            self.folder = Path(tempfile.mkdtemp(prefix="bullet_sim_meshes_"))
+            target = self.folder / target.name
+        # Another simulator may be converting the same mesh: write beside, then rename, which is atomic.
+        with tempfile.NamedTemporaryFile("w", dir=str(self.folder), suffix=".part", delete=False) as part:
+            part.write("\n".join(lines) + "\n")
+        os.replace(part.name, str(target))
+        return target
+
+
+class MeshFiles:
+    """From a urdf_model.Mesh to files: ``find_mesh(uri)`` -> path or None, and a MeshCache. Any thread may ask."""
+
+    def __init__(self, find_mesh, cache=None):
+        self._find_mesh = find_mesh
+        self._cache = cache or MeshCache()
+
+    def exists(self, mesh):
+        """Whether there is such a file, which is all that matters for drawing."""
+        return self._find_mesh(mesh.filename) is not None
+
+    def wavefront(self, mesh):
+        """Return the file to collide with; raises BulletSimError when the mesh cannot be found or read."""
+        path = self._find_mesh(mesh.filename)
+        if path is None:
+            raise BulletSimError("mesh %s cannot be found" % mesh.filename)
+        return self._cache.wavefront(path)
+
+
+class ShapeStore:
+    """The collision shapes of one physics client, one compound for each set of geometries."""
+
+    def __init__(self, client, mesh_files):
+        self._client = client
+        self._mesh_files = mesh_files
+        self._shapes = {}
+
+    def compound(self, shapes, concave):
+        """Return PyBullet's id of the compound of ``shapes`` (urdf_model.Shape), or -1 for none.
+
+        ``concave`` keeps meshes as triangles (only for bodies that never move); otherwise they are their convex hull.
+        Raises BulletSimError for a mesh that cannot be found or read.
+        """
+        parts = []
+        for shape in shapes:
+            geometry, origin, file = shape.geometry, shape.origin, None
+            if isinstance(geometry, Mesh):
+                file = self._mesh_files.wavefront(geometry)
+            elif isinstance(geometry, Plane) and (len(shapes) > 1 or not np.allclose(origin, np.eye(4), atol=1e-12)):
+                geometry, origin = Box(_SLAB_M), origin @ pose_matrix((0.0, 0.0, -_SLAB_M[2] / 2.0))
+            parts.append((geometry, file, origin))
+        if not parts:
+            return NO_SHAPE
+        key = (concave,) + tuple((geometry, file, origin.tobytes()) for geometry, file, origin in parts)
+        if key not in self._shapes:
+            self._shapes[key] = self._create(parts, concave)
+        return self._shapes[key]
+
+    def _create(self, parts, concave):
+        if isinstance(parts[0][0], Plane):
+            return pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
+        columns = {
+            "shapeTypes": [],
+            "halfExtents": [],
+            "radii": [],
+            "lengths": [],
+            "fileNames": [],
+            "meshScales": [],
+            "flags": [],
+            "collisionFramePositions": [],
+            "collisionFrameOrientations": [],
+        }
+        for geometry, file, origin in parts:
+            columns["shapeTypes"].append(_SHAPE_TYPES[type(geometry)])
+            columns["halfExtents"].append([side / 2.0 for side in getattr(geometry, "size", (0.0, 0.0, 0.0))])
+            columns["radii"].append(getattr(geometry, "radius", 0.0))
+            columns["lengths"].append(getattr(geometry, "length", 0.0))
+            columns["fileNames"].append(file or "")
+            columns["meshScales"].append(list(getattr(geometry, "scale", (1.0, 1.0, 1.0))))
+            columns["flags"].append(pybullet.GEOM_FORCE_CONCAVE_TRIMESH if concave and file else 0)
+            columns["collisionFramePositions"].append(origin[:3, 3].tolist())
+            columns["collisionFrameOrientations"].append(quaternion_from_matrix(origin).tolist())
+        shape = pybullet.createCollisionShapeArray(**columns, physicsClientId=self._client)
+        if shape < 0:
+            raise BulletSimError("PyBullet made no collision shape of %s" % ([part[:2] for part in parts],))
+        return shape
+
+
+_SHAPE_TYPES = {
+    Box: pybullet.GEOM_BOX,
+    Cylinder: pybullet.GEOM_CYLINDER,
+    Sphere: pybullet.GEOM_SPHERE,
+    Mesh: pybullet.GEOM_MESH,
+}
+
+
+def principal_axes(inertia):
+    """Return the principal moments (3,) of a (3, 3) inertia and the rotation (3, 3) whose columns are their axes."""
+    moments, axes = np.linalg.eigh(inertia)
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] = -axes[:, 0]
+    return moments, axes

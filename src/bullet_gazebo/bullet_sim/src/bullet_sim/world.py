@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The world: one PyBullet client, its models, its time."""
+
+import os
+
+import numpy as np
+import pybullet
+
+from urdf_model import Link, Plane, Robot, Shape, merge_fixed
+
+from .builder import build
+from .errors import BulletSimError
+from .model import Contact, Model
+from .pose import Pose
+from .shapes import MeshFiles, ShapeStore
+from .stand_ins import with_stand_ins
+
+
+def plain_path(uri):
+    """Return the file that ``uri`` (a path or file://…) names, or None: for a world without packages."""
+    path = uri[len("file://") :] if uri.startswith("file://") else uri
+    return path if os.path.isfile(path) else None
+
+
+class World:
+    """A physics world that steps in fixed ticks of ``time_step_s``.
+
+    Every call, from the constructor to ``close``, belongs to one thread. The same calls in the same order give the same
+    numbers, bit for bit, in every fresh world on one machine.
+
+    :param time_step_s: length of a tick [s]
+    :param gravity: (3,) [m/s^2]
+    :param solver_iterations: of Bullet's constraint solver
+    :param seed: of ``World.random``, for whoever needs noise
+    :param find_mesh: function from a mesh URI to a file path, or None when there is no such file
+    :param warn: function that is told what was mended, in one line
+    """
+
+    def __init__(
+        self,
+        time_step_s=0.002,
+        gravity=(0.0, 0.0, -9.81),
+        solver_iterations=20,
+        seed=0,
+        find_mesh=plain_path,
+        warn=lambda text: None,
+    ):
+        if not 1e-5 <= time_step_s <= 0.05:
+            raise BulletSimError("a time step of %g s is out of range; expected 1e-5 to 0.05 s" % time_step_s)
+        self.time_step_s = time_step_s
+        self.solver_iterations = solver_iterations
+        self.tick = 0
+        self.models = {}
+        self.random = np.random.default_rng(seed)
+        self._warn = warn
+        self._client = pybullet.connect(pybullet.DIRECT)
+        if self._client < 0:
+            raise BulletSimError("PyBullet gave no physics client; are too many worlds open in this process?")
+        self._mesh_files = MeshFiles(find_mesh)
+        self._shapes = ShapeStore(self._client, self._mesh_files)
+        self._weightless = []  # models of which some link has no weight
+        self._touched = []  # models that something was done to since the last step, perhaps in their sleep
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=time_step_s,
+            numSolverIterations=solver_iterations,
+            numSubSteps=0,
+            deterministicOverlappingPairs=1,
+            physicsClientId=self._client,
+        )
+        self.set_gravity(gravity)
+
+    @property
+    def time_s(self):
+        """Simulated time since the world began [s]."""
+        return self.tick * self.time_step_s
+
+    @property
+    def gravity(self):
+        """Gravity (3,) [m/s^2]."""
+        return self._gravity
+
+    def set_gravity(self, gravity):
+        """Set gravity (3,) [m/s^2]. Raises BulletSimError unless it is three finite numbers."""
+        gravity = tuple(float(g) for g in gravity)
+        if len(gravity) != 3 or not np.isfinite(gravity).all():
+            raise BulletSimError("gravity is three finite numbers, found %s" % (gravity,))
+        pybullet.setGravity(*gravity, physicsClientId=self._client)
+        self._gravity = gravity
+        self.wake_all()
+
+    def set_solver_iterations(self, iterations):
+        """Set the iterations of Bullet's constraint solver, 1 to 1000."""
+        if not 1 <= iterations <= 1000:
+            raise BulletSimError("%s solver iterations are out of range; expected 1 to 1000" % iterations)
+        pybullet.setPhysicsEngineParameter(numSolverIterations=iterations, physicsClientId=self._client)
+        self.solver_iterations = iterations
+
+    def wake_all(self):
+        """Have every resting body looked at again: Bullet does not notice what is changed from outside."""
+        for model in self.models.values():
+            model.wake()
+
+    def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=()):
+        """Put ``robot`` (urdf_model.Robot) into the world as ``name``, its frame at ``pose``; return its Model.
+
+        The frame of a robot from a URDF is that of its root link. What stands in for meshes that are missing is told
+        to ``warn``.
+        ``static`` fixes the root; by default only a robot whose root link is called "world" is fixed, as in Gazebo.
+        Raises BulletSimError when the name is taken or empty or the pose is not finite.
+        """
+        if not name:
+            raise BulletSimError("a model needs a name")
+        if name in self.models:
+            raise BulletSimError("model '%s' exists already; delete it first or choose another name" % name)
+        pose = (pose or Pose()).checked()
+        static = robot.root == "world" if static is None else static
+        robot, mended = with_stand_ins(robot, self._mesh_files)
+        if mended:
+            self._warn("model '%s': %s" % (name, mended))
+        merged = merge_fixed(robot)
+        body, root_offset = build(
+            self._client, merged, pose, static, self._shapes, lambda text: self._warn("model '%s': %s" % (name, text))
+        )
+        model = Model(self._client, name, robot, merged, body, root_offset, static, self)
+        if self_collision_pairs:
+            model.set_self_collision_pairs(self_collision_pairs)
+        self.models[name] = model
+        return model
+
+    def respawn(self, name, static):
+        """Replace a model by itself, fixed in the world or free, where it stands; return the new Model.
+
+        For a plugin that knows more of a robot than its description says, such as that it is bolted to the floor.
+        """
+        old = self._model(name)
+        if old.static == static:
+            return old
+        pose, position = old.base_pose(), old.read_joints()[0]
+        order = list(self.models)
+        self.delete(name)
+        model = self.spawn(old.robot, name, pose, static)
+        model.set_joint_positions(np.arange(len(position)), position)
+        model.mark_start()
+        self.models = {key: self.models[key] for key in order}
+        return model
+
+    def add_ground_plane(self, name="ground_plane"):
+        """Add the half space below z = 0; return its Model (one link, "link", as Gazebo's has)."""
+        link = Link("link", collisions=[Shape(Plane(), np.eye(4), "collision", None, "link")])
+        return self.spawn(Robot(name, {"link": link}, {}, "link"), name, static=True)
+
+    def delete(self, name):
+        """Remove a model. Raises BulletSimError when there is none of that name."""
+        model = self._model(name)
+        pybullet.removeBody(model.body, physicsClientId=self._client)
+        del self.models[name]
+        self.note_weightless(model, False)
+        self._touched = [other for other in self._touched if other is not model]
+        # What stood on it shall fall.
+        self.wake_all()
+
+    def note_weightless(self, model, wanted):
+        """For Model: whether ``model`` has links whose weight must be taken away at each step."""
+        self._weightless = [other for other in self._weightless if other is not model] + [model] * wanted
+
+    def note_touched(self, model):
+        """For Model: something was done to ``model``, which may be asleep."""
+        if model not in self._touched:
+            self._touched.append(model)
+
+    def step(self):
+        """Advance the world by one tick."""
+        for model in self._weightless:
+            model.cancel_weight()
+        pybullet.stepSimulation(physicsClientId=self._client)
+        self.tick += 1
+        if self._touched:
+            touched, self._touched = self._touched, []
+            for model in touched:
+                model.feel_again()
+
+    def reset_models(self):
+        """Return every model to its marked start. Time goes on."""
+        for model in self.models.values():
+            model.reset()
+
+    def reset_time(self):
+        """Begin again at tick 0."""
+        self.tick = 0
+
+    def contacts(self, model=None):
+        """Return the contacts of the last step as a list of Contact; all, or those that involve one Model."""
+        body = {} if model is None else {"bodyA": model.body}
+        names = {other.body: other for other in self.models.values()}
+        found = []
+        for point in pybullet.getContactPoints(physicsClientId=self._client, **body) or ():
+            a, b = names[point[1]], names[point[2]]
+            found.append(
+                Contact(
+                    a.name, a.link_name(point[3]), b.name, b.link_name(point[4]), point[5], point[7], point[8], point[9]
+                )
+            )
+        return found
+
+    def ray_test_batch(self, starts, ends):
+        """Cast rays from ``starts`` (k, 3) to ``ends`` (k, 3) [m, world]; return the fractions (k,) at which they hit.
+
+        1.0 where a ray meets nothing.
+        """
+        starts, ends = np.asarray(starts, dtype=float), np.asarray(ends, dtype=float)
+        hits = pybullet.rayTestBatch(starts.tolist(), ends.tolist(), physicsClientId=self._client)
+        return np.array([hit[2] if hit[0] >= 0 else 1.0 for hit in hits])
+
+    def close(self):
+        """Give the physics client back. The world is of no use afterwards."""
+        if self._client is not None:
+            pybullet.disconnect(physicsClientId=self._client)
+            self._client = None
+            self.models = {}
+
+    def _model(self, name):
+        try:
+            return self.models[name]
+        except KeyError:
+            known = ", ".join(self.models) or "none"
+            raise BulletSimError("there is no model '%s'; models: %s" % (name, known)) from None

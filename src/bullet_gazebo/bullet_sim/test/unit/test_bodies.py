@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pushing, weighing and touching single bodies; bodies that sleep and wake up."""
+
+import math
+
+import numpy as np
+import pytest
+
+from bullet_sim import BulletSimError, Pose, World
+from urdf_model import Joint, Limit, Link, Plane, Robot, Shape, Surface, parse_urdf
+from urdf_model.transforms import pose_matrix
+
+BOX = """<robot name="box"><link name="box"><inertial><mass value="1"/>
+  <inertia ixx="0.0017" iyy="0.0017" izz="0.0017"/></inertial>
+  <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>%s</robot>"""
+ROD = """<robot name="rod"><link name="post"/>
+  <link name="rod"><inertial><origin xyz="0.5 0 0"/><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.2" izz="0.2"/></inertial></link>
+  <joint name="pivot" type="continuous"><parent link="post"/><child link="rod"/><axis xyz="0 0 1"/></joint></robot>"""
+ASLEEP_AFTER = 2500  # ticks
+
+
+@pytest.fixture
+def world():
+    world = World()
+    yield world
+    world.close()
+
+
+@pytest.fixture
+def sleeping_box(world):
+    world.add_ground_plane()
+    box = world.spawn(parse_urdf(BOX % ""), "box", Pose((0, 0, 0.05)))
+    step(world, ASLEEP_AFTER)
+    return box
+
+
+def step(world, ticks):
+    for _ in range(ticks):
+        world.step()
+
+
+@pytest.mark.parametrize("touch, moved", [
+    (lambda world, box: box.set_base_pose(Pose((0, 0, 2))), lambda box: box.base_pose().position[2] < 1.99),
+    (lambda world, box: box.set_base_twist((0, 0, 2), (0, 0, 0)), lambda box: box.base_pose().position[2] > 0.1),
+    (lambda world, box: box.apply_wrench("box", (0, 0, 2000)), lambda box: box.base_pose().position[2] > 0.1),
+    (lambda world, box: world.set_gravity((0, 0, 5)), lambda box: box.base_pose().position[2] > 0.06),
+])
+def test_a_sleeping_body_wakes_up_when_it_is_touched(world, sleeping_box, touch, moved):
+    touch(world, sleeping_box)
+    step(world, 50)
+    assert moved(sleeping_box)
+
+
+def test_a_push_in_its_sleep_gives_a_body_the_whole_impulse(world):
+    """Without weight nor floor, so that nothing but the push moves it."""
+    world.set_gravity((0, 0, 0))
+    box = world.spawn(parse_urdf(BOX % ""), "box")
+    step(world, ASLEEP_AFTER)
+    for _ in range(5):
+        box.apply_wrench("box", (1.0, 0, 0))
+        world.step()
+    step(world, 5)
+    assert box.base_twist()[0][0] == pytest.approx(5 * 0.002, rel=1e-6)
+
+
+@pytest.mark.parametrize("take_away", [
+    lambda world: world.delete("support"),
+    lambda world: world.models["support"].set_base_pose(Pose((9, 9, 9)))])
+def test_a_sleeping_body_falls_when_its_support_goes(world, take_away):
+    world.spawn(parse_urdf(BOX % ""), "support", Pose((0, 0, 0.05)), static=True)
+    box = world.spawn(parse_urdf(BOX % ""), "box", Pose((0, 0, 0.15)))
+    step(world, ASLEEP_AFTER)
+    take_away(world)
+    step(world, 50)
+    assert box.base_pose().position[2] < 0.14
+
+
+@pytest.mark.parametrize("friction, slides", [(None, False), (0.7, False), (0.3, True), (1000.0, False)])
+def test_friction_holds_a_box_up_to_its_coefficient(world, friction, slides):
+    """Pushed with half of its weight, on a floor that says nothing."""
+    world.add_ground_plane()
+    robot = parse_urdf(BOX % "")
+    robot.links["box"].surface = Surface(friction=friction)
+    box = world.spawn(robot, "box", Pose((0, 0, 0.05)))
+    for _ in range(250):
+        box.apply_wrench("box", (0.5 * 9.81, 0, 0))
+        world.step()
+    travelled = box.base_pose().position[0]
+    # 0.5 s at (0.5 - mu) g
+    assert travelled == pytest.approx(0.5 * 0.2 * 9.81 * 0.25 if slides else 0.0, abs=0.02)
+
+
+def test_friction_stands_in_the_gazebo_element_of_a_urdf(world):
+    xml = BOX % '<gazebo reference="box"><mu1>0.2</mu1><kp>1e5</kp><kd>1</kd><material>Gazebo/Red</material></gazebo>'
+    assert parse_urdf(xml).links["box"].surface == Surface(0.2, 1e5, 1.0)
+
+
+def test_a_soft_contact_gives_way(world):
+    world.add_ground_plane()
+    robot = parse_urdf(BOX % "")
+    robot.links["box"].surface = Surface(stiffness=1000.0, damping=10.0)
+    box = world.spawn(robot, "box", Pose((0, 0, 0.05)))
+    step(world, 1500)
+    # Four corners, all with the same spring: between m g / k and a quarter of it.
+    assert 0.05 - 0.011 < box.base_pose().position[2] < 0.0485
+
+
+def test_a_link_without_weight_floats_and_gets_it_back(world):
+    xml = BOX % '<gazebo reference="box"><turnGravityOff>true</turnGravityOff></gazebo>'
+    box = world.spawn(parse_urdf(xml), "box", Pose((0, 0, 1)))
+    assert not box.has_weight("box")
+    step(world, 500)
+    assert box.base_pose().position[2] == pytest.approx(1.0, abs=1e-6)
+    box.set_weight("box", True)
+    step(world, 100)
+    assert box.base_pose().position[2] == pytest.approx(1.0 - 0.5 * 9.81 * 0.04, abs=0.01)
+    box.set_weight("box", False)
+    world.delete("box")
+    world.step()
+
+
+def test_mass_and_inertia_can_be_set(world):
+    box = world.spawn(parse_urdf(BOX % ""), "box", Pose((0, 0, 1)))
+    world.set_gravity((0, 0, 0))
+    box.set_inertial("box", 4.0, np.diag((0.02, 0.04, 0.05)))
+    assert box.inertial("box").mass == 4.0
+    for _ in range(100):
+        box.apply_wrench("box", (4.0, 0, 0), (0, 0, 0.05))
+        world.step()
+    linear, angular = box.base_twist()
+    assert linear[0] == pytest.approx(0.2, rel=1e-3) and angular[2] == pytest.approx(0.2, rel=1e-3)
+
+
+@pytest.mark.parametrize("mass, inertia, message", [
+    (0.0, np.eye(3), "mass of 0 kg"), (math.nan, np.eye(3), "expected a positive"),
+    (1.0, np.diag((1.0, -1.0, 1.0)), "not positive"),
+    (1.0, np.array([[1.0, 0.5, 0], [0.5, 1.0, 0], [0, 0, 1.5]]), "principal axes.*cannot be turned")])
+def test_an_impossible_inertia_is_refused(world, mass, inertia, message):
+    rod = world.spawn(parse_urdf(ROD), "rod", static=True)
+    with pytest.raises(BulletSimError, match=message):
+        rod.set_inertial("rod", mass, inertia)
+
+
+def test_an_effort_adds_to_what_drives_the_joint(world):
+    rod = world.spawn(parse_urdf(ROD), "rod", static=True)
+    index = np.array([0])
+    rod.drive_velocity(index, np.zeros(1), np.array([0.3]))
+    for _ in range(100):
+        rod.add_effort(index, np.array([1.0]))
+        world.step()
+    # 0.7 Nm left on 2 kg * 0.25 m^2 + 0.2 kg m^2
+    assert rod.read_joints()[1][0] == pytest.approx(0.7 / 0.7 * 0.2, rel=1e-2)
+
+
+def test_limits_can_be_set(world):
+    rod = world.spawn(parse_urdf(ROD), "rod", static=True)
+    rod.set_limits(0, -0.1, 0.25)
+    for _ in range(2000):
+        rod.drive_effort(np.array([0]), np.array([1.0]))
+        world.step()
+    assert rod.read_joints()[0][0] == pytest.approx(0.25, abs=1e-2)
+    with pytest.raises(BulletSimError, match="not below"):
+        rod.set_limits(0, 1.0, 1.0)
+
+
+def test_frames_of_model_and_joint_need_not_be_those_of_the_links(world):
+    """The root stands 1 m beside the model's frame, and a joint 0.5 m beside its child's, as SDF may have it."""
+    link = parse_urdf(BOX % "").links["box"]
+    hinge = Joint("hinge", "continuous", "a", "b", pose_matrix((0.5, 0, 0)), np.array([0.0, 0.0, 1.0]), Limit(),
+                  child_offset=pose_matrix((0.5, 0, 0)))
+    robot = Robot("r", {"a": link, "b": Link("b", link.inertial)}, {"hinge": hinge}, "a",
+                  root_origin=pose_matrix((0, 1, 0)))
+    world.set_gravity((0, 0, 0))
+    model = world.spawn(robot, "r", Pose((10, 0, 0)))
+    model.set_joint_positions(np.array([0]), np.array([math.pi / 2]))
+    assert model.base_pose().position == pytest.approx((10, 0, 0))
+    assert model.link_pose("a").position == pytest.approx((10, 1, 0), abs=1e-6)
+    assert model.link_pose("b").position == pytest.approx((10.5, 1.5, 0), abs=1e-6)
+    model.set_base_pose(Pose((0, 0, 5)))
+    assert model.link_pose("a").position == pytest.approx((0, 1, 5), abs=1e-6)
+    model.set_base_twist((0, 0, 0), (0, 0, 1))
+    np.testing.assert_allclose(model.link_twist("a")[0], (-1, 0, 0), atol=1e-6)
+    np.testing.assert_allclose(model.base_twist()[0], (0, 0, 0), atol=1e-6)
+
+
+@pytest.mark.parametrize("origin, height", [
+    (np.eye(4), 0.0), (pose_matrix((0, 0, 0.3)), 0.3), (pose_matrix((0, 0, 0.5), (0, 0.4, 0)), 0.5)])
+def test_a_plane_may_be_raised_and_tilted(world, origin, height):
+    floor = Robot("f", {"l": Link("l", collisions=[Shape(Plane(), origin)])}, {}, "l")
+    world.spawn(floor, "floor", static=True)
+    hit = world.ray_test_batch([(0, 0, 2), (1, 0, 2)], [(0, 0, -2), (1, 0, -2)])
+    slope = -origin[0, 2] / origin[2, 2]
+    np.testing.assert_allclose(2.0 - 4.0 * hit, (height, height + slope), atol=1e-3)
+
+
+def test_solver_iterations_are_checked(world):
+    world.set_solver_iterations(50)
+    with pytest.raises(BulletSimError, match="expected 1 to 1000"):
+        world.set_solver_iterations(0)
