@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The services and the topic under /gazebo that are about single links and joints."""
+import numpy as np
+from gazebo_msgs.msg import LinkState
+from gazebo_msgs.srv import (
+    ApplyBodyWrench,
+    ApplyBodyWrenchResponse,
+    ApplyJointEffort,
+    ApplyJointEffortResponse,
+    BodyRequest,
+    BodyRequestResponse,
+    GetJointProperties,
+    GetJointPropertiesResponse,
+    GetLinkProperties,
+    GetLinkPropertiesResponse,
+    GetLinkState,
+    GetLinkStateResponse,
+    JointRequest,
+    JointRequestResponse,
+    SetJointProperties,
+    SetJointPropertiesResponse,
+    SetLinkProperties,
+    SetLinkPropertiesResponse,
+    SetLinkState,
+    SetLinkStateResponse,
+)
+
+from bullet_sim import BulletSimError, Pose
+from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg, vector_from_msg
+from gazebo_ros.entities import WORLD_FRAMES, UnknownEntity
+from gazebo_ros.jobs import TimedJobs
+
+_REFUSALS = (UnknownEntity, BulletSimError, ValueError)
+_JOINT_TYPES = {"revolute": GetJointPropertiesResponse.REVOLUTE, "continuous": GetJointPropertiesResponse.CONTINUOUS,
+                "prismatic": GetJointPropertiesResponse.PRISMATIC}
+# Fields of ODEJointProperties that are about ODE's solver and have no counterpart in Bullet.
+_ODE_ONLY = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor", "fmax", "vel")
+
+
+class BodyServices:
+    """Advertises the services. Everything here runs in the loop thread."""
+
+    def __init__(self, simulation, entities, ros, log):
+        """``entities``: :class:`gazebo_ros.entities.Entities`."""
+        self._simulation = simulation
+        self._world = simulation.world
+        self._entities = entities
+        self._log = log
+        self._wrenches = TimedJobs()  # of (model, link)
+        self._efforts = TimedJobs()  # of (model, joint)
+        self._link_state_commands = ros.queue("/gazebo/set_link_state", LinkState, depth=10)
+        for name, srv_class, handler in (
+                ("apply_body_wrench", ApplyBodyWrench, self._apply_body_wrench),
+                ("apply_joint_effort", ApplyJointEffort, self._apply_joint_effort),
+                ("clear_body_wrenches", BodyRequest, self._clear_body_wrenches),
+                ("clear_joint_forces", JointRequest, self._clear_joint_forces),
+                ("get_joint_properties", GetJointProperties, self._get_joint_properties),
+                ("get_link_properties", GetLinkProperties, self._get_link_properties),
+                ("get_link_state", GetLinkState, self._get_link_state),
+                ("set_joint_properties", SetJointProperties, self._set_joint_properties),
+                ("set_link_properties", SetLinkProperties, self._set_link_properties),
+                ("set_link_state", SetLinkState, self._set_link_state)):
+            ros.service("/gazebo/" + name, srv_class, handler)
+
+    def take_commands(self):
+        """Do what came in on /gazebo/set_link_state."""
+        for command in self._link_state_commands.drain():
+            try:
+                self._put_link(command)
+            except _REFUSALS as error:
+                self._log.warn_throttle(5.0, "/gazebo/set_link_state: %s" % error)
+
+    def push(self):
+        """Before a physics step: apply the wrenches and efforts that are due."""
+        now = self._simulation.time_ns
+        for (model_name, link), (force, torque) in self._wrenches.due(now):
+            self._world.models[model_name].apply_wrench(link, force, torque)
+        for (model_name, joint), effort in self._efforts.due(now):
+            model = self._world.models[model_name]
+            model.add_effort(model.index([joint]), np.array([effort]))
+
+    def forget(self, model_name=None):
+        """Drop the wrenches and efforts of a model that is gone, or all."""
+        for jobs in (self._wrenches, self._efforts):
+            jobs.remove(lambda target: model_name is None or target[0] == model_name)
+
+    # -- wrenches and efforts -------------------------------------------------------------------------------------
+
+    def _apply_body_wrench(self, request):
+        try:
+            model, link = self._entities.link(request.body_name)
+            if model.static and model.merged.frames[link].link == model.merged.root:
+                raise ValueError("link '%s' is fixed in the world; no wrench moves it" % request.body_name)
+            force, torque = vector_from_msg(request.wrench.force), vector_from_msg(request.wrench.torque)
+            # From the link's origin to the point, in world axes; the force itself acts at the centre of mass.
+            lever = vector_from_msg(request.reference_point)
+            if request.reference_frame not in WORLD_FRAMES:
+                frame = self._entities.frame(request.reference_frame)[0]
+                rotation = frame[:3, :3]
+                force, torque = rotation @ force, rotation @ torque
+                lever = rotation @ lever + frame[:3, 3] - np.array(model.link_pose(link).position)
+            payload = (force, torque + np.cross(lever, force))
+        except _REFUSALS as error:
+            return ApplyBodyWrenchResponse(False, "ApplyBodyWrench: %s" % error)
+        self._wrenches.add((model.name, link), payload, request.start_time.to_nsec(), request.duration.to_nsec())
+        return ApplyBodyWrenchResponse(True, "ApplyBodyWrench: wrench will be applied")
+
+    def _apply_joint_effort(self, request):
+        try:
+            model, joint = self._entities.joint(request.joint_name)
+            effort = float(request.effort)
+            if not np.isfinite(effort):
+                raise ValueError("the effort is %s, expected a finite number" % effort)
+        except _REFUSALS as error:
+            return ApplyJointEffortResponse(False, "ApplyJointEffort: %s" % error)
+        self._efforts.add((model.name, joint), effort, request.start_time.to_nsec(), request.duration.to_nsec())
+        return ApplyJointEffortResponse(True, "ApplyJointEffort: effort will be applied")
+
+    def _clear_body_wrenches(self, request):
+        try:
+            model, link = self._entities.link(request.body_name)
+            self._wrenches.remove(lambda target: target == (model.name, link))
+        except UnknownEntity as error:
+            self._log.warn("/gazebo/clear_body_wrenches: %s" % error)
+        return BodyRequestResponse()
+
+    def _clear_joint_forces(self, request):
+        try:
+            model, joint = self._entities.joint(request.joint_name)
+            self._efforts.remove(lambda target: target == (model.name, joint))
+        except UnknownEntity as error:
+            self._log.warn("/gazebo/clear_joint_forces: %s" % error)
+        return JointRequestResponse()
+
+    # -- links ----------------------------------------------------------------------------------------------------
+
+    def _get_link_state(self, request):
+        response = GetLinkStateResponse()
+        try:
+            model, link = self._entities.link(request.link_name)
+            pose, linear, angular = self._entities.relative(model.link_pose(link), *model.link_twist(link),
+                                                            request.reference_frame)
+        except UnknownEntity as error:
+            response.status_message = "GetLinkState: %s" % error
+            return response
+        response.link_state = LinkState(request.link_name, msg_from_pose(pose), msg_from_twist(linear, angular),
+                                        request.reference_frame)
+        response.success = True
+        response.status_message = "GetLinkState: got state"
+        return response
+
+    def _set_link_state(self, request):
+        try:
+            self._put_link(request.link_state)
+        except _REFUSALS as error:
+            return SetLinkStateResponse(False, "SetLinkState: %s" % error)
+        return SetLinkStateResponse(True, "SetLinkState: success")
+
+    def _put_link(self, state):
+        model, link = self._entities.link(state.link_name)
+        frame = model.merged.frames[link]
+        if frame.link != model.merged.root:
+            raise ValueError("link '%s' hangs on a joint and cannot be put anywhere by itself; use set_model_state for "
+                             "the model or set_model_configuration for its joints" % state.link_name)
+        pose = self._entities.pose_in_world(pose_from_msg(state.pose), state.reference_frame).matrix()
+        linear, angular = twist_from_msg(state.twist)
+        rotation = self._entities.frame(state.reference_frame)[0][:3, :3]
+        linear, angular = rotation @ linear, rotation @ angular
+        # The model goes along, so that this link is there.
+        base = pose @ np.linalg.inv(frame.offset)
+        model.set_base_pose(Pose.from_matrix(base))
+        if not model.static:
+            model.set_base_twist(linear + np.cross(angular, base[:3, 3] - pose[:3, 3]), angular)
+
+    def _get_link_properties(self, request):
+        response = GetLinkPropertiesResponse()
+        try:
+            model, link = self._entities.link(request.link_name)
+            inertial = model.inertial(link)
+            response.gravity_mode = model.has_weight(link)
+        except _REFUSALS as error:
+            response.status_message = "GetLinkProperties: %s" % error
+            return response
+        response.com = msg_from_pose(Pose(tuple(inertial.centre)))
+        response.mass = inertial.mass
+        for name, i, j in _INERTIA:
+            setattr(response, name, inertial.inertia[i, j])
+        response.success = True
+        response.status_message = "GetLinkProperties: got properties"
+        return response
+
+    def _set_link_properties(self, request):
+        try:
+            model, link = self._entities.link(request.link_name)
+            old = model.inertial(link)
+            pose = pose_from_msg(request.com)
+            if not np.allclose(pose.position, old.centre, atol=1e-6):
+                raise ValueError("the centre of mass of link '%s' stays at %s; it cannot be moved to %s"
+                                 % (request.link_name, _numbers(old.centre), _numbers(pose.position)))
+            inertia = np.zeros((3, 3))
+            for name, i, j in _INERTIA:
+                inertia[i, j] = inertia[j, i] = getattr(request, name)
+            rotation = pose.matrix()[:3, :3]
+            inertia = rotation @ inertia @ rotation.T
+            if not (request.mass == old.mass and np.allclose(inertia, old.inertia, rtol=1e-12, atol=0.0)):
+                model.set_inertial(link, request.mass, inertia)
+            model.set_weight(link, request.gravity_mode)
+        except _REFUSALS as error:
+            return SetLinkPropertiesResponse(False, "SetLinkProperties: %s" % error)
+        return SetLinkPropertiesResponse(True, "SetLinkProperties: properties set")
+
+    # -- joints ---------------------------------------------------------------------------------------------------
+
+    def _get_joint_properties(self, request):
+        response = GetJointPropertiesResponse()
+        try:
+            model, joint = self._entities.joint(request.joint_name)
+        except UnknownEntity as error:
+            response.status_message = "GetJointProperties: %s" % error
+            return response
+        index, = model.index([joint])
+        position, rate, _ = model.read_joints()
+        response.type = _JOINT_TYPES[model.merged.joints[joint].type]
+        response.damping = [model.damping[index]]
+        response.position = [position[index]]
+        response.rate = [rate[index]]
+        response.success = True
+        response.status_message = "GetJointProperties: got properties"
+        return response
+
+    def _set_joint_properties(self, request):
+        wanted = request.ode_joint_config
+        ignored = [name for name in _ODE_ONLY if getattr(wanted, name)]
+        try:
+            model, joint = self._entities.joint(request.joint_name)
+            index = int(model.index([joint])[0])
+            damping, upper, lower = (_single(wanted, name) for name in ("damping", "hiStop", "loStop"))
+            if damping is None and upper is None and lower is None:
+                raise ValueError("nothing to set: damping, hiStop and loStop are empty, and %s"
+                                 % ("%s has no counterpart here" % ", ".join(ignored) if ignored else "so is the rest"))
+            if damping is not None and damping < 0.0:
+                raise ValueError("damping is %g, expected 0 or more" % damping)
+            if upper is not None or lower is not None:
+                model.set_limits(index, float(model.lower[index]) if lower is None else lower,
+                                 float(model.upper[index]) if upper is None else upper)
+            if damping is not None:
+                model.set_damping(index, damping)
+        except _REFUSALS as error:
+            return SetJointPropertiesResponse(False, "SetJointProperties: %s" % error)
+        rest = "; no counterpart here: %s" % ", ".join(ignored) if ignored else ""
+        return SetJointPropertiesResponse(True, "SetJointProperties: properties set%s" % rest)
+
+
+_INERTIA = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
+
+
+def _single(config, name):
+    """The first value of a field of ODEJointProperties, or None where it is empty; one axis is all that joints have."""
+    values = list(getattr(config, name))
+    if values and not np.isfinite(values[0]):
+        raise ValueError("%s is %s, expected a finite number" % (name, values[0]))
+    return values[0] if values else None
+
+
+def _numbers(values):
+    return "(%s)" % ", ".join("%.4g" % value for value in values)

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where geometry_msgs and the world's own types meet."""
+import math
+
+import numpy as np
+from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Pose as PoseMsg
+
+from bullet_sim import Pose
+
+
+def pose_from_msg(msg):
+    """``geometry_msgs/Pose`` -> :class:`bullet_sim.Pose`; a quaternion of zeros means no rotation.
+
+    Raises ``bullet_sim.BulletSimError`` for numbers that are not finite.
+    """
+    position, orientation = msg.position, msg.orientation
+    return Pose((position.x, position.y, position.z),
+                (orientation.x, orientation.y, orientation.z, orientation.w)).checked()
+
+
+def msg_from_pose(pose):
+    """:class:`bullet_sim.Pose` -> ``geometry_msgs/Pose``."""
+    return PoseMsg(Point(*pose.position), Quaternion(*pose.quaternion))
+
+
+def twist_from_msg(msg):
+    """``geometry_msgs/Twist`` -> (linear, angular) as arrays (3,); raises ``ValueError`` where not finite."""
+    linear = np.array([msg.linear.x, msg.linear.y, msg.linear.z])
+    angular = np.array([msg.angular.x, msg.angular.y, msg.angular.z])
+    if not all(math.isfinite(value) for value in (*linear, *angular)):
+        raise ValueError("the twist is not finite: linear %s, angular %s" % (linear, angular))
+    return linear, angular
+
+
+def msg_from_twist(linear, angular):
+    """Linear [m/s] and angular [rad/s] velocity, (3,) each -> ``geometry_msgs/Twist``."""
+    return Twist(Vector3(*linear), Vector3(*angular))
+
+
+def vector_from_msg(msg):
+    """``geometry_msgs/Vector3`` or ``Point`` -> array (3,); raises ``ValueError`` where not finite."""
+    vector = np.array([msg.x, msg.y, msg.z])
+    if not np.isfinite(vector).all():
+        raise ValueError("the vector (%g, %g, %g) is not finite" % tuple(vector))
+    return vector

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Meshes made light enough to draw in software: split by colour, thinned out, kept on disk. ROS-free."""
+import hashlib
+import json
+import os
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+#: Triangles that a mesh keeps; a robot of thirty links then draws in some 20 ms without a graphics card.
+TRIANGLES = 2500
+# Part of the name of cached files: raise it when the same mesh would come out differently.
+_VERSION = 2
+_FINEST_GRID = 512
+
+
+class MeshPart(NamedTuple):
+    """One colour of a mesh: a Wavefront file in metres; red, green, blue, alpha from 0 to 1, or None for no colour."""
+
+    path: str
+    colour: tuple
+
+
+class DrawingError(Exception):
+    """A mesh cannot be read."""
+
+
+def thin_out(vertices, faces, target):
+    """Fewer triangles of about the same shape, at most ``target`` where that is possible at all.
+
+    Vertices (n, 3) that share a cell of a cubic grid become their mean; triangles (m, 3) that lose a corner go. The
+    finest grid that meets the target is taken. Returns (vertices, faces).
+    """
+    if len(faces) <= target:
+        return vertices, faces
+    low, size = vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), 1e-9)
+    coarse, fine = 2, _FINEST_GRID
+    best = None
+    while fine - coarse > 1:
+        cells = (coarse + fine) // 2
+        thinned = _cluster(vertices, faces, np.floor((vertices - low) * (cells / size)).astype(np.int64))
+        if len(thinned[1]) <= target:
+            coarse, best = cells, thinned
+        else:
+            fine = cells
+    return best if best is not None else (vertices, faces)
+
+
+def _cluster(vertices, faces, cells):
+    _, cluster = np.unique(cells @ np.array([1, 4096, 4096 ** 2]), return_inverse=True)
+    count = np.bincount(cluster)
+    merged = np.stack([np.bincount(cluster, vertices[:, k]) / count for k in range(3)], axis=1)
+    corners = cluster[faces]
+    whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 0] != corners[:, 2])
+    corners = corners[whole]
+    # Smallest corner first, the sense of rotation kept: thin walls have two triangles that face apart.
+    start = corners.argmin(axis=1)[:, None]
+    corners = np.take_along_axis(corners, (start + np.arange(3)) % 3, axis=1)
+    return merged, np.unique(corners, axis=0)
+
+
+class DrawingCache:
+    """Thinned meshes on disk, under a hash of the original's content."""
+
+    def __init__(self, folder=None, triangles=TRIANGLES):
+        """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``."""
+        base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+        self._folder = Path(folder or os.path.join(base, "bullet_gazebo", "drawings"))
+        self._triangles = triangles
+
+    def parts(self, path):
+        """The list of :class:`MeshPart` of the mesh file at ``path``; raises :class:`DrawingError`."""
+        try:
+            content = Path(path).read_bytes()
+        except OSError as error:
+            raise DrawingError("mesh %s cannot be read: %s" % (path, error.strerror)) from error
+        key = "%s-%d-%d" % (hashlib.sha256(content).hexdigest()[:32], self._triangles, _VERSION)
+        index = self._folder / key / "parts.json"
+        if not index.exists():
+            index = self._make(path, key)
+        listed = json.loads(index.read_text(encoding="utf-8"))
+        return [MeshPart(str(index.parent / name), tuple(colour) if colour else None) for name, colour in listed]
+
+    def _make(self, path, key):
+        pieces = _read(path)
+        total = sum(len(faces) for _, faces, _ in pieces)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            self._folder = Path(tempfile.mkdtemp(prefix="bullet_gazebo_drawings_"))
+        draft = Path(tempfile.mkdtemp(dir=self._folder))
+        listed = []
+        for number, (vertices, faces, colour) in enumerate(pieces):
+            vertices, faces = thin_out(vertices, faces, max(20, round(self._triangles * len(faces) / total)))
+            if len(faces):
+                name = "part%d.obj" % number
+                (draft / name).write_text(_wavefront(vertices, faces), encoding="ascii")
+                listed.append((name, colour))
+        (draft / "parts.json").write_text(json.dumps(listed), encoding="utf-8")
+        target = self._folder / key
+        try:
+            draft.rename(target)
+        except OSError:
+            target = draft if not (target / "parts.json").exists() else target  # another window was faster
+        return target / "parts.json"
+
+
+def _read(path):
+    """The mesh as [(vertices (n, 3), faces (m, 3), rgba or None)], one for each colour."""
+    import trimesh
+
+    gamma = 1.0 / 2.2 if str(path).lower().endswith(".dae") else 1.0
+    try:
+        scene = trimesh.load(str(path), force="scene")
+        pieces = {}
+        for node in scene.graph.nodes_geometry:
+            transform, name = scene.graph[node]
+            mesh = scene.geometry[name]
+            if len(getattr(mesh, "faces", ())) == 0:
+                continue
+            vertices = trimesh.transform_points(mesh.vertices, transform)
+            pieces.setdefault(_colour(mesh, gamma), []).append((vertices, np.asarray(mesh.faces)))
+    except Exception as error:  # noqa: BLE001  (trimesh raises whatever the library behind a format does)
+        raise DrawingError("mesh %s cannot be read: %s" % (path, error)) from error
+    if not pieces:
+        raise DrawingError("mesh %s has no triangles" % path)
+    joined = []
+    for colour, meshes in pieces.items():
+        starts = np.cumsum([0] + [len(vertices) for vertices, _ in meshes[:-1]])
+        shifted = [faces + start for (_, faces), start in zip(meshes, starts, strict=True)]
+        joined.append((np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(shifted), colour))
+    return joined
+
+
+def _colour(mesh, gamma):
+    material = getattr(mesh.visual, "material", None)
+    colour = getattr(material, "main_color", None)
+    if colour is None and getattr(mesh.visual, "kind", None) in ("face", "vertex"):
+        colour = mesh.visual.main_color
+    if colour is None:
+        return None
+    # Modelling programs write COLLADA colours as linear light; screens want them with gamma. The fourth number is left
+    # out: exporters do not agree on whether it means opacity or transparency.
+    return (*(round((int(value) / 255.0) ** gamma, 3) for value in colour[:3]), 1.0)
+
+
+def _wavefront(vertices, faces):
+    lines = ["v %.6g %.6g %.6g" % tuple(vertex) for vertex in vertices]
+    lines += ["f %d %d %d" % tuple(face) for face in faces + 1]
+    return "\n".join(lines) + "\n"

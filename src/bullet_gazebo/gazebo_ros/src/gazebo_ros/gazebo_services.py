@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The services under /gazebo. Each answer says in its status_message what was found and, if need be, what is right."""
+import re
+
+import numpy as np
+import rospy
+from bullet_sim_msgs.srv import AdvanceTicks, AdvanceTicksResponse
+from gazebo_msgs.msg import ModelState, ODEPhysics
+from gazebo_msgs.srv import (
+    DeleteModel,
+    DeleteModelResponse,
+    GetModelProperties,
+    GetModelPropertiesResponse,
+    GetModelState,
+    GetModelStateResponse,
+    GetPhysicsProperties,
+    GetPhysicsPropertiesResponse,
+    GetWorldProperties,
+    GetWorldPropertiesResponse,
+    SetModelConfiguration,
+    SetModelConfigurationResponse,
+    SetModelState,
+    SetModelStateResponse,
+    SetPhysicsProperties,
+    SetPhysicsPropertiesResponse,
+    SpawnModel,
+    SpawnModelResponse,
+)
+from geometry_msgs.msg import Vector3
+from std_srvs.srv import Empty, EmptyResponse
+
+from bullet_sim import BulletSimError
+from gazebo_ros.body_services import BodyServices
+from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg
+from gazebo_ros.entities import Entities, UnknownEntity
+from gazebo_ros.light_services import LightServices
+from gazebo_ros.mailbox import LoopEnded
+from gazebo_ros.simulation import AdvanceRefused
+from gazebo_ros.spawning import SpawnRefused
+from gazebo_ros.urdf_extras import unscoped
+
+_ROOT_ELEMENT = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
+_NOT_CONTENT = re.compile(r"<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
+
+
+def root_element(xml):
+    """Name of the root element of an XML text, or "" where there is none."""
+    found = _ROOT_ELEMENT.search(_NOT_CONTENT.sub("", xml))
+    return found.group(1) if found else ""
+
+
+class GazeboServices:
+    """Advertises the services; the loop's work runs in the loop, what is slow in the thread of the request."""
+
+    def __init__(self, simulation, spawner, lights, ros, log):
+        """Advertises everything at once; requests wait until the loop runs. ``lights``: list of ``sdf_model.Light``."""
+        self._simulation = simulation
+        self._world = simulation.world
+        self._spawner = spawner
+        self._ros = ros
+        self._log = log
+        self._entities = Entities(simulation.world)
+        self._bodies = BodyServices(simulation, self._entities, ros, log)
+        LightServices(lights, ros)
+        #: For the loop, before each physics step.
+        self.push = self._bodies.push
+        self._state_requests = {}
+        self._model_state_commands = ros.queue("/gazebo/set_model_state", ModelState, depth=10)
+        for name, srv_class, handler in (
+                ("delete_model", DeleteModel, self._delete_model),
+                ("get_model_properties", GetModelProperties, self._get_model_properties),
+                ("get_model_state", GetModelState, self._get_model_state),
+                ("get_physics_properties", GetPhysicsProperties, self._get_physics_properties),
+                ("get_world_properties", GetWorldProperties, self._get_world_properties),
+                ("pause_physics", Empty, self._pause),
+                ("reset_simulation", Empty, lambda _: self._reset(time_too=True)),
+                ("reset_world", Empty, lambda _: self._reset(time_too=False)),
+                ("set_model_configuration", SetModelConfiguration, self._set_model_configuration),
+                ("set_model_state", SetModelState, self._set_model_state),
+                ("set_physics_properties", SetPhysicsProperties, self._set_physics_properties),
+                ("unpause_physics", Empty, self._unpause)):
+            ros.service("/gazebo/" + name, srv_class, handler)
+        for name, srv_class, handler in (
+                ("advance", AdvanceTicks, self._advance),
+                ("spawn_sdf_model", SpawnModel, self._spawn_model),
+                ("spawn_urdf_model", SpawnModel, self._spawn_model)):
+            ros.service_in_thread("/gazebo/" + name, srv_class, handler)
+
+    def take_commands(self):
+        """Loop thread: do what came in on /gazebo/set_model_state and /gazebo/set_link_state."""
+        self._bodies.take_commands()
+        for command in self._model_state_commands.drain():
+            try:
+                self._put_model(command)
+            except (UnknownEntity, BulletSimError, ValueError) as error:
+                self._log.warn_throttle(5.0, "/gazebo/set_model_state: %s" % error)
+
+    # -- services in the thread of the request ------------------------------------------------------------------
+
+    def _spawn_model(self, request):
+        try:
+            is_sdf = root_element(request.model_xml) in ("sdf", "gazebo")
+            prepare = self._spawner.prepare_sdf if is_sdf else self._spawner.prepare
+            prepared = prepare(request.model_name, request.model_xml, request.robot_namespace,
+                               lambda: rospy.get_param("/"))
+            self._simulation.board.call(self._spawn_prepared, prepared, request)
+        except (SpawnRefused, LoopEnded) as error:
+            return SpawnModelResponse(False, "SpawnModel: Failure - %s" % error)
+        except Exception as error:  # noqa: BLE001  (a plugin's constructor is anybody's code)
+            self._log.error("spawning '%s' failed: %r" % (request.model_name, error))
+            return SpawnModelResponse(False, "SpawnModel: Failure - %s: %s" % (type(error).__name__, error))
+        self._ros.flush()
+        return SpawnModelResponse(True, "SpawnModel: Successfully spawned entity")
+
+    def _spawn_prepared(self, prepared, request):
+        try:
+            pose = self._entities.pose_in_world(pose_from_msg(request.initial_pose), request.reference_frame)
+        except (UnknownEntity, BulletSimError) as error:
+            raise SpawnRefused(str(error)) from error
+        self._spawner.spawn(prepared, pose)
+
+    def _advance(self, request):
+        board = self._simulation.board
+        try:
+            done = board.call(self._simulation.start_advance, request.ticks, request.await_topics, request.timeout_s)
+            tick, time_ns = done.result()
+        except (AdvanceRefused, LoopEnded) as error:
+            tick, time_ns = self._simulation.tick, self._simulation.time_ns
+            return AdvanceTicksResponse(False, "advance: %s" % error, rospy.Time(*divmod(time_ns, 10**9)), tick)
+        return AdvanceTicksResponse(True, "advance: done", rospy.Time(*divmod(time_ns, 10**9)), tick)
+
+    # -- services in the loop -----------------------------------------------------------------------------------
+
+    def _delete_model(self, request):
+        try:
+            self._spawner.delete(request.model_name)
+        except BulletSimError as error:
+            return DeleteModelResponse(False, "DeleteModel: model does not exist - %s" % error)
+        self._state_requests.pop(request.model_name, None)
+        self._bodies.forget(request.model_name)
+        return DeleteModelResponse(True, "DeleteModel: successfully deleted model")
+
+    def _pause(self, _):
+        self._simulation.paused = True
+        return EmptyResponse()
+
+    def _unpause(self, _):
+        self._simulation.paused = False
+        return EmptyResponse()
+
+    def _reset(self, time_too):
+        if time_too:
+            # Their times are of a past that is gone.
+            self._bodies.forget()
+        self._simulation.reset(time_too)
+        return EmptyResponse()
+
+    def _get_world_properties(self, _):
+        return GetWorldPropertiesResponse(self._simulation.time_s, list(self._world.models), True, True,
+                                          "GetWorldProperties: got properties")
+
+    def _get_model_properties(self, request):
+        response = GetModelPropertiesResponse()
+        try:
+            model = self._entities.model(request.model_name)
+        except UnknownEntity as error:
+            response.status_message = "GetModelProperties: %s" % error
+            return response
+        links = model.merged.links
+        response.canonical_body_name = next(iter(links))
+        response.body_names = list(links)
+        response.geom_names = ["%s_collision%s" % (link.name, "_%d" % k if k else "")
+                               for link in links.values() for k, _ in enumerate(link.collisions)]
+        response.joint_names = list(model.joint_names)
+        response.is_static = bool(model.static)
+        response.success = True
+        response.status_message = "GetModelProperties: got properties"
+        return response
+
+    def _get_model_state(self, request):
+        response = GetModelStateResponse()
+        try:
+            model = self._entities.model(request.model_name)
+            pose, linear, angular = self._entities.relative(model.base_pose(), *model.base_twist(),
+                                                            request.relative_entity_name)
+        except UnknownEntity as error:
+            response.status_message = "GetModelState: %s" % error
+            return response
+        count = self._state_requests[request.model_name] = self._state_requests.get(request.model_name, 0) + 1
+        response.header.seq = count
+        response.header.stamp = rospy.Time(*divmod(self._simulation.time_ns, 10**9))
+        response.header.frame_id = request.relative_entity_name
+        response.pose = msg_from_pose(pose)
+        response.twist = msg_from_twist(linear, angular)
+        response.success = True
+        response.status_message = "GetModelState: got properties"
+        return response
+
+    def _set_model_state(self, request):
+        try:
+            self._put_model(request.model_state)
+        except (UnknownEntity, BulletSimError, ValueError) as error:
+            return SetModelStateResponse(False, "SetModelState: %s" % error)
+        return SetModelStateResponse(True, "SetModelState: set model state done")
+
+    def _put_model(self, state):
+        model = self._entities.model(state.model_name)
+        pose = self._entities.pose_in_world(pose_from_msg(state.pose), state.reference_frame)
+        linear, angular = twist_from_msg(state.twist)
+        rotation = self._entities.frame(state.reference_frame)[0][:3, :3]
+        model.set_base_pose(pose)
+        if not model.static:
+            model.set_base_twist(rotation @ linear, rotation @ angular)
+
+    def _set_model_configuration(self, request):
+        names, positions = request.joint_names, request.joint_positions
+        try:
+            model = self._entities.model(request.model_name)
+            if len(names) != len(positions):
+                raise ValueError("%d joint names but %d positions; give one position for each joint"
+                                 % (len(names), len(positions)))
+            self._put_joints(model, [unscoped(model.name, name) for name in names], positions)
+        except (UnknownEntity, BulletSimError, ValueError) as error:
+            return SetModelConfigurationResponse(False, "SetModelConfiguration: %s" % error)
+        self._simulation.joints_were_set(model.name)
+        return SetModelConfigurationResponse(True, "SetModelConfiguration: success")
+
+    @staticmethod
+    def _put_joints(model, names, positions):
+        position = np.array(positions, dtype=float)
+        if not np.isfinite(position).all():
+            raise ValueError("joint positions are not finite: %s" % (list(positions),))
+        if names:
+            index = model.index(names)
+            model.set_joint_positions(index, np.clip(position, model.lower[index], model.upper[index]))
+
+    def _get_physics_properties(self, _):
+        simulation = self._simulation
+        factor = simulation.real_time_factor
+        return GetPhysicsPropertiesResponse(
+            time_step=simulation.step_s, pause=simulation.paused, max_update_rate=factor / simulation.step_s,
+            gravity=Vector3(*self._world.gravity),
+            ode_config=ODEPhysics(sor_pgs_iters=self._world.solver_iterations), success=True,
+            status_message="GetPhysicsProperties: got properties")
+
+    def _set_physics_properties(self, request):
+        simulation = self._simulation
+        gravity = request.gravity
+        try:
+            if abs(request.time_step - simulation.step_s) > 1e-9:
+                raise ValueError("time_step %g s cannot be set while the world runs; it is %g s (the world file's "
+                                 "max_step_size decides)" % (request.time_step, simulation.step_s))
+            if not request.max_update_rate >= 0.0:
+                raise ValueError("max_update_rate is %g Hz, expected 0 (as fast as possible) or a positive number"
+                                 % request.max_update_rate)
+            iterations = request.ode_config.sor_pgs_iters or self._world.solver_iterations
+            if iterations != self._world.solver_iterations:
+                self._world.set_solver_iterations(iterations)
+            self._world.set_gravity((gravity.x, gravity.y, gravity.z))
+        except (BulletSimError, ValueError) as error:
+            return SetPhysicsPropertiesResponse(False, "SetPhysicsProperties: %s" % error)
+        factor = request.max_update_rate * simulation.step_s
+        if abs(factor - simulation.real_time_factor) > 1e-9:
+            simulation.real_time_factor = factor
+        return SetPhysicsPropertiesResponse(True, "SetPhysicsProperties: gravity, update rate and solver "
+                                                  "iterations set; the rest of ode_config has no counterpart here")

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Log lines from the loop: handed to a thread, because a terminal or /rosout may block and the loop must not."""
+import collections
+import sys
+import threading
+import time
+
+
+class LoopLog:
+    """``info``, ``warn``, ``error`` and their throttled variants; callable from every thread.
+
+    ``sinks`` maps "info", "warn", "error" to functions of one text.
+    """
+
+    def __init__(self, sinks, clock=time.monotonic):
+        """Starts the writing thread."""
+        self._sinks = sinks
+        self._clock = clock
+        self._lines = collections.deque()
+        self._wake = threading.Event()
+        self._ending = False
+        self._last = {}
+        self._thread = threading.Thread(target=self._write, name="loop_log", daemon=True)
+        self._thread.start()
+
+    def info(self, text):
+        """Log at level info."""
+        self._post("info", text)
+
+    def warn(self, text):
+        """Log at level warning."""
+        self._post("warn", text)
+
+    def error(self, text):
+        """Log at level error."""
+        self._post("error", text)
+
+    def info_throttle(self, period_s, text):
+        """As :meth:`info`, at most once in ``period_s`` wall seconds from the same place in the code."""
+        self._post_throttled("info", period_s, text)
+
+    def warn_throttle(self, period_s, text):
+        """As :meth:`warn`, at most once in ``period_s`` wall seconds from the same place in the code."""
+        self._post_throttled("warn", period_s, text)
+
+    def error_throttle(self, period_s, text):
+        """As :meth:`error`, at most once in ``period_s`` wall seconds from the same place in the code."""
+        self._post_throttled("error", period_s, text)
+
+    def close(self):
+        """Write what is left and end the thread."""
+        self._ending = True
+        self._wake.set()
+        self._thread.join(0.3)
+
+    def _post(self, level, text):
+        self._lines.append((level, text))
+        self._wake.set()
+
+    def _post_throttled(self, level, period_s, text):
+        caller = sys._getframe(2)
+        place = (caller.f_code, caller.f_lineno)
+        now = self._clock()
+        if now - self._last.get(place, -period_s) >= period_s:
+            self._last[place] = now
+            self._post(level, text)
+
+    def _write(self):
+        while True:
+            self._wake.wait()
+            self._wake.clear()
+            while self._lines:
+                level, text = self._lines.popleft()
+                self._sinks[level](text)
+            if self._ending:
+                return

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Publishing from the loop without ever waiting for a subscriber.
+
+rospy registers topics and shakes hands with subscribers; from there on the sockets belong to the loop thread. A message
+is serialised once and handed to each connection with a non-blocking send. What a socket takes only in part is kept and
+goes first the next time; a connection that is still full loses the newest message. Nothing here imports rospy, so the
+sockets can be tested with plain pairs.
+"""
+import collections
+import contextlib
+import ctypes
+import errno
+import os
+import socket
+import struct
+from io import BytesIO
+
+_LENGTH = struct.Struct("<I")
+_FLAGS = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
+
+# send(2) called without giving up the interpreter. It never blocks, and Python's own socket.send lets other threads run
+# at every call: with a thread that computes and ten subscribers, a tick would wait for that thread ten times over.
+_send = ctypes.PyDLL(None, use_errno=True).send
+_send.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_size_t, ctypes.c_int]
+_send.restype = ctypes.c_ssize_t
+_FULL = (errno.EAGAIN, errno.EWOULDBLOCK, errno.EINTR)
+
+# Send buffer of a connection [bytes]. The kernel's own would let a subscriber that stopped reading find minutes of old
+# messages when it comes back; larger messages go out in parts, one part a tick.
+SEND_BUFFER_BYTES = 128 * 1024
+
+
+class Peer:
+    """The sending end of one subscriber's connection."""
+
+    __slots__ = ("transport", "dropped", "_socket", "_rest")
+
+    def __init__(self, transport):
+        """``transport``: rospy's connection object (``socket``, ``close()``, ``stat_bytes``, ``stat_num_msg``)."""
+        self.transport = transport
+        self.dropped = 0
+        self._rest = None
+        self._socket = transport.socket
+        if self._socket is not None:
+            # Small messages go out at once instead of waiting for the acknowledgement of the one before.
+            with contextlib.suppress(OSError):
+                self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            with contextlib.suppress(OSError):
+                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+
+    @property
+    def has_rest(self):
+        """True while a part of a message is still to be sent."""
+        return self._rest is not None
+
+    def send(self, data):
+        """Send the framed message ``data`` or drop it. Raises ``OSError`` when the connection is dead."""
+        if self._rest is not None:
+            self.flush()
+            if self._rest is not None:
+                self.dropped += 1
+                return
+        sent = self._send(data)
+        if sent == 0:
+            self.dropped += 1
+            return
+        if sent < len(data):
+            self._rest = data[sent:]
+        self.transport.stat_num_msg += 1
+
+    def flush(self):
+        """Send what is left of a message, as far as the socket takes it. Raises ``OSError`` when it is dead."""
+        if self._rest is not None:
+            self._rest = self._rest[self._send(self._rest):] or None
+
+    def _send(self, data):
+        if self._socket is None:
+            raise OSError("connection closed")
+        sent = _send(self._socket.fileno(), data, len(data), _FLAGS)
+        if sent < 0:
+            code = ctypes.get_errno()
+            if code in _FULL:
+                return 0
+            raise OSError(code, os.strerror(code))
+        self.transport.stat_bytes += sent
+        return sent
+
+
+class LoopPublisher:
+    """One topic, published from the loop thread.
+
+    Until :meth:`attach` gave it rospy's side of the topic it has no listeners and publishing only fills the latch.
+    """
+
+    def __init__(self, hub, topic, msg_class, latch=False, greet=False):
+        """``latch`` as in ROS; ``greet`` gives late joiners the last message, unannounced."""
+        self.topic = topic
+        self.msg_class = msg_class
+        self.latch = latch
+        self._hub = hub
+        self._keep_last = latch or greet
+        self._has_header = getattr(msg_class, "_has_header", False)
+        self._buffer = BytesIO()
+        self._seq = 0
+        self._last = None
+        self._impl = None
+        self._known = None
+        self._peers = []
+        self._release = None
+
+    def attach(self, impl, release):
+        """Begin to serve rospy's publisher ``impl`` (its ``connections``); ``release()`` ends the registration."""
+        self._release = release
+        self._impl = impl
+        self._hub.attention.append(self)
+
+    @property
+    def has_listeners(self):
+        """True while somebody is connected."""
+        impl = self._impl
+        return impl is not None and bool(impl.connections)
+
+    def publish(self, message):
+        """Send ``message`` to everybody who is connected; costs next to nothing when nobody is."""
+        impl = self._impl
+        if self._keep_last or (impl is not None and impl.connections):
+            self.publish_serialized(self._serialize(message))
+
+    def publish_serialized(self, data):
+        """Send a message that is already framed: its length as little-endian uint32, then its bytes."""
+        impl = self._impl
+        if impl is not None:
+            connections = impl.connections
+            # Before the latch changes: who has joined since gets this message once, not the one before as well.
+            if connections is not self._known:
+                self._adopt(connections)
+            dead = None
+            for peer in self._peers:
+                try:
+                    peer.send(data)
+                except OSError:
+                    dead = [*(dead or ()), peer]
+                    continue
+                if peer.has_rest:
+                    self._hub.backlog.add(self)
+            if dead:
+                self._bury(dead)
+        if self._keep_last:
+            self._last = data
+
+    def greet(self):
+        """Send the last message to connections that came after it."""
+        impl = self._impl
+        if impl is None or impl.connections is self._known:
+            return
+        dead = []
+        for peer in self._adopt(impl.connections):
+            if self._last is None:
+                continue
+            try:
+                peer.send(self._last)
+            except OSError:
+                dead.append(peer)
+            if peer.has_rest:
+                self._hub.backlog.add(self)
+        self._bury(dead)
+
+    def flush(self):
+        """Send what is left of earlier messages. Returns True while something still is."""
+        dead = []
+        for peer in self._peers:
+            try:
+                peer.flush()
+            except OSError:
+                dead.append(peer)
+        self._bury(dead)
+        return any(peer.has_rest for peer in self._peers)
+
+    def close(self):
+        """Stop publishing and give the registration back."""
+        self._impl = self._known = None
+        self._peers = []
+        self._hub.backlog.discard(self)
+        release, self._release = self._release, None
+        if release is not None:
+            release()
+
+    def _adopt(self, connections):
+        """Follow rospy's list of connections (a new list at every change); return the peers that are new."""
+        known = {id(peer.transport): peer for peer in self._peers}
+        self._peers = [known.get(id(connection)) or Peer(connection) for connection in connections]
+        self._known = connections
+        return [peer for peer in self._peers if id(peer.transport) not in known]
+
+    def _bury(self, dead):
+        for peer in dead:
+            self._peers.remove(peer)
+            with contextlib.suppress(Exception):  # rospy logs what goes wrong in closing a broken connection
+                peer.transport.close()
+
+    def _serialize(self, message):
+        if self._has_header:
+            self._seq += 1
+            message.header.seq = self._seq
+        buffer = self._buffer
+        buffer.seek(4)
+        message.serialize(buffer)
+        end = buffer.tell()
+        buffer.seek(0)
+        buffer.write(_LENGTH.pack(end - 4))
+        buffer.truncate(end)
+        return buffer.getvalue()
+
+
+class PublisherHub:
+    """What the loop does for all its publishers, once per turn."""
+
+    def __init__(self):
+        """No publishers yet."""
+        #: Publishers with a new connection; other threads append, the loop takes.
+        self.attention = collections.deque()
+        #: Publishers with parts of messages still to send; loop thread only.
+        self.backlog = set()
+
+    def service(self):
+        """Greet new listeners and go on with messages that were sent in part."""
+        while self.attention:
+            self.attention.popleft().greet()
+        if self.backlog:
+            for publisher in list(self.backlog):
+                if not publisher.flush():
+                    self.backlog.discard(publisher)

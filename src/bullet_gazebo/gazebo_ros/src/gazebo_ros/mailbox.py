@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How other threads reach the loop: they post, the loop takes. ROS-free.
+
+Commands go into a :class:`Mailbox` (only the newest counts) or a :class:`Queue` (each one counts), requests into the
+:class:`RequestBoard`, which answers each with a ``Future`` of its own.
+"""
+import collections
+import threading
+from concurrent.futures import CancelledError, Future
+
+
+class Mailbox:
+    """Newest wins: a later message replaces one that was not taken yet."""
+
+    def __init__(self):
+        """Empty."""
+        #: Messages delivered since the start; read by the lock-step service.
+        self.delivered = 0
+        # A deque of one: append and pop are atomic, so no message is lost between the threads.
+        self._newest = collections.deque(maxlen=1)
+
+    def put(self, message):
+        """Any thread: post a message."""
+        self._newest.append(message)
+        self.delivered += 1
+
+    def take(self):
+        """Loop thread: the newest message since the last call, or None."""
+        return self._newest.pop() if self._newest else None
+
+    def close(self):
+        """Drop what is left."""
+        self._newest.clear()
+
+
+class Queue:
+    """Each message counts: oldest first, up to ``depth`` unread ones; beyond that the oldest are lost and counted."""
+
+    def __init__(self, depth):
+        """``depth``: how many unread messages are kept."""
+        if depth < 1:
+            raise ValueError("queue depth is %r, expected at least 1" % (depth,))
+        self.delivered = 0
+        self.lost = 0
+        self._messages = collections.deque(maxlen=depth)
+
+    def put(self, message):
+        """Any thread: post a message."""
+        if len(self._messages) == self._messages.maxlen:
+            self.lost += 1
+        self._messages.append(message)
+        self.delivered += 1
+
+    def drain(self):
+        """Loop thread: all unread messages, oldest first."""
+        messages = []
+        while self._messages:
+            messages.append(self._messages.popleft())
+        return messages
+
+    def close(self):
+        """Drop what is left."""
+        self._messages.clear()
+
+
+class RequestBoard:
+    """Calls that other threads want made in the loop thread."""
+
+    def __init__(self):
+        """Open, no requests."""
+        self._requests = collections.deque()
+        self._lock = threading.Lock()
+        self._wake = threading.Event()
+        self._closed = False
+
+    def submit(self, function, *arguments):
+        """Any thread: have ``function(*arguments)`` called between two ticks; returns a ``Future``."""
+        future = Future()
+        with self._lock:
+            if self._closed:
+                future.cancel()
+                return future
+            self._requests.append((future, function, arguments))
+        self._wake.set()
+        return future
+
+    def call(self, function, *arguments):
+        """Any other thread: submit and wait; returns or raises what the function does.
+
+        Raises :class:`LoopEnded` when the loop stops before it answers.
+        """
+        try:
+            return self.submit(function, *arguments).result()
+        except CancelledError:
+            raise LoopEnded("the simulator is shutting down") from None
+
+    def run_pending(self):
+        """Loop thread: answer every request that is there by now. Returns how many there were."""
+        if not self._requests:
+            return 0
+        count = len(self._requests)
+        for _ in range(count):
+            future, function, arguments = self._requests.popleft()
+            if not future.set_running_or_notify_cancel():
+                continue
+            try:
+                future.set_result(function(*arguments))
+            except Exception as error:  # noqa: BLE001  (whatever it is, it belongs to the one who asked)
+                future.set_exception(error)
+        return count
+
+    def wait(self, timeout_s):
+        """Loop thread, while nothing moves: sleep until a request comes or the time [s] is over."""
+        if self._wake.wait(timeout_s):
+            self._wake.clear()
+
+    def close(self):
+        """Cancel what is pending and refuse what comes later."""
+        with self._lock:
+            self._closed = True
+            pending, self._requests = self._requests, collections.deque()
+        for future, _, _ in pending:
+            future.cancel()
+
+
+class LoopEnded(Exception):
+    """The loop stopped before it could answer."""

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a model plugin is: the piece of Python that a URDF's ``<plugin filename="...">`` brings into the world.
+
+A plugin lives in the loop thread. Everything it is given here may be called from there and from nowhere else; the only
+things other threads touch are the mailboxes and queues that the context hands out. Nothing it can call blocks: topics
+and services are registered with the ROS master by a thread of their own, messages are sent without waiting.
+"""
+
+
+class PluginError(Exception):
+    """A plugin cannot serve this model; the text says what was found and what would be right."""
+
+
+class ModelPlugin:
+    """Base class of all model plugins.
+
+    Per tick the loop calls ``update`` of every plugin, makes one physics step, and calls ``publish`` of every plugin.
+    Times are simulation seconds since the start of the world; ``dt`` is the length of a tick [s].
+    A plugin that raises is reported once with its traceback and left out from then on; the world goes on.
+    """
+
+    @classmethod
+    def spawn_options(cls, robot, element):
+        """Keyword arguments that ``bullet_sim.World.spawn`` shall get for a model with this plugin.
+
+        Called before the model exists, with the ``urdf_model.Robot`` and the ``<plugin>`` element. A robot that is
+        bolted to the floor answers ``{"static": True}``; one with its own self-collision table adds
+        ``self_collision_pairs``.
+
+        Runs in a service thread (not in the loop), so slow work such as computing tables belongs here.
+        """
+        return {}
+
+    def __init__(self, context):
+        """Runs in the loop thread at spawn, after a start configuration (``spawn_model -J``) is in place.
+
+        Raise :class:`PluginError` to refuse the model. ``context`` is a :class:`PluginContext`.
+        """
+        self.context = context
+
+    def update(self, time_s, dt):
+        """Before the physics step: read the state, command the drives. ``time_s`` is the time the step starts at."""
+
+    def publish(self, time_s):
+        """After the physics step: publish what is due. ``time_s`` is the time that the step reached."""
+
+    def joints_set(self):
+        """A service has put the model's joints elsewhere (set_model_configuration); targets may want to follow."""
+
+    def reset(self):
+        """The world was put back to its start. After ``reset_simulation`` the next ``time_s`` is smaller."""
+
+    def close(self):
+        """The model is being deleted or the node ends. Topics and services of the context are closed after this."""
+
+
+class PluginContext:
+    """What one plugin of one model is given.
+
+    Attributes
+    ----------
+    world, model :
+        ``bullet_sim.World`` and the ``bullet_sim.Model`` this plugin belongs to.
+    robot :
+        ``urdf_model.Robot`` of the model.
+    element :
+        The ``<plugin>`` element (ElementTree).
+    namespace : str
+        The plugin's ``robotNamespace``, absolute and without trailing slash ("" for the root namespace).
+    urdf_xml : str
+        The robot description as it was spawned.
+    log :
+        ``info``, ``warn``, ``error`` and ``*_throttle(period_s, text)``; never blocks the loop.
+    """
+
+    def __init__(self, world, model, robot, element, namespace, urdf_xml, log, ros, parameters):
+        """``ros`` makes the communication objects (see :mod:`gazebo_ros.ros_objects`); ``parameters`` is the tree of
+        the parameter server at spawn time."""
+        self.world = world
+        self.model = model
+        self.robot = robot
+        self.element = element
+        self.namespace = namespace
+        self.urdf_xml = urdf_xml
+        self.log = log
+        self._ros = ros
+        self._parameters = parameters
+        self._opened = []
+
+    def resolve(self, name):
+        """Absolute ROS name: relative names live in the plugin's namespace."""
+        if name.startswith("/"):
+            return name
+        return "%s/%s" % (self.namespace, name)
+
+    def publisher(self, topic, msg_class, latch=False):
+        """A :class:`gazebo_ros.loop_publisher.LoopPublisher`; ``has_listeners`` and ``publish`` are for the loop."""
+        return self._opening(self._ros.publisher(self.resolve(topic), msg_class, latch=latch))
+
+    def mailbox(self, topic, msg_class):
+        """A subscription of which only the newest message counts: ``take()`` -> message or None."""
+        return self._opening(self._ros.mailbox(self.resolve(topic), msg_class))
+
+    def queue(self, topic, msg_class, depth):
+        """A subscription that loses nothing up to ``depth`` unread messages: ``drain()`` -> list, oldest first."""
+        return self._opening(self._ros.queue(self.resolve(topic), msg_class, depth))
+
+    def service(self, name, srv_class, handler):
+        """Advertise a service; ``handler(request)`` runs in the loop thread between two ticks."""
+        return self._opening(self._ros.service(self.resolve(name), srv_class, handler))
+
+    def service_in_thread(self, name, srv_class, handler):
+        """Advertise a service that may take its time; ``handler(request)`` runs in a thread of its own.
+
+        It reaches the model through :meth:`call_in_loop` only.
+        """
+        return self._opening(self._ros.service_in_thread(self.resolve(name), srv_class, handler))
+
+    def call_in_loop(self, function, *arguments):
+        """Any thread but the loop's: have ``function(*arguments)`` called between two ticks; returns or raises what it
+        does. Raises ``rospy.ServiceException`` when the loop ends before."""
+        return self._ros.call_in_loop(function, *arguments)
+
+    def flush(self):
+        """Any thread but the loop's: wait until the topics and services opened so far are known to the ROS master."""
+        self._ros.flush()
+
+    def branch(self):
+        """A context for a part of the plugin that opens topics and services, and closes them, on its own."""
+        return PluginContext(self.world, self.model, self.robot, self.element, self.namespace, self.urdf_xml, self.log,
+                             self._ros, self._parameters)
+
+    def param(self, name, default=None):
+        """Value of a ROS parameter as it was when the model was spawned; relative names as in :meth:`resolve`."""
+        branch = self._parameters
+        for part in self.resolve(name).strip("/").split("/"):
+            if not isinstance(branch, dict) or part not in branch:
+                return default
+            branch = branch[part]
+        return branch
+
+    def element_text(self, tag, default=None):
+        """Stripped text of a child of the ``<plugin>`` element, or ``default`` where it is missing or empty."""
+        text = self.element.findtext(tag)
+        return text.strip() if text and text.strip() else default
+
+    def close(self):
+        """Close every topic and service that was opened through this context."""
+        while self._opened:
+            self._opened.pop().close()
+
+    def _opening(self, opened):
+        self._opened.append(opened)
+        return opened

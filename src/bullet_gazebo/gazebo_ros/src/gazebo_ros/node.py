@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The /gazebo node: reads its parameters, builds the loop and what hangs on it, runs it, cleans up."""
+import contextlib
+import gc
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+
+import rosgraph
+import rospkg
+import rospy
+
+from bullet_sim import BulletSimError, World
+from gazebo_ros import snapshot
+from gazebo_ros.gazebo_services import GazeboServices
+from gazebo_ros.loop_log import LoopLog
+from gazebo_ros.loop_publisher import PublisherHub
+from gazebo_ros.mailbox import RequestBoard
+from gazebo_ros.model_plugin import PluginError
+from gazebo_ros.plugin_table import PluginTable
+from gazebo_ros.publications import Publications
+from gazebo_ros.resources import ResourceFinder, model_folders
+from gazebo_ros.ros_objects import RosObjects
+from gazebo_ros.simulation import Simulation
+from gazebo_ros.single_instance import refusal, running_instance
+from gazebo_ros.spawning import Spawner
+from gazebo_ros.world_file import WorldFileError, find_world, read_world
+from sdf_model import ModelFolders
+
+# How long threads may hold the interpreter [s]. PyBullet keeps it during a step, and with the default of 5 ms one busy
+# thread would cost the loop more than half of its time.
+_SWITCH_INTERVAL_S = 0.0005
+# How long the threads of rospy get to end after the loop has [s].
+_THREADS_END_S = 0.3
+
+
+def main(argv=None):
+    """Run the simulator until a signal or a shutdown request ends it; returns the exit code."""
+    argv = sys.argv if argv is None else argv
+    name = rosgraph.names.load_mappings(argv).get("__name", "gazebo")
+    namespace = rosgraph.names.get_ros_namespace(argv=argv)
+    node_name = rosgraph.names.ns_join(namespace, name)
+    try:
+        found = running_instance(node_name)
+    except OSError as error:
+        print("No ROS master at %s (%s): start roscore or use roslaunch." % (rosgraph.get_master_uri(), error),
+              file=sys.stderr)
+        return 1
+    if found is not None:
+        print(refusal(node_name, *found), file=sys.stderr)
+        return 1
+
+    ending = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ending.set())
+    rospy.init_node(name, argv=argv, disable_rostime=True, disable_signals=True)
+    rospy.rostime._set_rostime(rospy.Time(0, 0))
+    if not rospy.has_param("/use_sim_time"):
+        rospy.set_param("/use_sim_time", True)
+
+    sys.setswitchinterval(_SWITCH_INTERVAL_S)
+    log = LoopLog({"info": rospy.loginfo, "warn": rospy.logwarn, "error": rospy.logerr})
+    code = 1
+    try:
+        with contextlib.ExitStack() as cleanup:
+            simulation = _build(log, cleanup)
+            gc.freeze()
+            simulation.run(lambda: ending.is_set() or rospy.is_shutdown())
+            code = 0
+    except (WorldFileError, PluginError, BulletSimError, ValueError) as error:
+        log.error(str(error))
+    finally:
+        _end(log, code)
+    return code
+
+
+def _build(log, cleanup):
+    """Everything from the parameters to a simulation that is ready to run; what must be undone goes on ``cleanup``."""
+    packages = rospkg.RosPack()
+    share = packages.get_path("gazebo_ros")
+    world_name = rospy.get_param("~world_name", "worlds/empty.world")
+    folders = ModelFolders(model_folders(packages))
+    description = read_world(find_world(world_name, [share, *_resource_folders()]), folders)
+    if description.warning:
+        log.warn(description.warning)
+    for problem in description.problems:
+        log.error(problem)
+    table = PluginTable.from_yaml(os.path.join(share, "config", "model_plugins.yaml"),
+                                  rospy.get_param("~model_plugins", None))
+    finder = ResourceFinder(packages)
+
+    snapshot.remove_stale()
+    writer = snapshot.SnapshotWriter()
+    cleanup.callback(writer.close)
+    world = World(time_step_s=description.time_step_s, gravity=description.gravity,
+                  seed=int(rospy.get_param("~seed", 0)), find_mesh=finder, warn=log.warn)
+    cleanup.callback(world.close)
+
+    hub, board = PublisherHub(), RequestBoard()
+    cleanup.callback(board.close)
+    ros = RosObjects(hub, board, log)
+    simulation = Simulation(world, board, log, real_time_factor=float(rospy.get_param("~real_time_factor", 1.0)),
+                            paused=bool(rospy.get_param("~paused", False)), deliveries=ros.deliveries)
+    publications = Publications(simulation, ros, writer, log,
+                                clock_rate=float(rospy.get_param("~clock_rate", 1.0 / description.time_step_s)))
+    spawner = Spawner(simulation, table, ros, finder, folders, log,
+                      on_change=lambda: _tell_viewers(writer, publications, world, spawner))
+    services = GazeboServices(simulation, spawner, description.lights, ros, log)
+    spawner.spawn_world(description.models)
+    _tell_viewers(writer, publications, world, spawner)
+    rospy.set_param("~snapshot", str(writer.folder))
+    ros.flush()
+
+    def on_turn():
+        hub.service()
+        publications.on_turn()
+        services.take_commands()
+
+    simulation.on_turn = on_turn
+    simulation.before_step = services.push
+    simulation.on_tick = publications.on_tick
+    simulation.on_time_reset = publications.time_was_reset
+    cleanup.callback(simulation.unhost)
+    return simulation
+
+
+def _resource_folders():
+    return [folder for folder in os.environ.get("GAZEBO_RESOURCE_PATH", "").split(":") if folder]
+
+
+def _tell_viewers(writer, publications, world, spawner):
+    writer.write_scene([{"name": model.name, "joints": list(model.joint_names),
+                         "urdf": spawner.drawings.get(model.name)} for model in world.models.values()])
+    publications.write_snapshot()
+
+
+def _end(log, code):
+    """Leave the ROS graph and the process, whatever rospy's threads are waiting for."""
+    rospy.signal_shutdown("the simulator ends")
+    log.close()
+    deadline = time.monotonic() + _THREADS_END_S
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread() and not thread.daemon:
+            thread.join(max(0.0, deadline - time.monotonic()))
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # A subscription that is still connecting to a node which does not answer would keep the process for a minute.
+    os._exit(code)

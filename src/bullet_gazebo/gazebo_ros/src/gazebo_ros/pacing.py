@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeping simulation time in step with wall time, and measuring how well that works. ROS-free."""
+import time
+
+# A stall longer than this is not made up for: simulation time then stays behind for good [s].
+MAX_DEBT_S = 0.2
+# While it makes up for a stall the world runs at most this many times as fast as asked.
+MAX_CATCH_UP = 2.0
+# Flat out, the loop lets other threads have the interpreter once in this many ticks.
+YIELD_EVERY = 10
+
+
+class Pacer:
+    """Lets one tick after another happen at the right wall time.
+
+    ``step_s`` is the simulated length of a tick [s], ``real_time_factor`` how many of them fit into their own length
+    (0: as many as the machine manages). ``clock`` and ``sleep`` are replaceable for tests.
+    """
+
+    def __init__(self, step_s, real_time_factor=1.0, clock=time.perf_counter, sleep=time.sleep):
+        """Raises ``ValueError`` for a step that is not positive and for a negative factor."""
+        if not step_s > 0.0:
+            raise ValueError("the time step is %r s, expected a positive number" % (step_s,))
+        if not real_time_factor >= 0.0:
+            raise ValueError("real_time_factor is %r, expected 1.0 for real time, another positive number, or 0 for as "
+                             "fast as possible" % (real_time_factor,))
+        self.real_time_factor = real_time_factor
+        self._period = step_s / real_time_factor if real_time_factor else 0.0
+        self._clock = clock
+        self._sleep = sleep
+        self._count = 0
+        self.restart()
+
+    def restart(self):
+        """Forget what is owed: time counts from now on. For the start and after a pause."""
+        self._due = self._last = self._clock()
+
+    def wait(self):
+        """Sleep until the next tick is due. Called once after every tick."""
+        if not self._period:
+            self._count += 1
+            if self._count % YIELD_EVERY == 0:
+                self._sleep(0)
+            return
+        now = self._clock()
+        self._due += self._period
+        if now - self._due > MAX_DEBT_S:
+            self._due = now - MAX_DEBT_S
+        wake = max(self._due, self._last + self._period / MAX_CATCH_UP)
+        if wake > now:
+            self._sleep(wake - now)
+            now = self._clock()
+        self._last = now
+
+
+class RateMeter:
+    """Real-time factor over consecutive windows of wall time."""
+
+    def __init__(self, window_s=1.0, clock=time.perf_counter):
+        """``window_s``: length of a window [s]."""
+        self._window = window_s
+        self._clock = clock
+        self.restart(0.0)
+
+    def restart(self, time_s):
+        """Start a window at simulation time ``time_s`` [s]: after a pause, which is no slowness, or a reset."""
+        self._wall_start = self._clock()
+        self._sim_start = time_s
+
+    def update(self, time_s):
+        """The real-time factor of the window that ends now, or None while it is still open."""
+        elapsed = self._clock() - self._wall_start
+        if elapsed < self._window:
+            return None
+        factor = (time_s - self._sim_start) / elapsed
+        self.restart(time_s)
+        return factor
+
+
+class SlownessWatch:
+    """Decides when a low real-time factor is worth a warning: several windows in a row, then not again for a while."""
+
+    def __init__(self, threshold=0.95, windows=3, quiet_windows=10):
+        """Below ``threshold`` times the factor that was asked for a window counts as slow."""
+        self._threshold = threshold
+        self._windows = windows
+        self._quiet = quiet_windows
+        self._slow = 0
+
+    def is_news(self, factor, wanted):
+        """Take in one window's factor and the one asked for; True when it is time to warn."""
+        if factor >= self._threshold * wanted:
+            self._slow = 0
+            return False
+        self._slow += 1
+        return self._slow >= self._windows and (self._slow - self._windows) % self._quiet == 0

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which Python class stands behind the file name of a model plugin."""
+import importlib
+import os
+
+import yaml
+
+from gazebo_ros.model_plugin import ModelPlugin, PluginError
+
+
+class PluginTable:
+    """File name of a plugin -> ``"module:Class"``, imported when first asked for."""
+
+    def __init__(self, entries):
+        """``entries``: mapping of file names to "module:Class"; a wrong entry raises :class:`PluginError`."""
+        if not isinstance(entries, dict):
+            raise PluginError("the table of model plugins is %s, expected a mapping of file name to module:Class"
+                              % type(entries).__name__)
+        for filename, target in entries.items():
+            if not isinstance(target, str) or target.count(":") != 1 or not all(target.split(":")):
+                raise PluginError("model plugin %s: found %r, expected \"module:Class\"" % (filename, target))
+        self._entries = dict(entries)
+        self._classes = {}
+
+    @classmethod
+    def from_yaml(cls, path, extra=None):
+        """The table of a YAML file, with the entries of the mapping ``extra`` added or replaced."""
+        with open(path, encoding="utf-8") as file:
+            entries = yaml.safe_load(file) or {}
+        if extra is not None and not isinstance(extra, dict):
+            raise PluginError("~model_plugins is %r, expected a mapping of file name to module:Class" % (extra,))
+        return cls({**entries, **(extra or {})})
+
+    @property
+    def known(self):
+        """Sorted file names."""
+        return sorted(self._entries)
+
+    def find(self, filename):
+        """The plugin class for ``<plugin filename=...>``, or None for a file name that is not in the table.
+
+        A path in front of the file name does not count. An entry that cannot be imported, or that is no
+        ``ModelPlugin``, raises :class:`PluginError`.
+        """
+        key = os.path.basename(filename)
+        if key not in self._entries:
+            return None
+        if key not in self._classes:
+            self._classes[key] = self._load(key, self._entries[key])
+        return self._classes[key]
+
+    @staticmethod
+    def _load(key, target):
+        module_name, class_name = target.split(":")
+        try:
+            loaded = getattr(importlib.import_module(module_name), class_name)
+        except (ImportError, AttributeError) as error:
+            raise PluginError("model plugin %s: cannot load %s: %s" % (key, target, error)) from error
+        if not (isinstance(loaded, type) and issubclass(loaded, ModelPlugin)):
+            raise PluginError("model plugin %s: %s is not a subclass of gazebo_ros.model_plugin.ModelPlugin"
+                              % (key, target))
+        return loaded

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What /gazebo itself publishes, tick by tick: the clock, the states of models and links, how fast it runs, and the
+snapshot for viewers."""
+import struct
+import time
+
+import rospy
+from gazebo_msgs.msg import LinkStates, ModelStates, PerformanceMetrics
+from rosgraph_msgs.msg import Clock
+
+from gazebo_ros.convert import msg_from_pose, msg_from_twist
+from gazebo_ros.pacing import RateMeter, SlownessWatch
+
+_CLOCK_MESSAGE = struct.Struct("<III")
+_CLOCK_BYTES = 8
+# Faster than real time the clock is not published at every tick: at most this often per wall second [Hz].
+MAX_WALL_CLOCK_RATE = 500.0
+# Model and link states and the snapshot go out at this rate, in simulation time [Hz].
+STATES_RATE = 100.0
+# How often the snapshot is written in a paused world, where services still move things [Hz, wall time].
+PAUSED_SNAPSHOT_RATE = 20.0
+
+
+class Publications:
+    """Call :meth:`on_tick` after each tick, :meth:`on_turn` at each turn of the loop."""
+
+    def __init__(self, simulation, ros, snapshot, log, clock_rate):
+        """``clock_rate`` [Hz] divides the tick rate; raises ``ValueError`` otherwise.
+
+        ``snapshot``: :class:`SnapshotWriter`.
+        """
+        tick_rate = 1.0 / simulation.step_s
+        self._clock_divisor = round(tick_rate / clock_rate) if clock_rate > 0.0 else 0
+        if not self._clock_divisor or abs(self._clock_divisor * clock_rate - tick_rate) > 1e-6 * tick_rate:
+            raise ValueError("clock_rate is %g Hz, expected a divisor of the tick rate, %g Hz"
+                             % (clock_rate, tick_rate))
+        self._states_divisor = max(1, round(tick_rate / STATES_RATE))
+        self._simulation = simulation
+        self._snapshot = snapshot
+        self._log = log
+        self._meter = RateMeter()
+        self._watch = SlownessWatch()
+        self._rospy_time_changed = rospy.rostime.get_rostime_cond()
+        self._clock_sent_at = 0.0
+        self._snapshot_written_at = 0.0
+        self._snapshot_too_small = False
+        self._clock = ros.publisher("/clock", Clock, greet=True)
+        self._model_states = ros.publisher("/gazebo/model_states", ModelStates)
+        self._link_states = ros.publisher("/gazebo/link_states", LinkStates)
+        self._metrics = ros.publisher("/gazebo/performance_metrics", PerformanceMetrics)
+        self.publish_clock()
+
+    def on_turn(self):
+        """While the world stands still: keep that time out of the measured rate, and show what services change."""
+        if self._simulation.is_stepping:
+            return
+        self._meter.restart(self._simulation.time_s)
+        now = time.perf_counter()
+        if now - self._snapshot_written_at >= 1.0 / PAUSED_SNAPSHOT_RATE:
+            self._snapshot_written_at = now
+            self.write_snapshot()
+
+    def on_tick(self):
+        """Publish what is due at this tick."""
+        simulation = self._simulation
+        tick = simulation.tick
+        self._set_rospy_time()
+        if tick % self._clock_divisor == 0 or simulation.paused:
+            if simulation.real_time_factor == 1.0 and not simulation.paused:
+                self.publish_clock()
+            else:
+                now = time.perf_counter()
+                if now - self._clock_sent_at >= 1.0 / MAX_WALL_CLOCK_RATE:
+                    self._clock_sent_at = now
+                    self.publish_clock()
+        if tick % self._states_divisor == 0:
+            self.write_snapshot()
+            self._publish_states()
+        factor = self._meter.update(simulation.time_s)
+        if factor is not None:
+            self._report(factor)
+
+    def publish_clock(self):
+        """Send the time to everybody, now."""
+        seconds, nanoseconds = divmod(self._simulation.time_ns, 10**9)
+        self._clock.publish_serialized(_CLOCK_MESSAGE.pack(_CLOCK_BYTES, seconds, nanoseconds))
+
+    def time_was_reset(self):
+        """Simulation time has jumped back."""
+        self._meter.restart(self._simulation.time_s)
+        self._set_rospy_time()
+        self.publish_clock()
+
+    def write_snapshot(self):
+        """Put the present state where viewers read it."""
+        parts = []
+        for model in self._simulation.world.models.values():
+            pose = model.base_pose()
+            parts += (pose.position, pose.quaternion)
+            if model.joint_names:
+                parts.append(model.read_joints()[0])
+        try:
+            self._snapshot.write(self._simulation.tick, self._simulation.time_s, parts)
+        except ValueError as error:
+            if not self._snapshot_too_small:
+                self._log.warn("%s; windows and cameras stand still" % error)
+            self._snapshot_too_small = True
+
+    def _set_rospy_time(self):
+        # What rospy's own subscription to /clock would do, which this node does without.
+        rospy.rostime._rostime_current = rospy.Time(*divmod(self._simulation.time_ns, 10**9))
+        with self._rospy_time_changed:
+            self._rospy_time_changed.notify_all()
+
+    def _publish_states(self):
+        models = self._simulation.world.models
+        if self._model_states.has_listeners:
+            self._model_states.publish(ModelStates(
+                list(models), [msg_from_pose(model.base_pose()) for model in models.values()],
+                [msg_from_twist(*model.base_twist()) for model in models.values()]))
+        if self._link_states.has_listeners:
+            message = LinkStates()
+            for model in models.values():
+                for link in model.merged.links:
+                    message.name.append("%s::%s" % (model.name, link))
+                    message.pose.append(msg_from_pose(model.link_pose(link)))
+                    message.twist.append(msg_from_twist(*model.link_twist(link)))
+            self._link_states.publish(message)
+
+    def _report(self, factor):
+        simulation = self._simulation
+        if self._metrics.has_listeners:
+            metrics = PerformanceMetrics(real_time_factor=factor)
+            metrics.header.stamp = rospy.Time(*divmod(simulation.time_ns, 10**9))
+            self._metrics.publish(metrics)
+        wanted = simulation.real_time_factor
+        if not simulation.paused and self._watch.is_news(factor, wanted):
+            self._log.warn("the simulation runs at %.2f of real time instead of %g: this machine is too busy; close "
+                           "windows (gui:=false), or publish /clock less often (clock_rate:=250)" % (factor, wanted))

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the files are that URDF and world files speak of: package://, model://, file:// and plain paths."""
+import os
+from pathlib import Path
+from urllib.parse import unquote, urlparse
+
+import rospkg
+
+
+def model_folders(packages=None, environ=os.environ):
+    """Folders that ``model://NAME`` is looked for in, the user's own first, ours last. ``packages``: RosPack."""
+    listed = [Path(folder) for folder in environ.get("GAZEBO_MODEL_PATH", "").split(":") if folder]
+    ours = Path((packages or rospkg.RosPack()).get_path("gazebo_ros")) / "models"
+    return [*listed, Path.home() / ".gazebo" / "models", ours]
+
+
+class ResourceFinder:
+    """Turns resource names into paths. Callable; remembers what it found, so later calls cost a dictionary look-up."""
+
+    def __init__(self, packages=None):
+        """``packages``: a ``rospkg.RosPack`` that has looked around already, which saves doing it again."""
+        self._packages = packages or rospkg.RosPack()
+        self._model_folders = model_folders(self._packages)
+        self._found = {}
+
+    def __call__(self, name):
+        """The path of an existing file, or None."""
+        if name not in self._found:
+            self._found[name] = next((str(path) for path in self._candidates(name) if path.is_file()), None)
+        return self._found[name]
+
+    def forget_missing(self):
+        """Look again for what was not there: files appear while a lab is being written."""
+        self._found = {name: path for name, path in self._found.items() if path is not None}
+
+    def _candidates(self, name):
+        url = urlparse(name)
+        if url.scheme == "package":
+            try:
+                yield Path(self._packages.get_path(url.netloc)) / unquote(url.path).lstrip("/")
+            except rospkg.ResourceNotFound:
+                return
+        elif url.scheme == "model":
+            for folder in self._model_folders:
+                yield folder / url.netloc / unquote(url.path).lstrip("/")
+        elif url.scheme == "file":
+            yield Path("/" + (url.netloc + unquote(url.path)).lstrip("/"))
+        elif not url.scheme:
+            yield Path(name)

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Topics and services of the loop, registered with the ROS master by a thread of their own.
+
+A registration is a round trip to the master (1 to 2 ms); a robot brings about a hundred. The objects are handed out at
+once and come alive when their turn comes, so the loop never waits; :meth:`RosObjects.flush` waits for all of them.
+"""
+import queue
+import threading
+
+import rospy
+
+from gazebo_ros.loop_publisher import LoopPublisher
+from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue
+
+
+class RosObjects:
+    """Makes publishers, mailboxes, queues and services for the loop."""
+
+    def __init__(self, hub, board, log):
+        """``hub``: :class:`PublisherHub`; ``board``: :class:`RequestBoard`; ``log``: :class:`LoopLog`."""
+        self._hub = hub
+        self._board = board
+        self._log = log
+        self._jobs = queue.SimpleQueue()
+        self._inboxes = {}
+        threading.Thread(target=self._work, name="ros_registrar", daemon=True).start()
+
+    def publisher(self, topic, msg_class, latch=False, greet=False):
+        """A :class:`LoopPublisher` for the absolute name ``topic``."""
+        publisher = LoopPublisher(self._hub, topic, msg_class, latch=latch, greet=greet)
+
+        def register():
+            registration = rospy.Publisher(topic, msg_class, latch=latch, queue_size=1)
+            # rospy would put a queue and a thread between us and each connection.
+            registration.impl.set_queue_size(None)
+            registration.impl.add_subscriber_listener(_Attention(self._hub, publisher))
+            publisher.attach(registration.impl, lambda: self._jobs.put(registration.unregister))
+
+        self._jobs.put(register)
+        return publisher
+
+    def mailbox(self, topic, msg_class):
+        """A :class:`Mailbox` that messages on ``topic`` fall into."""
+        return self._subscribe(_Inbox(Mailbox(), topic, self), msg_class)
+
+    def queue(self, topic, msg_class, depth):
+        """A :class:`Queue` that messages on ``topic`` fall into."""
+        return self._subscribe(_Inbox(Queue(depth), topic, self), msg_class)
+
+    def service(self, name, srv_class, handler):
+        """Advertise ``name``; ``handler(request)`` runs in the loop thread."""
+        return self.service_in_thread(name, srv_class, lambda request: self.call_in_loop(handler, request))
+
+    def service_in_thread(self, name, srv_class, handler):
+        """Advertise ``name``; ``handler(request)`` runs in rospy's thread for the request."""
+        service = _Service(self)
+
+        def register():
+            service.registration = rospy.Service(name, srv_class, handler)
+
+        self._jobs.put(register)
+        return service
+
+    def call_in_loop(self, function, *arguments):
+        """Any thread but the loop's: have ``function(*arguments)`` called between two ticks and wait for it.
+
+        Raises ``rospy.ServiceException``, the right end for a service request, when the loop ends before.
+        """
+        try:
+            return self._board.call(function, *arguments)
+        except LoopEnded as error:
+            raise rospy.ServiceException(str(error)) from None
+
+    def deliveries(self):
+        """How many messages the loop's subscriptions have received: {topic: count}."""
+        return {topic: sum(inbox.delivered for inbox in inboxes) for topic, inboxes in list(self._inboxes.items())}
+
+    def flush(self, timeout_s=10.0):
+        """Any thread but the loop's: wait until all registrations asked for so far are done."""
+        done = threading.Event()
+        self._jobs.put(done.set)
+        return done.wait(timeout_s)
+
+    def later(self, function):
+        """Have ``function()`` called in the registration thread."""
+        self._jobs.put(function)
+
+    def _subscribe(self, inbox, msg_class):
+        self._inboxes[inbox.topic] = [*self._inboxes.get(inbox.topic, ()), inbox]
+
+        def register():
+            inbox.registration = rospy.Subscriber(inbox.topic, msg_class, inbox.put, tcp_nodelay=True)
+
+        self._jobs.put(register)
+        return inbox
+
+    def _forget(self, inbox):
+        left = [other for other in self._inboxes.get(inbox.topic, ()) if other is not inbox]
+        if left:
+            self._inboxes[inbox.topic] = left
+        else:
+            self._inboxes.pop(inbox.topic, None)
+
+    def _work(self):
+        while True:
+            job = self._jobs.get()
+            try:
+                job()
+            except Exception as error:  # noqa: BLE001  (one bad name or a lost master must not end the thread)
+                if not rospy.is_shutdown():
+                    self._log.error("cannot register with the ROS master: %s" % error)
+
+
+class _Attention(rospy.SubscribeListener):
+    """Tells the loop that a publisher has a new listener."""
+
+    def __init__(self, hub, publisher):
+        self._hub = hub
+        self._publisher = publisher
+
+    def peer_subscribe(self, topic_name, topic_publish, peer_publish):
+        self._hub.attention.append(self._publisher)
+
+
+class _Inbox:
+    """A mailbox or a queue together with its subscription."""
+
+    def __init__(self, box, topic, objects):
+        self.topic = topic
+        self.registration = None
+        self.put = box.put
+        self._box = box
+        self._objects = objects
+        if isinstance(box, Mailbox):
+            self.take = box.take
+        else:
+            self.drain = box.drain
+
+    @property
+    def delivered(self):
+        return self._box.delivered
+
+    @property
+    def lost(self):
+        return self._box.lost
+
+    def close(self):
+        self._objects._forget(self)
+        self._objects.later(lambda: self.registration.unregister())
+        self._box.close()
+
+
+class _Service:
+    """An advertised service."""
+
+    def __init__(self, objects):
+        self.registration = None
+        self._objects = objects
+
+    def close(self):
+        self._objects.later(lambda: self.registration.shutdown("closed"))

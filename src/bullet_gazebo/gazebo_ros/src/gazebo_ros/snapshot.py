@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The state of the world in shared memory, for processes that draw it. ROS-free.
+
+One folder per simulator, in memory where the system has ``/dev/shm``: ``state`` (time, and per body base pose and joint
+angles, rewritten many times a second) and ``scene.json`` (which bodies there are, rewritten when that changes). The
+simulator holds a lock on ``state``, so a folder whose lock is free was left by a dead one.
+
+``state`` begins with a header (magic, sequence number) and has two slots. The writer fills the one that is not current,
+then raises the sequence number; a slot carries its own number, zero while it is being written, so a reader that was
+overtaken notices and reads again. A slot is: number, scene revision, tick, count of values, time [s], then the values.
+Of each body, in the scene's order: position x y z [m], quaternion x y z w, joint angles [rad or m].
+"""
+import contextlib
+import fcntl
+import json
+import mmap
+import os
+import struct
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+MAGIC = 0x42475331
+#: Values that a slot holds [float64]; pages that are never written cost nothing.
+CAPACITY = 65536
+_HEADER = struct.Struct("<QQ")
+_SLOT = struct.Struct("<QQQQd")
+_SLOT_BYTES = _SLOT.size + 8 * CAPACITY
+_NUMBER = struct.Struct("<Q")
+_PREFIX = "bullet_gazebo-"
+
+
+class SnapshotError(Exception):
+    """There is no snapshot to read, or it does not fit."""
+
+
+def _shared_memory_folder():
+    return Path("/dev/shm") if os.access("/dev/shm", os.W_OK) else Path(tempfile.gettempdir())
+
+
+def remove_stale(parent=None):
+    """Delete this user's folders of simulators that are gone; returns their paths."""
+    parent = _shared_memory_folder() if parent is None else Path(parent)
+    removed = []
+    for folder in parent.glob("%s%d-*" % (_PREFIX, os.getuid())):
+        try:
+            with open(folder / "state", "rb") as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                _remove(folder)
+                removed.append(folder)
+        except FileNotFoundError:
+            # Made this moment by another simulator, or half removed: an old one is safe to delete.
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+        except OSError:
+            continue
+    return removed
+
+
+def _remove(folder):
+    for path in list(folder.glob("*")):
+        with contextlib.suppress(OSError):
+            path.unlink()
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+class SnapshotWriter:
+    """The simulator's side."""
+
+    def __init__(self, parent=None):
+        """Makes the folder (private to the user) and takes its lock."""
+        parent = _shared_memory_folder() if parent is None else Path(parent)
+        self.folder = Path(tempfile.mkdtemp(prefix="%s%d-%d-" % (_PREFIX, os.getuid(), os.getpid()), dir=parent))
+        self.revision = 0
+        self._sequence = 0
+        self._file = open(self.folder / "state", "w+b")  # noqa: SIM115  (open as long as the simulator lives)
+        fcntl.flock(self._file, fcntl.LOCK_EX)
+        size = _HEADER.size + 2 * _SLOT_BYTES
+        self._file.truncate(size)
+        self._memory = mmap.mmap(self._file.fileno(), size)
+        self._values = [np.frombuffer(self._memory, np.float64, CAPACITY, _HEADER.size + k * _SLOT_BYTES + _SLOT.size)
+                        for k in range(2)]
+        _HEADER.pack_into(self._memory, 0, MAGIC, 0)
+        self.write_scene([])
+
+    def write_scene(self, bodies):
+        """Say which bodies there are.
+
+        ``bodies``: list of dictionaries with ``name``, ``joints`` (names) and whatever a viewer needs to draw it.
+        States written from here on refer to this list.
+        """
+        self.revision += 1
+        path = self.folder / "scene.json"
+        draft = path.with_suffix(".new")
+        draft.write_text(json.dumps({"revision": self.revision, "bodies": bodies}), encoding="utf-8")
+        draft.replace(path)
+
+    def write(self, tick, time_s, parts):
+        """Write the state: ``parts`` are arrays that, one after the other, are the slot's values.
+
+        Raises ``ValueError`` when they are more than :data:`CAPACITY`.
+        """
+        number = self._sequence + 1
+        slot = number & 1
+        offset = _HEADER.size + slot * _SLOT_BYTES
+        values = self._values[slot]
+        _NUMBER.pack_into(self._memory, offset, 0)
+        count = 0
+        for part in parts:
+            end = count + len(part)
+            if end > CAPACITY:
+                raise ValueError("the world has more than %d state values, the snapshot's capacity" % CAPACITY)
+            values[count:end] = part
+            count = end
+        _SLOT.pack_into(self._memory, offset, 0, self.revision, tick, count, time_s)
+        _NUMBER.pack_into(self._memory, offset, number)
+        self._sequence = number
+        _NUMBER.pack_into(self._memory, 8, number)
+
+    def close(self):
+        """Remove the folder. Readers that have it open keep the last state."""
+        self._values = None
+        with contextlib.suppress(BufferError):
+            self._memory.close()
+        _remove(self.folder)
+        self._file.close()
+
+
+class Snapshot:
+    """One state: ``tick``, ``time_s``, ``revision`` of the scene, ``values`` (float64 array, a copy)."""
+
+    __slots__ = ("revision", "tick", "time_s", "values")
+
+    def __init__(self, revision, tick, time_s, values):
+        self.revision = revision
+        self.tick = tick
+        self.time_s = time_s
+        self.values = values
+
+
+class SnapshotReader:
+    """A viewer's side."""
+
+    def __init__(self, folder):
+        """``folder`` as the writer made it; :class:`SnapshotError` when there is none."""
+        self._folder = Path(folder)
+        try:
+            with open(self._folder / "state", "rb") as file:
+                self._memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        except (OSError, ValueError) as error:
+            raise SnapshotError("no snapshot in %s: %s" % (folder, error)) from error
+        magic, _ = _HEADER.unpack_from(self._memory, 0)
+        if magic != MAGIC:
+            raise SnapshotError("%s/state is no snapshot of this version" % folder)
+
+    @property
+    def is_alive(self):
+        """False once the simulator has removed its folder."""
+        return (self._folder / "state").exists()
+
+    def read(self):
+        """The newest complete :class:`Snapshot`, or None before the first one."""
+        while True:
+            _, number = _HEADER.unpack_from(self._memory, 0)
+            if number == 0:
+                return None
+            offset = _HEADER.size + (number & 1) * _SLOT_BYTES
+            before, revision, tick, count, time_s = _SLOT.unpack_from(self._memory, offset)
+            if before != number or count > CAPACITY:
+                continue
+            values = np.frombuffer(self._memory, np.float64, count, offset + _SLOT.size).copy()
+            if _NUMBER.unpack_from(self._memory, offset)[0] == number:
+                return Snapshot(revision, tick, time_s, values)
+
+    def scene(self):
+        """``(revision, bodies)`` as the writer's :meth:`SnapshotWriter.write_scene` said last."""
+        try:
+            scene = json.loads((self._folder / "scene.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise SnapshotError("no scene in %s: %s" % (self._folder, error)) from error
+        return scene["revision"], scene["bodies"]

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Models come and go: from a description to a model in the world with its plugins, and back.
+
+What is slow (parsing, importing plugins, looking for files) happens in the thread of the request; the loop only makes
+the bodies.
+"""
+import gc
+
+import numpy as np
+
+from bullet_sim import BulletSimError, MeshFiles, Pose, with_stand_ins
+from gazebo_ros import urdf_extras
+from gazebo_ros.model_plugin import PluginContext, PluginError
+from gazebo_ros.simulation import HostedPlugin
+from sdf_model import SdfError, parse_sdf_model
+from urdf_model import Plane, UrdfError, drawing_urdf, merge_fixed, parse_urdf
+
+
+class SpawnRefused(Exception):
+    """The model cannot be made; the text says what was found and what would be right."""
+
+
+class Prepared:
+    """A description that the loop can turn into a model. ``drawing``: URDF text for viewers, or None for a floor."""
+
+    #: Where the model stands in the frame it is spawned in (4x4), which an SDF may say itself. None: there.
+    origin = None
+
+    def __init__(self, name, xml, drawing, robot, namespace, start, plugins, parameters, options):
+        self.name = name
+        self.xml = xml
+        self.drawing = drawing
+        self.robot = robot
+        self.namespace = namespace
+        self.start = start
+        self.plugins = plugins
+        self.parameters = parameters
+        self.options = options
+
+
+class Spawner:
+    """Makes models and their plugins, and keeps the list that viewers are told."""
+
+    def __init__(self, simulation, table, ros, finder, model_folders, log, on_change):
+        """``table``: :class:`PluginTable`; ``finder``: :class:`ResourceFinder`; ``on_change()``: models changed.
+
+        ``model_folders``: ``sdf_model.ModelFolders``.
+        """
+        self._simulation = simulation
+        self._table = table
+        self._ros = ros
+        self._finder = finder
+        self._log = log
+        self._on_change = on_change
+        self.model_folders = model_folders
+        self._mesh_files = MeshFiles(finder)
+        #: What viewers draw of the models that were spawned here: {model name: URDF text, or None for a floor}.
+        self.drawings = {}
+
+    def prepare(self, name, xml, namespace, parameters):
+        """Any thread but the loop's: read a URDF. Raises :class:`SpawnRefused`.
+
+        ``parameters``: function that returns the tree of the parameter server; called when a plugin needs it.
+        """
+        self._check_name(name)
+        try:
+            robot = parse_urdf(xml, source="the description of '%s'" % name)
+        except UrdfError as error:
+            raise SpawnRefused(str(error)) from error
+        return self.prepare_robot(name, xml, robot, namespace, parameters, drawing=xml)
+
+    def prepare_sdf(self, name, xml, namespace, parameters):
+        """Any thread but the loop's: read an SDF with one model. Raises :class:`SpawnRefused`."""
+        self._check_name(name)
+        try:
+            found = parse_sdf_model(xml, "the description of '%s'" % name, self.model_folders)
+        except SdfError as error:
+            raise SpawnRefused(str(error)) from error
+        if found.warning:
+            self._log.warn("model '%s': %s" % (name, found.warning))
+        prepared = self.prepare_robot(name, xml, found.robot, namespace, parameters)
+        prepared.origin = found.pose
+        return prepared
+
+    def prepare_robot(self, name, xml, robot, namespace, parameters, drawing=None):
+        """Any thread but the loop's: the same for a ``urdf_model.Robot`` that has been read from ``xml``.
+
+        ``drawing``: URDF text for viewers where there is one already.
+        """
+        self._check_name(name)
+        try:
+            start = urdf_extras.start_configuration(robot)
+            plugins, options = self._plugins(robot, namespace)
+        except (urdf_extras.ExtrasError, PluginError) as error:
+            raise SpawnRefused(str(error)) from error
+        for warning in robot.warnings:
+            self._log.warn(warning)
+        # Reads every mesh, so that the loop finds it in the form that loads quickly.
+        self._finder.forget_missing()
+        robot, mended = with_stand_ins(robot, self._mesh_files)
+        if mended:
+            self._log.warn("model '%s': %s" % (name, mended))
+        if mended or drawing is None:
+            drawing = None if is_floor(robot) else drawing_urdf(merge_fixed(robot))
+        options = {"static": urdf_extras.is_static(robot), **options}
+        return Prepared(name, xml, drawing, robot, namespace, start, plugins, parameters() if plugins else {}, options)
+
+    def spawn(self, prepared, pose):
+        """Loop thread: make the model at ``pose`` and start its plugins. Raises :class:`SpawnRefused`."""
+        world = self._simulation.world
+        try:
+            if prepared.origin is not None:
+                pose = Pose.from_matrix(pose.checked().matrix() @ prepared.origin)
+            model = world.spawn(prepared.robot, prepared.name, pose, **prepared.options)
+        except BulletSimError as error:
+            raise SpawnRefused(str(error)) from error
+        try:
+            self._set_start(model, prepared.start)
+            self.drawings[prepared.name] = prepared.drawing
+            for plugin_class, element, namespace in prepared.plugins:
+                self._start_plugin(prepared, model.name, plugin_class, element, namespace)
+        except (PluginError, BulletSimError) as error:
+            self._remove(prepared.name)
+            raise SpawnRefused(str(error)) from error
+        except Exception:
+            self._remove(prepared.name)
+            raise
+        self._on_change()
+        # What a model brought stays as long as the model: no use in walking through it at every collection.
+        gc.freeze()
+
+    def spawn_world(self, models):
+        """Loop thread, before it runs: make the models of a world (``sdf_model.SdfModel``); logs what cannot be."""
+        for found in models:
+            try:
+                prepared = self.prepare_robot(found.name, "", found.robot, "", dict)
+                self.spawn(prepared, Pose.from_matrix(found.pose))
+            except SpawnRefused as error:
+                self._log.error("model '%s' of the world file: %s" % (found.name, error))
+
+    def delete(self, name):
+        """Loop thread: remove a model and its plugins. Raises ``BulletSimError`` when there is none of that name."""
+        if name not in self._simulation.world.models:
+            self._simulation.world.delete(name)  # raises, and knows the right text
+        self._remove(name)
+        self._on_change()
+
+    def _remove(self, name):
+        self._simulation.unhost(name)
+        self._simulation.world.delete(name)
+        self.drawings.pop(name, None)
+
+    def _set_start(self, model, start):
+        names = list(start)
+        index = model.index(names)
+        wanted = np.array([start[name] for name in names])
+        position = np.clip(wanted, model.lower[index], model.upper[index])
+        for name, asked, got in zip(names, wanted, position, strict=True):
+            if abs(asked - got) > 1e-3:
+                self._log.warn("model '%s': joint %s cannot start at %g, its limit is %g"
+                               % (model.name, name, asked, got))
+        if names:
+            model.set_joint_positions(index, position)
+            model.mark_start()
+
+    def _start_plugin(self, prepared, model_name, plugin_class, element, namespace):
+        simulation = self._simulation
+        label = element.get("filename")
+        # By name: an earlier plugin may have replaced the model by a fixed one.
+        model = simulation.world.models[model_name]
+        context = PluginContext(simulation.world, model, prepared.robot, element, namespace, prepared.xml, self._log,
+                                self._ros, prepared.parameters)
+        try:
+            plugin = plugin_class(context)
+        except Exception:
+            context.close()
+            raise
+        simulation.host(HostedPlugin(plugin, context, model_name, label))
+
+    def _plugins(self, robot, spawn_namespace):
+        found, options = [], {}
+        for element in urdf_extras.plugins(robot):
+            filename = element.get("filename") or ""
+            plugin_class = self._table.find(filename)
+            if plugin_class is None:
+                self._log.warn("model plugin '%s' is not known here and is left out; known plugins: %s"
+                               % (filename, ", ".join(self._table.known)))
+                continue
+            options.update(plugin_class.spawn_options(robot, element))
+            found.append((plugin_class, element, urdf_extras.namespace_of(element, spawn_namespace)))
+        return found, options
+
+    def _check_name(self, name):
+        if not name:
+            raise SpawnRefused("the model needs a name (model_name is empty)")
+        if name in self.drawings:
+            raise SpawnRefused("entity already exists: delete the model '%s' first or choose another name" % name)
+
+
+def is_floor(robot):
+    """Whether a ``urdf_model.Robot`` is nothing but a plane to stand on."""
+    shapes = [shape for link in robot.links.values() for shape in (*link.visuals, *link.collisions)]
+    return bool(shapes) and all(isinstance(shape.geometry, Plane) for shape in shapes)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What this node reads in the ``<gazebo>`` elements of a URDF, or of an SDF, where only we write them. ROS-free."""
+import math
+import re
+
+#: The element, inside <gazebo>, in which spawn_model hands over the joint positions of its option -J.
+START_CONFIGURATION = "start_configuration"
+
+
+class ExtrasError(Exception):
+    """A <gazebo> element cannot be used; the text says which and what would be right."""
+
+
+def plugins(robot):
+    """The ``<plugin>`` elements of all ``<gazebo>`` elements that belong to the model, not to a sensor."""
+    return [plugin for gazebo in robot.gazebo for plugin in gazebo.findall("plugin")]
+
+
+def is_static(robot):
+    """True or None (not said): ``<gazebo><static>true</static></gazebo>`` fixes a model in the world."""
+    said = [(gazebo.findtext("static") or "").strip().lower() for gazebo in robot.gazebo]
+    return True if "true" in said or "1" in said else None
+
+
+def start_configuration(robot):
+    """Joint positions {name: rad or m} of the model at its start, from ``<gazebo><start_configuration>``.
+
+    Raises :class:`ExtrasError` for unknown or repeated joints and values that are no numbers.
+    """
+    known = [joint.name for joint in robot.movable_joints()]
+    positions = {}
+    for gazebo in robot.gazebo:
+        for element in gazebo.findall("%s/joint" % START_CONFIGURATION):
+            name, text = element.get("name"), element.text or ""
+            if name not in known:
+                raise ExtrasError("start configuration: joint '%s' is not a movable joint of '%s'; joints: %s"
+                                  % (name, robot.name, ", ".join(known) or "none"))
+            if name in positions:
+                raise ExtrasError("start configuration: joint '%s' is given twice" % name)
+            try:
+                positions[name] = float(text)
+            except ValueError:
+                positions[name] = math.nan
+            if not math.isfinite(positions[name]):
+                raise ExtrasError("start configuration: joint '%s' is at '%s', expected a finite number" % (name, text))
+    return positions
+
+
+def unscoped(model_name, name):
+    """A joint or link of a model by its own name, also where it is given as Gazebo scopes it, ``model::name``."""
+    scope = model_name + "::"
+    return name[len(scope):] if name.startswith(scope) else name
+
+
+def with_start_configuration(xml, positions):
+    """The model description ``xml`` with a start configuration added. ``positions``: list of (name, value)."""
+    if not positions:
+        return xml
+    joints = "".join('<joint name="%s">%r</joint>' % (_attribute(name), float(value)) for name, value in positions)
+    block = "<gazebo><%s>%s</%s></gazebo>" % (START_CONFIGURATION, joints, START_CONFIGURATION)
+    for end in ("</robot>", "</model>"):
+        head, found, tail = xml.rpartition(end)
+        if found:
+            return head + block + end + tail
+    raise ExtrasError("joint positions need a URDF or an SDF: the description has no </robot> and no </model>")
+
+
+def namespace_of(plugin, spawn_namespace):
+    """The absolute namespace of a plugin: its own ``robotNamespace``, else the one it was spawned with."""
+    own = (plugin.findtext("robotNamespace") or "").strip()
+    name = (own or spawn_namespace or "").strip("/")
+    name = re.sub("/+", "/", name)
+    return "/" + name if name else ""
+
+
+def _attribute(text):
+    return text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node of the window: waits for the simulator, mirrors its snapshot, ends with it."""
+import os
+import signal
+import sys
+import threading
+import time
+
+import rospkg
+import rospy
+
+from gazebo_ros.snapshot import SnapshotError, SnapshotReader
+
+# Pictures a second; a robot that is watched needs no more, and without a graphics card each costs tens of ms.
+_FRAME_RATE = 20.0
+_WAIT_S = 60.0
+
+
+def main():
+    """Show the world until the simulator ends or the user closes the window; returns the exit code.
+
+    Without a display or without OpenGL says so in a line and returns 0: the lab goes on without a window.
+    """
+    # Physics comes first: the window takes what the processors have left, and software OpenGL one thread.
+    os.nice(19)
+    os.environ.setdefault("LP_NUM_THREADS", "1")
+    if not os.environ.get("DISPLAY"):
+        print("gazebo_gui: no display (DISPLAY is not set), the lab goes on without a window; rviz or gui:=false")
+        return 0
+    from gazebo_ros import window  # loads PyBullet, which is of no use without a display
+
+    if not window.can_open():
+        print("gazebo_gui: no OpenGL on display %s, the lab goes on without a window" % os.environ["DISPLAY"])
+        return 0
+
+    ending = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ending.set())
+    rospy.init_node("gazebo_gui", disable_rostime=True, disable_signals=True)
+    try:
+        _show(window, lambda: ending.is_set() or rospy.is_shutdown())
+    except (SnapshotError, rospkg.ResourceNotFound) as error:
+        print("gazebo_gui: %s" % error, file=sys.stderr)
+    rospy.signal_shutdown("the window is closed")
+    sys.stdout.flush()
+    # PyBullet's window thread is not always willing to end.
+    os._exit(0)
+
+
+def _show(window, stop):
+    from gazebo_ros.drawing import DrawingCache
+    from gazebo_ros.resources import ResourceFinder
+
+    reader = _wait_for_snapshot(stop)
+    if reader is None:
+        return
+    view = window.Window(DrawingCache(), ResourceFinder(), rospy.logwarn, frame_rate=_FRAME_RATE)
+    shown_revision = None
+    while not stop() and view.is_open and reader.is_alive:
+        started = time.monotonic()
+        snapshot = reader.read()
+        if snapshot is not None and snapshot.revision != shown_revision:
+            revision, bodies = reader.scene()
+            if revision == snapshot.revision:
+                view.set_scene(bodies, snapshot.values)
+                shown_revision = revision
+        if snapshot is not None and snapshot.revision == shown_revision:
+            view.set_state(snapshot.values)
+        time.sleep(max(0.005, 1.0 / _FRAME_RATE - (time.monotonic() - started)))
+
+
+def _wait_for_snapshot(stop):
+    """The reader of the simulator on this master; None when ``stop()``; raises ``SnapshotError`` after a minute."""
+    deadline = time.monotonic() + _WAIT_S
+    while not stop():
+        folder = rospy.get_param("/gazebo/snapshot", None)
+        try:
+            if folder is not None:
+                return SnapshotReader(folder)
+        except SnapshotError:
+            folder = None  # left by an earlier simulator
+        if time.monotonic() > deadline:
+            raise SnapshotError("no simulator on this ROS master after %.0f s" % _WAIT_S)
+        time.sleep(0.1)
+    return None

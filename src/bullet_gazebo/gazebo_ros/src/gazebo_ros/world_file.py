@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which file a world name means, and what a world that does not say more has. ROS-free."""
+from pathlib import Path
+
+from sdf_model import SdfError, parse_sdf_world
+
+#: What holds in a world that says nothing else: gravity [m/s^2], length of a tick [s].
+GRAVITY = (0.0, 0.0, -9.81)
+TIME_STEP_S = 0.002
+
+
+class WorldFileError(Exception):
+    """The world file cannot be used; the text names the file, and the line where there is one."""
+
+
+def find_world(name, folders):
+    """Path of the world file ``name``: itself if it is there, else below one of ``folders``.
+
+    Raises :class:`WorldFileError` that says where it was looked for.
+    """
+    candidates = [Path(name), *(Path(folder) / name for folder in folders)]
+    for path in candidates:
+        if path.is_file():
+            return path
+    raise WorldFileError("world file '%s' not found; looked for %s" % (name, ", ".join(map(str, candidates))))
+
+
+def read_world(path, folders):
+    """The ``sdf_model.SdfWorld`` of the file at ``path``, with gravity and step size in any case.
+
+    ``folders``: ``sdf_model.ModelFolders``. Raises :class:`WorldFileError`.
+    """
+    try:
+        world = parse_sdf_world(path, folders)
+    except SdfError as error:
+        raise WorldFileError(str(error)) from error
+    world.gravity = world.gravity or GRAVITY
+    world.time_step_s = world.time_step_s or TIME_STEP_S
+    return world

@@ -1,0 +1,320 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The services under /gazebo against the running node."""
+import math
+import subprocess
+import threading
+import time
+import unittest
+
+import rospy
+import rostest
+from bullet_sim_msgs.srv import AdvanceTicks
+from gazebo_msgs.msg import ModelState, ModelStates, PerformanceMetrics
+from gazebo_msgs.srv import (
+    DeleteModel,
+    GetModelState,
+    GetPhysicsProperties,
+    GetWorldProperties,
+    SetModelConfiguration,
+    SetModelState,
+    SetPhysicsProperties,
+    SpawnModel,
+)
+from geometry_msgs.msg import Point, Pose, Quaternion
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, String
+from std_srvs.srv import Empty, Trigger
+
+BOX = """<robot name="box"><link name="body">
+  <inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link></robot>"""
+ARM = """<robot name="arm"><link name="base"/>
+  <link name="upper"><inertial><origin xyz="0.2 0 0"/><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"><inertial><origin xyz="0.2 0 0"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" velocity="3" effort="100"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/>
+    <origin xyz="0.4 0 0"/><limit lower="-2" upper="2" velocity="3" effort="100"/></joint>
+  <gazebo><plugin name="probe" filename="libprobe.so">%s</plugin></gazebo></robot>"""
+DEADLINE_S = 15.0
+
+
+def wait_for(condition, what):
+    """Poll until ``condition()`` is true; an error that says what was awaited otherwise."""
+    end = time.monotonic() + DEADLINE_S
+    while time.monotonic() < end:
+        found = condition()
+        if found:
+            return found
+        time.sleep(0.01)
+    raise AssertionError("waited %.0f s in vain for %s" % (DEADLINE_S, what))
+
+
+class Listener:
+    """Collects messages of a topic."""
+
+    def __init__(self, topic, msg_class):
+        self.messages = []
+        self._subscriber = rospy.Subscriber(topic, msg_class, self.messages.append)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._subscriber.unregister()
+
+    def wait(self, count=1):
+        """The messages, as soon as there are ``count`` of them."""
+        wait_for(lambda: len(self.messages) >= count, "%d messages on %s" % (count, self._subscriber.name))
+        return self.messages
+
+
+class GazeboServices(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        for name, srv_class in (
+                ("spawn_urdf_model", SpawnModel), ("spawn_sdf_model", SpawnModel), ("delete_model", DeleteModel),
+                ("get_model_state", GetModelState), ("set_model_state", SetModelState),
+                ("get_world_properties", GetWorldProperties), ("set_model_configuration", SetModelConfiguration),
+                ("get_physics_properties", GetPhysicsProperties), ("set_physics_properties", SetPhysicsProperties),
+                ("pause_physics", Empty), ("unpause_physics", Empty), ("reset_world", Empty),
+                ("reset_simulation", Empty), ("advance", AdvanceTicks)):
+            proxy = rospy.ServiceProxy("/gazebo/" + name, srv_class)
+            proxy.wait_for_service(DEADLINE_S)
+            setattr(cls, name, staticmethod(proxy))
+
+    def tearDown(self):
+        self.unpause_physics()
+        for name in self.get_world_properties().model_names:
+            if name != "ground_plane":
+                self.delete_model(name)
+
+    def spawn(self, name, xml, z=0.0, namespace="", frame=""):
+        return self.spawn_urdf_model(name, xml, namespace, Pose(Point(0, 0, z), Quaternion(0, 0, 0, 1)), frame)
+
+    def spawn_ok(self, *arguments, **options):
+        response = self.spawn(*arguments, **options)
+        self.assertTrue(response.success, response.status_message)
+        self.assertEqual(response.status_message, "SpawnModel: Successfully spawned entity")
+
+    def refused(self, response, *words):
+        self.assertFalse(response.success)
+        for word in words:
+            self.assertIn(word, response.status_message)
+
+    # -- time -----------------------------------------------------------------------------------------------------
+
+    def test_clock_runs_at_500_hz_of_real_time(self):
+        with Listener("/clock", Clock) as clock:
+            clock.wait()
+            start, count = time.monotonic(), len(clock.messages)
+            clock.wait(count + 1500)
+            rate = (len(clock.messages) - count) / (time.monotonic() - start)
+            stamps = [message.clock.to_nsec() for message in clock.messages]
+        self.assertAlmostEqual(rate, 500.0, delta=15.0)
+        self.assertEqual({b - a for a, b in zip(stamps, stamps[1:], strict=False)}, {2_000_000})
+        self.assertTrue(rospy.get_param("/use_sim_time"))
+
+    def test_pause_stops_the_clock_and_a_late_listener_still_learns_the_time(self):
+        self.pause_physics()
+        before = self.get_world_properties().sim_time
+        self.assertTrue(self.get_physics_properties().pause)
+        with Listener("/clock", Clock) as clock:
+            clock.wait()
+            self.assertAlmostEqual(clock.messages[0].clock.to_sec(), before)
+            self.assertEqual(self.get_world_properties().sim_time, before)
+        self.unpause_physics()
+        wait_for(lambda: self.get_world_properties().sim_time > before, "time after unpause")
+
+    def test_reset_world_keeps_the_clock_monotonic(self):
+        self.spawn_ok("box", BOX, z=3.0)
+        start = self.get_model_state("box", "").pose.position.z
+        with Listener("/clock", Clock) as clock:
+            clock.wait(100)
+            self.reset_world()
+            self.assertAlmostEqual(self.get_model_state("box", "").pose.position.z, 3.0, delta=0.05)
+            clock.wait(len(clock.messages) + 100)
+            stamps = [message.clock.to_nsec() for message in clock.messages]
+        self.assertLessEqual(start, 3.0)
+        self.assertEqual(stamps, sorted(stamps))
+
+    def test_reset_simulation_sets_time_to_zero_and_listeners_survive(self):
+        wait_for(lambda: self.get_world_properties().sim_time > 0.5, "half a second")
+        with Listener("/clock", Clock) as clock:
+            clock.wait(10)
+            self.reset_simulation()
+            self.assertLess(self.get_world_properties().sim_time, 0.5)
+            count = len(clock.messages)
+            clock.wait(count + 100)
+            self.assertLess(clock.messages[-1].clock.to_sec(), clock.messages[0].clock.to_sec() + 1.0)
+
+    # -- lock-step --------------------------------------------------------------------------------------------------
+
+    def test_advance_moves_a_paused_world_by_exactly_so_many_ticks(self):
+        self.pause_physics()
+        start = self.advance(ticks=0)
+        done = self.advance(ticks=123)
+        self.assertTrue(done.success, done.status_message)
+        self.assertEqual(done.tick - start.tick, 123)
+        self.assertEqual((done.sim_time - start.sim_time).to_nsec(), 246_000_000)
+
+    def test_advance_waits_for_a_command(self):
+        self.spawn_ok("arm", ARM % "", namespace="/arm")
+        self.pause_physics()
+        self.refused(self.advance(1, ["/arm/target"], 0.2), "0.2 s", "/arm/target")
+        self.refused(self.advance(1, ["/arm/wrong"], 0.2), "/arm/wrong", "/arm/target")
+        publisher = rospy.Publisher("/arm/target", Float64, queue_size=1)
+        wait_for(lambda: publisher.get_num_connections() > 0, "a connection to /arm/target")
+        answers = []
+        thread = threading.Thread(target=lambda: answers.append(self.advance(500, ["/arm/target"], DEADLINE_S)))
+        thread.start()
+        publisher.publish(0.25)
+        thread.join(DEADLINE_S)
+        self.assertTrue(answers[0].success, answers[0].status_message)
+        where = eval(rospy.ServiceProxy("/arm/where", Trigger)().message)
+        self.assertAlmostEqual(where[0], 0.25, delta=0.01)
+
+    def test_advance_in_a_running_world_is_refused(self):
+        self.refused(self.advance(ticks=1), "pause_physics")
+
+    # -- models -----------------------------------------------------------------------------------------------------
+
+    def test_a_model_comes_falls_and_goes(self):
+        self.spawn_ok("box", BOX, z=0.5)
+        self.assertEqual(self.get_world_properties().model_names, ["ground_plane", "box"])
+        wait_for(lambda: abs(self.get_model_state("box", "").pose.position.z - 0.1) < 0.003, "the box to lie down")
+        state = self.get_model_state("box", "ground_plane")
+        self.assertTrue(state.success)
+        self.assertEqual(state.header.frame_id, "ground_plane")
+        deleted = self.delete_model("box")
+        self.assertEqual((deleted.success, deleted.status_message), (True, "DeleteModel: successfully deleted model"))
+        self.refused(self.delete_model("box"), "model does not exist", "ground_plane")
+        self.refused(self.get_model_state("box", ""), "box", "ground_plane")
+
+    def test_spawn_delete_spawn_of_the_same_name_gives_the_exact_pose(self):
+        self.pause_physics()
+        for k in range(20):
+            self.spawn_ok("box", BOX, z=1.0 + k)
+            self.assertAlmostEqual(self.get_model_state("box", "").pose.position.z, 1.0 + k, places=12)
+            self.assertTrue(self.delete_model("box").success)
+
+    def test_a_pose_may_be_relative_to_a_link(self):
+        self.pause_physics()
+        self.spawn_ok("arm", ARM % "", z=1.0)
+        self.spawn_ok("box", BOX, z=0.5, frame="arm::lower")
+        position = self.get_model_state("box", "").pose.position
+        # PyBullet keeps link frames in single precision.
+        self.assertAlmostEqual(position.x, 0.4, places=6)
+        self.assertAlmostEqual(position.z, 1.5, places=6)
+        self.refused(self.spawn("other", BOX, frame="arm::hand"), "arm", "hand", "lower")
+        self.refused(self.spawn("other", BOX, frame="nobody"), "nobody", "model::link")
+
+    def test_what_cannot_be_spawned_is_said(self):
+        self.spawn_ok("box", BOX)
+        self.refused(self.spawn("box", BOX), "already exists", "box")
+        self.refused(self.spawn("", BOX), "name")
+        self.refused(self.spawn("x", "<robot"), "XML")
+        self.refused(self.spawn("x", "<mujoco/>"), "<mujoco>", "<robot>")
+        self.refused(self.spawn_sdf_model("x", "<sdf version='1.6'/>", "", Pose(), ""), "<model>")
+        self.refused(self.spawn("x", BOX, z=math.nan), "finite")
+        self.refused(self.spawn("x", ARM % "<refuse>yes</refuse>"), "refused on purpose")
+        self.assertEqual(self.get_world_properties().model_names, ["ground_plane", "box"])
+
+    def test_the_state_of_a_model_can_be_set(self):
+        self.pause_physics()
+        self.spawn_ok("box", BOX)
+        state = ModelState(model_name="box", pose=Pose(Point(1, 2, 3), Quaternion(0, 0, 0, 2)))
+        state.twist.linear.x = 0.5
+        response = self.set_model_state(state)
+        self.assertEqual((response.success, response.status_message), (True, "SetModelState: set model state done"))
+        got = self.get_model_state("box", "")
+        self.assertEqual((got.pose.position.x, got.pose.position.y, got.pose.position.z), (1.0, 2.0, 3.0))
+        self.assertAlmostEqual(got.twist.linear.x, 0.5)
+        state.pose.position.x = math.inf
+        self.refused(self.set_model_state(state), "finite")
+        publisher = rospy.Publisher("/gazebo/set_model_state", ModelState, queue_size=1)
+        wait_for(lambda: publisher.get_num_connections() > 0, "a connection to /gazebo/set_model_state")
+        state.pose.position.x = -4.0
+        publisher.publish(state)
+        wait_for(lambda: self.get_model_state("box", "").pose.position.x == -4.0, "the box at x = -4")
+
+    def test_joints_can_be_set_and_stay(self):
+        self.spawn_ok("arm", ARM % "", namespace="/arm")
+        self.assertTrue(self.set_model_configuration("arm", "", ["elbow", "arm::shoulder"], [0.5, -0.25]).success)
+        where = rospy.ServiceProxy("/arm/where", Trigger)
+        with Listener("/arm/joint_states", JointState) as states:
+            states.wait(100)
+        shoulder, elbow = eval(where().message)
+        self.assertAlmostEqual(shoulder, -0.25, delta=0.002)
+        self.assertAlmostEqual(elbow, 0.5, delta=0.002)
+        self.refused(self.set_model_configuration("arm", "", ["elbow"], [0.5, 1.0]), "1 joint names but 2 positions")
+        self.refused(self.set_model_configuration("arm", "", ["knee"], [0.5]), "knee", "elbow")
+        self.refused(self.set_model_configuration("leg", "", [], []), "leg", "arm")
+
+    def test_spawn_model_puts_joints_at_their_start_before_anything_is_published(self):
+        values = {"shoulder": 0.7853981633974483, "elbow": -1.1}
+        # Gazebo's own launch files scope some joints by the model's name.
+        arguments = ["-J", "shoulder", repr(values["shoulder"]), "-J", "arm::elbow", repr(values["elbow"])]
+        command = ["rosrun", "gazebo_ros", "spawn_model", "-urdf", "-stdin"]
+        spawned = subprocess.run([*command, "-model", "arm", "-z", "1.5", "-Y", "-1e-1", "-robot_namespace", "/arm",
+                                  *arguments], input=ARM % "", text=True, timeout=30, check=False)
+        self.assertEqual(spawned.returncode, 0)
+        with Listener("/arm/first_state", JointState) as first:
+            message = first.wait()[0]
+        self.assertEqual(message.name, ["shoulder", "elbow"])
+        for name, position in zip(message.name, message.position, strict=True):
+            self.assertAlmostEqual(position, values[name], delta=2e-4)
+        self.assertAlmostEqual(self.get_model_state("arm", "").pose.position.z, 1.5)
+        self.assertAlmostEqual(self.get_model_state("arm", "").pose.orientation.z, -math.sin(0.05))
+        wrong = subprocess.run([*command, "-model", "other", "-J", "knee", "1"], input=ARM % "", text=True, timeout=30,
+                               check=False)
+        self.assertEqual(wrong.returncode, 1)
+
+    def test_a_plugin_that_breaks_leaves_the_world_running(self):
+        self.spawn_ok("arm", ARM % "", namespace="/arm")
+        publisher = rospy.Publisher("/arm/break", String, queue_size=1)
+        wait_for(lambda: publisher.get_num_connections() > 0, "a connection to /arm/break")
+        publisher.publish("now")
+        wait_for(lambda: "/arm/joint_states" not in dict(rospy.get_published_topics("/arm")), "the plugin to be closed")
+        before = self.get_world_properties().sim_time
+        wait_for(lambda: self.get_world_properties().sim_time > before, "time to go on")
+        self.assertTrue(self.delete_model("arm").success)
+
+    def test_topics_of_a_deleted_model_are_gone_and_come_back(self):
+        for _ in range(3):
+            self.spawn_ok("arm", ARM % "", namespace="/arm")
+            with Listener("/arm/joint_states", JointState) as states:
+                states.wait(3)
+            self.assertTrue(self.delete_model("arm").success)
+
+    # -- states and figures -----------------------------------------------------------------------------------------
+
+    def test_model_states_lists_all_models(self):
+        self.spawn_ok("box", BOX, z=0.1)
+        with Listener("/gazebo/model_states", ModelStates) as states:
+            wait_for(lambda: states.messages and states.messages[-1].name == ["ground_plane", "box"], "both models")
+
+    def test_the_real_time_factor_is_published(self):
+        with Listener("/gazebo/performance_metrics", PerformanceMetrics) as metrics:
+            metrics.wait(2)
+        self.assertAlmostEqual(metrics.messages[-1].real_time_factor, 1.0, delta=0.05)
+
+    def test_gravity_can_be_set(self):
+        before = self.get_physics_properties()
+        self.assertEqual((before.time_step, before.max_update_rate), (0.002, 500.0))
+        gravity = type(before.gravity)(0.0, 0.0, -1.62)
+        try:
+            self.assertTrue(self.set_physics_properties(0.002, 500.0, gravity, before.ode_config).success)
+            self.assertEqual(self.get_physics_properties().gravity.z, -1.62)
+            self.refused(self.set_physics_properties(0.001, 500.0, gravity, before.ode_config), "0.001", "0.002")
+        finally:
+            self.set_physics_properties(0.002, 500.0, before.gravity, before.ode_config)
+
+
+if __name__ == "__main__":
+    rospy.init_node("gazebo_services_test", disable_rostime=True)
+    rostest.rosrun("gazebo_ros", "gazebo_services", GazeboServices)

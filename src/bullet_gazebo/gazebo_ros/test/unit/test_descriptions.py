@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is read in URDF and world files, and light meshes for drawing."""
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gazebo_ros import drawing, urdf_extras, world_file
+from gazebo_ros.spawning import is_floor
+from gazebo_ros.urdf_extras import ExtrasError
+from sdf_model import ModelFolders
+from urdf_model import parse_urdf
+
+WORLDS = Path(__file__).resolve().parents[2] / "worlds"
+MODELS = ModelFolders([WORLDS.parent / "models"])
+URDF = """<?xml version="1.0"?>
+<robot name="arm">
+  <link name="base"/><link name="tip"/>
+  <joint name="hinge" type="continuous"><parent link="base"/><child link="tip"/></joint>
+  <gazebo><plugin name="p" filename="liba.so"><robotNamespace>/arm</robotNamespace></plugin></gazebo>
+  <gazebo reference="tip"><sensor name="s" type="ray"><plugin name="q" filename="libsensor.so"/></sensor></gazebo>
+  <gazebo><plugin name="r" filename="libb.so"/></gazebo>
+</robot>
+"""
+
+
+def test_plugins_of_sensors_are_not_plugins_of_the_model():
+    assert [plugin.get("filename") for plugin in urdf_extras.plugins(parse_urdf(URDF))] == ["liba.so", "libb.so"]
+
+
+def test_a_plugin_without_namespace_gets_the_one_it_is_spawned_with():
+    own, none = urdf_extras.plugins(parse_urdf(URDF))
+    assert urdf_extras.namespace_of(own, "/lab") == "/arm"
+    assert urdf_extras.namespace_of(none, "lab//one/") == "/lab/one"
+    assert urdf_extras.namespace_of(none, "/") == ""
+    assert urdf_extras.namespace_of(none, "") == ""
+
+
+def test_a_start_configuration_comes_back_as_it_was_given():
+    value = 0.1 + 0.2
+    robot = parse_urdf(urdf_extras.with_start_configuration(URDF, [("hinge", value)]))
+    assert urdf_extras.start_configuration(robot) == {"hinge": value}
+
+
+def test_no_start_configuration_leaves_the_description_alone():
+    assert urdf_extras.with_start_configuration(URDF, []) == URDF
+    assert urdf_extras.start_configuration(parse_urdf(URDF)) == {}
+
+
+@pytest.mark.parametrize("positions, text", [
+    ([("knee", 1.0)], "knee.*hinge"), ([("hinge", 1.0), ("hinge", 2.0)], "twice"),
+    ([("hinge", float("nan"))], "finite")])
+def test_a_wrong_start_configuration_is_named(positions, text):
+    robot = parse_urdf(urdf_extras.with_start_configuration(URDF, positions))
+    with pytest.raises(ExtrasError, match=text):
+        urdf_extras.start_configuration(robot)
+
+
+def test_start_positions_of_an_sdf_go_into_its_model():
+    sdf = urdf_extras.with_start_configuration("<sdf><model name='m'><link name='l'/></model></sdf>", [("hinge", 1.0)])
+    assert sdf.index("<link") < sdf.index("<gazebo>") < sdf.index("</model>")
+
+
+def test_start_positions_need_a_model():
+    with pytest.raises(ExtrasError, match="</robot>.*</model>"):
+        urdf_extras.with_start_configuration("<sdf/>", [("hinge", 1.0)])
+
+
+def test_static_is_said_in_a_gazebo_element():
+    assert urdf_extras.is_static(parse_urdf(URDF)) is None
+    static = URDF.replace("</robot>", "<gazebo><static>true</static></gazebo></robot>")
+    assert urdf_extras.is_static(parse_urdf(static)) is True
+
+
+def write_world(folder, content):
+    path = folder / "a.world"
+    path.write_text('<sdf version="1.6">\n<world name="w">\n%s\n</world>\n</sdf>' % content, encoding="utf-8")
+    return path
+
+
+def test_the_empty_world_has_a_floor_and_needs_no_warning():
+    world = world_file.read_world(world_file.find_world("worlds/empty.world", [WORLDS.parent]), MODELS)
+    assert ([model.name for model in world.models], world.gravity, world.time_step_s) == (
+        ["ground_plane"], (0.0, 0.0, -9.81), 0.002)
+    assert is_floor(world.models[0].robot) and [light.name for light in world.lights] == ["sun"]
+    assert (world.warning, world.problems) == ("", [])
+
+
+def test_a_world_that_says_nothing_has_the_usual_gravity_and_step(tmp_path):
+    world = world_file.read_world(write_world(tmp_path, ""), MODELS)
+    assert (world.models, world.gravity, world.time_step_s) == ([], (0.0, 0.0, -9.81), 0.002)
+
+
+def test_gravity_and_step_size_are_taken(tmp_path):
+    world = world_file.read_world(write_world(
+        tmp_path, "<gravity>0 0 -1.62</gravity><physics><max_step_size>0.001</max_step_size></physics>"), MODELS)
+    assert (world.gravity, world.time_step_s) == ((0.0, 0.0, -1.62), 0.001)
+
+
+@pytest.mark.parametrize("content, text", [
+    ("<gravity>0 0</gravity>", "line 3.*'0 0'.*3 numbers"),
+    ("<physics><max_step_size>fast</max_step_size></physics>", "line 3.*'fast'"),
+    ("<physics><max_step_size>2</max_step_size></physics>", "line 3.*2 s")])
+def test_wrong_values_are_named_with_their_line(tmp_path, content, text):
+    with pytest.raises(world_file.WorldFileError, match=text):
+        world_file.read_world(write_world(tmp_path, content), MODELS)
+
+
+def test_a_missing_world_says_where_it_was_looked_for(tmp_path):
+    with pytest.raises(world_file.WorldFileError, match="nowhere.world.*%s" % tmp_path):
+        world_file.find_world("nowhere.world", [tmp_path])
+
+
+def sphere(rings):
+    """Vertices (n, 3) and outward triangles of a unit sphere."""
+    angles = np.linspace(0.0, np.pi, rings + 1)
+    turns = np.linspace(0.0, 2.0 * np.pi, 2 * rings + 1)
+    grid = np.array([[np.sin(a) * np.cos(t), np.sin(a) * np.sin(t), np.cos(a)] for a in angles for t in turns])
+    width = len(turns)
+    faces = [f for i in range(rings) for j in range(width - 1)
+             for f in ((i * width + j, (i + 1) * width + j, (i + 1) * width + j + 1),
+                       (i * width + j, (i + 1) * width + j + 1, i * width + j + 1))]
+    return grid, np.array(faces)
+
+
+def test_thinning_out_keeps_the_shape_and_the_outside():
+    vertices, faces = sphere(60)
+    thin_vertices, thin_faces = drawing.thin_out(vertices, faces, 1000)
+    assert 300 < len(thin_faces) <= 1000
+    corners = thin_vertices[thin_faces]
+    assert np.abs(np.linalg.norm(thin_vertices[np.unique(thin_faces)], axis=1) - 1.0).max() < 0.1
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outward = (normals * corners.mean(axis=1)).sum(axis=1)
+    assert (outward > 0.0).mean() > 0.98
+
+
+def test_a_small_mesh_is_left_as_it_is():
+    vertices, faces = sphere(5)
+    assert drawing.thin_out(vertices, faces, 1000)[1] is faces
+
+
+def test_a_mesh_is_thinned_once_and_then_found_again(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    path = tmp_path / "ball.stl"
+    trimesh.Trimesh(*sphere(60)).export(str(path))
+    cache = drawing.DrawingCache(tmp_path / "cache", triangles=500)
+    part, = cache.parts(path)
+    written = Path(part.path).stat().st_mtime_ns
+    assert Path(part.path).read_text(encoding="ascii").count("\nf ") <= 500
+    assert cache.parts(path) == [part] and Path(part.path).stat().st_mtime_ns == written
+
+
+def test_an_unreadable_mesh_names_its_path(tmp_path):
+    with pytest.raises(drawing.DrawingError, match="missing.stl"):
+        drawing.DrawingCache(tmp_path).parts(tmp_path / "missing.stl")
+
+
+def test_the_core_loads_without_ros():
+    """Everything but the node and its conversions must import where there is no ROS."""
+    block = "import sys; sys.modules.update(dict.fromkeys(%r)); " % (
+        ("rospy", "rosgraph", "roslib", "gazebo_msgs", "geometry_msgs", "std_msgs", "std_srvs", "rosgraph_msgs"),)
+    names = ("pacing", "loop_publisher", "mailbox", "loop_log", "model_plugin", "plugin_table", "snapshot",
+             "simulation", "entities", "urdf_extras", "world_file", "drawing", "jobs", "spawning")
+    imports = "; ".join("import gazebo_ros.%s" % name for name in names)
+    subprocess.run([sys.executable, "-c", block + imports], check=True)

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The loop's publisher on real sockets: partial writes, full peers, dead peers, late joiners."""
+import contextlib
+import socket
+import struct
+
+import pytest
+
+from gazebo_ros.loop_publisher import LoopPublisher, PublisherHub
+
+
+class FakeTransport:
+    """What rospy hands over for one subscriber."""
+
+    def __init__(self, impl):
+        self._impl = impl
+        self.socket, self.far = socket.socketpair()
+        self.stat_bytes = self.stat_num_msg = 0
+
+    def close(self):
+        self._impl.connections = [other for other in self._impl.connections if other is not self]
+        self.socket.close()
+
+    def received(self):
+        """Everything that has arrived, as a list of whole messages; fails on a torn one."""
+        self.far.setblocking(False)
+        data = b""
+        with contextlib.suppress(BlockingIOError):
+            while chunk := self.far.recv(1 << 20):
+                data += chunk
+        self.rest = getattr(self, "rest", b"") + data
+        messages = []
+        while len(self.rest) >= 4:
+            length, = struct.unpack_from("<I", self.rest)
+            if len(self.rest) < 4 + length:
+                break
+            messages.append(self.rest[4:4 + length])
+            self.rest = self.rest[4 + length:]
+        return messages
+
+
+class FakeImpl:
+    """rospy's side of a topic: a list that is replaced at every change."""
+
+    def __init__(self):
+        self.connections = []
+
+    def connect(self):
+        transport = FakeTransport(self)
+        self.connections = [*self.connections, transport]
+        return transport
+
+
+class FakeMessage:
+    """Serialises to its own bytes."""
+
+    _has_header = False
+
+    def __init__(self, content):
+        self.content = content
+
+    def serialize(self, buffer):
+        buffer.write(self.content)
+
+
+class FakeHeader:
+    seq = 0
+
+
+class FakeStamped(FakeMessage):
+    _has_header = True
+
+    def __init__(self):
+        super().__init__(b"")
+        self.header = FakeHeader()
+
+    def serialize(self, buffer):
+        buffer.write(b"seq %d" % self.header.seq)
+
+
+@pytest.fixture
+def impl():
+    return FakeImpl()
+
+
+@pytest.fixture
+def hub():
+    return PublisherHub()
+
+
+def make(hub, impl, msg_class=FakeMessage, **options):
+    publisher = LoopPublisher(hub, "/topic", msg_class, **options)
+    publisher.attach(impl, lambda: None)
+    return publisher
+
+
+def test_every_peer_gets_every_message(hub, impl):
+    publisher, peers = make(hub, impl), [impl.connect() for _ in range(3)]
+    for text in (b"one", b"two"):
+        publisher.publish(FakeMessage(text))
+    for peer in peers:
+        assert peer.received() == [b"one", b"two"]
+        assert (peer.stat_num_msg, peer.stat_bytes) == (2, 14)
+
+
+def test_a_shorter_message_after_a_longer_one_carries_nothing_of_it(hub, impl):
+    publisher, peer = make(hub, impl), impl.connect()
+    publisher.publish(FakeMessage(b"a long message"))
+    publisher.publish(FakeMessage(b"short"))
+    assert peer.received() == [b"a long message", b"short"]
+
+
+def test_nothing_is_serialised_without_listeners(hub, impl):
+    class Costly(FakeMessage):
+        def serialize(self, buffer):
+            raise AssertionError("serialised for nobody")
+
+    publisher = make(hub, impl)
+    assert not publisher.has_listeners
+    publisher.publish(Costly(b""))
+
+
+def test_before_registration_there_are_no_listeners(hub):
+    publisher = LoopPublisher(hub, "/topic", FakeMessage)
+    assert not publisher.has_listeners
+    publisher.publish(FakeMessage(b"x"))
+    publisher.close()
+
+
+def test_a_full_peer_loses_the_newest_messages_and_stays_in_frame(hub, impl):
+    publisher, slow, quick = make(hub, impl), impl.connect(), impl.connect()
+    quick_got = []
+    for number in range(3000):
+        publisher.publish(FakeMessage(struct.pack("<I", number) * 500))
+        hub.service()
+        quick_got += quick.received()
+    assert len(quick_got) == 3000
+    slow_got = []
+    while messages := slow.received():
+        slow_got += messages
+        hub.service()
+    assert slow.rest == b"" and 0 < len(slow_got) < 3000
+    assert slow_got == [struct.pack("<I", number) * 500 for number in range(len(slow_got))]
+    assert not hub.backlog
+    publisher.publish(FakeMessage(b"alive"))
+    assert slow.received() == [b"alive"]
+
+
+def test_a_message_larger_than_the_socket_arrives_in_parts(hub, impl):
+    publisher, peer = make(hub, impl), impl.connect()
+    content = bytes(range(256)) * 16384
+    publisher.publish(FakeMessage(content))
+    assert publisher in hub.backlog
+    got = []
+    for _ in range(1000):
+        got += peer.received()
+        if got:
+            break
+        hub.service()
+    assert got == [content]
+    assert publisher not in hub.backlog
+
+
+def test_a_dead_peer_is_closed_and_the_others_go_on(hub, impl):
+    publisher, dead, living = make(hub, impl), impl.connect(), impl.connect()
+    dead.far.close()
+    for _ in range(3):
+        publisher.publish(FakeMessage(b"x"))
+    assert impl.connections == [living]
+    assert living.received() == [b"x"] * 3
+
+
+def test_a_socket_that_rospy_closed_meanwhile_is_no_error(hub, impl):
+    publisher, gone, living = make(hub, impl), impl.connect(), impl.connect()
+    publisher.publish(FakeMessage(b"x"))
+    gone.socket.close()
+    publisher.publish(FakeMessage(b"y"))
+    assert living.received() == [b"x", b"y"]
+
+
+def test_late_joiners_of_a_latched_topic_get_the_last_message_once(hub, impl):
+    publisher, early = make(hub, impl, latch=True), impl.connect()
+    publisher.publish(FakeMessage(b"old"))
+    publisher.publish(FakeMessage(b"state"))
+    late = impl.connect()
+    hub.attention.append(publisher)
+    hub.service()
+    hub.attention.append(publisher)
+    hub.service()
+    assert early.received() == [b"old", b"state"]
+    assert late.received() == [b"state"]
+
+
+def test_a_joiner_that_a_new_message_reaches_first_gets_only_that(hub, impl):
+    publisher = make(hub, impl, latch=True)
+    publisher.publish(FakeMessage(b"old"))
+    late = impl.connect()
+    publisher.publish(FakeMessage(b"new"))
+    hub.attention.append(publisher)
+    hub.service()
+    assert late.received() == [b"new"]
+
+
+def test_what_was_published_before_registration_is_latched(hub, impl):
+    publisher = LoopPublisher(hub, "/topic", FakeMessage, latch=True)
+    publisher.publish(FakeMessage(b"early"))
+    late = impl.connect()
+    publisher.attach(impl, lambda: None)
+    hub.service()
+    assert late.received() == [b"early"]
+
+
+def test_joiners_of_an_ordinary_topic_get_nothing_old(hub, impl):
+    publisher = make(hub, impl)
+    impl.connect()
+    publisher.publish(FakeMessage(b"old"))
+    late = impl.connect()
+    hub.attention.append(publisher)
+    hub.service()
+    assert late.received() == []
+
+
+def test_headers_are_numbered_from_one(hub, impl):
+    publisher, peer = make(hub, impl, FakeStamped), impl.connect()
+    for _ in range(3):
+        publisher.publish(FakeStamped())
+    assert peer.received() == [b"seq 1", b"seq 2", b"seq 3"]
+
+
+def test_close_gives_the_registration_back_once(hub, impl):
+    released = []
+    publisher = LoopPublisher(hub, "/topic", FakeMessage)
+    publisher.attach(impl, lambda: released.append(1))
+    impl.connect()
+    publisher.close()
+    publisher.close()
+    publisher.publish(FakeMessage(b"x"))
+    hub.service()
+    assert released == [1] and not publisher.has_listeners

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Commands and requests on their way into the loop."""
+import threading
+import time
+
+import pytest
+
+from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue, RequestBoard
+
+
+def test_only_the_newest_message_counts():
+    box = Mailbox()
+    assert box.take() is None
+    box.put("first")
+    box.put("second")
+    assert box.take() == "second"
+    assert box.take() is None
+    assert box.delivered == 2
+
+
+def test_a_queue_keeps_order_and_counts_what_it_lost():
+    queue = Queue(3)
+    for number in range(5):
+        queue.put(number)
+    assert queue.drain() == [2, 3, 4]
+    assert queue.drain() == []
+    assert (queue.delivered, queue.lost) == (5, 2)
+
+
+def test_a_queue_without_room_is_refused():
+    with pytest.raises(ValueError, match="at least 1"):
+        Queue(0)
+
+
+@pytest.fixture
+def board():
+    board = RequestBoard()
+    yield board
+    board.close()
+
+
+def serve(board, until):
+    while not until():
+        board.run_pending()
+        board.wait(0.005)
+
+
+def in_thread(function):
+    results = []
+
+    def run():
+        try:
+            results.append(function())
+        except Exception as error:  # noqa: BLE001
+            results.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread, results
+
+
+def test_a_call_runs_in_the_loop_and_returns_to_the_caller(board):
+    loop = threading.get_ident()
+    thread, results = in_thread(lambda: board.call(lambda a, b: (threading.get_ident(), a + b), 2, 3))
+    serve(board, lambda: not thread.is_alive())
+    assert results == [(loop, 5)]
+
+
+def test_an_error_goes_to_the_caller_and_not_into_the_loop(board):
+    thread, results = in_thread(lambda: board.call(lambda: 1 / 0))
+    serve(board, lambda: not thread.is_alive())
+    assert isinstance(results[0], ZeroDivisionError)
+
+
+def test_each_of_many_callers_gets_the_own_answer(board):
+    calls = [in_thread(lambda number=number: board.call(lambda: number)) for number in range(30)]
+    serve(board, lambda: not any(thread.is_alive() for thread, _ in calls))
+    assert [results for _, results in calls] == [[number] for number in range(30)]
+
+
+def test_callers_that_still_wait_at_the_end_are_told(board):
+    thread, results = in_thread(lambda: board.call(lambda: None))
+    deadline = time.monotonic() + 5.0
+    while not board._requests and time.monotonic() < deadline:
+        time.sleep(0.001)
+    board.close()
+    thread.join(5.0)
+    assert isinstance(results[0], LoopEnded) and "shutting down" in str(results[0])
+
+
+def test_callers_after_the_end_are_told_at_once(board):
+    board.close()
+    with pytest.raises(LoopEnded):
+        board.call(lambda: None)
+
+
+def test_a_request_wakes_an_idle_loop(board):
+    threading.Timer(0.05, lambda: board.submit(lambda: None)).start()
+    start = time.monotonic()
+    board.wait(5.0)
+    assert time.monotonic() - start < 2.0
+    assert board.run_pending() == 1

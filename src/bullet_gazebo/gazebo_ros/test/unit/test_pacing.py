@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pacing against a clock that only moves when somebody sleeps or works."""
+import pytest
+
+from gazebo_ros.pacing import MAX_CATCH_UP, MAX_DEBT_S, Pacer, RateMeter, SlownessWatch
+
+
+class FakeClock:
+    """Seconds that pass when told to."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+    def sleep(self, seconds):
+        assert seconds >= 0.0
+        self.now += seconds
+
+
+@pytest.fixture
+def clock():
+    return FakeClock()
+
+
+def test_ticks_take_their_own_length(clock):
+    pacer = Pacer(0.002, clock=clock, sleep=clock.sleep)
+    for _ in range(500):
+        clock.now += 0.0003
+        pacer.wait()
+    assert clock.now == pytest.approx(101.0)
+
+
+def test_late_wakes_do_not_add_up(clock):
+    pacer = Pacer(0.002, clock=clock, sleep=lambda seconds: clock.sleep(seconds + 0.0002))
+    for _ in range(500):
+        pacer.wait()
+    assert clock.now == pytest.approx(101.0, abs=0.0003)
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0, 10.0])
+def test_the_factor_scales_the_period(clock, factor):
+    pacer = Pacer(0.002, factor, clock=clock, sleep=clock.sleep)
+    for _ in range(500):
+        pacer.wait()
+    assert clock.now == pytest.approx(100.0 + 1.0 / factor)
+
+
+def test_a_short_stall_is_made_up_for_at_a_bounded_speed(clock):
+    pacer = Pacer(0.002, clock=clock, sleep=clock.sleep)
+    clock.now += 0.1
+    pacer.wait()
+    after_stall = clock.now
+    for _ in range(10):
+        pacer.wait()
+    assert clock.now - after_stall == pytest.approx(10 * 0.002 / MAX_CATCH_UP)
+    for _ in range(489):
+        pacer.wait()
+    assert clock.now == pytest.approx(101.0)
+
+
+def test_a_long_stall_is_given_up(clock):
+    pacer = Pacer(0.002, clock=clock, sleep=clock.sleep)
+    clock.now += 10.0
+    for _ in range(1000):
+        pacer.wait()
+    assert clock.now == pytest.approx(110.0 + 1000 * 0.002 - MAX_DEBT_S, abs=0.005)
+
+
+def test_restart_forgets_what_is_owed(clock):
+    pacer = Pacer(0.002, clock=clock, sleep=clock.sleep)
+    clock.now += 0.15
+    pacer.restart()
+    pacer.wait()
+    assert clock.now == pytest.approx(100.152)
+
+
+def test_as_fast_as_possible_lets_others_run_now_and_then(clock):
+    slept = []
+    pacer = Pacer(0.002, 0.0, clock=clock, sleep=slept.append)
+    for _ in range(100):
+        pacer.wait()
+    assert slept == [0] * 10
+
+
+@pytest.mark.parametrize("step, factor", [(0.0, 1.0), (-1.0, 1.0), (float("nan"), 1.0), (0.002, -1.0),
+                                          (0.002, float("nan"))])
+def test_impossible_settings_are_refused_with_what_was_found(step, factor):
+    with pytest.raises(ValueError, match="expected"):
+        Pacer(step, factor)
+
+
+def test_the_meter_reports_once_per_window(clock):
+    meter = RateMeter(1.0, clock=clock)
+    factors = []
+    for tick in range(1, 2001):
+        clock.now += 0.004
+        factor = meter.update(tick * 0.002)
+        if factor is not None:
+            factors.append(factor)
+    assert len(factors) == 8 or len(factors) == 7
+    assert factors == pytest.approx([0.5] * len(factors))
+
+
+def test_a_single_slow_second_is_no_news():
+    watch = SlownessWatch(windows=3, quiet_windows=10)
+    assert [watch.is_news(factor, 1.0) for factor in (0.5, 1.0, 0.9, 0.9, 1.0)] == [False] * 5
+
+
+def test_lasting_slowness_is_news_once_in_a_while():
+    watch = SlownessWatch(windows=3, quiet_windows=10)
+    news = [watch.is_news(0.5, 1.0) for _ in range(25)]
+    assert [index for index, is_news in enumerate(news) if is_news] == [2, 12, 22]
+
+
+def test_slowness_is_relative_to_what_was_asked_for():
+    watch = SlownessWatch(windows=1)
+    assert not watch.is_news(0.5, 0.5)
+    assert watch.is_news(0.9, 2.0)
+    assert not watch.is_news(0.9, 0.0)

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The snapshot: what one process writes, another reads whole or not at all."""
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from gazebo_ros import snapshot
+from gazebo_ros.snapshot import SnapshotError, SnapshotReader, SnapshotWriter
+
+
+@pytest.fixture
+def writer(tmp_path):
+    writer = SnapshotWriter(tmp_path)
+    yield writer
+    writer.close()
+
+
+def test_nothing_to_read_before_the_first_write(writer):
+    assert SnapshotReader(writer.folder).read() is None
+
+
+def test_a_reader_gets_what_was_written_last(writer):
+    reader = SnapshotReader(writer.folder)
+    for tick in range(1, 6):
+        writer.write(tick, tick * 0.002, [(tick, 0.0, 1.0), np.arange(tick, dtype=float)])
+    read = reader.read()
+    assert (read.tick, read.time_s, read.revision) == (5, 0.01, writer.revision)
+    assert read.values.tolist() == [5.0, 0.0, 1.0, 0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_what_was_read_does_not_change_afterwards(writer):
+    writer.write(1, 0.002, [[1.0]])
+    read = SnapshotReader(writer.folder).read()
+    for tick in (2, 3):
+        writer.write(tick, 0.0, [[9.0]])
+    assert read.values.tolist() == [1.0]
+
+
+def test_a_new_scene_raises_the_revision(writer):
+    reader = SnapshotReader(writer.folder)
+    writer.write_scene([{"name": "robot", "joints": ["a"], "urdf": "<robot/>"}])
+    revision, bodies = reader.scene()
+    assert revision == writer.revision and bodies[0]["name"] == "robot"
+    writer.write(1, 0.0, [[0.0] * 8])
+    assert reader.read().revision == revision
+
+
+def test_too_many_values_are_refused(writer):
+    with pytest.raises(ValueError, match="capacity"):
+        writer.write(1, 0.0, [np.zeros(snapshot.CAPACITY), [0.0]])
+    assert SnapshotReader(writer.folder).read() is None
+
+
+def test_closing_removes_the_folder_and_readers_notice(writer):
+    reader = SnapshotReader(writer.folder)
+    writer.write(1, 0.0, [[1.0]])
+    assert reader.is_alive
+    writer.close()
+    assert not writer.folder.exists() and not reader.is_alive
+    assert reader.read().values.tolist() == [1.0]
+
+
+def test_no_folder_is_an_error_that_names_it(tmp_path):
+    with pytest.raises(SnapshotError, match="nowhere"):
+        SnapshotReader(tmp_path / "nowhere")
+
+
+def test_a_folder_is_private(writer):
+    assert (writer.folder.stat().st_mode & 0o077) == 0
+
+
+WRITE_FOR_EVER = """
+import sys
+from gazebo_ros.snapshot import SnapshotWriter
+writer = SnapshotWriter(sys.argv[1])
+print(writer.folder, flush=True)
+tick = 0
+while True:
+    tick += 1
+    writer.write(tick, 0.0, [[float(tick)] * (1 + tick % 700)])
+"""
+
+
+def test_a_reader_in_another_process_never_sees_half_a_state(tmp_path):
+    process = subprocess.Popen([sys.executable, "-c", WRITE_FOR_EVER, str(tmp_path)], stdout=subprocess.PIPE, text=True)
+    try:
+        reader = SnapshotReader(process.stdout.readline().strip())
+        seen = set()
+        end = time.monotonic() + 1.5
+        while time.monotonic() < end:
+            read = reader.read()
+            if read is not None:
+                assert len(read.values) == 1 + read.tick % 700
+                assert (read.values == read.tick).all()
+                seen.add(read.tick)
+        assert len(seen) > 100
+        # It dies without cleaning up: the next simulator does.
+        process.kill()
+        process.wait()
+        assert len(snapshot.remove_stale(tmp_path)) == 1
+        assert os.listdir(tmp_path) == []
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+def test_the_folder_of_a_living_simulator_stays(writer, tmp_path):
+    assert snapshot.remove_stale(tmp_path) == []
+    assert writer.folder.exists()
