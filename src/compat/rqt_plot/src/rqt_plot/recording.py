@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Samples of several curves, written by one thread and read by another. Knows neither ROS nor Qt."""
+import threading
+
+import numpy as np
+
+# At 50 Hz the last 20 minutes.
+CAPACITY = 60_000
+# Stamps of several publishers may cross by less; a larger step back is a simulation that has started again.
+RESTART_STEP_S = 1.0
+
+
+class _Series:
+    """The last `capacity` samples, in order. The array is twice as long, so that old ones are moved out rarely."""
+
+    def __init__(self, capacity):
+        self._data = np.empty((2, 2 * capacity))
+        self._capacity = capacity
+        self._end = 0
+
+    def append(self, time_s, value):
+        if self._end and time_s < self._data[0, self._end - 1] - RESTART_STEP_S:
+            self._end = 0
+        if self._end == self._data.shape[1]:
+            self._data[:, :self._capacity] = self._data[:, self._capacity:]
+            self._end = self._capacity
+        self._data[:, self._end] = time_s, value
+        self._end += 1
+
+    def kept(self):
+        """A view, for whoever holds the lock: (2, n), times and values."""
+        return self._data[:, max(0, self._end - self._capacity):self._end]
+
+
+class Recording:
+    """Curves by label. Times are in s, on whatever clock the writer uses."""
+
+    def __init__(self, capacity=CAPACITY):
+        self._capacity = capacity
+        self._series = {}
+        self._lock = threading.Lock()
+
+    @property
+    def labels(self):
+        with self._lock:
+            return list(self._series)
+
+    def add(self, label):
+        with self._lock:
+            self._series.setdefault(label, _Series(self._capacity))
+
+    def remove(self, label):
+        with self._lock:
+            self._series.pop(label, None)
+
+    def clear(self):
+        """Forget all samples; the curves stay."""
+        with self._lock:
+            self._series = {label: _Series(self._capacity) for label in self._series}
+
+    def append(self, label, time_s, value):
+        """Add a sample; one of a curve that has been removed meanwhile is dropped.
+
+        A time that jumps back by more than RESTART_STEP_S starts the curve anew.
+        """
+        with self._lock:
+            if label in self._series:
+                self._series[label].append(time_s, value)
+
+    def samples(self, span_s=None):
+        """Return {label: (2, n) array, times and values}, and the earliest time kept, from which a graph may count [s].
+
+        span_s: return only those that are at most so much older than the newest of all curves [s].
+        """
+        with self._lock:
+            kept = {label: series.kept() for label, series in self._series.items()}
+            filled = [part[0] for part in kept.values() if part.size]
+            begin_s = min((times[0] for times in filled), default=0.0)
+            if span_s is not None and filled:
+                oldest_s = max(times[-1] for times in filled) - span_s
+                kept = {label: part[:, np.searchsorted(part[0], oldest_s):] for label, part in kept.items()}
+            return {label: part.copy() for label, part in kept.items()}, begin_s

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The live window: what to plot, autoscroll, pause, and the graph."""
+from pyqtgraph.Qt import QtCore, QtWidgets
+
+from . import fields
+from .graph import Graph
+
+REDRAW_MS = 50
+# A long recording, shown whole, takes long to draw; then it is drawn less often.
+DRAWING_SHARE = 0.25
+RETRY_MS = 1000
+
+
+class PlotWindow(QtWidgets.QWidget):
+    """subscribe(path) -> labels (raises PlotError), unsubscribe(label): how curves get into the recording.
+
+    A path whose topic is not there yet is tried again every second.
+    """
+
+    problem = QtCore.Signal(str)  # may be emitted from any thread
+
+    def __init__(self, recording, subscribe, unsubscribe, span_s):
+        super().__init__()
+        self._recording, self._subscribe, self._unsubscribe = recording, subscribe, unsubscribe
+        self._span_s = span_s
+        self._waiting = []
+        self.setWindowTitle("rqt_plot")
+        self.resize(900, 600)
+
+        self._entry = QtWidgets.QLineEdit(placeholderText="/topic/field[0]")
+        self._autoscroll = QtWidgets.QCheckBox("autoscroll", checked=True)
+        self.pause = QtWidgets.QCheckBox("pause")
+        self._remove_menu = QtWidgets.QMenu(self)
+        add, remove, clear = (QtWidgets.QToolButton(text=text) for text in ("+", "−", "clear"))
+        remove.setMenu(self._remove_menu)
+        remove.setPopupMode(QtWidgets.QToolButton.ToolButtonPopupMode.InstantPopup)
+        row = QtWidgets.QHBoxLayout()
+        for item in (QtWidgets.QLabel("Topic"), self._entry, add, remove, self._autoscroll, self.pause, clear):
+            row.addWidget(item)
+        self._graph = Graph()
+        self._status = QtWidgets.QLabel(wordWrap=True)
+        layout = QtWidgets.QVBoxLayout(self)
+        layout.addLayout(row)
+        layout.addWidget(self._graph, stretch=1)
+        layout.addWidget(self._status)
+
+        for signal in (add.clicked, self._entry.returnPressed):
+            signal.connect(self._add_entry)
+        self._remove_menu.aboutToShow.connect(self._fill_remove_menu)
+        clear.clicked.connect(recording.clear)
+        self._autoscroll.toggled.connect(lambda on: on or self._graph.enableAutoRange())
+        self.problem.connect(self._status.setText)
+        self._redraw_timer = QtCore.QTimer(self, interval=REDRAW_MS)
+        self._redraw_timer.timeout.connect(self._redraw)
+        self._retry_timer = QtCore.QTimer(self, interval=RETRY_MS)
+        self._retry_timer.timeout.connect(self._retry)
+        for timer in (self._redraw_timer, self._retry_timer):
+            timer.start()
+
+    def add(self, argument):
+        """Plot what an argument of the command line names. Return whether all is well; if not, the window says why."""
+        try:
+            self._waiting += fields.expand(argument)
+        except fields.PlotError as error:
+            self._status.setText(str(error))
+            return False
+        return self._retry()
+
+    def _add_entry(self):
+        if self._entry.text() and self.add(self._entry.text()):
+            self._entry.clear()
+
+    def _retry(self):
+        if not self._waiting:
+            return True
+        paths, self._waiting = self._waiting, []
+        problems = []
+        for path in paths:
+            try:
+                self._subscribe(path)
+            except fields.UnknownTopic as error:
+                self._waiting.append(path)
+                problems.append("waiting: %s" % error)
+            except fields.PlotError as error:
+                problems.append(str(error))
+        self._status.setText("\n".join(problems))
+        return not problems
+
+    def _fill_remove_menu(self):
+        self._remove_menu.clear()
+        labels = self._recording.labels
+        for label in labels:
+            self._remove_menu.addAction(label, lambda label=label: self._unsubscribe(label))
+        if self._waiting:
+            self._remove_menu.addAction("what is waited for", self._waiting.clear)
+        if len(labels) > 1:
+            self._remove_menu.addAction("all", lambda: [self._unsubscribe(label) for label in labels])
+
+    def _redraw(self):
+        if self.pause.isChecked():
+            return
+        watch = QtCore.QElapsedTimer()
+        watch.start()
+        self._graph.draw(self._recording, self._span_s if self._autoscroll.isChecked() else None)
+        self._graph.viewport().repaint()
+        self._redraw_timer.setInterval(max(REDRAW_MS, int(watch.elapsed() / DRAWING_SHARE)))

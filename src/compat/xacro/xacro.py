@@ -1,0 +1,14 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The name that launch files older than ROS melodic give the ``xacro`` command."""
+import os
+import sys
+
+# Python looks for modules in the folder of a script first, and there lies xacro.py.
+HERE = os.path.dirname(os.path.realpath(__file__))
+sys.path[:] = [folder for folder in sys.path if os.path.realpath(folder) != HERE]
+
+from xacro import main  # noqa: E402
+
+if __name__ == "__main__":
+    main()
