@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers that live as long as the process that spawned them."""
+import os
+import time
+
+import rosgraph
+import rosparam
+import rospy
+import yaml
+from controller_manager_msgs.srv import (
+    ListControllers,
+    LoadController,
+    SwitchController,
+    SwitchControllerRequest,
+    UnloadController,
+)
+from std_msgs.msg import Bool
+
+# Between two looks at something that is not there yet [wall s].
+_POLL_S = 0.1
+_FAILED_LOAD_PAUSE_S = 1.0
+# How long a paused simulation may keep an ending process from ending.
+_TAKE_DOWN_S = 2.0
+
+
+class NotThere(Exception):
+    """What was waited for did not come; the text says what it was and how to get it."""
+
+
+class ControllerLifetime:
+    """Loads and starts controllers through the services of one controller manager, and takes them down again."""
+
+    def __init__(self, namespace="", timeout_s=0.0):
+        """Wait for the controller manager below ``namespace`` (relative to the node's own), at most ``timeout_s`` wall
+        seconds (0 or less: for ever). Raises :class:`NotThere`."""
+        self._prefix = (namespace.rstrip("/") + "/" if namespace else "") + "controller_manager/"
+        self._deadline = time.monotonic() + timeout_s if timeout_s > 0.0 else None
+        self._timeout_s = timeout_s
+        self._loaded = []
+        self._load = self._proxy("load_controller", LoadController)
+        self._switch = self._proxy("switch_controller", SwitchController)
+        self._list = self._proxy("list_controllers", ListControllers)
+        self._unload = self._proxy("unload_controller", UnloadController)
+
+    def _proxy(self, name, srv_class):
+        service = rospy.resolve_name(self._prefix + name)
+        told = False
+        while True:
+            try:
+                rospy.wait_for_service(service, _POLL_S)
+                return rospy.ServiceProxy(service, srv_class)
+            except rospy.ROSException:
+                pass
+            if rospy.is_shutdown():
+                raise rospy.ROSInterruptException()
+            # Simulated time that stands at 0 is a simulator that is not up yet.
+            still_starting = rospy.get_param("/use_sim_time", False) and rospy.get_rostime().is_zero()
+            if self._deadline is not None and time.monotonic() > self._deadline and not still_starting:
+                raise NotThere("no controller manager: service %s did not come within %g s; is the robot spawned, with "
+                               "libgazebo_ros_control.so in its description and this robotNamespace?"
+                               % (service, self._timeout_s))
+            if not told:
+                rospy.loginfo("waiting for the service %s", service)
+                told = True
+
+    @staticmethod
+    def wait_for_true(topic):
+        """Wait until the std_msgs/Bool topic ``topic`` says true."""
+        rospy.loginfo("waiting for %s to say true", rospy.resolve_name(topic))
+        while not rospy.wait_for_message(topic, Bool).data:
+            pass
+
+    @staticmethod
+    def names_from(arguments):
+        """Names of controllers; an argument that is an existing file is loaded to the parameter server, and its keys
+        are names. Raises :class:`NotThere` for a file without any."""
+        names = []
+        for argument in arguments:
+            if not os.path.isfile(argument):
+                names.append(argument)
+                continue
+            try:
+                with open(argument, encoding="utf-8") as file:
+                    content = yaml.safe_load(file)
+            except (OSError, yaml.YAMLError) as error:
+                raise NotThere("%s cannot be read as YAML: %s" % (argument, " ".join(str(error).split()))) from error
+            if not isinstance(content, dict) or not content:
+                raise NotThere("%s has no controllers: expected a mapping of names to parameters" % argument)
+            rosparam.upload_params(rosgraph.names.get_ros_namespace(), content)
+            names.extend(content)
+        return names
+
+    def bring_up(self, names, start=True):
+        """Load each of ``names``; start those that could be loaded, all or none."""
+        for name in names:
+            if rospy.is_shutdown():
+                return
+            if self._asked(self._load, name):
+                self._loaded.append(name)
+                rospy.loginfo("loaded controller '%s'", name)
+            else:
+                time.sleep(_FAILED_LOAD_PAUSE_S)
+                rospy.logerr("controller '%s' could not be loaded: see the log of the node that holds the controller "
+                             "manager (/gazebo) for the reason", name)
+        if not start or not self._loaded:
+            return
+        if self._asked(self._switch, self._loaded, [], SwitchControllerRequest.STRICT, False, 0.0):
+            rospy.loginfo("started controllers: %s", ", ".join(self._loaded))
+        else:
+            rospy.logerr("controllers could not be started: %s; see the log of the node that holds the controller "
+                         "manager (/gazebo) for the reason", ", ".join(self._loaded))
+
+    def take_down(self):
+        """Stop what was brought up and unload it, last one first. What is gone already does not matter."""
+        if not self._loaded:
+            return
+        names, self._loaded = self._loaded, []
+        try:
+            states = {controller.name: controller.state for controller in self._list().controller}
+            running = [name for name in names if states.get(name) == "running"]
+            if running:
+                self._switch(start_controllers=[], stop_controllers=running, start_asap=False,
+                             strictness=SwitchControllerRequest.STRICT, timeout=_TAKE_DOWN_S)
+            for name in reversed(names):
+                if name in states:
+                    self._unload(name)
+        except (rospy.ServiceException, rospy.ROSException):
+            rospy.logdebug("the controller manager is gone; nothing to take down")
+
+    @staticmethod
+    def _asked(proxy, *arguments):
+        try:
+            return proxy(*arguments).ok
+        except rospy.ServiceException as error:
+            rospy.logerr("%s: %s", proxy.resolved_name, error)
+            return False
+
+
+def loaded_controllers():
+    """{name: state} of the controllers of this namespace's controller manager."""
+    listing = rospy.ServiceProxy("controller_manager/list_controllers", ListControllers)()
+    return {controller.name: controller.state for controller in listing.controller}

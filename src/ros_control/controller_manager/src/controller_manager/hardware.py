@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The joints that controllers see: state arrays to read, command arrays to write. ROS-free."""
+import enum
+
+import numpy as np
+
+from .errors import ControllerError, HardwareError
+from .interfaces import COMMAND, JOINT_STATE
+
+
+class SwitchResult(enum.Enum):
+    """How far the hardware is with a change of controllers."""
+
+    DONE = "done"
+    ONGOING = "ongoing"
+    ERROR = "error"
+
+
+class RobotHardware:
+    """n joints; all arrays are (n,) float64 in the order of ``joint_names``, in SI units and radians.
+
+    Attributes
+    ----------
+    position, velocity, effort :
+        The measured state, written in place before each update. Copy what you keep.
+    command : dict
+        {interface of ``interfaces.COMMAND``: array}. Only the entries of the joints that have the interface count.
+    interface_joints : dict
+        {interface: tuple of its joints}, ``JOINT_STATE`` (all joints) included.
+
+    A driver derives from this, fills the state before and reads the commands after ``ControllerManager.update``.
+    """
+
+    def __init__(self, joint_interfaces):
+        """``joint_interfaces``: {joint name: its command interfaces, a collection that may be empty}."""
+        self.joint_names = tuple(joint_interfaces)
+        self.interface_joints = {JOINT_STATE: self.joint_names}
+        for interface in COMMAND:
+            joints = tuple(name for name, interfaces in joint_interfaces.items() if interface in interfaces)
+            if joints:
+                self.interface_joints[interface] = joints
+        for name, interfaces in joint_interfaces.items():
+            for interface in interfaces:
+                if interface not in COMMAND:
+                    raise HardwareError("joint '%s' has the hardware interface '%s'; known are %s"
+                                        % (name, interface, ", ".join(COMMAND)))
+        count = len(self.joint_names)
+        self._index = {name: i for i, name in enumerate(self.joint_names)}
+        self.position = np.zeros(count)
+        self.velocity = np.zeros(count)
+        self.effort = np.zeros(count)
+        self.command = {interface: np.zeros(count) for interface in COMMAND}
+
+    def index(self, interface, joints, asked_by):
+        """Indices (k,) of ``joints`` (names). Raises :class:`ControllerError` where one lacks ``interface``;
+        ``asked_by`` is who needs them, for the text."""
+        offered = self.interface_joints.get(interface)
+        if offered is None:
+            raise ControllerError(
+                "%s needs %s, which no joint of this robot has (it has %s); change the controller's type, or "
+                "<hardwareInterface> in the transmissions of the URDF"
+                % (asked_by, interface, ", ".join(self.interface_joints)))
+        for joint in joints:
+            if joint not in offered:
+                found = ("it has another hardware interface" if joint in self._index
+                         else "the URDF has no transmission for it")
+                raise ControllerError("%s: joint '%s' cannot be used through %s: %s; joints with this interface: %s"
+                                      % (asked_by, joint, interface, found, ", ".join(offered)))
+        return np.array([self._index[joint] for joint in joints], dtype=int)
+
+    # -- a change of controllers; claims are {interface: joints} of each controller ----------------------------------
+
+    def prepare_switch(self, start, stop):
+        """Whether the controllers with the claims ``stop`` may give way to those with ``start`` (lists of claims)."""
+        return True
+
+    def do_switch(self, start, stop):
+        """Begin the change; called once, between two updates."""
+
+    def switch_result(self, claims=None):
+        """A :class:`SwitchResult` for the whole change, or for the resources of one controller's ``claims``."""
+        return SwitchResult.DONE

@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Names of the hardware interfaces, as they stand in ``controller_manager_msgs/ControllerState``."""
+
+JOINT_STATE = "hardware_interface::JointStateInterface"
+POSITION = "hardware_interface::PositionJointInterface"
+VELOCITY = "hardware_interface::VelocityJointInterface"
+EFFORT = "hardware_interface::EffortJointInterface"
+
+#: Interfaces that command a joint: who uses a joint through one of these claims it.
+COMMAND = (POSITION, VELOCITY, EFFORT)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joint limits: where they stand, and what they make of a command. ROS-free, all joints of an interface at once.
+
+The rules are joint_limits_interface's: saturation, or soft limits for joints whose URDF has a <safety_controller>.
+"""
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import HardwareError
+
+
+@dataclass(frozen=True)
+class SoftLimits:
+    """A <safety_controller>: soft range [rad or m], k_position [1/s], k_velocity [N m s/rad or N s/m]."""
+
+    lower: float
+    upper: float
+    k_position: float
+    k_velocity: float
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """What one joint may do; infinite where there is no limit. ``soft``: :class:`SoftLimits` or None."""
+
+    lower: float = -math.inf
+    upper: float = math.inf
+    velocity: float = math.inf
+    acceleration: float = math.inf
+    effort: float = math.inf
+    soft: SoftLimits | None = None
+
+
+def limits_from_urdf(joint, soft=None):
+    """The limits of a ``urdf_model.Joint``; a continuous joint has no position limits."""
+    limit = joint.limit
+
+    def value(number, absent=math.inf):
+        return absent if number is None else number
+
+    if joint.type == "continuous":
+        return JointLimits(velocity=value(limit.velocity), effort=value(limit.effort), soft=soft)
+    return JointLimits(value(limit.lower, -math.inf), value(limit.upper), value(limit.velocity), math.inf,
+                       value(limit.effort), soft)
+
+
+def with_parameters(limits, values, source):
+    """``limits`` with those replaced that the mapping ``values`` (a joint's entry under ``joint_limits``) names.
+
+    ``has_position_limits``, ``has_velocity_limits``, ``has_acceleration_limits``, ``has_effort_limits``: true needs the
+    values (``min_position``, ``max_position``, ``max_velocity`` ...), false takes the limit away. ``source``: name of
+    the parameter, for messages. Raises :class:`HardwareError`.
+    """
+    if not isinstance(values, dict):
+        raise HardwareError("parameter %s is %r, expected a mapping such as {has_velocity_limits: true, "
+                            "max_velocity: 1.0}" % (source, values))
+    changes = {}
+    for switch, keys in (("has_position_limits", {"min_position": "lower", "max_position": "upper"}),
+                         ("has_velocity_limits", {"max_velocity": "velocity"}),
+                         ("has_acceleration_limits", {"max_acceleration": "acceleration"}),
+                         ("has_effort_limits", {"max_effort": "effort"})):
+        wanted = values.get(switch)
+        if wanted is None:
+            continue
+        if not isinstance(wanted, bool):
+            raise HardwareError("parameter %s/%s is %r, expected true or false" % (source, switch, wanted))
+        for key, field in keys.items():
+            changes[field] = _number(values, key, source) if wanted else -math.inf if field == "lower" else math.inf
+    if values.get("angle_wraparound") is True and not values.get("has_position_limits"):
+        changes["lower"], changes["upper"] = -math.inf, math.inf
+    changed = dataclasses.replace(limits, **changes)
+    if changed.lower > changed.upper:
+        raise HardwareError("parameter %s: min_position %g is above max_position %g"
+                            % (source, changed.lower, changed.upper))
+    return changed
+
+
+def _number(values, key, source):
+    number = values.get(key)
+    if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
+        raise HardwareError("parameter %s/%s is %r, expected a number" % (source, key, number))
+    if key not in ("min_position", "max_position") and number < 0.0:
+        raise HardwareError("parameter %s/%s is %g, expected 0 or more" % (source, key, number))
+    return float(number)
+
+
+class _Columns:
+    """The limits of k joints as arrays (k,), and which joints have soft ones."""
+
+    def __init__(self, names, limits):
+        self.lower, self.upper, self.velocity, self.acceleration, self.effort = (
+            np.array([getattr(limit, field) for limit in limits], dtype=float)
+            for field in ("lower", "upper", "velocity", "acceleration", "effort"))
+        soft = [k for k, limit in enumerate(limits) if limit.soft is not None]
+        self.soft = np.array(soft, dtype=int)
+        self.has_soft = bool(soft)
+        self.soft_lower, self.soft_upper, self.k_position, self.k_velocity = (
+            np.array([getattr(limits[k].soft, field) for k in soft])
+            for field in ("lower", "upper", "k_position", "k_velocity"))
+        self.soft_velocity = self.velocity[self.soft]
+        self.names = names
+
+    def require(self, field, wanted, why):
+        """Raise :class:`HardwareError` where a joint of ``wanted`` (indices) has no limit on ``field``."""
+        for k in wanted:
+            if math.isinf(getattr(self, field)[k]):
+                raise HardwareError(
+                    'joint \'%s\' has no %s limit, which %s; give %s="..." in the <limit> of the URDF, or '
+                    "joint_limits/%s/{has_%s_limits: true, max_%s: ...}"
+                    % (self.names[k], field, why, field, self.names[k], field, field))
+
+    def soft_velocity_range(self, position):
+        """Lowest and highest velocity of the soft joints at ``position`` (of the soft joints)."""
+        fastest = self.soft_velocity
+        low = np.minimum(np.maximum(-self.k_position * (position - self.soft_lower), -fastest), fastest)
+        high = np.minimum(np.maximum(-self.k_position * (position - self.soft_upper), -fastest), fastest)
+        return low, high
+
+
+class PositionLimiter:
+    """Position commands: no faster than the velocity limit from one command to the next, within the range.
+
+    Open loop: counts from its own last command, not from the measured position.
+    """
+
+    def __init__(self, names, limits):
+        """``limits``: :class:`JointLimits` of joints ``names``. Raises :class:`HardwareError` for soft limits without
+        a velocity limit."""
+        self._columns = _Columns(names, limits)
+        self._columns.require("velocity", self._columns.soft, "soft limits (<safety_controller>) need")
+        self._last = None
+
+    def reset(self):
+        """Count from the measured position the next time."""
+        self._last = None
+
+    def enforce(self, command, dt, position, velocity):
+        """What may be commanded (k,) of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
+        columns = self._columns
+        last = position if self._last is None else self._last
+        reach = columns.velocity * dt
+        low, high = np.maximum(last - reach, columns.lower), np.minimum(last + reach, columns.upper)
+        if columns.has_soft:
+            soft = columns.soft
+            slowest, fastest = columns.soft_velocity_range(last[soft])
+            # Only a joint with a range has anything to keep clear of.
+            ranged = np.isfinite(columns.lower[soft]) & np.isfinite(columns.upper[soft])
+            slowest = np.where(ranged, slowest, -columns.soft_velocity)
+            fastest = np.where(ranged, fastest, columns.soft_velocity)
+            low[soft] = np.maximum(last[soft] + slowest * dt, columns.lower[soft])
+            high[soft] = np.minimum(last[soft] + fastest * dt, columns.upper[soft])
+        self._last = np.minimum(np.maximum(command, low), high)
+        return self._last
+
+
+class VelocityLimiter:
+    """Velocity commands: within the velocity limit, and the acceleration limit where there is one."""
+
+    def __init__(self, names, limits):
+        """Raises :class:`HardwareError` for a joint without a velocity limit."""
+        self._columns = _Columns(names, limits)
+        self._columns.require("velocity", range(len(limits)), "velocity-controlled joints need")
+        self._accelerates = bool(np.isfinite(self._columns.acceleration).any())
+        self._last = np.zeros(len(limits))
+
+    def reset(self):
+        """Count accelerations from standstill."""
+        self._last = np.zeros(len(self._last))
+
+    def enforce(self, command, dt, position, velocity):
+        """What may be commanded (k,) of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
+        columns = self._columns
+        low, high = -columns.velocity, columns.velocity
+        if columns.has_soft:
+            soft = columns.soft
+            low, high = low.copy(), high.copy()
+            ranged = np.isfinite(columns.lower[soft]) & np.isfinite(columns.upper[soft])
+            slowest, fastest = columns.soft_velocity_range(position[soft])
+            low[soft] = np.where(ranged, slowest, low[soft])
+            high[soft] = np.where(ranged, fastest, high[soft])
+        if self._accelerates:
+            # Soft limits count from the measured velocity, saturation from the last command.
+            base = self._last
+            if columns.has_soft:
+                base = base.copy()
+                base[columns.soft] = velocity[columns.soft]
+            change = columns.acceleration * dt
+            low, high = np.maximum(low, base - change), np.minimum(high, base + change)
+        self._last = np.minimum(np.maximum(command, low), high)
+        return self._last
+
+
+class EffortLimiter:
+    """Effort commands: within the effort limit, and none that drives a joint further beyond its other limits."""
+
+    def __init__(self, names, limits):
+        """Raises :class:`HardwareError` for a joint without a velocity or effort limit."""
+        self._columns = _Columns(names, limits)
+        for field in ("velocity", "effort"):
+            self._columns.require(field, range(len(limits)), "effort-controlled joints need")
+
+    def reset(self):
+        """Nothing to forget."""
+
+    def enforce(self, command, dt, position, velocity):
+        """What may be commanded (k,) of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""
+        columns = self._columns
+        low = np.where((position < columns.lower) | (velocity < -columns.velocity), 0.0, -columns.effort)
+        high = np.where((position > columns.upper) | (velocity > columns.velocity), 0.0, columns.effort)
+        if columns.has_soft:
+            soft, effort = columns.soft, columns.effort[columns.soft]
+            slowest, fastest = columns.soft_velocity_range(position[soft])
+            ranged = np.isfinite(columns.lower[soft]) & np.isfinite(columns.upper[soft])
+            slowest = np.where(ranged, slowest, -columns.soft_velocity)
+            fastest = np.where(ranged, fastest, columns.soft_velocity)
+            low[soft] = np.clip(-columns.k_velocity * (velocity[soft] - slowest), -effort, effort)
+            high[soft] = np.clip(-columns.k_velocity * (velocity[soft] - fastest), -effort, effort)
+        return np.minimum(np.maximum(command, low), high)

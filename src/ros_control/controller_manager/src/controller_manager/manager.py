@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which controllers are loaded, which of them run, and how that changes. ROS-free; one thread only."""
+import contextlib
+from concurrent.futures import Future, InvalidStateError
+
+from .controller import Controller
+from .errors import ControllerError, Refused
+from .hardware import SwitchResult
+from .interfaces import COMMAND, POSITION
+
+BEST_EFFORT = 1
+STRICT = 2
+
+INITIALIZED = "initialized"
+RUNNING = "running"
+STOPPED = "stopped"
+WAITING = "waiting"
+ABORTED = "aborted"
+
+
+class Loaded:
+    """A controller under its name: ``name``, ``kind`` (its type string), ``controller``, ``state``."""
+
+    __slots__ = ("name", "kind", "controller", "state")
+
+    def __init__(self, name, kind, controller):
+        self.name = name
+        self.kind = kind
+        self.controller = controller
+        self.state = INITIALIZED
+
+    @property
+    def claimed_resources(self):
+        """List of (hardware interface, sorted joint names)."""
+        return [(interface, sorted(joints)) for interface, joints in self.controller.claims.items()]
+
+    @property
+    def commanded_joints(self):
+        """Set of the joints that this controller commands, through whichever interface."""
+        claims = self.controller.claims
+        return {joint for interface in COMMAND for joint in claims.get(interface, ())}
+
+
+class _Switch:
+    """A change that was agreed to and waits for the next update."""
+
+    def __init__(self, start, stop, new, start_asap, timeout_s):
+        self.start = start  # every controller whose starting() is due
+        self.stop = stop
+        self.new = new  # those of ``start`` that did not run before
+        self.start_asap = start_asap
+        self.timeout_s = timeout_s
+        self.began_s = None
+        self.future = Future()
+
+
+class ControllerManager:
+    """Loads, starts and stops controllers on one robot's hardware.
+
+    A change of who runs takes place inside :meth:`update`, so it takes as long as updates do not come.
+    """
+
+    def __init__(self, hardware, log):
+        """``hardware``: :class:`RobotHardware`; ``log``: ``info``, ``warn``, ``error`` of one text."""
+        self.hardware = hardware
+        self._log = log
+        self._loaded = {}
+        self._running = []
+        self._idle = []  # loaded, not running, with something to do all the same
+        self._switch = None
+        self._has_updated = False
+        self._closed = False
+        self._after_update = []
+
+    @property
+    def loaded(self):
+        """List of :class:`Loaded`, in the order of loading."""
+        return list(self._loaded.values())
+
+    def load(self, name, kind, controller_class, context):
+        """Make a controller; it does not run yet. Raises :class:`Refused` when the name is taken or its constructor
+        refuses; the context is closed then."""
+        try:
+            self.check_free(name)
+            controller = controller_class(name, self.hardware, context)
+        except Refused:
+            context.close()
+            raise
+        except ControllerError as error:
+            context.close()
+            raise Refused("cannot load controller '%s': %s" % (name, error)) from error
+        except Exception as error:
+            context.close()
+            raise Refused("cannot load controller '%s': its constructor failed with %s: %s"
+                          % (name, type(error).__name__, error)) from error
+        self._loaded[name] = Loaded(name, kind, controller)
+        self._sort()
+
+    def check_free(self, name):
+        """Raise :class:`Refused` when a controller of this name is loaded."""
+        if self._closed:
+            raise Refused("the controller manager has ended")
+        if name in self._loaded:
+            raise Refused("cannot load controller '%s': a controller of this name is already loaded (type %s); unload "
+                          "it first" % (name, self._loaded[name].kind))
+
+    def unload(self, name):
+        """Remove a controller. Raises :class:`Refused` when it runs, or when there is none of that name."""
+        loaded = self._loaded.get(name)
+        if loaded is None:
+            raise Refused("cannot unload controller '%s': %s" % (name, self._unknown()))
+        if loaded.state == RUNNING:
+            raise Refused("cannot unload controller '%s': it is running; stop it first" % name)
+        del self._loaded[name]
+        self._sort()
+        self._close(loaded)
+
+    def switch(self, start, stop, strictness=STRICT, start_asap=False, timeout_s=0.0):
+        """Agree to stop and start controllers (lists of names) within the next updates.
+
+        Returns a ``Future`` that ends when that is done (also when a start was given up, see state ``aborted``).
+        Raises :class:`Refused` when the rules of the chosen strictness, a joint wanted by two controllers or the
+        hardware forbid it; nothing changes then. ``timeout_s``: how long the hardware may take, 0 for ever.
+        """
+        if self._switch is not None or self._closed:
+            raise Refused("the controller manager has ended" if self._closed else "another switch is under way")
+        if strictness == 0:
+            self._log.warn("switch_controller: strictness 0 is taken as BEST_EFFORT (%d); say which one is meant, "
+                           "BEST_EFFORT or STRICT (%d)" % (BEST_EFFORT, STRICT))
+        strict = strictness == STRICT
+        starting, stopping = self._named(start, strict, "start"), self._named(stop, strict, "stop")
+        for loaded in self._loaded.values():
+            running = loaded.state == RUNNING
+            if running and loaded in stopping and loaded in starting:
+                raise Refused("conflicting switching command: '%s' is running and shall be started and stopped; one "
+                              "call cannot restart it" % loaded.name)
+            if strict and not running and loaded in stopping:
+                raise Refused("cannot stop controller '%s': it is %s, not running" % (loaded.name, loaded.state))
+            if strict and running and loaded in starting:
+                raise Refused("cannot start controller '%s': it is already running" % loaded.name)
+        stopping = [loaded for loaded in stopping if loaded.state == RUNNING]
+        new = [loaded for loaded in starting if loaded.state != RUNNING]
+        self._check_conflicts([loaded for loaded in self._running if loaded not in stopping] + new)
+        if not self.hardware.prepare_switch(_claims(new), _claims(stopping)):
+            raise Refused("the hardware refuses to start [%s] and stop [%s]" % (_names(new), _names(stopping)))
+        self._switch = _Switch(starting, stopping, new, start_asap, timeout_s)
+        return self._switch.future
+
+    def abandon_switch(self, future):
+        """Forget a change that nobody waits for any more; without effect when it is done."""
+        if self._switch is not None and self._switch.future is future:
+            for loaded in self._switch.start:
+                if loaded.state == WAITING:
+                    loaded.state = ABORTED
+            self._switch = None
+
+    def after_next_update(self):
+        """A ``Future`` that ends with the next update, or at once as long as there has been none."""
+        future = Future()
+        if self._closed:
+            future.cancel()
+        elif self._has_updated:
+            self._after_update.append(future)
+        else:
+            future.set_result(None)
+        return future
+
+    def update(self, time_s, dt, reset_controllers=False):
+        """One tick. ``time_s``: control time [s], ``dt``: since the last update [s].
+
+        ``reset_controllers`` stops and starts every running controller first. A controller that raises is reported
+        and taken out (state ``aborted``); its velocity and effort commands become 0.
+        """
+        for loaded in self._running:
+            try:
+                if reset_controllers:
+                    loaded.controller.stopping(time_s)
+                    loaded.controller.starting(time_s)
+                loaded.controller.update(time_s, dt)
+            except Exception as error:  # noqa: BLE001  (a controller is anybody's code; the others go on)
+                self._fail(loaded, "update", error)
+        for loaded in self._idle:
+            try:
+                loaded.controller.idle(time_s)
+            except Exception as error:  # noqa: BLE001
+                self._idle = [other for other in self._idle if other is not loaded]
+                self._log.error("controller '%s' failed in idle() with %s: %s; it is not called again before it runs"
+                                % (loaded.name, type(error).__name__, error))
+        if self._switch is not None:
+            self._go_on_switching(time_s)
+        self._has_updated = True
+        if self._after_update:
+            waiting, self._after_update = self._after_update, []
+            for future in waiting:
+                _finish(future)
+
+    def close(self):
+        """Close all controllers and release who waits (their futures are cancelled)."""
+        self._closed = True
+        for future in [*self._after_update, *([self._switch.future] if self._switch else ())]:
+            future.cancel()
+        self._switch, self._after_update, self._running, self._idle = None, [], [], []
+        while self._loaded:
+            self._close(self._loaded.popitem()[1])
+
+    # -- inside -------------------------------------------------------------------------------------------------
+
+    def _named(self, names, strict, purpose):
+        found = []
+        for name in names:
+            loaded = self._loaded.get(name)
+            if loaded is None and strict:
+                raise Refused("cannot %s controller '%s': %s" % (purpose, name, self._unknown()))
+            if loaded is not None and loaded not in found:
+                found.append(loaded)
+        return found
+
+    def _unknown(self):
+        return "no controller of this name is loaded; loaded are: %s" % (", ".join(self._loaded) or "none")
+
+    @staticmethod
+    def _check_conflicts(would_run):
+        users = {}
+        for loaded in would_run:
+            for joint in loaded.commanded_joints:
+                users.setdefault(joint, []).append(loaded.name)
+        shared = {joint: names for joint, names in users.items() if len(names) > 1}
+        if shared:
+            raise Refused("resource conflict: %s" % "; ".join(
+                "joint '%s' is claimed by %s" % (joint, " and ".join(names))
+                for joint, names in sorted(shared.items())))
+
+    def _go_on_switching(self, time_s):
+        switch, hardware = self._switch, self.hardware
+        if switch.began_s is None:
+            switch.began_s = time_s
+            hardware.do_switch(_claims(switch.new), _claims(switch.stop))
+            for loaded in switch.stop:
+                self._stop(loaded, time_s)
+        timed_out = switch.timeout_s > 0.0 and time_s - switch.began_s > switch.timeout_s
+        whole = None if switch.start_asap else hardware.switch_result()
+        left = []
+        for loaded in switch.start:
+            result = whole or hardware.switch_result(loaded.controller.claims)
+            if result is SwitchResult.DONE:
+                self._start(loaded, time_s)
+            elif result is SwitchResult.ERROR or timed_out:
+                self._log.error("controller '%s' is not started: the hardware %s" % (
+                    loaded.name, "reports an error" if result is SwitchResult.ERROR else
+                    "did not get ready within %g s" % switch.timeout_s))
+                self._set_state(loaded, ABORTED)
+            else:
+                self._set_state(loaded, WAITING)
+                left.append(loaded)
+        switch.start = left
+        if not left:
+            self._switch = None
+            _finish(switch.future)
+
+    def _start(self, loaded, time_s):
+        try:
+            loaded.controller.starting(time_s)
+        except Exception as error:  # noqa: BLE001
+            self._fail(loaded, "starting", error)
+        else:
+            self._set_state(loaded, RUNNING)
+
+    def _stop(self, loaded, time_s):
+        try:
+            loaded.controller.stopping(time_s)
+        except Exception as error:  # noqa: BLE001
+            self._fail(loaded, "stopping", error)
+        else:
+            self._set_state(loaded, STOPPED)
+
+    def _fail(self, loaded, where, error):
+        self._log.error("controller '%s' failed in %s() with %s: %s; it is stopped, the others go on"
+                        % (loaded.name, where, type(error).__name__, error))
+        self._set_state(loaded, ABORTED)
+        for interface, joints in loaded.controller.claims.items():
+            if interface in COMMAND and interface != POSITION:
+                index = self.hardware.index(interface, joints, loaded.name)
+                self.hardware.command[interface][index] = 0.0
+
+    def _set_state(self, loaded, state):
+        loaded.state = state
+        self._sort()
+
+    def _sort(self):
+        # In the order of loading, as updates have always been made.
+        self._running = [loaded for loaded in self._loaded.values() if loaded.state == RUNNING]
+        self._idle = [loaded for loaded in self._loaded.values()
+                      if loaded.state != RUNNING and type(loaded.controller).idle is not Controller.idle]
+
+    def _close(self, loaded):
+        try:
+            loaded.controller.close()
+        except Exception as error:  # noqa: BLE001
+            self._log.error("controller '%s' failed in close() with %s: %s"
+                            % (loaded.name, type(error).__name__, error))
+        loaded.controller.context.close()
+
+
+def _claims(controllers):
+    return [loaded.controller.claims for loaded in controllers]
+
+
+def _names(controllers):
+    return ", ".join(loaded.name for loaded in controllers)
+
+
+def _finish(future):
+    # Who waited may have given up and cancelled it.
+    with contextlib.suppress(InvalidStateError):
+        future.set_result(None)

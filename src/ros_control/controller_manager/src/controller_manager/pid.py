@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""PID for k joints at once, with control_toolbox's meaning of the parameters. ROS-free; time is an argument."""
+import math
+
+import numpy as np
+
+from .errors import ControllerError
+
+
+class Gains:
+    """Arrays (k,): ``p``, ``i``, ``d``, ``i_min``, ``i_max``, and ``antiwindup`` (bool)."""
+
+    def __init__(self, p, i, d, i_min, i_max, antiwindup):
+        self.p, self.i, self.d = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (p, i, d))
+        self.i_min, self.i_max = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (i_min, i_max))
+        self.antiwindup = np.atleast_1d(np.asarray(antiwindup, dtype=bool))
+
+    @classmethod
+    def from_params(cls, read, names):
+        """The gains that stand under ``names`` (k parameter names, e.g. ``"gains/joint_1"``).
+
+        ``read(name)`` -> (value or None, absolute name), e.g. ``ControllerContext.entry``. ``p`` is required.
+        ``i_clamp`` [output's unit] bounds the integral term both ways, ``i_clamp_min`` and ``i_clamp_max`` override
+        it. Raises :class:`ControllerError`.
+        """
+        rows = [cls._row(read, name) for name in names]
+        return cls(*zip(*rows, strict=True)) if rows else cls([], [], [], [], [], [])
+
+    @classmethod
+    def joined(cls, parts):
+        """The gains of several :class:`Gains`, one after the other."""
+        return cls(*(np.concatenate([getattr(part, field) for part in parts])
+                     for field in ("p", "i", "d", "i_min", "i_max", "antiwindup")))
+
+    @staticmethod
+    def _row(read, name):
+        def number(key, default):
+            value, full_name = read("%s/%s" % (name, key))
+            if value is None:
+                value = default
+            if value is None:
+                raise ControllerError("parameter %s is missing; give the proportional gain, e.g. "
+                                      "{p: 100.0, i: 0.0, d: 1.0, i_clamp: 0.0}" % full_name)
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+                raise ControllerError("parameter %s is %r, expected a number" % (full_name, value))
+            return float(value)
+
+        p, i, d = number("p", None), number("i", 0.0), number("d", 0.0)
+        clamp = abs(number("i_clamp", 0.0))
+        i_min, i_max = number("i_clamp_min", -clamp), number("i_clamp_max", clamp)
+        if i_min > i_max:
+            raise ControllerError("parameter %s: i_clamp_min %g is above i_clamp_max %g"
+                                  % (read(name)[1], i_min, i_max))
+        antiwindup, full_name = read(name + "/antiwindup")
+        if antiwindup not in (None, True, False):
+            raise ControllerError("parameter %s is %r, expected true or false" % (full_name, antiwindup))
+        return p, i, d, i_min, i_max, bool(antiwindup)
+
+
+class Pid:
+    """One PID per joint. The output is p e + i-term + d de/dt.
+
+    Without antiwindup the i-term i * (integral of e) is clamped to [i_min, i_max]; with it, the integral itself is.
+    """
+
+    def __init__(self, gains):
+        """``gains``: :class:`Gains` of k joints."""
+        self.gains = gains
+        self._bounded = gains.antiwindup & (gains.i != 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.where(self._bounded, gains.i_min / gains.i, 0.0), np.where(self._bounded, gains.i_max / gains.i,
+                                                                                 0.0)
+        self._low, self._high = np.minimum(*ends), np.maximum(*ends)
+        self._low[~self._bounded], self._high[~self._bounded] = -np.inf, np.inf
+        self._any_integral = bool(gains.i.any())
+        self.integral = np.zeros(len(gains.p))
+        self.last_error = np.zeros(len(gains.p))
+
+    def reset(self, index=slice(None)):
+        """Forget the past, of all joints or of those in ``index``. The error before the first update counts as 0."""
+        self.integral[index] = 0.0
+        self.last_error[index] = 0.0
+
+    def update(self, error, dt, error_dot=None):
+        """Output (k,) for ``error`` (k,); ``error_dot`` (k,) is differentiated from the errors when not given.
+
+        0 when ``dt`` is not positive, and for joints whose error is not finite; these keep their past.
+        """
+        if not dt > 0.0:
+            return np.zeros(len(error))
+        gains = self.gains
+        finite = np.isfinite(error)
+        if error_dot is not None:
+            finite &= np.isfinite(error_dot)
+        every = finite.all()
+        if not every:
+            error = np.where(finite, error, 0.0)
+            error_dot = None if error_dot is None else np.where(finite, error_dot, 0.0)
+        if error_dot is None:
+            error_dot = (error - self.last_error) / dt
+        output = gains.p * error + gains.d * error_dot
+        if self._any_integral:
+            # A joint with a non-finite error adds nothing here: its error was replaced by 0.
+            self.integral += error * dt
+            np.maximum(self.integral, self._low, out=self.integral)
+            np.minimum(self.integral, self._high, out=self.integral)
+            output += np.minimum(np.maximum(gains.i * self.integral, gains.i_min), gains.i_max)
+        if every:
+            self.last_error = np.array(error)
+            return output
+        self.last_error = np.where(finite, error, self.last_error)
+        return np.where(finite, output, 0.0)

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The services of a controller manager: each request in a thread of its own, the work in the loop's."""
+import contextlib
+import threading
+from concurrent.futures import CancelledError
+from concurrent.futures import TimeoutError as FutureTimeout
+
+import rospy
+from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
+from controller_manager_msgs.srv import (
+    ListControllers,
+    ListControllersResponse,
+    ListControllerTypes,
+    ListControllerTypesResponse,
+    LoadController,
+    LoadControllerResponse,
+    ReloadControllerLibraries,
+    ReloadControllerLibrariesResponse,
+    SwitchController,
+    SwitchControllerResponse,
+    UnloadController,
+    UnloadControllerResponse,
+)
+
+from controller_manager.controller import ControllerContext
+from controller_manager.errors import ControlError, Refused
+from controller_manager.manager import BEST_EFFORT
+
+BASE_CLASS = "controller_interface::ControllerBase"
+# How much longer than its own time limit a switch may keep its caller waiting [wall s].
+_GRACE_S = 1.0
+
+
+class ControllerManagerServices:
+    """Serves ``<namespace>/controller_manager/...``, one request after the other.
+
+    Loading, unloading and switching end with the loop's next update; while physics is paused they wait for it. The
+    only loads that do not are those before the very first update.
+    """
+
+    def __init__(self, manager, find_table, host, robot):
+        """``host``: ``namespace``, ``log``, ``service_in_thread``, ``call_in_loop``, ``branch`` and ``flush`` as
+        ``gazebo_ros.model_plugin.PluginContext`` has them. ``find_table()`` -> :class:`ControllerTable`, asked at each
+        request, from any thread. ``robot``: ``urdf_model.Robot`` that controllers are told of."""
+        self._manager = manager
+        self._find_table = find_table
+        self._host = host
+        self._robot = robot
+        self._log = host.log
+        self._closed = False
+        self._one_at_a_time = threading.Lock()
+        for name, srv_class, handler in (
+                ("list_controllers", ListControllers, self._list),
+                ("list_controller_types", ListControllerTypes, self._list_types),
+                ("load_controller", LoadController, self._load),
+                ("unload_controller", UnloadController, self._unload),
+                ("switch_controller", SwitchController, self._switch),
+                ("reload_controller_libraries", ReloadControllerLibraries, self._reload)):
+            host.service_in_thread("controller_manager/" + name, srv_class, self._serialised(handler))
+
+    def close(self):
+        """Loop thread: refuse what comes and release who waits."""
+        self._closed = True
+        self._manager.close()
+
+    def _serialised(self, handler):
+        def answer(request):
+            with self._one_at_a_time:
+                if self._closed:
+                    raise rospy.ServiceException("the controller manager of this robot has ended")
+                try:
+                    return handler(request)
+                except CancelledError:
+                    raise rospy.ServiceException("the controller manager ended before it could answer") from None
+
+        return answer
+
+    def _in_loop(self, function, *arguments):
+        return self._host.call_in_loop(function, *arguments)
+
+    def _succeeds(self, function, *arguments):
+        """Call and return True, or log what was refused and return False."""
+        try:
+            function(*arguments)
+        except ControlError as error:
+            self._log.error("%s/controller_manager: %s" % (self._host.namespace, error))
+            return False
+        return True
+
+    # -- one method per service; these run in threads -------------------------------------------------------------
+
+    def _list(self, _):
+        return ListControllersResponse(self._in_loop(self._states))
+
+    def _list_types(self, _):
+        try:
+            types = self._find_table().types
+        except ControlError as error:
+            raise rospy.ServiceException(str(error)) from error
+        return ListControllerTypesResponse(types, [BASE_CLASS] * len(types))
+
+    def _load(self, request):
+        return LoadControllerResponse(self._succeeds(self._do_load, request.name))
+
+    def _unload(self, request):
+        return UnloadControllerResponse(self._succeeds(self._do_unload, request.name))
+
+    def _switch(self, request):
+        return SwitchControllerResponse(self._succeeds(
+            self._do_switch, request.start_controllers, request.stop_controllers, request.strictness,
+            request.start_asap, request.timeout))
+
+    def _reload(self, request):
+        return ReloadControllerLibrariesResponse(self._succeeds(self._do_reload, request.force_kill))
+
+    # -- what they do -----------------------------------------------------------------------------------------------
+
+    def _states(self):
+        return [ControllerState(loaded.name, loaded.state, loaded.kind,
+                                [HardwareInterfaceResources(*claim) for claim in loaded.claimed_resources])
+                for loaded in self._manager.loaded]
+
+    def _do_load(self, name):
+        host, manager = self._host, self._manager
+        self._in_loop(manager.check_free, name)
+        context = ControllerContext(name, host.namespace, _parameters(host.namespace), host.branch(), self._log,
+                                    self._robot)
+        kind = context.param("type")
+        if not isinstance(kind, str) or not kind:
+            found = "is missing" if kind is None else "is %r" % (kind,)
+            raise Refused("cannot load controller '%s': parameter %s %s; give the controller's type, e.g. "
+                          "position_controllers/JointTrajectoryController (has its YAML file been loaded, in this "
+                          "namespace?)" % (name, context.resolve("type"), found))
+        try:
+            # Importing takes its time; not the loop's.
+            controller_class = self._find_table().find(kind)
+        except ControlError as error:
+            raise Refused("cannot load controller '%s': %s" % (name, error)) from error
+        self._in_loop(manager.load, name, kind, controller_class, context)
+        host.flush()
+        self._await_update()
+
+    def _do_unload(self, name):
+        self._in_loop(self._manager.unload, name)
+        self._await_update()
+
+    def _do_switch(self, start, stop, strictness, start_asap, timeout_s):
+        future = self._in_loop(self._manager.switch, start, stop, strictness, start_asap, timeout_s)
+        try:
+            future.result(timeout_s + _GRACE_S if timeout_s > 0.0 else None)
+        except FutureTimeout:
+            with contextlib.suppress(CancelledError):
+                self._in_loop(self._manager.abandon_switch, future)
+            raise Refused("the switch was given up after %g s: the control loop does not run (is physics paused?) or "
+                          "the hardware is not ready" % (timeout_s + _GRACE_S)) from None
+
+    def _do_reload(self, force_kill):
+        names = [state.name for state in self._in_loop(self._states)]
+        if names and not force_kill:
+            raise Refused("cannot reload the controller libraries: %s are loaded; unload them first or set force_kill"
+                          % ", ".join(names))
+        if names:
+            self._do_switch([], names, BEST_EFFORT, False, 0.0)
+        for name in names:
+            self._do_unload(name)
+        try:
+            self._find_table().reload()
+        except Exception as error:  # noqa: BLE001  (anybody's source)
+            raise Refused("cannot reload the controller libraries: %s: %s" % (type(error).__name__, error)) from error
+
+    def _await_update(self):
+        self._in_loop(self._manager.after_next_update).result()
+
+
+def _parameters(namespace):
+    try:
+        return rospy.get_param(namespace or "/")
+    except KeyError:
+        return {}
