@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The joints of a simulated model as hardware for controllers: state in, limits, drives out. ROS-free."""
+import math
+
+import numpy as np
+
+from controller_manager.errors import ControllerError, HardwareError
+from controller_manager.hardware import RobotHardware
+from controller_manager.interfaces import EFFORT, POSITION, VELOCITY
+from controller_manager.limits import (
+    EffortLimiter,
+    PositionLimiter,
+    VelocityLimiter,
+    limits_from_urdf,
+    with_parameters,
+)
+from controller_manager.pid import Gains, Pid
+from controller_manager.transmissions import read_soft_limits, read_transmissions
+
+# Stands for "as strong as need be" [N m, N]: what Gazebo's position interface does is kinematic, and descriptions with
+# link inertias of 10 kg m2 and motors of 100 N m rely on it.
+_UNLIMITED = 1e9
+
+_LIMITERS = {POSITION: PositionLimiter, VELOCITY: VelocityLimiter, EFFORT: EffortLimiter}
+
+
+class SimulatedHardware(RobotHardware):
+    """The joints of a ``bullet_sim.Model`` that have a transmission.
+
+    Commands act on the joint, as in Gazebo; mechanicalReduction and offset have no effect. Per interface:
+
+    position
+        the joint is at the command after the step, whatever effort that takes
+    position with PID gains
+        the effort is the PID's output of the position error, at most the effort limit
+    velocity
+        a motor keeps the velocity with at most the effort limit; with PID gains, the PID's output as an effort
+    effort
+        the effort acts
+
+    Until the first command joints with a position interface stay where they were spawned.
+    """
+
+    def __init__(self, model, robot, urdf_xml, limit_parameters=None, gain_parameters=None, namespace="", log=None):
+        """``robot``, ``urdf_xml``: the description that names transmissions and limits. ``limit_parameters``,
+        ``gain_parameters``: {joint: ...} as they stand under ``joint_limits`` and ``gazebo_ros_control/pid_gains`` of
+        ``namespace``. ``log``: ``warn`` and ``error`` of one text. Raises :class:`HardwareError`.
+        """
+        joints, warnings = read_transmissions(urdf_xml, model.joint_names)
+        for warning in warnings:
+            log.warn(warning)
+        super().__init__({joint.name: (joint.interface,) for joint in joints})
+        self.joints = joints
+        self._model = model
+        self._model_index = model.index(self.joint_names)
+        soft = read_soft_limits(urdf_xml)
+        limits = [self._limits_of(joint.name, robot, soft, limit_parameters, namespace) for joint in joints]
+        self._groups = []
+        for interface in (POSITION, VELOCITY, EFFORT):
+            here = [i for i, joint in enumerate(joints) if joint.interface == interface]
+            gains = {} if interface == EFFORT else self._gains_of(here, gain_parameters, namespace, log)
+            self._add_group(interface, [i for i in here if i not in gains], limits, None)
+            self._add_group(interface, list(gains), limits, list(gains.values()))
+        self._continuous = np.array([robot.joints[name].type == "continuous" for name in self.joint_names], dtype=bool)
+        self._frozen = None
+        self.read()
+        self.joints_set()
+
+    def read(self):
+        """Take the model's joint state, as it is after the last physics step."""
+        for ours, theirs in zip((self.position, self.velocity, self.effort), self._model.read_joints(), strict=True):
+            ours[:] = theirs[self._model_index]
+
+    def write(self, dt):
+        """Drive the model's joints for the next physics step of ``dt`` seconds."""
+        for group in self._groups:
+            index = group.index
+            command = self.command[group.interface][index]
+            if self._frozen is not None:
+                command = self._frozen[index] if group.interface == POSITION else np.zeros(len(index))
+            position, velocity = self.position[index], self.velocity[index]
+            group.drive(group.limiter.enforce(command, dt, position, velocity), position, velocity, dt)
+
+    def joints_set(self):
+        """The joints were put elsewhere (at the start too): stay there, and count limits from there."""
+        self.read()
+        self.command[POSITION][:] = self.position
+        self.command[VELOCITY][:] = 0.0
+        self.command[EFFORT][:] = 0.0
+        if self._frozen is not None:
+            self._frozen = self.position.copy()
+        for group in self._groups:
+            group.reset()
+
+    def stop(self, stopped):
+        """Emergency stop: while ``stopped``, joints stay where they were when it came, without effort or velocity."""
+        if stopped and self._frozen is None:
+            self._frozen = self.position.copy()
+        elif not stopped:
+            self._frozen = None
+
+    # -- inside -------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def _limits_of(name, robot, soft, parameters, namespace):
+        limits = limits_from_urdf(robot.joints[name], soft.get(name))
+        values = (parameters or {}).get(name) if isinstance(parameters, dict) else None
+        if values is None:
+            return limits
+        return with_parameters(limits, values, "%s/joint_limits/%s" % (namespace, name))
+
+    def _gains_of(self, indices, parameters, namespace, log):
+        """{index: Gains} of the joints that have PID gains; incomplete ones are reported and left out."""
+        found = {}
+        source = "%s/gazebo_ros_control/pid_gains" % namespace
+        for i in indices:
+            name = self.joint_names[i]
+            if not isinstance(parameters, dict) or name not in parameters:
+                continue
+            values = parameters[name] if isinstance(parameters[name], dict) else {}
+
+            def read(entry, values=values):
+                return values.get(entry.rpartition("/")[2]), "%s/%s" % (source, entry)
+
+            try:
+                found[i] = Gains.from_params(read, [name])
+            except ControllerError as error:
+                log.error("joint '%s' is driven without PID: %s" % (name, error))
+        return found
+
+    def _add_group(self, interface, indices, limits, gains):
+        if not indices:
+            return
+        names = [self.joint_names[i] for i in indices]
+        limiter = _LIMITERS[interface](names, [limits[i] for i in indices])
+        effort = np.array([min(limits[i].effort, _UNLIMITED) for i in indices])
+        index, model_index = np.array(indices), self._model_index[indices]
+        if gains is not None:
+            self._groups.append(_PidGroup(self, interface, index, model_index, limiter, effort, Gains.joined(gains)))
+        else:
+            self._groups.append(_GROUPS[interface](self, interface, index, model_index, limiter, effort))
+
+
+class _Group:
+    """Joints of one interface that are driven the same way. ``index`` is into the hardware's arrays."""
+
+    def __init__(self, hardware, interface, index, model_index, limiter, effort):
+        self.interface = interface
+        self.index = index
+        self.limiter = limiter
+        self._hardware = hardware
+        self._model = hardware._model
+        self._model_index = model_index
+        self._effort = effort
+
+    def reset(self):
+        self.limiter.reset()
+
+
+class _PositionGroup(_Group):
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self._unlimited = np.full(len(self.index), _UNLIMITED)
+
+    def drive(self, command, position, velocity, dt):
+        # The velocity that ends at the command; stable at any inertia because the solver finds the effort for it.
+        self._model.drive_velocity(self._model_index, (command - position) / dt, self._unlimited)
+
+
+class _VelocityGroup(_Group):
+    def drive(self, command, position, velocity, dt):
+        self._model.drive_velocity(self._model_index, command, self._effort)
+
+
+class _EffortGroup(_Group):
+    def drive(self, command, position, velocity, dt):
+        self._model.drive_effort(self._model_index, command)
+
+
+class _PidGroup(_Group):
+    def __init__(self, hardware, interface, index, model_index, limiter, effort, gains):
+        super().__init__(hardware, interface, index, model_index, limiter, effort)
+        self._pid = Pid(gains)
+
+    def reset(self):
+        super().reset()
+        self._pid.reset()
+
+    def drive(self, command, position, velocity, dt):
+        if self.interface == POSITION:
+            error = command - position
+            around = self._hardware._continuous[self.index]
+            if around.any():
+                error = np.where(around, np.remainder(error + math.pi, 2.0 * math.pi) - math.pi, error)
+        else:
+            error = command - velocity
+        effort = self._pid.update(error, dt)
+        self._model.drive_effort(self._model_index, np.minimum(np.maximum(effort, -self._effort), self._effort))
+
+
+_GROUPS = {POSITION: _PositionGroup, VELOCITY: _VelocityGroup, EFFORT: _EffortGroup}
+
+__all__ = ["HardwareError", "SimulatedHardware"]

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""libgazebo_ros_control.so as a model plugin of /gazebo: a controller manager on the model's joints."""
+import math
+import os
+
+import rospkg
+import rospy
+import yaml
+from std_msgs.msg import Bool
+
+from controller_manager import ControlError, ControllerTable
+from controller_manager.manager import ControllerManager
+from controller_manager.services import ControllerManagerServices
+from gazebo_ros.model_plugin import ModelPlugin
+from gazebo_ros_control.hardware import SimulatedHardware
+from urdf_model import UrdfError, parse_urdf
+
+DEFAULT_SIM_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
+#: Private parameter of /gazebo: a mapping of controller type to "module:Class" that adds to ros_controllers' table.
+MORE_TYPES = "~controller_types"
+
+
+class GazeboRosControl(ModelPlugin):
+    """Elements: robotNamespace, robotParam, controlPeriod [s], eStopTopic, robotSimType; legacyModeNS has no effect.
+
+    A description that gives no hardware is one error in the log; the model stays, without controllers.
+    """
+
+    def __init__(self, context):
+        super().__init__(context)
+        self._hardware = None
+        try:
+            self._build(context)
+        except (ControlError, UrdfError) as error:
+            self._hardware = None
+            context.log.error("model '%s' has no controllers: %s" % (context.model.name, error))
+
+    def _build(self, context):
+        robot, urdf_xml = self._description(context)
+        self._period_s = self._control_period(context)
+        sim_type = context.element_text("robotSimType", DEFAULT_SIM_TYPE)
+        if sim_type != DEFAULT_SIM_TYPE:
+            context.log.warn("model '%s': robotSimType '%s' is not known and taken as %s"
+                             % (context.model.name, sim_type, DEFAULT_SIM_TYPE))
+        hardware = SimulatedHardware(
+            context.model, robot, urdf_xml, context.param("joint_limits"),
+            context.param("gazebo_ros_control/pid_gains"), context.namespace, context.log)
+        if not hardware.joint_names:
+            context.log.warn("model '%s': its description has no <transmission>, so no joint can be controlled"
+                             % context.model.name)
+        self._manager = ControllerManager(hardware, context.log)
+        self._last_update_s = None
+        self._restart = False
+        topic = context.element_text("eStopTopic")
+        self._stop_messages = context.mailbox(topic, Bool) if topic else None
+        self._stopped = False
+        self._types = _Types()
+        self._services = ControllerManagerServices(self._manager, self._types.table, context, robot)
+        self._hardware = hardware
+
+    def update(self, time_s, dt):
+        hardware = self._hardware
+        if hardware is None:
+            return
+        hardware.read()
+        if self._stop_messages is not None:
+            self._take_stop()
+        last = self._last_update_s
+        # Half a nanosecond: multiples of a tick and of the period meet in rounding only.
+        if last is None or time_s - last >= self._period_s - 5e-10:
+            restart, self._restart = self._restart, False
+            self._manager.update(time_s, self._period_s if last is None else time_s - last, restart)
+            self._last_update_s = time_s
+        hardware.write(dt)
+
+    def joints_set(self):
+        if self._hardware is not None:
+            self._hardware.joints_set()
+
+    def reset(self):
+        # Controllers begin anew from where the joints are now: what they were about belongs to the time before.
+        self._last_update_s = None
+        self._restart = True
+        self.joints_set()
+
+    def close(self):
+        if self._hardware is not None:
+            self._services.close()
+
+    def _take_stop(self):
+        message = self._stop_messages.take()
+        if message is None:
+            return
+        if self._stopped and not message.data:
+            self._restart = True
+        self._stopped = message.data
+        self._hardware.stop(message.data)
+
+    @staticmethod
+    def _description(context):
+        """(robot, URDF text) that robotParam names, looked for upwards from the namespace; else what was spawned."""
+        name = context.element_text("robotParam", "robot_description")
+        namespace = context.namespace
+        while not name.startswith("/"):
+            text = context.param("%s/%s" % (namespace, name))
+            if isinstance(text, str) and text.strip():
+                break
+            if not namespace:
+                return context.robot, context.urdf_xml
+            namespace = namespace.rpartition("/")[0]
+        else:
+            text = context.param(name)
+            if not isinstance(text, str):
+                return context.robot, context.urdf_xml
+        if text.strip() == context.urdf_xml.strip():
+            return context.robot, context.urdf_xml
+        return parse_urdf(text, source="%s/%s" % (namespace, name.lstrip("/"))), text
+
+    @staticmethod
+    def _control_period(context):
+        step_s = context.world.time_step_s
+        text = context.element_text("controlPeriod")
+        if text is None:
+            return step_s
+        try:
+            period_s = float(text)
+        except ValueError:
+            period_s = math.nan
+        if not (math.isfinite(period_s) and period_s > 0.0):
+            context.log.error("model '%s': controlPeriod is '%s', expected a number of seconds above 0; the physics "
+                              "step of %g s is used" % (context.model.name, text, step_s))
+            return step_s
+        if period_s < step_s - 5e-10:
+            context.log.error("model '%s': controlPeriod %g s is shorter than the physics step of %g s; controllers "
+                              "run at every step" % (context.model.name, period_s, step_s))
+        elif period_s > step_s + 5e-10:
+            context.log.warn("model '%s': controlPeriod %g s is longer than the physics step of %g s"
+                             % (context.model.name, period_s, step_s))
+        return period_s
+
+
+class _Types:
+    """The table of controller types: ros_controllers' file, and what the node's parameter adds to it by now."""
+
+    def __init__(self):
+        path = os.path.join(rospkg.RosPack().get_path("ros_controllers"), "config", "controllers.yaml")
+        with open(path, encoding="utf-8") as file:
+            self._own = yaml.safe_load(file)
+        self._entries, self._table = None, None
+
+    def table(self):
+        """Any thread, one at a time: the :class:`ControllerTable`."""
+        more = rospy.get_param(MORE_TYPES, {})
+        if not isinstance(more, dict):
+            raise ControlError("parameter %s is %r, expected a mapping of controller type to module:Class"
+                               % (rospy.resolve_name(MORE_TYPES), more))
+        entries = {**self._own, **_flat(more)}
+        if entries != self._entries:
+            self._entries, self._table = entries, ControllerTable(entries)
+        return self._table
+
+
+def _flat(tree, path=""):
+    """{"a/b": value} of {"a": {"b": value}}: the parameter server takes a slash in a key for a namespace."""
+    flat = {}
+    for key, value in tree.items():
+        flat.update(_flat(value, path + key + "/") if isinstance(value, dict) else {path + key: value})
+    return flat

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A controller of somebody's own that breaks when it is told to."""
+from std_msgs.msg import Empty
+
+from controller_manager import POSITION, Controller
+
+
+class Breaking(Controller):
+    """Raises the elbow, until something comes on ``break``."""
+
+    def __init__(self, name, hardware, context):
+        super().__init__(name, hardware, context)
+        self.index = self.claim(POSITION, ["elbow"])
+        self.inbox = context.mailbox("break", Empty)
+
+    def update(self, time_s, dt):
+        if self.inbox.take() is not None:
+            raise ValueError("told to break")
+        self.hardware.command[POSITION][self.index] = -0.3

@@ -1,0 +1,504 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers on a robot of two joints in the running simulator: services, tools, mistakes."""
+import contextlib
+import os
+import random
+import signal
+import subprocess
+import threading
+import time
+import unittest
+
+import rospy
+import rostest
+from controller_manager_msgs.srv import (
+    ListControllers,
+    ListControllerTypes,
+    LoadController,
+    ReloadControllerLibraries,
+    SwitchController,
+    UnloadController,
+)
+from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SetModelConfiguration, SpawnModel
+from geometry_msgs.msg import Point, Pose, Quaternion
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Float64MultiArray
+from std_msgs.msg import Empty as EmptyMessage
+from std_srvs.srv import Empty
+
+from controller_manager_msgs import utils
+
+BEST_EFFORT, STRICT = 1, 2
+DEADLINE_S = 20.0
+POSITION = "hardware_interface::PositionJointInterface"
+
+
+def wait_for(condition, what, deadline_s=DEADLINE_S):
+    """Poll until ``condition()`` is true; an error that says what was awaited otherwise."""
+    end = time.monotonic() + deadline_s
+    while time.monotonic() < end:
+        found = condition()
+        if found:
+            return found
+        time.sleep(0.01)
+    raise AssertionError("waited %.0f s in vain for %s" % (deadline_s, what))
+
+
+class Manager:
+    """The services of one robot's controller manager."""
+
+    def __init__(self, namespace):
+        self.namespace = namespace
+        for name, srv_class in (("list_controllers", ListControllers), ("list_controller_types", ListControllerTypes),
+                                ("load_controller", LoadController), ("unload_controller", UnloadController),
+                                ("switch_controller", SwitchController),
+                                ("reload_controller_libraries", ReloadControllerLibraries)):
+            proxy = rospy.ServiceProxy("%s/controller_manager/%s" % (namespace, name), srv_class)
+            proxy.wait_for_service(DEADLINE_S)
+            setattr(self, "_" + name, proxy)
+
+    def load(self, name):
+        return self._load_controller(name).ok
+
+    def unload(self, name):
+        return self._unload_controller(name).ok
+
+    def switch(self, start=(), stop=(), strictness=STRICT, timeout=0.0):
+        return self._switch_controller(list(start), list(stop), strictness, False, timeout).ok
+
+    def listing(self):
+        return self._list_controllers().controller
+
+    def states(self):
+        return {controller.name: controller.state for controller in self.listing()}
+
+    def types(self):
+        return self._list_controller_types()
+
+    def reload(self, force):
+        return self._reload_controller_libraries(force).ok
+
+
+class Joints:
+    """The newest message on a robot's joint_states."""
+
+    def __init__(self, namespace):
+        self.newest, self.count = None, 0
+        self._topic = namespace + "/joint_states"
+        self._subscriber = rospy.Subscriber(self._topic, JointState, self._take)
+
+    def _take(self, message):
+        self.newest, self.count = message, self.count + 1
+
+    def at(self, tolerance=0.002, **wanted):
+        """Wait until joints are at the positions given by name."""
+        wait_for(lambda: self.newest and all(
+            abs(dict(zip(self.newest.name, self.newest.position, strict=True))[name] - position) < tolerance
+            for name, position in wanted.items()), "%s at %s (last %s)" % (self._topic, wanted, self.newest))
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+class GazeboControl(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        for name, srv_class in (("spawn_urdf_model", SpawnModel), ("delete_model", DeleteModel),
+                                ("get_world_properties", GetWorldProperties), ("pause_physics", Empty),
+                                ("unpause_physics", Empty), ("reset_world", Empty), ("reset_simulation", Empty),
+                                ("set_model_configuration", SetModelConfiguration)):
+            proxy = rospy.ServiceProxy("/gazebo/" + name, srv_class)
+            proxy.wait_for_service(DEADLINE_S)
+            setattr(cls, name, staticmethod(proxy))
+        cls.urdf = rospy.get_param("/robot_description")
+        cls.log = []
+        cls._rosout = rospy.Subscriber("/rosout", Log, cls.log.append)
+
+    def setUp(self):
+        self._publishers = {}
+        self._cleanups_of_test = contextlib.ExitStack()
+        self.spawn("one")
+        self.one = Manager("/one")
+
+    def tearDown(self):
+        self._cleanups_of_test.close()
+        self.unpause_physics()
+        for name in self.get_world_properties().model_names:
+            if name != "ground_plane":
+                self.delete_model(name)
+
+    def spawn(self, name, urdf=None):
+        xml = (urdf or self.urdf).replace("/one<", "/%s<" % name)
+        response = self.spawn_urdf_model(name, xml, "/", Pose(Point(0, 0, 0), Quaternion(0, 0, 0, 1)), "")
+        self.assertTrue(response.success, response.status_message)
+
+    def joints(self, namespace="/one"):
+        joints = Joints(namespace)
+        self._cleanups_of_test.callback(joints.close)
+        return joints
+
+    def send(self, topic, message):
+        if topic not in self._publishers:
+            publisher = rospy.Publisher(topic, type(message), queue_size=1)
+            self._publishers[topic] = publisher
+            self._cleanups_of_test.callback(publisher.unregister)
+            wait_for(publisher.get_num_connections, "a listener on " + topic)
+        self._publishers[topic].publish(message)
+
+    def said(self, *words):
+        """Wait for one line in the log that has all ``words``."""
+        return wait_for(lambda: [m.msg for m in self.log if all(word in m.msg for word in words)],
+                        "a log line with %s" % (words,))[0]
+
+    def start(self, *names, manager=None):
+        manager = manager or self.one
+        for name in names:
+            self.assertTrue(manager.load(name), name)
+        self.assertTrue(manager.switch(names))
+
+    @contextlib.contextmanager
+    def process(self, *command, namespace="/one"):
+        """Run a tool in a namespace; it is told to end afterwards and must do so."""
+        process = subprocess.Popen(["rosrun", "controller_manager", *command], stdout=subprocess.PIPE, text=True,
+                                   stderr=subprocess.STDOUT, env={**os.environ, "ROS_NAMESPACE": namespace},
+                                   start_new_session=True)
+        try:
+            yield process
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGINT)
+            try:
+                process.communicate(timeout=DEADLINE_S)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                raise
+
+    def tool(self, *command, namespace="/one"):
+        """(exit code, output) of a tool that ends by itself."""
+        done = subprocess.run(["rosrun", "controller_manager", *command], capture_output=True, text=True,
+                              env={**os.environ, "ROS_NAMESPACE": namespace}, timeout=DEADLINE_S)
+        return done.returncode, done.stdout + done.stderr
+
+    # -- services ---------------------------------------------------------------------------------------------------
+
+    def test_joints_move_where_the_controller_says(self):
+        joints = self.joints()
+        self.start("joint_state_controller", "both")
+        joints.at(shoulder=0.0, elbow=0.0)
+        self.send("/one/both/command", Float64MultiArray(data=[0.5, -0.7]))
+        joints.at(shoulder=0.5, elbow=-0.7)
+        self.assertEqual(joints.newest.name, ["elbow", "shoulder"])
+
+    def test_joint_states_come_at_50_hz_of_simulated_time(self):
+        self.start("joint_state_controller")
+        stamps = []
+        subscriber = rospy.Subscriber("/one/joint_states", JointState,
+                                      lambda message: stamps.append(message.header.stamp.to_nsec()))
+        wait_for(lambda: len(stamps) > 50, "50 joint states")
+        subscriber.unregister()
+        self.assertEqual({b - a for a, b in zip(stamps[:50], stamps[1:51], strict=True)}, {20_000_000})
+
+    def test_listing_says_type_state_and_resources(self):
+        self.start("joint_state_controller")
+        self.assertTrue(self.one.load("both"))
+        reader, both = self.one.listing()
+        self.assertEqual((reader.name, reader.type, reader.state), (
+            "joint_state_controller", "joint_state_controller/JointStateController", "running"))
+        self.assertEqual([(c.hardware_interface, c.resources) for c in reader.claimed_resources],
+                         [("hardware_interface::JointStateInterface", [])])
+        self.assertEqual(both.state, "initialized")
+        self.assertEqual([(c.hardware_interface, c.resources) for c in both.claimed_resources],
+                         [(POSITION, ["elbow", "shoulder"])])
+        types = self.one.types()
+        self.assertIn("position_controllers/JointPositionController", types.types)
+        self.assertEqual(set(types.base_classes), {"controller_interface::ControllerBase"})
+        self.assertEqual(len(types.types), len(types.base_classes))
+
+    def test_a_joint_has_one_master(self):
+        self.start("both")
+        self.assertTrue(self.one.load("elbow"))
+        for strictness in (BEST_EFFORT, STRICT):
+            self.assertFalse(self.one.switch(["elbow"], strictness=strictness))
+        self.said("/one/controller_manager", "resource conflict", "'elbow'", "both")
+        self.assertTrue(self.one.switch(["elbow"], ["both"]))
+        self.assertEqual(self.one.states(), {"both": "stopped", "elbow": "running"})
+        self.assertFalse(self.one.unload("elbow"))
+        self.assertTrue(self.one.unload("both"))
+        self.assertEqual(self.one.states(), {"elbow": "running"})
+
+    def test_strictness(self):
+        self.start("both")
+        self.assertFalse(self.one.switch(["nobody"]))
+        self.assertFalse(self.one.switch(["both"]))
+        self.assertTrue(self.one.switch(["nobody"], ["somebody"], BEST_EFFORT))
+        self.assertFalse(self.one.switch(["both"], ["both"], BEST_EFFORT))
+        self.assertEqual(self.one.states(), {"both": "running"})
+
+    def test_while_physics_is_paused_switching_waits(self):
+        self.assertTrue(self.one.load("both"))
+        self.pause_physics()
+        answers = []
+        thread = threading.Thread(target=lambda: answers.append(self.one.switch(["both"])))
+        thread.start()
+        thread.join(0.7)
+        self.assertTrue(thread.is_alive())
+        self.unpause_physics()
+        thread.join(DEADLINE_S)
+        self.assertEqual(answers, [True])
+        self.assertEqual(self.one.states(), {"both": "running"})
+
+    def test_a_switch_with_a_timeout_gives_up(self):
+        self.assertTrue(self.one.load("both"))
+        self.pause_physics()
+        start = time.monotonic()
+        self.assertFalse(self.one.switch(["both"], timeout=0.2))
+        self.assertGreater(time.monotonic() - start, 1.1)
+        self.said("given up after 1.2 s", "paused")
+        self.unpause_physics()
+        self.assertEqual(self.one.states(), {"both": "initialized"})
+
+    def test_deleting_the_robot_ends_requests_that_wait(self):
+        self.assertTrue(self.one.load("both"))
+        self.pause_physics()
+        errors = []
+
+        def ask():
+            try:
+                self.one.switch(["both"])
+            except rospy.ServiceException as error:
+                errors.append(str(error))
+
+        thread = threading.Thread(target=ask)
+        thread.start()
+        thread.join(0.3)
+        self.delete_model("one")
+        thread.join(DEADLINE_S)
+        self.assertFalse(thread.is_alive())
+        self.assertEqual(len(errors), 1)
+
+    def test_twenty_clients_leave_a_consistent_state(self):
+        failures = []
+
+        def client(number):
+            choose = random.Random(number)
+            manager = Manager("/one")
+            try:
+                for _ in range(12):
+                    name = choose.choice(["both", "shoulder", "elbow", "joint_state_controller"])
+                    choose.choice([
+                        lambda name=name: manager.load(name), lambda name=name: manager.unload(name),
+                        lambda name=name: manager.switch([name], (), choose.choice([BEST_EFFORT, STRICT])),
+                        lambda name=name: manager.switch((), [name], choose.choice([BEST_EFFORT, STRICT]))])()
+                    masters = [joint for controller in manager.listing() if controller.state == "running"
+                               for claim in controller.claimed_resources for joint in claim.resources]
+                    if len(masters) != len(set(masters)):
+                        failures.append("two masters: %s" % manager.listing())
+            except Exception as error:  # noqa: BLE001
+                failures.append(repr(error))
+
+        threads = [threading.Thread(target=client, args=(number,)) for number in range(20)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(90.0)
+        self.assertFalse(any(thread.is_alive() for thread in threads))
+        self.assertEqual(failures, [])
+        self.one.switch((), list(self.one.states()), BEST_EFFORT)
+        for name, state in self.one.states().items():
+            self.assertIn(state, ("initialized", "stopped"))
+            self.assertTrue(self.one.unload(name))
+        self.start("both")
+
+    def test_reload_libraries(self):
+        self.start("both")
+        self.assertFalse(self.one.reload(False))
+        self.assertTrue(self.one.reload(True))
+        self.assertEqual(self.one.states(), {})
+        self.start("both")
+
+    # -- the simulator around them ------------------------------------------------------------------------------------
+
+    def test_two_robots_have_controllers_of_their_own(self):
+        self.spawn("two")
+        two = Manager("/two")
+        self.start("joint_state_controller", "both")
+        self.start("joint_state_controller", "elbow", manager=two)
+        self.send("/one/both/command", Float64MultiArray(data=[0.4, 0.4]))
+        self.send("/two/elbow/command", Float64(-0.6))
+        self.joints("/one").at(shoulder=0.4, elbow=0.4)
+        self.joints("/two").at(shoulder=0.0, elbow=-0.6)
+        self.assertEqual(list(two.states()), ["joint_state_controller", "elbow"])
+
+    def test_emergency_stop_and_release(self):
+        joints = self.joints()
+        self.start("joint_state_controller", "both")
+        self.send("/one/stop", Bool(True))
+        self.send("/one/both/command", Float64MultiArray(data=[0.5, 0.5]))
+        count = joints.count
+        wait_for(lambda: joints.count > count + 25, "half a second of joint states")
+        joints.at(shoulder=0.0, elbow=0.0)
+        self.send("/one/stop", Bool(False))
+        count = joints.count
+        wait_for(lambda: joints.count > count + 25, "half a second of joint states")
+        joints.at(shoulder=0.0, elbow=0.0)  # the restart has dropped the command
+
+        def released():
+            self.send("/one/both/command", Float64MultiArray(data=[0.5, 0.4]))
+            return joints.newest.position[1] > 0.1
+
+        wait_for(released, "the joints to move again")
+        joints.at(shoulder=0.5, elbow=0.4)
+
+    def test_reset_returns_to_the_start_and_controllers_hold_there(self):
+        joints = self.joints()
+        self.start("joint_state_controller", "both")
+        for reset in (self.reset_world, self.reset_simulation):
+            self.send("/one/both/command", Float64MultiArray(data=[0.5, 0.5]))
+            joints.at(shoulder=0.5, elbow=0.5)
+            reset()
+            joints.at(shoulder=0.0, elbow=0.0)
+            count = joints.count
+            wait_for(lambda count=count: joints.count > count + 10, "joint states after the reset")
+            joints.at(shoulder=0.0, elbow=0.0)
+
+    def test_joints_that_were_set_stay_until_a_command(self):
+        joints = self.joints()
+        self.start("joint_state_controller")
+        self.set_model_configuration("one", "", ["shoulder", "elbow"], [0.3, -0.3])
+        joints.at(shoulder=0.3, elbow=-0.3)
+        count = joints.count
+        wait_for(lambda: joints.count > count + 10, "joint states")
+        joints.at(shoulder=0.3, elbow=-0.3)
+
+    def test_controller_managers_are_found(self):
+        self.spawn("two")
+        Manager("/two")
+        lister = utils.ControllerManagerLister()
+        self.assertEqual(lister(), ["/one/controller_manager", "/two/controller_manager"])
+        self.assertEqual(utils.get_controller_managers("/two"), ["/two/controller_manager"])
+        self.assertFalse(utils.is_controller_manager("/three/controller_manager"))
+        self.start("elbow")
+        self.assertEqual([c.name for c in utils.ControllerLister("/one/controller_manager")()], ["elbow"])
+        self.assertIn("mistyped", utils.get_rosparam_controller_names("/one"))
+        self.assertNotIn("untyped", utils.get_rosparam_controller_names("/one"))
+        self.delete_model("two")
+        wait_for(lambda: lister() == ["/one/controller_manager"], "the other controller manager to be gone")
+
+    # -- tools --------------------------------------------------------------------------------------------------------
+
+    def test_the_spawner_brings_up_and_takes_down(self):
+        with self.process("spawner", "joint_state_controller", "both") as spawner:
+            wait_for(lambda: self.one.states() == {"joint_state_controller": "running", "both": "running"},
+                     "the spawner's controllers")
+            self.assertIsNone(spawner.poll())
+        self.assertEqual(self.one.states(), {})
+
+    def test_the_spawner_takes_down_what_others_have_stopped(self):
+        with self.process("spawner", "joint_state_controller", "shoulder", "elbow"):
+            wait_for(lambda: list(self.one.states().values()) == ["running"] * 3, "the spawner's controllers")
+            self.assertTrue(self.one.switch((), ["shoulder", "elbow"]))
+            self.assertTrue(self.one.unload("elbow"))
+        self.assertEqual(self.one.states(), {})
+
+    def test_the_spawner_takes_a_namespace_and_stopped(self):
+        with self.process("spawner", "--namespace", "/one", "--stopped", "both", namespace="/"):
+            wait_for(lambda: self.one.states() == {"both": "initialized"}, "the spawner's controller")
+
+    def test_the_spawner_waits_for_a_topic(self):
+        with self.process("spawner", "--wait-for", "/go", "both"):
+            self.send("/go", Bool(False))
+            self.assertEqual(self.one.states(), {})
+
+            def go():
+                self.send("/go", Bool(True))
+                return self.one.states() == {"both": "running"}
+
+            wait_for(go, "the spawner's controller")
+
+    def test_the_spawner_says_when_there_is_no_controller_manager(self):
+        code, output = self.tool("spawner", "--timeout", "1", "both", namespace="/nobody")
+        self.assertEqual(code, 1)
+        self.assertIn("no controller manager: service /nobody/controller_manager/load_controller", output)
+
+    def test_the_spawner_goes_on_without_what_cannot_be_loaded(self):
+        with self.process("spawner", "untyped", "both"):
+            wait_for(lambda: self.one.states() == {"both": "running"}, "the spawner's controller")
+            self.said("'untyped' could not be loaded")
+
+    def test_the_unspawner_keeps_controllers_stopped(self):
+        self.start("both")
+        with self.process("unspawner", "both"):
+            wait_for(lambda: self.one.states() == {"both": "stopped"}, "the controller to be stopped")
+        wait_for(lambda: self.one.states() == {"both": "running"}, "the controller to run again")
+
+    def test_the_controller_manager_tool(self):
+        self.assertIn("No controllers", self.tool("controller_manager", "list")[1])
+        self.assertEqual(self.tool("controller_manager", "load", "elbow", "shoulder")[0], 0)
+        self.assertEqual(self.tool("controller_manager", "start", "elbow")[0], 0)
+        self.assertIn("'elbow' - '%s' ( running )" % POSITION, self.tool("controller_manager", "list")[1])
+        self.assertIn("effort_controllers/", self.tool("controller_manager", "list-types")[1])
+        self.assertEqual(self.tool("controller_manager", "spawn", "joint_state_controller")[0], 0)
+        self.assertEqual(self.tool("controller_manager", "kill", "elbow")[0], 0)
+        self.assertEqual(self.one.states(), {"shoulder": "initialized", "joint_state_controller": "running"})
+        self.assertEqual(self.tool("controller_manager", "unload", "joint_state_controller")[0], 1)
+        self.assertEqual(self.tool("controller_manager", "reload-libraries", "--restore")[0], 0)
+        self.assertEqual(self.one.states()["joint_state_controller"], "running")
+
+    def test_controller_groups(self):
+        self.assertEqual(self.tool("controller_group", "spawn", "together")[0], 0)
+        self.assertEqual(self.one.states(), {"both": "running", "shoulder": "initialized", "elbow": "initialized"})
+        self.assertEqual(self.tool("controller_group", "switch", "apart")[0], 0)
+        self.assertEqual(self.one.states(), {"both": "stopped", "shoulder": "running", "elbow": "running"})
+        self.assertIn("elbow (running)", self.tool("controller_group", "list")[1])
+        code, output = self.tool("controller_group", "switch", "nobody")
+        self.assertEqual(code, 1)
+        self.assertIn("there is no group 'nobody'; groups: apart, together", output)
+
+    # -- mistakes: one line that names what is wrong and what would be right; the simulator lives on -----------------
+
+    def test_controllers_that_cannot_be_loaded(self):
+        for name, *words in (
+                ("untyped", "/one/untyped/type is missing", "give the controller's type"),
+                ("mistyped", "'position_controllers/JointPositonController' is not known", "known types"),
+                ("jointless", "joint 'wrist'", "no transmission", "shoulder, elbow"),
+                ("effort", "/one/effort needs hardware_interface::EffortJointInterface", "<hardwareInterface>"),
+                ("rateless", "/one/rateless/publish_rate is missing", "50"),
+                ("absent", "/one/absent/type is missing", "loaded")):
+            self.assertFalse(self.one.load(name), name)
+            line = self.said("cannot load controller '%s'" % name, *words)
+            self.assertNotIn("\n", line)
+        self.assertEqual(self.one.states(), {})
+        self.start("both")
+
+    def test_a_controller_of_ones_own_that_breaks_is_taken_out_alone(self):
+        self.assertIn("my_lab/Breaking", self.one.types().types)
+        joints = self.joints()
+        self.start("joint_state_controller", "breaking", "shoulder")
+        joints.at(elbow=-0.3)
+        self.send("/one/breaking/break", EmptyMessage())
+        self.said("controller 'breaking' failed in update() with ValueError: told to break")
+        self.assertEqual(self.one.states()["breaking"], "aborted")
+        self.send("/one/shoulder/command", Float64(0.4))
+        joints.at(shoulder=0.4, elbow=-0.3)
+        self.assertTrue(self.one.switch(["breaking"]))
+
+    def test_descriptions_that_give_no_hardware(self):
+        for number, (old, new, *words) in enumerate((
+                ("PositionJointInterface", "LaserJointInterface", "LaserJointInterface", "known are"),
+                ('<joint name="elbow"><hard', '<joint name="wrist"><hard', "'wrist'", "its joints are"),
+                ('upper="2" velocity="3" effort="100"/>', 'upper="2" velocity="3" effort="100"/><safety_controller/>',
+                 "<safety_controller> has k_velocity=None", "expected a number"))):
+            name = "bad_%d" % number
+            # The parameter would speak for the good robot.
+            urdf = self.urdf.replace(old, new).replace("<eStopTopic>", "<robotParam>/none</robotParam><eStopTopic>")
+            self.spawn(name, urdf)
+            line = self.said("model '%s' has no controllers" % name, *words)
+            self.assertNotIn("\n", line)
+        self.start("both")
+
+
+if __name__ == "__main__":
+    rospy.init_node("gazebo_control_test")
+    rostest.rosrun("gazebo_ros_control", "gazebo_control", GazeboControl)

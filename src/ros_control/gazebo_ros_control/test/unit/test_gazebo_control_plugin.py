@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the elements of the plugin mean, in a physics world without a master."""
+from xml.etree import ElementTree
+
+import pytest
+from std_msgs.msg import Bool
+
+from bullet_sim import Pose, World
+from controller_manager import POSITION, Controller
+from controller_manager.testing import FakeInbox, FakeLog, fake_context
+from gazebo_ros_control.plugin import GazeboRosControl, _flat
+from urdf_model import parse_urdf
+
+DT = 0.002
+URDF = """<robot name="arm"><link name="world"/><link name="l"><inertial><mass value="1"/>
+  <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="revolute"><parent link="world"/><child link="l"/><axis xyz="0 0 1"/>
+  <limit lower="-1" upper="1" velocity="%s" effort="9"/></joint>
+<transmission name="t"><type>transmission_interface/SimpleTransmission</type><joint name="j">
+  <hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint><actuator name="m"/>
+</transmission></robot>"""
+
+
+class Recorder(Controller):
+    def __init__(self, name, hardware, context):
+        super().__init__(name, hardware, context)
+        self.index = self.claim(POSITION, ["j"])
+        self.updates, self.starts, self.target = [], [], None
+
+    def starting(self, time_s):
+        self.starts.append(time_s)
+
+    def update(self, time_s, dt):
+        self.updates.append((round(time_s, 9), round(dt, 9)))
+        if self.target is not None:
+            self.hardware.command[POSITION][self.index] = self.target
+
+
+class Simulator:
+    """One robot with the plugin; also what the plugin takes for its context."""
+
+    def __init__(self, elements="", parameters=None, urdf=URDF % 2):
+        self.world = World(time_step_s=DT)
+        self.robot, self.urdf_xml, self.namespace = parse_urdf(urdf), urdf, "/lab/arm"
+        self.model = self.world.spawn(self.robot, "arm", Pose((0, 0, 0)))
+        self.element = ElementTree.fromstring("<plugin>%s</plugin>" % elements)
+        self.parameters = parameters or {}
+        self.log, self.inboxes, self.services = FakeLog(), {}, {}
+        self.plugin = GazeboRosControl(self)
+        self.controller = None
+
+    # -- the context
+
+    def param(self, name, default=None):
+        return self.parameters.get(name if name.startswith("/") else "%s/%s" % (self.namespace, name), default)
+
+    def element_text(self, tag, default=None):
+        return self.element.findtext(tag, default)
+
+    def mailbox(self, topic, msg_class):
+        return self.inboxes.setdefault(topic, FakeInbox())
+
+    def service_in_thread(self, name, srv_class, handler):
+        self.services[name] = handler
+
+    # -- what tests do
+
+    def start(self):
+        manager = self.plugin._manager
+        manager.load("one", "test/Recorder", Recorder, fake_context("one")[0])
+        manager.switch(["one"], [])
+        self.run(1)
+        self.controller = manager.loaded[0].controller
+        return self.controller
+
+    def run(self, ticks):
+        for _ in range(ticks):
+            self.plugin.update(self.world.time_s, DT)
+            self.world.step()
+
+    @property
+    def velocity(self):
+        return self.model.read_joints()[1][0]
+
+
+@pytest.fixture
+def simulate():
+    simulators = []
+
+    def make(*arguments, **options):
+        simulators.append(Simulator(*arguments, **options))
+        return simulators[-1]
+
+    yield make
+    for simulator in simulators:
+        simulator.plugin.close()
+        simulator.world.close()
+
+
+def test_controllers_run_at_every_step(simulate):
+    simulator = simulate()
+    controller = simulator.start()
+    simulator.run(3)
+    assert controller.updates == [(0.002, DT), (0.004, DT), (0.006, DT)]
+    assert sorted(simulator.services) == ["controller_manager/" + name for name in (
+        "list_controller_types", "list_controllers", "load_controller", "reload_controller_libraries",
+        "switch_controller", "unload_controller")]
+    assert simulator.log.lines == []
+
+
+def test_a_control_period_of_several_steps(simulate):
+    simulator = simulate("<controlPeriod>0.01</controlPeriod>")
+    controller = simulator.start()
+    simulator.run(20)
+    assert controller.updates == [(0.01, 0.01), (0.02, 0.01), (0.03, 0.01), (0.04, 0.01)]
+    assert "controlPeriod 0.01 s is longer" in simulator.log.of("warn")[0]
+
+
+@pytest.mark.parametrize(("period", "text"), [
+    ("0.0001", "0.0001 s is shorter than the physics step of 0.002 s"), ("often", "'often', expected a number"),
+    ("-1", "'-1', expected a number")])
+def test_a_wrong_control_period_is_one_error_and_every_step_counts(simulate, period, text):
+    simulator = simulate("<controlPeriod>%s</controlPeriod>" % period)
+    controller = simulator.start()
+    simulator.run(2)
+    assert [time_s for time_s, _ in controller.updates] == [0.002, 0.004]
+    assert len(simulator.log.lines) == 1 and text in simulator.log.of("error")[0]
+
+
+def test_limits_hold_between_updates(simulate):
+    simulator = simulate("<controlPeriod>0.01</controlPeriod>")
+    simulator.start().target = 1.0
+    simulator.run(30)
+    assert simulator.velocity == pytest.approx(2.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("where", ["/lab/arm/robot_description", "/lab/robot_description", "/robot_description"])
+def test_the_description_is_looked_for_upwards(simulate, where):
+    simulator = simulate(parameters={where: URDF % 0.5})
+    simulator.start().target = 1.0
+    simulator.run(30)
+    assert simulator.velocity == pytest.approx(0.5, abs=1e-3)
+
+
+def test_robot_param_names_another_parameter(simulate):
+    simulator = simulate("<robotParam>my_robot</robotParam>",
+                         {"/lab/arm/robot_description": URDF % 0.5, "/lab/arm/my_robot": URDF % 1.0})
+    simulator.start().target = 1.0
+    simulator.run(30)
+    assert simulator.velocity == pytest.approx(1.0, abs=1e-3)
+
+
+def test_joint_limits_are_read_in_the_namespace(simulate):
+    simulator = simulate(parameters={
+        "/lab/arm/joint_limits": {"j": {"has_velocity_limits": True, "max_velocity": 0.25}}})
+    simulator.start().target = 1.0
+    simulator.run(30)
+    assert simulator.velocity == pytest.approx(0.25, abs=1e-3)
+
+
+def test_reset_and_release_of_the_emergency_stop_restart_controllers(simulate):
+    simulator = simulate("<eStopTopic>stop</eStopTopic>")
+    controller = simulator.start()
+    simulator.run(2)
+    simulator.plugin.reset()
+    simulator.run(2)
+    assert len(controller.starts) == 2
+    simulator.inboxes["stop"].put(Bool(False))
+    simulator.run(2)
+    assert len(controller.starts) == 2, "nothing was stopped"
+    simulator.inboxes["stop"].put(Bool(True))
+    simulator.run(2)
+    simulator.inboxes["stop"].put(Bool(False))
+    simulator.run(2)
+    assert len(controller.starts) == 3
+
+
+@pytest.mark.parametrize(("found", "other", "text"), [
+    ("PositionJoint", "MagicJoint", "'hardware_interface/MagicJointInterface'; known are"),
+    ('Transmission</type><joint name="j">', 'Transmission</type><joint name="k">', "names joint 'k'")])
+def test_a_description_without_hardware_is_one_error(simulate, found, other, text):
+    urdf = (URDF % 2).replace(found, other)
+    simulator = simulate(urdf=urdf)
+    simulator.run(3)
+    assert len(simulator.log.lines) == 1 and simulator.services == {}
+    assert "model 'arm' has no controllers" in simulator.log.of("error")[0] and text in simulator.log.of("error")[0]
+
+
+def test_slashes_in_types_survive_the_parameter_server():
+    assert _flat({"a": {"B": "m:C", "d": {"E": "n:F"}}, "g": "h:I"}) == {"a/B": "m:C", "a/d/E": "n:F", "g": "h:I"}
