@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Why a trajectory is refused: one class per cause; each text says what was found and what would be right."""
+
+
+class TrajectoryError(Exception):
+    """Root of the errors of this package."""
+
+
+class JointNamesError(TrajectoryError):
+    """The joints of a trajectory are not those that are controlled. ``names``: what was found wrong."""
+
+    def __init__(self, names, text):
+        super().__init__(text)
+        self.names = tuple(names)
+
+
+class NoJointNames(JointNamesError):
+    """``joint_names`` is empty."""
+
+    def __init__(self, known):
+        super().__init__((), "joint_names is empty, expected %s" % ", ".join(known))
+
+
+class UnknownJoints(JointNamesError):
+    """Joints that are not controlled."""
+
+    def __init__(self, names, known):
+        super().__init__(names, "unknown joint %s, expected %s" % (", ".join(names), ", ".join(known)))
+
+
+class RepeatedJoints(JointNamesError):
+    """Joints that are named more than once."""
+
+    def __init__(self, names):
+        super().__init__(names, "joint_names has %s more than once" % ", ".join(names))
+
+
+class MissingJoints(JointNamesError):
+    """Joints that are not named, where all must be."""
+
+    def __init__(self, names):
+        super().__init__(names, "joint_names lacks %s; all joints must be named (allow_partial_joints_goal is false)"
+                         % ", ".join(names))
+
+
+class NoPositions(TrajectoryError):
+    """A point without positions."""
+
+    def __init__(self, point):
+        super().__init__("point %d has no positions; every point needs one for each joint" % point)
+        self.point = point
+
+
+class WrongSize(TrajectoryError):
+    """A field of a point whose length is not the number of joints."""
+
+    def __init__(self, point, field, found, expected):
+        optional = "" if field == "positions" else " or none"
+        super().__init__("point %d has %d %s, expected %d%s" % (point, found, field, expected, optional))
+        self.point, self.field, self.found, self.expected = point, field, found, expected
+
+
+class NotFinite(TrajectoryError):
+    """NaN or infinity in a field of a point."""
+
+    def __init__(self, point, field):
+        super().__init__("point %d has %s that are not finite numbers" % (point, field))
+        self.point, self.field = point, field
+
+
+class TimesNotIncreasing(TrajectoryError):
+    """``time_from_start`` [s] of a point is not above that of the point before."""
+
+    def __init__(self, point, time_s, before_s):
+        super().__init__("time_from_start must increase: point %d has %.9g s after %.9g s" % (point, time_s, before_s))
+        self.point, self.time_s, self.before_s = point, time_s, before_s
+
+
+class AllPointsInPast(TrajectoryError):
+    """Nothing is left to do: ``dropped`` points, the last of them due ``late_s`` [s] ago."""
+
+    def __init__(self, dropped, late_s):
+        if late_s > 0.0:
+            text = "all %d points are in the past, the last one by %.6f s; check header.stamp" % (dropped, late_s)
+        else:
+            text = "the last of %d points is due at once; give it a time_from_start above 0" % dropped
+        super().__init__(text)
+        self.dropped, self.late_s = dropped, late_s
+
+
+class BeforeTrajectory(TrajectoryError):
+    """A time [s] that lies before the trajectory."""
+
+    def __init__(self, time_s, start_time):
+        super().__init__("the time asked for is %.6f s before the start of the trajectory" % (start_time - time_s))
+        self.time_s, self.start_time = time_s, start_time

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Follows one trajectory after the other and watches over the goal at hand."""
+import math
+
+import numpy as np
+
+from .goal_monitor import GoalMonitor
+from .replacement import replace
+from .tolerances import Tolerances
+from .trajectory import hold, stop
+
+_TURN = 2.0 * math.pi
+
+
+class Follower:
+    """What n joints shall do now. Times [s] are on any one clock that does not run backwards; one thread only.
+
+    Attributes
+    ----------
+    trajectory : :class:`Trajectory`
+        What is being followed.
+    desired : (3, n) array
+        Position, velocity, acceleration that the last :meth:`update` asked for.
+    error : (3, n) array
+        Desired minus actual of the last :meth:`update`; positions the shorter way round, accelerations 0.
+    goal : object or None
+        What was passed with the command that is being watched.
+    """
+
+    def __init__(self, joint_names, continuous=None, stop_duration_s=0.0, allow_partial=False):
+        """``continuous`` (n,) bool: joints that turn without end; ``stop_duration_s`` [s]: how long a stop may take,
+        0: stand at once where the joints are; ``allow_partial``: commands need not name all joints.
+
+        Nothing may be asked of it before :meth:`start`.
+        """
+        self.joint_names = list(joint_names)
+        count = len(self.joint_names)
+        self._continuous = np.zeros(count, dtype=bool) if continuous is None else np.asarray(continuous, dtype=bool)
+        self._stop_duration_s = stop_duration_s
+        self._allow_partial = allow_partial
+        self.trajectory = None
+        self.desired = np.zeros((3, count))
+        self.error = np.zeros((3, count))
+        self.goal = None
+        self._monitor = None
+        self._ahead = np.zeros((3, count))
+        self._ahead_of = None
+        self._turns = np.zeros(count)
+        # Rows of the tables, so that no tick needs to make them.
+        self._position_error, self._velocity_error = self.error[0], self.error[1]
+
+    def start(self, time_s, position, velocity):
+        """Stand, or come to rest, from the measured ``position`` and ``velocity`` (n,). No goal."""
+        self.goal = self._monitor = None
+        self.desired[:] = position, velocity, np.zeros(len(position))
+        self.error[:] = 0.0
+        self.trajectory = stop(time_s, np.array(position), np.array(velocity), self._stop_duration_s)
+
+    def accept(self, command, now, position, goal=None, tolerances=None):
+        """Follow ``command`` from now on; returns the :class:`Replacement`, or None for a command without points.
+
+        ``now`` [s]: the first time that can still be changed, so later than the last :meth:`update`; ``position``
+        (n,): measured. A command without points is a stop. With a ``goal`` (any object) the way is watched with
+        ``tolerances`` (:class:`Tolerances`). The goal before, if any, is forgotten: say so to its owner.
+
+        Raises :class:`TrajectoryError`; nothing has changed then.
+        """
+        if not len(command.times):
+            self.stop(now, position, goal)
+            return None
+        replacement = replace(self.trajectory, command, now, self.joint_names, self._continuous, self._allow_partial)
+        self.trajectory = replacement.trajectory
+        self._watch(goal, tolerances, replacement.begins)
+        return replacement
+
+    def stop(self, now, position, goal=None):
+        """Come to rest: at once at the measured ``position`` (n,), or from what is desired within the stop duration.
+
+        With a ``goal`` it is reached when the joints should rest, whether they do or not.
+        """
+        if self._stop_duration_s > 0.0:
+            desired = self.trajectory.sample(now)
+            self.trajectory = stop(now, desired[0], desired[1], self._stop_duration_s)
+        else:
+            self.trajectory = hold(now, np.array(position))
+        self._watch(goal, None, np.full(len(self.joint_names), float(now)))
+
+    def release(self):
+        """Forget the goal; go on along the trajectory."""
+        self.goal = self._monitor = None
+
+    def look_ahead(self, time_s):
+        """(3, n): what will be desired at ``time_s``, such as the next tick, if nothing comes between; overwritten by
+        the next call."""
+        self._ahead_of = self.trajectory, time_s
+        return self.trajectory.sample(time_s, self._ahead)
+
+    def update(self, time_s, position, velocity):
+        """Fill ``desired`` and ``error`` for the measured ``position``, ``velocity`` (n,) of ``time_s``.
+
+        Returns the goal's :class:`Verdict` when it ends now, else None. After a violation the joints go on along their
+        trajectory.
+        """
+        desired = self.desired
+        if self._ahead_of == (self.trajectory, time_s):
+            desired[:] = self._ahead
+        else:
+            self.trajectory.sample(time_s, desired)
+        error = self._position_error
+        np.subtract(desired[0], position, error)
+        np.subtract(desired[1], velocity, self._velocity_error)
+        turns = np.multiply(error, 1.0 / _TURN, self._turns)
+        np.rint(turns, turns)
+        np.multiply(turns, _TURN, turns)
+        np.subtract(error, turns, error)
+        if self._monitor is None:
+            return None
+        verdict = self._monitor.check(time_s, self.error)
+        if verdict is not None:
+            self._monitor = None
+        return verdict
+
+    def _watch(self, goal, tolerances, begins):
+        self.goal = goal
+        self._monitor = None
+        if goal is not None:
+            self._monitor = GoalMonitor(self.joint_names, tolerances or Tolerances.none(len(self.joint_names)), begins,
+                                        self.trajectory.end_times)

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether a goal is reached, or missed."""
+import enum
+from typing import NamedTuple
+
+import numpy as np
+
+_QUANTITIES = ("position", "velocity", "acceleration")
+
+
+class Outcome(enum.Enum):
+    """How a goal ended."""
+
+    SUCCEEDED = "succeeded"
+    PATH_TOLERANCE_VIOLATED = "path"
+    GOAL_TOLERANCE_VIOLATED = "goal"
+
+
+class Verdict(NamedTuple):
+    """The end of a goal. Where it failed: which ``joint``, by which ``quantity`` and ``error``, beyond which
+    ``tolerance`` [rad or m, per s, per s^2]. ``text`` says it in words and is empty for success."""
+
+    outcome: Outcome
+    text: str = ""
+    joint: str = ""
+    quantity: str = ""
+    error: float = 0.0
+    tolerance: float = 0.0
+
+
+class GoalMonitor:
+    """Watches n joints while they follow one goal.
+
+    From ``begins`` to ``ends`` a joint must keep the path tolerance; from ``ends`` on it has ``goal_time_s`` to come
+    within the goal tolerance once, which is enough. The goal succeeds when every joint has.
+    """
+
+    def __init__(self, joint_names, tolerances, begins, ends):
+        """``begins``, ``ends``: (n,) [s]."""
+        self._joint_names = joint_names
+        self._tolerances = tolerances
+        self._begins = begins
+        self._ends = ends
+        self._begin = float(begins.min())
+        self._all_from, self._all_until = float(begins.max()), float(ends.min())
+        self._watches_path = bool(np.isfinite(tolerances.path).any())
+        self._done = np.zeros(len(joint_names), dtype=bool)
+        self._size = np.empty((3, len(joint_names)))
+        self._within = np.empty((3, len(joint_names)), dtype=bool)
+
+    def check(self, time_s, error):
+        """The :class:`Verdict`, or None while it is open. ``error`` (3, n): desired minus actual at ``time_s``."""
+        if time_s < self._begin:
+            return None
+        size = np.abs(error, out=self._size)
+        if self._all_from <= time_s < self._all_until:
+            # Most ticks of a goal: all joints are on their way.
+            if self._watches_path and not np.less_equal(size, self._tolerances.path, out=self._within).all():
+                return self._path_verdict(time_s, error, ~self._within)
+            return None
+        begun = time_s >= self._begins
+        ended = begun & (time_s >= self._ends)
+        # Not "greater than": an error that is not a number is beyond every tolerance.
+        off_path = ~(size <= self._tolerances.path) & (begun & ~ended)
+        if off_path.any():
+            return self._path_verdict(time_s, error, off_path)
+        off_goal = ~(size <= self._tolerances.goal) & (ended & ~self._done)
+        self._done |= ended & ~off_goal.any(axis=0)
+        if self._done.all():
+            return Verdict(Outcome.SUCCEEDED)
+        off_goal &= time_s >= self._ends + self._tolerances.goal_time_s
+        if off_goal.any():
+            return self._goal_verdict(time_s, error, off_goal)
+        return None
+
+    def _path_verdict(self, time_s, error, where):
+        joint, row = np.argwhere(where.T)[0]
+        return self._verdict(Outcome.PATH_TOLERANCE_VIOLATED, joint, row, error, self._tolerances.path,
+                             "at %.3f s" % (time_s - self._begin))
+
+    def _goal_verdict(self, time_s, error, where):
+        joint, row = np.argwhere(where.T)[0]
+        return self._verdict(Outcome.GOAL_TOLERANCE_VIOLATED, joint, row, error, self._tolerances.goal,
+                             "%.3f s after the end" % (time_s - self._ends[joint]))
+
+    def _verdict(self, outcome, joint, row, error, tolerances, when):
+        name, quantity = self._joint_names[joint], _QUANTITIES[row]
+        found, allowed = float(error[row, joint]), float(tolerances[row, joint])
+        text = "%s %s error %f (%s, tolerance %g) %s" % (name, outcome.value, found, quantity, allowed, when)
+        return Verdict(outcome, text, name, quantity, found, allowed)

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How a new command takes the place of the trajectory that is being followed."""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .command import joint_indices
+from .errors import AllPointsInPast
+from .segment import QUINTIC, constant, shifted, splines
+from .trajectory import Trajectory
+
+# How close to half a turn two ways round count as equally short [rad].
+_HALF_TURN_TOLERANCE = 1e-9
+
+
+class Replacement(NamedTuple):
+    """``trajectory``; ``begins`` (n,): from when on [s] each joint follows the command; ``dropped``: how many points
+    were left out because their time has passed; ``late_s``: how long ago the first of them was due [s]."""
+
+    trajectory: Trajectory
+    begins: np.ndarray
+    dropped: int
+    late_s: float
+
+
+def replace(current, command, now, joint_names, continuous, allow_partial=False):
+    """Follow ``current`` until ``command`` begins, then the command: a :class:`Replacement`.
+
+    ``current``: :class:`Trajectory` of ``joint_names``; ``command``: :class:`Command` with points; ``now`` [s]: the
+    first time that can still be changed, not before the start of ``current``; ``continuous`` (n,) bool: joints that
+    turn without end.
+
+    Points at or before ``now`` are left out. A bridge leads from the current trajectory, at the start of the command
+    or ``now``, whichever is later, to the first point that is left. Continuous joints take the shorter way round: all
+    their points are shifted by whole turns. Joints that the command does not name stay on their current trajectory.
+
+    Raises :class:`JointNamesError` and :class:`AllPointsInPast`.
+    """
+    named = joint_indices(command.joint_names, joint_names, allow_partial)
+    start = now if command.start_time is None else command.start_time
+    times = start + command.times
+    dropped = int(np.searchsorted(times, now, side="right"))
+    if dropped == len(times):
+        raise AllPointsInPast(dropped, now - times[-1])
+
+    bridge_start = max(start, now)
+    from_state = current.sample(bridge_start)[:, named]
+    positions = command.positions[dropped:].copy()
+    for column in np.flatnonzero(continuous[named]):
+        positions[:, column] += whole_turns(from_state[0, column], positions[0, column])
+    times = times[dropped:]
+    degrees = command.degrees[dropped:]
+    velocities, accelerations = command.velocities[dropped:], command.accelerations[dropped:]
+    if times[0] > bridge_start:
+        times = np.concatenate([[bridge_start], times])
+        degrees = np.concatenate([[QUINTIC], degrees])
+        positions = np.concatenate([from_state[:1], positions])
+        velocities = np.concatenate([from_state[1:2], velocities])
+        accelerations = np.concatenate([from_state[2:], accelerations])
+    coefficients = np.concatenate([splines(times, positions, velocities, accelerations, degrees),
+                                   constant(positions[-1])[None]])
+
+    late_s = now - (start + command.times[0]) if dropped else 0.0
+    begins = np.full(len(joint_names), now, dtype=float)
+    begins[named] = bridge_start
+    end_times = current.end_times.copy()
+    end_times[named] = times[-1]
+    return Replacement(_merged(current, now, times, coefficients, named, end_times), begins, dropped, late_s)
+
+
+def whole_turns(position, target):
+    """What to add to ``target`` [rad], a multiple of a full turn, so that it is nearest to ``position``.
+
+    Where both ways round are equally long, the way keeps the sign of ``target - position``.
+    """
+    way = math.remainder(target - position, 2.0 * math.pi)
+    if abs(abs(way) - math.pi) < _HALF_TURN_TOLERANCE:
+        way = math.copysign(way, target - position)
+    return position + way - target
+
+
+def _merged(current, now, starts, coefficients, named, end_times):
+    """``current`` from the piece that holds ``now`` on; from ``starts[0]`` on the columns ``named`` are replaced."""
+    first = max(int(np.searchsorted(current.starts, now, side="right")) - 1, 0)
+    kept = current.starts[first:]
+    if len(named) == len(end_times):
+        kept = kept[kept < starts[0]]
+        merged = np.empty((len(starts), *current.coefficients.shape[1:]))
+        merged[:, :, named] = coefficients
+        return Trajectory(np.concatenate([kept, starts]),
+                          np.concatenate([current.coefficients[first:first + len(kept)], merged]), end_times)
+    # The pieces of all joints begin at the same times, so each curve is cut where the others have points.
+    cuts = np.union1d(kept, starts)
+    merged = _cut(current.starts, current.coefficients, cuts)
+    new = cuts >= starts[0]
+    merged[np.ix_(new, np.arange(6), named)] = _cut(starts, coefficients, cuts[new])
+    return Trajectory(cuts, merged, end_times)
+
+
+def _cut(starts, coefficients, cuts):
+    """The curves that begin at ``starts``, as pieces that begin at ``cuts`` (none before the first start)."""
+    pieces = np.searchsorted(starts, cuts, side="right") - 1
+    return shifted(coefficients[pieces], cuts - starts[pieces])

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Polynomials between points: linear, cubic or quintic.
+
+A polynomial of k joints is an array (6, k): row i holds the coefficients of s**i, with s [s] the time since its start.
+Everything here works on m polynomials at once, (m, 6, k).
+"""
+import numpy as np
+
+# Degree of the polynomial that a point's fields allow: positions alone, with velocities, with accelerations too.
+LINEAR, CUBIC, QUINTIC = 1, 3, 5
+
+# Pascal's triangle: row i, column j is "i over j".
+_BINOMIAL = np.array([[1, 0, 0, 0, 0, 0], [1, 1, 0, 0, 0, 0], [1, 2, 1, 0, 0, 0], [1, 3, 3, 1, 0, 0],
+                      [1, 4, 6, 4, 1, 0], [1, 5, 10, 10, 5, 1]], dtype=float)
+_POWERS = np.subtract.outer(np.arange(6), np.arange(6)).clip(0)
+
+
+def splines(times, positions, velocities, accelerations, degrees):
+    """The m - 1 polynomials through m points: (m - 1, 6, k).
+
+    ``times`` (m,) [s], strictly increasing; ``positions``, ``velocities``, ``accelerations`` (m, k); ``degrees`` (m,)
+    of LINEAR, CUBIC, QUINTIC says which of the fields of a point count. The poorer end of a segment decides for it.
+    The coefficients solve position, velocity and acceleration at both ends (cubic, quintic Hermite interpolation).
+    """
+    duration = np.diff(times)[:, None]
+    degree = np.minimum(degrees[:-1], degrees[1:])
+    distance = positions[1:] - positions[:-1]
+    coefficients = np.zeros((len(duration), 6, positions.shape[1]))
+    coefficients[:, 0] = positions[:-1]
+
+    at = degree == LINEAR
+    coefficients[at, 1] = distance[at] / duration[at]
+
+    at = degree == CUBIC
+    t, d = duration[at], distance[at]
+    v0, v1 = velocities[:-1][at], velocities[1:][at]
+    coefficients[at, 1] = v0
+    coefficients[at, 2] = (3.0 * d / t - 2.0 * v0 - v1) / t
+    coefficients[at, 3] = (-2.0 * d / t + v0 + v1) / t**2
+
+    at = degree == QUINTIC
+    t, d = duration[at], distance[at]
+    v0, v1 = velocities[:-1][at], velocities[1:][at]
+    a0, a1 = accelerations[:-1][at], accelerations[1:][at]
+    coefficients[at, 1] = v0
+    coefficients[at, 2] = a0 / 2.0
+    coefficients[at, 3] = (20.0 * d - (12.0 * v0 + 8.0 * v1) * t - (3.0 * a0 - a1) * t**2) / (2.0 * t**3)
+    coefficients[at, 4] = (-30.0 * d + (16.0 * v0 + 14.0 * v1) * t + (3.0 * a0 - 2.0 * a1) * t**2) / (2.0 * t**4)
+    coefficients[at, 5] = (12.0 * d - (6.0 * v0 + 6.0 * v1) * t - (a0 - a1) * t**2) / (2.0 * t**5)
+    return coefficients
+
+
+def constant(position):
+    """The polynomial (6, k) that stays at ``position`` (k,)."""
+    coefficients = np.zeros((6, len(position)))
+    coefficients[0] = position
+    return coefficients
+
+
+def shifted(coefficients, delay):
+    """The same curves, (m, 6, k), with time counted from ``delay`` (m,) [s] after their start."""
+    # Taylor: the new coefficient j is the sum over i >= j of (i over j) delay**(i - j) c_i.
+    matrices = _BINOMIAL * np.asarray(delay, dtype=float)[:, None, None] ** _POWERS
+    return np.einsum("mij,mik->mjk", matrices, coefficients)

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How far the joints may be from where they should be."""
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Tolerances(NamedTuple):
+    """Bounds on position, velocity and acceleration error, arrays (3, n) [rad or m, per s, per s^2]; inf: no bound.
+
+    ``path`` holds on the way, ``goal`` at the end; ``goal_time_s`` is how much later the end may be reached [s].
+    """
+
+    path: np.ndarray
+    goal: np.ndarray
+    goal_time_s: float
+
+    @classmethod
+    def none(cls, count):
+        """No bounds on ``count`` joints."""
+        return cls(np.full((3, count), np.inf), np.full((3, count), np.inf), 0.0)
+
+
+def bounds(count, position=0.0, velocity=0.0, acceleration=0.0):
+    """(3, n) for :class:`Tolerances` from numbers or arrays (n,) in which 0 stands for no bound."""
+    table = np.empty((3, count))
+    for row, values in enumerate((position, velocity, acceleration)):
+        table[row] = values
+    table[~(table > 0.0)] = np.inf
+    return table
+
+
+def merge_tolerances(defaults, joint_names, path=(), goal=(), goal_time_s=0.0):
+    """A new :class:`Tolerances`: ``defaults`` with what a goal says.
+
+    ``path`` and ``goal``: rows of (joint name, position, velocity, acceleration). A positive number takes the place of
+    the default, a negative one lifts the bound, 0 keeps the default; the same for ``goal_time_s`` [s], where a
+    negative one means no time at all. Rows of other joints are left aside.
+    """
+    if goal_time_s == 0.0:
+        goal_time_s = defaults.goal_time_s
+    return Tolerances(_merged(defaults.path, joint_names, path), _merged(defaults.goal, joint_names, goal),
+                      max(goal_time_s, 0.0))
+
+
+def _merged(default, joint_names, rows):
+    table = default.copy()
+    for name, *values in rows:
+        if name in joint_names:
+            column = table[:, joint_names.index(name)]
+            for row, value in enumerate(values):
+                if value > 0.0:
+                    column[row] = value
+                elif value < 0.0:
+                    column[row] = np.inf
+    return table
