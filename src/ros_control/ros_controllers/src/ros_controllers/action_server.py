@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The server's side of actionlib for a loop that must not wait.
+
+It does what ``actionlib.ActionServer`` does on the wire, with other means: goals and cancel requests come in through
+queues and are handled when the loop calls :meth:`ActionServer.spin`; status, feedback and results go out through
+publishers that never wait. One thread; time is an argument. Without rospy.
+"""
+import itertools
+
+import genpy
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+
+#: How often the status goes out while nothing changes, and how long the status of a goal that has ended is told [s].
+STATUS_PERIOD_S = 0.2
+REMEMBERED_S = 5.0
+#: Unread goals and cancel requests that are kept.
+QUEUE_DEPTH = 50
+
+_ENDED = (GoalStatus.REJECTED, GoalStatus.RECALLED, GoalStatus.PREEMPTED, GoalStatus.ABORTED, GoalStatus.SUCCEEDED)
+
+# What a step makes of each state that it may be taken from.
+_STEPS = {
+    "accept": {GoalStatus.PENDING: GoalStatus.ACTIVE, GoalStatus.RECALLING: GoalStatus.PREEMPTING},
+    "reject": {GoalStatus.PENDING: GoalStatus.REJECTED, GoalStatus.RECALLING: GoalStatus.REJECTED},
+    "cancel": {GoalStatus.PENDING: GoalStatus.RECALLED, GoalStatus.RECALLING: GoalStatus.RECALLED,
+               GoalStatus.ACTIVE: GoalStatus.PREEMPTED, GoalStatus.PREEMPTING: GoalStatus.PREEMPTED},
+    "abort": {GoalStatus.ACTIVE: GoalStatus.ABORTED, GoalStatus.PREEMPTING: GoalStatus.ABORTED},
+    "succeed": {GoalStatus.ACTIVE: GoalStatus.SUCCEEDED, GoalStatus.PREEMPTING: GoalStatus.SUCCEEDED},
+    "request cancel of": {GoalStatus.PENDING: GoalStatus.RECALLING, GoalStatus.ACTIVE: GoalStatus.PREEMPTING},
+}
+_STATE_NAMES = {value: name for name, value in vars(GoalStatus).items() if name.isupper() and isinstance(value, int)}
+
+# Goals and cancel requests come on two topics, yet "cancel all, then do this" must not cancel the new goal: messages
+# are numbered as they come in.
+_arrivals = itertools.count()
+
+
+class WrongState(Exception):
+    """A step that the state of the goal does not allow."""
+
+
+class GoalHandle:
+    """One goal: ``goal`` (the message's goal part, None for a goal that was cancelled before it came), ``status``."""
+
+    def __init__(self, server, goal, goal_id, state):
+        self.goal = goal
+        self.status = GoalStatus(goal_id=goal_id, status=state)
+        self.ended_s = None
+        self._server = server
+
+    @property
+    def state(self):
+        """One of the constants of ``actionlib_msgs/GoalStatus``."""
+        return self.status.status
+
+    def accept(self, text=""):
+        """The goal is being worked on."""
+        self._step("accept", text)
+
+    def reject(self, result=None, text=""):
+        """The goal will not be worked on. ``result``: message, default an empty one; the same below."""
+        self._step("reject", text, result)
+
+    def cancel(self, result=None, text=""):
+        """The work ends early because somebody asked for that, or for something else."""
+        self._step("cancel", text, result)
+
+    def abort(self, result=None, text=""):
+        """The work has failed."""
+        self._step("abort", text, result)
+
+    def succeed(self, result=None, text=""):
+        """The work is done."""
+        self._step("succeed", text, result)
+
+    def publish_feedback(self, feedback):
+        """Tell the client how it goes."""
+        self._server._publish_feedback(self.status, feedback)
+
+    def _may(self, step):
+        return self.state in _STEPS[step]
+
+    def _step(self, step, text, result=None):
+        if not self._may(step):
+            raise WrongState("cannot %s a goal that is %s" % (step, _STATE_NAMES[self.state]))
+        self.status.status = _STEPS[step][self.state]
+        self.status.text = text
+        if self.state in _ENDED:
+            self._server._publish_result(self, result)
+        self._server._publish_status()
+
+
+class ActionServer:
+    """Serves one action. Every method belongs to the loop's thread."""
+
+    def __init__(self, topics, name, action_class, on_goal, on_cancel):
+        """Open the five topics below ``name``.
+
+        ``topics`` makes them: ``publisher(topic, msg_class, latch)`` and ``queue(topic, msg_class, depth)``, such as a
+        ``ControllerContext`` or a ``PluginContext``. ``action_class``: e.g. ``FollowJointTrajectoryAction``.
+        ``on_goal(handle)`` must accept or reject, at once or later; ``on_cancel(handle)`` should end the goal soon.
+        """
+        action = action_class()
+        self._result_class = type(action.action_result)
+        self._feedback_class = type(action.action_feedback)
+        self._on_goal = on_goal
+        self._on_cancel = on_cancel
+        self._goals = topics.queue(name + "/goal", _numbered(type(action.action_goal)), QUEUE_DEPTH)
+        self._cancels = topics.queue(name + "/cancel", _numbered(GoalID), QUEUE_DEPTH)
+        self._status = topics.publisher(name + "/status", GoalStatusArray, latch=True)
+        self._feedback = topics.publisher(name + "/feedback", self._feedback_class)
+        self._result = topics.publisher(name + "/result", self._result_class)
+        self._handles = []
+        self._last_cancel = genpy.Time()
+        self._time_s = 0.0
+        self._next_status_s = None
+        self._count = 0
+
+    def spin(self, time_s):
+        """Handle what has come in, and publish the status when it is due. ``time_s``: now, control time [s]."""
+        if time_s < self._time_s:
+            self._time_went_back(time_s)
+        self._time_s = time_s
+        messages = self._goals.drain()
+        cancels = self._cancels.drain()
+        if cancels:
+            messages = sorted(messages + cancels, key=lambda message: getattr(message, "arrival", 0))
+        for message in messages:
+            if isinstance(message, GoalID):
+                self._take_cancel(message)
+            else:
+                self._take_goal(message)
+        if self._next_status_s is None or time_s >= self._next_status_s:
+            self._publish_status()
+
+    @property
+    def feedback_is_heard(self):
+        """Whether it is worth making feedback."""
+        return self._feedback.has_listeners
+
+    # -- inside -------------------------------------------------------------------------------------------------
+
+    def _take_goal(self, message):
+        goal_id = message.goal_id
+        for handle in self._handles:
+            if handle.status.goal_id.id == goal_id.id:
+                # Sent twice, or cancelled before it came.
+                if handle.state == GoalStatus.RECALLING:
+                    handle.cancel()
+                return
+        now = self._now()
+        if not goal_id.id:
+            self._count += 1
+            goal_id.id = "%s-%d-%d.%09d" % (self._result_class._type, self._count, now.secs, now.nsecs)
+        stamp = goal_id.stamp
+        if not stamp:
+            goal_id.stamp = now
+        handle = GoalHandle(self, message.goal, goal_id, GoalStatus.PENDING)
+        self._handles.append(handle)
+        if stamp and stamp <= self._last_cancel:
+            handle.cancel(text="a request to cancel all goals up to a later time came before this goal")
+        else:
+            self._on_goal(handle)
+
+    def _take_cancel(self, message):
+        everything = not message.id and not message.stamp
+        known = False
+        for handle in list(self._handles):
+            goal_id = handle.status.goal_id
+            meant = bool(message.id) and goal_id.id == message.id
+            known = known or meant
+            if not (meant or everything or (message.stamp and goal_id.stamp <= message.stamp)):
+                continue
+            if handle._may("request cancel of"):
+                handle._step("request cancel of", "")
+                self._on_cancel(handle)
+        if message.id and not known:
+            # The request has overtaken its goal; the goal is not begun when it comes.
+            early = GoalHandle(self, None, GoalID(message.stamp, message.id), GoalStatus.RECALLING)
+            early.ended_s = self._time_s
+            self._handles.append(early)
+        self._last_cancel = max(self._last_cancel, message.stamp)
+
+    def _publish_result(self, handle, result):
+        handle.ended_s = self._time_s
+        message = self._result_class(status=handle.status)
+        message.header.stamp = self._now()
+        if result is not None:
+            message.result = result
+        self._result.publish(message)
+
+    def _publish_feedback(self, status, feedback):
+        if self._feedback.has_listeners:
+            message = self._feedback_class(status=status, feedback=feedback)
+            message.header.stamp = self._now()
+            self._feedback.publish(message)
+
+    def _publish_status(self):
+        forgotten_s = self._time_s - REMEMBERED_S
+        self._handles = [handle for handle in self._handles if handle.ended_s is None or handle.ended_s > forgotten_s]
+        message = GoalStatusArray(status_list=[handle.status for handle in self._handles])
+        message.header.stamp = self._now()
+        self._status.publish(message)
+        self._next_status_s = self._time_s + STATUS_PERIOD_S
+
+    def _time_went_back(self, time_s):
+        self._next_status_s = None
+        # Stamps of the time before would cancel goals for a long while.
+        self._last_cancel = genpy.Time()
+        for handle in self._handles:
+            if handle.ended_s is not None:
+                handle.ended_s = time_s
+
+    def _now(self):
+        return genpy.Time(*divmod(round(self._time_s * 1e9), 10**9))
+
+
+def _numbered(msg_class):
+    """``msg_class`` with a field ``arrival`` that is not on the wire: it counts the messages of all topics."""
+    def deserialize(self, data):
+        self.arrival = next(_arrivals)
+        return msg_class.deserialize(self, data)
+
+    return type(msg_class.__name__, (msg_class,), {"deserialize": deserialize, "arrival": 0})

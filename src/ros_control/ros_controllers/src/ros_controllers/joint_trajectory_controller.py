@@ -1,0 +1,341 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Moves joints along trajectories: the action, topics and service of joint_trajectory_controller.
+
+What a trajectory means is decided in the package ``joint_trajectory``; here its messages meet the joints.
+"""
+import math
+
+import numpy as np
+import rospy
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryResult,
+    JointTrajectoryControllerState,
+)
+from control_msgs.srv import QueryTrajectoryState, QueryTrajectoryStateResponse
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from controller_manager import EFFORT, POSITION, VELOCITY, Controller, ControllerError, Gains, Pid
+from joint_trajectory import (
+    Command,
+    Follower,
+    JointNamesError,
+    Outcome,
+    Tolerances,
+    TrajectoryError,
+    bounds,
+    joint_indices,
+    merge_tolerances,
+)
+from ros_controllers.action_server import ActionServer
+from ros_controllers.convert import stamp
+
+_ERROR_CODES = {
+    Outcome.SUCCEEDED: FollowJointTrajectoryResult.SUCCESSFUL,
+    Outcome.PATH_TOLERANCE_VIOLATED: FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
+    Outcome.GOAL_TOLERANCE_VIOLATED: FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED,
+}
+
+
+class JointTrajectoryController(Controller):
+    """Follows trajectories of the joints in parameter ``joints``; base of the classes at the end of this file.
+
+    Further parameters, with their defaults:
+
+    ``constraints/goal_time`` 0.0 s
+        how much later than planned a goal may be reached
+    ``constraints/stopped_velocity_tolerance`` 0.01 rad/s or m/s
+        the velocity below which a joint has stopped, at a goal
+    ``constraints/<joint>/trajectory``, ``constraints/<joint>/goal`` 0 rad or m
+        position error allowed on the way and at a goal; 0: any
+    ``state_publish_rate`` 50 Hz, ``action_monitor_rate`` 20 Hz
+        rates of ``state`` and of the action's feedback; 0: never
+    ``stop_trajectory_duration`` 0.0 s
+        how long a stop may take; 0: stand at once where the joints are
+    ``allow_partial_joints_goal`` false
+        whether a trajectory may leave joints out
+
+    Inside, times are the seconds for which the controller has run; they never run backwards.
+    """
+
+    def __init__(self, name, hardware, context):
+        super().__init__(name, hardware, context)
+        self._joints = context.texts("joints", "a list of joint names")
+        self._index = self.claim(self.interface, self._joints)
+        self._allow_partial = context.flag("allow_partial_joints_goal", False)
+        self._follower = Follower(self._joints, self._continuous(), self._not_negative("stop_trajectory_duration", 0.0),
+                                  self._allow_partial)
+        self._tolerances = self._default_tolerances()
+        self._state_timer = _Timer(self._not_negative("state_publish_rate", 50.0))
+        self._feedback_timer = _Timer(self._not_negative("action_monitor_rate", 20.0))
+        self._runs = False
+        self._time_s = 0.0  # control time of the last update
+        self._uptime = 0.0
+        self._dt = 0.0
+        self._began = 0.0  # uptime at which the last command was taken up
+        self._position = np.zeros(len(self._joints))
+        self._velocity = np.zeros(len(self._joints))
+        self._next = None
+        self._make_adapter()
+        self._server = ActionServer(context, "follow_joint_trajectory", FollowJointTrajectoryAction, self._on_goal,
+                                    self._on_cancel)
+        self._commands = context.mailbox("command", JointTrajectory)
+        self._state = context.publisher("state", JointTrajectoryControllerState)
+        context.service("query_state", QueryTrajectoryState, self._query_state)
+
+    # -- parameters -----------------------------------------------------------------------------------------------
+
+    def _continuous(self):
+        robot = self.context.robot
+        if robot is None:
+            raise ControllerError("%s needs the robot's URDF to know its joints: parameter %s is missing; load the "
+                                  "robot's description" % (self.context.namespace,
+                                                           self.context.in_root("robot_description")))
+        absent = [joint for joint in self._joints if joint not in robot.joints]
+        if absent:
+            raise ControllerError("parameter %s: the URDF has no joint %s; it has %s" % (
+                self.context.resolve("joints"), ", ".join(absent),
+                ", ".join(joint.name for joint in robot.movable_joints())))
+        return np.array([robot.joints[joint].type == "continuous" for joint in self._joints], dtype=bool)
+
+    def _default_tolerances(self):
+        count = len(self._joints)
+        path, goal = (np.array([self._not_negative("constraints/%s/%s" % (joint, kind), 0.0) for joint in self._joints])
+                      for kind in ("trajectory", "goal"))
+        stopped = self._not_negative("constraints/stopped_velocity_tolerance", 0.01)
+        return Tolerances(bounds(count, position=path), bounds(count, position=goal, velocity=stopped),
+                          self._not_negative("constraints/goal_time", 0.0))
+
+    def _not_negative(self, name, default):
+        value = self.context.number(name, default)
+        if value < 0.0:
+            raise ControllerError("parameter %s is %g, expected 0 or more" % (self.context.resolve(name), value))
+        return value
+
+    # -- life -------------------------------------------------------------------------------------------------------
+
+    def starting(self, time_s):
+        self._commands.take()  # what came before the start was not meant for now
+        self._time_s, self._uptime, self._began = time_s, 0.0, 0.0
+        self._measure()
+        self._follower.start(0.0, self._position, self._velocity)
+        self._state_timer.reset()
+        self._start_adapter()
+        self._runs = True
+
+    def update(self, time_s, dt):
+        self._time_s, self._dt = time_s, dt
+        self._uptime += dt
+        self._measure()
+        follower = self._follower
+        verdict = follower.update(self._uptime, self._position, self._velocity)
+        if verdict is not None:
+            self._conclude(verdict)
+        self._server.spin(time_s)
+        message = self._commands.take()
+        if message is not None:
+            self._on_command(message)
+        # Commands act until the next tick, so the joints shall go where they should be then.
+        self._next = follower.look_ahead(self._uptime + dt)
+        self._write(dt)
+        self._publish(time_s)
+
+    def idle(self, time_s):
+        self._server.spin(time_s)
+
+    def stopping(self, time_s):
+        self._runs = False
+        if self._follower.goal is not None:
+            goal = self._follower.goal
+            self._follower.release()
+            goal.cancel(text="the controller was stopped")
+
+    def _measure(self):
+        self._position = self.hardware.position[self._index]
+        self._velocity = self.hardware.velocity[self._index]
+
+    # -- commands ---------------------------------------------------------------------------------------------------
+
+    @property
+    def _next_cycle(self):
+        """The first uptime [s] that a command can still change."""
+        return self._uptime + self._dt
+
+    def _on_goal(self, handle):
+        if not self._runs:
+            self._reject(handle, FollowJointTrajectoryResult.INVALID_GOAL,
+                         "%s does not run; start it with the controller manager" % self.context.namespace)
+            return
+        goal = handle.goal
+        before = self._follower.goal
+        try:
+            tolerances = merge_tolerances(self._tolerances, self._joints, _rows(goal.path_tolerance),
+                                          _rows(goal.goal_tolerance), goal.goal_time_tolerance.to_sec())
+            # A joint that keeps up is still moving when the end is reached: it was told to stand only in this cycle.
+            tolerances = tolerances._replace(goal_time_s=tolerances.goal_time_s + self._dt)
+            self._follow(goal.trajectory, handle, tolerances)
+        except JointNamesError as error:
+            self._reject(handle, FollowJointTrajectoryResult.INVALID_JOINTS, str(error))
+        except TrajectoryError as error:
+            self._reject(handle, FollowJointTrajectoryResult.INVALID_GOAL, str(error))
+        else:
+            if before is not None:
+                before.cancel(text="another goal took its place")
+            handle.accept()
+            self._feedback_timer.reset()
+
+    def _reject(self, handle, code, text):
+        self.log.error("%s: goal rejected: %s" % (self.context.namespace, text))
+        handle.reject(FollowJointTrajectoryResult(code, text), text)
+
+    def _on_cancel(self, handle):
+        if handle is self._follower.goal:
+            self._follower.stop(self._next_cycle, self._position)
+            self._began = self._next_cycle
+        handle.cancel()
+
+    def _on_command(self, message):
+        before = self._follower.goal
+        try:
+            self._follow(message)
+        except TrajectoryError as error:
+            self.log.error_throttle(1.0, "%s: trajectory ignored: %s" % (self.context.resolve("command"), error))
+            return
+        if before is not None:
+            before.cancel(text="a trajectory on %s took its place" % self.context.resolve("command"))
+
+    def _follow(self, message, handle=None, tolerances=None):
+        """Follow a ``trajectory_msgs/JointTrajectory``; raises :class:`TrajectoryError`."""
+        now, start_time = self._next_cycle, None
+        # On the topic, no points stop the joints whatever the names are.
+        if message.points or handle is not None:
+            joint_indices(message.joint_names, self._joints, self._allow_partial)
+        if message.header.stamp:
+            start_time = self._uptime + (message.header.stamp.to_sec() - self._time_s)
+        command = Command(message.joint_names, (
+            (point.time_from_start.to_sec(), point.positions, point.velocities, point.accelerations)
+            for point in message.points), start_time)
+        replacement = self._follower.accept(command, now, self._position, handle, tolerances)
+        self._began = now if start_time is None else start_time
+        if replacement is not None and replacement.late_s > 0.0:
+            self.log.warn("%s: %d of %d points of a trajectory are left out: the first was due %.6f s ago"
+                          % (self.context.namespace, replacement.dropped, len(message.points), replacement.late_s))
+
+    def _conclude(self, verdict):
+        handle = self._follower.goal
+        self._follower.release()
+        result = FollowJointTrajectoryResult(_ERROR_CODES[verdict.outcome], verdict.text)
+        if verdict.outcome is Outcome.SUCCEEDED:
+            handle.succeed(result)
+        else:
+            self.log.error("%s: goal aborted: %s" % (self.context.namespace, verdict.text))
+            handle.abort(result, verdict.text)
+
+    # -- what is told -----------------------------------------------------------------------------------------------
+
+    def _publish(self, time_s):
+        if self._state_timer.is_due(self._uptime) and self._state.has_listeners:
+            self._state.publish(self._filled(JointTrajectoryControllerState(), time_s))
+        goal = self._follower.goal
+        if goal is not None and self._feedback_timer.is_due(self._uptime) and self._server.feedback_is_heard:
+            goal.publish_feedback(self._filled(FollowJointTrajectoryFeedback(), time_s))
+
+    def _filled(self, message, time_s):
+        since = rospy.Duration.from_sec(max(self._uptime - self._began, 0.0))
+        desired, error = self._follower.desired, self._follower.error
+        message.header.stamp = stamp(time_s)
+        message.joint_names = self._joints
+        message.desired = JointTrajectoryPoint(*desired.tolist(), [], since)
+        message.actual = JointTrajectoryPoint(self._position.tolist(), self._velocity.tolist(), [], [], since)
+        message.error = JointTrajectoryPoint(*error[:2].tolist(), [], [], since)
+        return message
+
+    def _query_state(self, request):
+        if not self._runs:
+            raise rospy.ServiceException("%s does not run" % self.context.namespace)
+        try:
+            state = self._follower.trajectory.query(self._uptime + (request.time.to_sec() - self._time_s))
+        except TrajectoryError as error:
+            raise rospy.ServiceException(str(error)) from error
+        return QueryTrajectoryStateResponse(self._joints, *state.tolist())
+
+    # -- what a subclass does with the desired state -----------------------------------------------------------------
+
+    def _make_adapter(self):
+        """Read what else it needs from the parameters."""
+
+    def _start_adapter(self):
+        """Give the command for the tick in which the controller starts."""
+        raise NotImplementedError
+
+    def _write(self, dt):
+        """Give the command for this tick: ``self._next`` is where the joints should be at its end."""
+        raise NotImplementedError
+
+
+class PositionJointTrajectoryController(JointTrajectoryController):
+    """position_controllers/JointTrajectoryController: the desired positions are the commands."""
+
+    interface = POSITION
+
+    def _start_adapter(self):
+        self.hardware.command[POSITION][self._index] = self._position
+
+    def _write(self, dt):
+        self.hardware.command[POSITION][self._index] = self._next[0]
+
+
+class _PidTrajectoryController(JointTrajectoryController):
+    """Command = ``velocity_ff/<joint>`` * desired velocity + PID(position error, velocity error), the PID of each joint
+    in ``gains/<joint>``."""
+
+    def _make_adapter(self):
+        self._pid = Pid(Gains.from_params(self.context.entry, ["gains/%s" % joint for joint in self._joints]))
+        self._velocity_ff = np.array([self.context.number("velocity_ff/%s" % joint, 0.0) for joint in self._joints])
+
+    def _start_adapter(self):
+        self._pid.reset()
+        self.hardware.command[self.interface][self._index] = 0.0
+
+    def _write(self, dt):
+        error = self._follower.error
+        self.hardware.command[self.interface][self._index] = (
+            self._velocity_ff * self._next[1] + self._pid.update(error[0], dt, error[1]))
+
+
+class VelocityJointTrajectoryController(_PidTrajectoryController):
+    """velocity_controllers/JointTrajectoryController"""
+
+    interface = VELOCITY
+
+
+class EffortJointTrajectoryController(_PidTrajectoryController):
+    """effort_controllers/JointTrajectoryController"""
+
+    interface = EFFORT
+
+
+class _Timer:
+    """Says when something that happens ``rate`` times a second is due; never for rate 0."""
+
+    def __init__(self, rate):
+        self._period_s = 1.0 / rate if rate > 0.0 else math.inf
+        self.reset()
+
+    def reset(self):
+        """Begin anew, with the next question."""
+        self._due_s = -math.inf if self._period_s < math.inf else math.inf
+
+    def is_due(self, time_s):
+        # Half a nanosecond: multiples of a tick and of the period meet in rounding only.
+        if time_s < self._due_s - 5e-10:
+            return False
+        following = self._due_s + self._period_s
+        self._due_s = following if following > time_s else time_s + self._period_s
+        return True
+
+
+def _rows(tolerances):
+    """``control_msgs/JointTolerance[]`` as rows for ``merge_tolerances``."""
+    return [(entry.name, entry.position, entry.velocity, entry.acceleration) for entry in tolerances]

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers that hold a position or a velocity with a PID whose output is an effort or a velocity."""
+import math
+
+import numpy as np
+from control_msgs.msg import JointControllerState
+from std_msgs.msg import Float64, Float64MultiArray
+
+from controller_manager import EFFORT, VELOCITY, Controller, ControllerError, Gains, Pid
+from ros_controllers.convert import stamp
+
+# A state message goes out with every tenth update.
+STATE_EVERY = 10
+
+
+class PidController(Controller):
+    """Base of the classes below: k joints, each with a PID from the error to a command of ``interface``.
+
+    The command topic carries one value per joint; what is not finite or of the wrong length is reported and left out.
+    Subclasses say how an error is made of command and state, and what the command is at the start.
+    """
+
+    interface = EFFORT
+
+    def __init__(self, name, hardware, context):
+        super().__init__(name, hardware, context)
+        self.joints, gain_names = self._read_joints()
+        self.index = self.claim(self.interface, self.joints)
+        self.pid = Pid(Gains.from_params(context.entry, gain_names))
+        self._read_limits()
+        self._command = np.zeros(len(self.joints))
+        self._inbox = context.mailbox("command", self.msg_class)
+
+    def starting(self, time_s):
+        self._inbox.take()  # what came before the start was not meant for now
+        self._command = self._limited(self._start_command())
+        self.pid.reset()
+
+    def update(self, time_s, dt):
+        message = self._inbox.take()
+        if message is not None:
+            self._accept(message)
+        error = self._error()
+        output = self.pid.update(error, dt)
+        self.hardware.command[self.interface][self.index] = output
+        self._after(time_s, dt, error, output)
+
+    def _accept(self, message):
+        values = np.atleast_1d(np.array(message.data, dtype=float))
+        if values.shape != self._command.shape or not np.isfinite(values).all():
+            self.log.error_throttle(1.0, "%s: command %s ignored, expected one finite number for each of %s"
+                                    % (self.context.resolve("command"), values.tolist(), ", ".join(self.joints)))
+        else:
+            self._command = self._limited(values)
+
+    def _read_limits(self):
+        """Subclasses that heed limits read them here."""
+
+    def _limited(self, command):
+        return command
+
+    def _after(self, time_s, dt, error, output):
+        """What a subclass has to tell after an update."""
+
+
+class _Single:
+    """For the joint in parameter ``joint``, gains in ``pid``; std_msgs/Float64 on ``command``, state on ``state``."""
+
+    msg_class = Float64
+
+    def __init__(self, name, hardware, context):
+        super().__init__(name, hardware, context)
+        self._updates = 0
+        self._publisher = context.publisher("state", JointControllerState)
+
+    def _read_joints(self):
+        return [self.context.text("joint", "the name of a joint")], ["pid"]
+
+    def _after(self, time_s, dt, error, output):
+        self._updates += 1
+        if self._updates % STATE_EVERY or not self._publisher.has_listeners:
+            return
+        gains = self.pid.gains
+        message = JointControllerState(
+            set_point=self._command[0], error=error[0], time_step=dt, command=output[0], p=gains.p[0], i=gains.i[0],
+            d=gains.d[0], i_clamp=gains.i_max[0], antiwindup=bool(gains.antiwindup[0]))
+        message.header.stamp = stamp(time_s)
+        self._fill(message, self.hardware.position[self.index[0]], self.hardware.velocity[self.index[0]])
+        self._publisher.publish(message)
+
+
+class _Position:
+    """Holds positions [rad or m], clamped to the URDF's range; continuous joints take the shorter way."""
+
+    def _read_limits(self):
+        robot = self.context.robot
+        if robot is None:
+            raise ControllerError("%s needs the joint limits of the URDF: parameter %s is missing; load the robot's "
+                                  "description" % (self.context.namespace, self.context.in_root("robot_description")))
+        joints = [robot.joints[name] for name in self.joints]
+        self._around = np.array([joint.type == "continuous" for joint in joints], dtype=bool)
+
+        def end(joint, value, absent):
+            return absent if value is None or joint.type == "continuous" else value
+
+        self._lower = np.array([end(joint, joint.limit.lower, -math.inf) for joint in joints])
+        self._upper = np.array([end(joint, joint.limit.upper, math.inf) for joint in joints])
+
+    def _limited(self, command):
+        return np.clip(command, self._lower, self._upper)
+
+    def _start_command(self):
+        return self.hardware.position[self.index]
+
+    def _error(self):
+        # Command and position of a joint with a range lie within it, and so does the straight way between them.
+        error = self._command - self.hardware.position[self.index]
+        if self._around.any():
+            error = np.where(self._around, np.remainder(error + math.pi, 2.0 * math.pi) - math.pi, error)
+        return error
+
+    @staticmethod
+    def _fill(message, position, velocity):
+        message.process_value, message.process_value_dot = position, velocity
+
+
+class EffortJointPositionController(_Position, _Single, PidController):
+    """effort_controllers/JointPositionController"""
+
+
+class VelocityJointPositionController(_Position, _Single, PidController):
+    """velocity_controllers/JointPositionController"""
+
+    interface = VELOCITY
+
+
+class EffortJointVelocityController(_Single, PidController):
+    """effort_controllers/JointVelocityController: holds a velocity [rad/s or m/s]."""
+
+    def _start_command(self):
+        return np.zeros(len(self.joints))
+
+    def _error(self):
+        return self._command - self.hardware.velocity[self.index]
+
+    @staticmethod
+    def _fill(message, position, velocity):
+        message.process_value = velocity
+
+
+class EffortJointGroupPositionController(_Position, PidController):
+    """effort_controllers/JointGroupPositionController: joints in ``joints``, gains of each in ``<joint>/pid``,
+    std_msgs/Float64MultiArray on ``command``; no state topic."""
+
+    msg_class = Float64MultiArray
+
+    def _read_joints(self):
+        joints = self.context.texts("joints", "a list of joint names")
+        return joints, ["%s/pid" % joint for joint in joints]

@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The action protocol, without a master: states of goals, cancel requests of every kind, what is published when."""
+import io
+
+import genpy
+import pytest
+from actionlib_msgs.msg import GoalID, GoalStatus
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryActionGoal,
+    FollowJointTrajectoryFeedback,
+    FollowJointTrajectoryResult,
+)
+
+from controller_manager.testing import FakeRos
+from ros_controllers.action_server import ActionServer, WrongState, _numbered
+
+
+class Topics:
+    """Keeps what is published, serialised and read back, because the server goes on changing its messages."""
+
+    def __init__(self):
+        self.ros = FakeRos()
+        self.sent = {}
+        self.latched = set()
+
+    def queue(self, topic, msg_class, depth):
+        self.ros.msg_class = msg_class
+        return self.ros.queue(topic, msg_class, depth)
+
+    def publisher(self, topic, msg_class, latch=False):
+        self.sent[topic] = []
+        if latch:
+            self.latched.add(topic)
+        return Recorder(self.sent[topic])
+
+
+class Recorder:
+    has_listeners = True
+
+    def __init__(self, sent):
+        self._sent = sent
+
+    def publish(self, message):
+        buffer = io.BytesIO()
+        message.serialize(buffer)
+        self._sent.append(type(message)().deserialize(buffer.getvalue()))
+
+
+class Served:
+    """A server whose owner accepts every goal (unless ``accepts`` is false) and leaves it at that."""
+
+    def __init__(self, accepts=True):
+        self.topics = Topics()
+        self.accepts = accepts
+        self.begun, self.asked_to_end = [], []
+        self.server = ActionServer(self.topics, "act", FollowJointTrajectoryAction, self._on_goal,
+                                   self.asked_to_end.append)
+
+    def _on_goal(self, handle):
+        self.begun.append(handle)
+        if self.accepts:
+            handle.accept("fine")
+
+    def send(self, name, stamp_s=1.0):
+        message = FollowJointTrajectoryActionGoal()
+        message.goal_id = GoalID(genpy.Time.from_sec(stamp_s), name)
+        self.topics.ros.inboxes["act/goal"].put(message)
+
+    def cancel(self, name="", stamp_s=0.0):
+        self.topics.ros.inboxes["act/cancel"].put(GoalID(genpy.Time.from_sec(stamp_s), name))
+
+    @property
+    def statuses(self):
+        """{goal id: state} as last published."""
+        return {status.goal_id.id: status.status for status in self.topics.sent["act/status"][-1].status_list}
+
+    @property
+    def results(self):
+        """List of (goal id, state)."""
+        return [(message.status.goal_id.id, message.status.status) for message in self.topics.sent["act/result"]]
+
+
+@pytest.fixture
+def served():
+    return Served()
+
+
+def test_goal_becomes_active_and_succeeds(served):
+    served.send("a")
+    served.server.spin(10.0)
+    assert served.statuses == {"a": GoalStatus.ACTIVE}
+    served.begun[0].succeed(FollowJointTrajectoryResult(error_code=7), "done")
+    message = served.topics.sent["act/result"][0]
+    assert (message.result.error_code, message.status.text) == (7, "done")
+    assert served.results == [("a", GoalStatus.SUCCEEDED)]
+    assert served.statuses == {"a": GoalStatus.SUCCEEDED}
+    assert message.header.stamp == genpy.Time(10)
+
+
+@pytest.mark.parametrize("steps, state", [
+    (["reject"], GoalStatus.REJECTED),
+    (["cancel"], GoalStatus.RECALLED),
+    (["accept", "abort"], GoalStatus.ABORTED),
+    (["accept", "succeed"], GoalStatus.SUCCEEDED),
+    (["accept", "cancel"], GoalStatus.PREEMPTED),
+])
+def test_states_of_a_goal(steps, state):
+    served = Served(accepts=False)
+    served.send("a")
+    served.server.spin(1.0)
+    for step in steps:
+        getattr(served.begun[0], step)()
+    assert served.results == [("a", state)]
+
+
+@pytest.mark.parametrize("steps", [["succeed"], ["abort"], ["accept", "accept"], ["accept", "reject"],
+                                   ["accept", "succeed", "cancel"], ["reject", "accept"]])
+def test_steps_out_of_order_are_refused(steps):
+    served = Served(accepts=False)
+    served.send("a")
+    served.server.spin(1.0)
+    with pytest.raises(WrongState, match="cannot %s a goal that is" % steps[-1]):
+        for step in steps:
+            getattr(served.begun[0], step)()
+
+
+def test_feedback_carries_the_goal(served):
+    served.send("a")
+    served.server.spin(1.0)
+    served.begun[0].publish_feedback(FollowJointTrajectoryFeedback(joint_names=["x"]))
+    message = served.topics.sent["act/feedback"][0]
+    assert (message.status.goal_id.id, message.feedback.joint_names) == ("a", ["x"])
+
+
+def test_status_goes_out_five_times_a_second_and_is_latched(served):
+    for tick in range(1000):
+        served.server.spin(tick * 0.002)
+    assert len(served.topics.sent["act/status"]) == 10
+    assert served.topics.latched == {"act/status"}
+
+
+def test_ended_goals_are_told_for_a_while(served):
+    served.send("a")
+    served.server.spin(1.0)
+    served.begun[0].succeed()
+    served.server.spin(5.9)
+    assert served.statuses == {"a": GoalStatus.SUCCEEDED}
+    served.server.spin(6.3)
+    assert served.statuses == {}
+
+
+def test_active_goals_are_told_for_ever(served):
+    served.send("a")
+    for time in (1.0, 100.0, 1000.0):
+        served.server.spin(time)
+    assert served.statuses == {"a": GoalStatus.ACTIVE}
+
+
+def test_goal_that_comes_twice_is_begun_once(served):
+    served.send("a")
+    served.send("a")
+    served.server.spin(1.0)
+    served.send("a")
+    served.server.spin(1.1)
+    assert len(served.begun) == 1
+
+
+def test_goals_without_a_name_get_one_each_and_the_time(served):
+    served.send("", 0.0)
+    served.send("", 0.0)
+    served.server.spin(2.5)
+    ids = [handle.status.goal_id for handle in served.begun]
+    assert len({goal_id.id for goal_id in ids}) == 2 and all(goal_id.id for goal_id in ids)
+    assert all(goal_id.stamp == genpy.Time(2, 500000000) for goal_id in ids)
+
+
+# -- cancel requests ----------------------------------------------------------------------------------------------
+
+def test_cancel_by_name(served):
+    served.send("a")
+    served.send("b")
+    served.cancel("a")
+    served.server.spin(1.0)
+    assert [handle.status.goal_id.id for handle in served.asked_to_end] == ["a"]
+    assert served.statuses == {"a": GoalStatus.PREEMPTING, "b": GoalStatus.ACTIVE}
+    served.asked_to_end[0].cancel()
+    assert served.results == [("a", GoalStatus.PREEMPTED)]
+
+
+def test_cancel_of_a_pending_goal_recalls_it():
+    served = Served(accepts=False)
+    served.send("a")
+    served.server.spin(1.0)
+    served.cancel("a")
+    served.server.spin(1.1)
+    assert served.statuses == {"a": GoalStatus.RECALLING}
+    served.asked_to_end[0].cancel()
+    assert served.results == [("a", GoalStatus.RECALLED)]
+
+
+def test_recalled_goal_that_is_accepted_all_the_same_is_preempting():
+    served = Served(accepts=False)
+    served.send("a")
+    served.server.spin(1.0)
+    served.cancel("a")
+    served.server.spin(1.1)
+    served.begun[0].accept()
+    assert served.statuses == {"a": GoalStatus.PREEMPTING}
+
+
+def test_cancel_all(served):
+    for name in "abc":
+        served.send(name)
+    served.server.spin(1.0)
+    served.begun[1].succeed()
+    served.cancel()
+    served.server.spin(1.1)
+    assert [handle.status.goal_id.id for handle in served.asked_to_end] == ["a", "c"]
+
+
+def test_cancel_up_to_a_time(served):
+    for name, stamp in (("a", 1.0), ("b", 2.0), ("c", 3.0)):
+        served.send(name, stamp)
+    served.server.spin(4.0)
+    served.cancel(stamp_s=2.0)
+    served.server.spin(4.1)
+    assert [handle.status.goal_id.id for handle in served.asked_to_end] == ["a", "b"]
+
+
+def test_cancel_by_name_and_time_means_both(served):
+    for name, stamp in (("a", 1.0), ("b", 2.0), ("c", 3.0)):
+        served.send(name, stamp)
+    served.server.spin(4.0)
+    served.cancel("c", 1.0)
+    served.server.spin(4.1)
+    assert [handle.status.goal_id.id for handle in served.asked_to_end] == ["a", "c"]
+
+
+def test_goal_from_before_a_cancelled_time_is_not_begun(served):
+    served.cancel(stamp_s=5.0)
+    served.server.spin(1.0)
+    served.send("late", 5.0)
+    served.send("next", 5.1)
+    served.server.spin(1.1)
+    assert served.results == [("late", GoalStatus.RECALLED)]
+    assert [handle.status.goal_id.id for handle in served.begun] == ["next"]
+
+
+def test_cancel_that_overtakes_its_goal_recalls_it(served):
+    served.cancel("a")
+    served.server.spin(1.0)
+    assert served.statuses == {"a": GoalStatus.RECALLING}
+    served.send("a")
+    served.server.spin(1.1)
+    assert served.results == [("a", GoalStatus.RECALLED)]
+    assert served.begun == []
+
+
+def test_cancel_of_a_goal_that_has_ended_does_nothing(served):
+    served.send("a")
+    served.server.spin(1.0)
+    served.begun[0].succeed()
+    served.cancel("a")
+    served.server.spin(1.1)
+    assert served.asked_to_end == [] and served.results == [("a", GoalStatus.SUCCEEDED)]
+
+
+def test_goals_and_cancels_of_one_tick_are_taken_in_the_order_of_arrival():
+    served = Served()
+    numbered_goal, numbered_cancel = _numbered(FollowJointTrajectoryActionGoal), _numbered(GoalID)
+
+    def arrive(topic, numbered, message):
+        buffer = io.BytesIO()
+        message.serialize(buffer)
+        served.topics.ros.inboxes[topic].put(numbered().deserialize(buffer.getvalue()))
+
+    old, new = FollowJointTrajectoryActionGoal(), FollowJointTrajectoryActionGoal()
+    old.goal_id.id, new.goal_id.id = "old", "new"
+    arrive("act/goal", numbered_goal, old)
+    arrive("act/cancel", numbered_cancel, GoalID())
+    arrive("act/goal", numbered_goal, new)
+    served.server.spin(1.0)
+    assert [handle.status.goal_id.id for handle in served.asked_to_end] == ["old"]
+
+
+def test_numbered_messages_are_the_same_on_the_wire():
+    numbered = _numbered(FollowJointTrajectoryActionGoal)
+    assert numbered._md5sum == FollowJointTrajectoryActionGoal._md5sum
+    assert numbered._type == FollowJointTrajectoryActionGoal._type
+
+
+def test_time_that_goes_back_does_not_cancel_or_silence_anything(served):
+    served.cancel(stamp_s=100.0)
+    served.server.spin(100.0)
+    published = len(served.topics.sent["act/status"])
+    served.send("a", 0.5)
+    served.server.spin(0.5)
+    assert len(served.topics.sent["act/status"]) > published
+    assert served.statuses == {"a": GoalStatus.ACTIVE}
