@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Callbacks that do not keep their owners alive."""
+import threading
+import weakref
+
+
+class Signal:
+    """Call every connected slot with the arguments that the signal is called with.
+
+    Slots are functions or bound methods, held weakly: connecting an object's method does not keep the object alive,
+    and a slot that has gone is skipped. (So a lambda needs a name of its own that outlives the call of connect.)
+    """
+
+    def __init__(self):
+        self._references = []
+        self._lock = threading.Lock()
+
+    def connect(self, slot):
+        """Call `slot` from now on. Connecting it a second time changes nothing."""
+        reference = _weak_reference(slot)
+        with self._lock:
+            if reference not in self._references:
+                self._references.append(reference)
+
+    def disconnect(self, slot):
+        """Stop calling `slot`. It does no harm if it was not connected."""
+        reference = _weak_reference(slot)
+        with self._lock:
+            self._references = [known for known in self._references if known != reference]
+
+    def __call__(self, *args, **kwargs):
+        """Call the slots in the order of their connection; what a slot raises reaches the caller."""
+        with self._lock:
+            self._references = [reference for reference in self._references if reference() is not None]
+            references = list(self._references)
+        # Outside the lock: a slot may connect or disconnect.
+        for reference in references:
+            slot = reference()
+            if slot is not None:
+                slot(*args, **kwargs)
+
+
+def _weak_reference(slot):
+    if not callable(slot):
+        raise TypeError("a slot is a function or a bound method, not %r" % (slot,))
+    # A plain reference to a bound method would die at once: the method object is made anew at each access.
+    return weakref.WeakMethod(slot) if hasattr(slot, "__self__") and hasattr(slot, "__func__") else weakref.ref(slot)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Waiting in terms of a clock that is given: free of ROS.
+
+A clock has `now()` [s], `sleep(duration_s)` and `is_shutdown()`.
+"""
+import errno
+import math
+
+
+class Stopwatch:
+    """Seconds that a clock has run since the stopwatch was made.
+
+    A clock of a simulation reads 0 until its first tick, which may be far ahead, and goes back when the world is
+    reset: neither step is time that passed, and neither is counted.
+    """
+
+    def __init__(self, now_s):
+        self._last_s = now_s
+        self._elapsed_s = 0.0
+
+    def elapsed_s(self, now_s):
+        """Read the stopwatch at clock reading `now_s` [s]."""
+        step_s = now_s - self._last_s
+        if self._last_s > 0.0 and step_s > 0.0:
+            self._elapsed_s += step_s
+        self._last_s = now_s
+        return self._elapsed_s
+
+
+class Ticker:
+    """A steady beat on a clock: the time that the work between two beats takes comes off the sleep."""
+
+    def __init__(self, clock, rate_hz):
+        if not rate_hz > 0.0:
+            raise ValueError("rate must be greater than 0 Hz, got %r" % (rate_hz,))
+        self._clock = clock
+        self._period_s = 1.0 / rate_hz
+        self._next_s = clock.now() + self._period_s
+
+    def sleep(self):
+        """Sleep until the next beat. Beats that were missed, or that the clock jumped over, are not caught up."""
+        now_s = self._clock.now()
+        remaining_s = self._next_s - now_s
+        if remaining_s < -self._period_s or remaining_s > self._period_s:
+            remaining_s = self._period_s
+            self._next_s = now_s + self._period_s
+        if remaining_s > 0.0:
+            self._clock.sleep(remaining_s)
+        self._next_s += self._period_s
+
+
+def is_unlimited(timeout_s):
+    """Tell whether a time-out means for ever: negative or infinite."""
+    return timeout_s < 0.0 or math.isinf(timeout_s)
+
+
+def wait_on(clock, test, timeout_s, raise_on_error, rate_hz, timeout_msg, body):
+    """Wait on `clock` until `test()` is true; see `baxter_dataflow.wait_for`, which is this on ROS time."""
+    watch = Stopwatch(clock.now())
+    ticker = Ticker(clock, rate_hz)
+    while not test():
+        if clock.is_shutdown():
+            return _failed(raise_on_error, errno.ESHUTDOWN, "ROS is shutting down")
+        if not is_unlimited(timeout_s) and watch.elapsed_s(clock.now()) >= timeout_s:
+            return _failed(raise_on_error, errno.ETIMEDOUT, timeout_msg)
+        if callable(body):
+            body()
+        ticker.sleep()
+    return True
+
+
+def _failed(raise_on_error, number, text):
+    if raise_on_error:
+        raise OSError(number, text)
+    return False

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Baxter SDK's Python interface."""
+from .analog_io import AnalogIO
+from .digital_io import DigitalIO
+from .gripper import Gripper
+from .head import Head
+from .joint_checks import UnknownNameError
+from .limb import Limb
+from .navigator import Navigator
+from .robot_enable import RobotEnable
+from .settings import (
+    CHECK_VERSION,
+    HEAD_PAN_ANGLE_TOLERANCE,
+    JOINT_ANGLE_TOLERANCE,
+    SDK_VERSION,
+    VERSIONS_SDK2GRIPPER,
+    VERSIONS_SDK2ROBOT,
+)
+from .version_check import VersionMismatch
+
+__all__ = [
+    "AnalogIO",
+    "CHECK_VERSION",
+    "DigitalIO",
+    "Gripper",
+    "HEAD_PAN_ANGLE_TOLERANCE",
+    "Head",
+    "JOINT_ANGLE_TOLERANCE",
+    "Limb",
+    "Navigator",
+    "RobotEnable",
+    "SDK_VERSION",
+    "UnknownNameError",
+    "VERSIONS_SDK2GRIPPER",
+    "VERSIONS_SDK2ROBOT",
+    "VersionMismatch",
+]

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The wire to one gripper: its state and properties, and commands that it acknowledges."""
+import errno
+import json
+
+import rospy
+from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndEffectorState
+
+from baxter_dataflow import Signal, wait_for
+from baxter_dataflow.ros_clock import RosClock
+from baxter_dataflow.waiting import Stopwatch, is_unlimited
+
+from . import startup
+from .gripper_types import TYPES
+
+# Numbers of commands wrap here.
+SEQUENCE_END = 2**31 - 1
+# What is left at least for the effect of a command after its acknowledgement was waited for [s].
+EFFECT_TIMEOUT_S = 0.5
+
+
+class GripperLink:
+    """What the classes of gripper_types work on; waits for the gripper as startup.wait_for_part does."""
+
+    def __init__(self, side):
+        self.name = "%s_gripper" % side
+        self.state = self.properties = None
+        self.parameters = {}
+        self.on_type_changed = Signal()
+        self.on_gripping_changed = Signal()
+        self.on_moving_changed = Signal()
+        self._sequence = 0
+        self._prefix = "/robot/end_effector/%s/" % self.name
+        self._publisher = rospy.Publisher(self._prefix + "command", EndEffectorCommand, queue_size=10)
+        self.kind = None
+        self._subscribers = [
+            rospy.Subscriber(self._prefix + "properties", EndEffectorProperties, self._on_properties, queue_size=1),
+            rospy.Subscriber(self._prefix + "state", EndEffectorState, self._on_state, queue_size=1),
+        ]
+        try:
+            startup.wait_for_part(self._prefix + "state", lambda: self.state is not None)
+            startup.wait_for_part(self._prefix + "properties", lambda: self.kind is not None)
+        except OSError as failure:
+            self.unregister()
+            if failure.errno == errno.ETIMEDOUT and self.properties is not None and self.kind is None:
+                raise OSError(errno.ETIMEDOUT, "there is no gripper on the %s arm: its properties say ui_type %d; "
+                              "1 is suction, 2 electric, 3 custom" % (side, self.properties.ui_type)) from failure
+            raise
+        except BaseException:
+            self.unregister()
+            raise
+        startup.wait_for_subscribers(self._publisher)
+
+    @property
+    def details(self):
+        """The JSON object in the state, empty if there is none."""
+        try:
+            details = json.loads(self.state.state)
+        except ValueError:
+            return {}
+        return details if isinstance(details, dict) else {}
+
+    def command(self, command, block=False, test=None, timeout_s=0.0, args=None, delay_s=0.0):
+        """Send a command. Returns True if not `block`; otherwise whether `test()` came true in `timeout_s`.
+
+        Sent again at 100 Hz until the gripper acknowledges it; only then, and `delay_s` later, `test` counts.
+        """
+        self._sequence = self._sequence % SEQUENCE_END + 1
+        message = EndEffectorCommand(
+            id=self.state.id, command=command, sender="%s_%s" % (rospy.get_name(), command), sequence=self._sequence,
+            args="" if args is None else json.dumps(args))
+        self._publisher.publish(message)
+        if not block:
+            return True
+        clock = RosClock()
+        watch = Stopwatch(clock.now())
+        acknowledged = wait_for(lambda: self._acknowledges(message), timeout_s, raise_on_error=False, rate=100,
+                                body=lambda: self._publisher.publish(message))
+        clock.sleep(delay_s)
+        remaining_s = timeout_s
+        if not is_unlimited(timeout_s):
+            remaining_s = max(EFFECT_TIMEOUT_S, timeout_s - watch.elapsed_s(clock.now()))
+        done = wait_for(test or (lambda: True), remaining_s, raise_on_error=False)
+        if not done:
+            self.warn("%s was %s, but had not the effect it should within %.1f s" % (
+                command, "acknowledged" if acknowledged else "not even acknowledged", watch.elapsed_s(clock.now())))
+        return done
+
+    def configure(self):
+        """Send the parameters."""
+        self.command("configure", args=self.parameters)
+
+    def override(self, topic, message, test, timeout_s):
+        """Publish `message` on rsdk/`topic` until `test()`; return whether it came true."""
+        publisher = rospy.Publisher(self._prefix + "rsdk/" + topic, type(message), queue_size=10)
+        try:
+            return wait_for(test, timeout_s, raise_on_error=False, rate=100, body=lambda: publisher.publish(message))
+        finally:
+            publisher.unregister()
+
+    def sleep(self, duration_s):
+        RosClock().sleep(duration_s)
+
+    def warn(self, text):
+        rospy.logwarn("%s: %s", self.name, text)
+
+    def unregister(self):
+        for end in (*self._subscribers, self._publisher):
+            end.unregister()
+
+    def _acknowledges(self, message):
+        # A robot that does not count commands says 0.
+        return (self.state.command_sender == message.sender
+                and self.state.command_sequence in (message.sequence, 0))
+
+    def _on_properties(self, message):
+        before, self.properties = self.kind, message
+        kind = TYPES.get(message.ui_type)
+        if kind is None:
+            self.kind = None
+        elif not isinstance(before, kind):
+            self.parameters = dict(kind.defaults)
+            self.kind = kind(self)
+            if before is not None:
+                self.on_type_changed(kind.name)
+
+    def _on_state(self, message):
+        before, self.state = self.state, message
+        if before is None:
+            return
+        for changed, old, new in ((self.on_gripping_changed, before.gripping, message.gripping),
+                                  (self.on_moving_changed, before.moving, message.moving)):
+            if (old == 1) != (new == 1):
+                changed(new == 1)

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What each kind of gripper can do, one class per kind. Free of ROS.
+
+A kind has only the methods that it is capable of; the public Gripper says so when another one is asked for. Each works
+on a `link` with `command(command, block, test, timeout_s, args)` → bool, `state` (the last EndEffectorState), `details`
+(its JSON object), `parameters` (the configured values), `configure()`, `sleep(duration_s)` and `warn(text)`.
+Flags of the state are 0, 1, or 2 for unknown: only 1 counts as true.
+"""
+from datetime import datetime
+
+CLOSED, OPEN = 0.0, 100.0
+DATE_FORMAT = "%Y/%m/%d %H:%M:%S"
+# After a reboot the hand answers before it takes commands [s].
+REBOOT_PAUSE_S = 1.0
+
+
+def clip_percent(value):
+    """Clip a number to 0.0 ... 100.0."""
+    return max(0.0, min(100.0, value))
+
+
+class CustomGripper:
+    """A tool that the robot knows nothing about: it has neither motor nor parameters."""
+
+    name = "custom"
+    defaults = {}
+
+    def __init__(self, link):
+        self._link = link
+
+
+class ElectricGripper:
+    """Two fingers on a motor; position and force in percent, 0 is closed."""
+
+    name = "electric"
+    # All in percent.
+    defaults = {"velocity": 50.0, "moving_force": 40.0, "holding_force": 30.0, "dead_zone": 5.0}
+
+    def __init__(self, link):
+        self._link = link
+
+    def reset(self, block, timeout_s):
+        return self._link.command("reset", block, lambda: self._ready() and self._link.state.error != 1, timeout_s)
+
+    def reboot(self, timeout_s, delay_check_s):
+        done = self._link.command("reboot", True, lambda: self._ready() and self._link.state.enabled == 1, timeout_s,
+                                  delay_s=delay_check_s)
+        self._link.sleep(REBOOT_PAUSE_S)
+        self._link.configure()
+        return done
+
+    def clear_calibration(self, block, timeout_s):
+        return self._link.command("clear_calibration", block,
+                                  lambda: self._ready() and self._link.state.calibrated != 1, timeout_s)
+
+    def calibrate(self, block, timeout_s):
+        if self._link.state.calibrated == 1:
+            self.clear_calibration(block, timeout_s)
+        if self._link.state.error == 1:
+            self.reset(block, timeout_s)
+        done = self._link.command("calibrate", block, lambda: self._ready() and self._link.state.calibrated == 1,
+                                  timeout_s)
+        self._link.configure()
+        return done
+
+    def stop(self, block, timeout_s):
+        return self._link.command("stop", block, lambda: self._link.state.moving != 1, timeout_s)
+
+    def command_position(self, position, block, timeout_s):
+        if self._link.state.calibrated != 1:
+            self._link.warn("it is not calibrated, so it does not move: call calibrate() first")
+            return False
+        position = clip_percent(position)
+        # The dead zone of this command, whatever is configured while it runs.
+        dead_zone = self._link.parameters["dead_zone"]
+        return self._link.command(
+            "go", block,
+            lambda: abs(self._link.state.position - position) < dead_zone or self._link.state.gripping == 1,
+            timeout_s, {"position": position})
+
+    def open(self, block, timeout_s):
+        return self.command_position(OPEN, block, timeout_s)
+
+    def close(self, block, timeout_s):
+        return self.command_position(CLOSED, block, timeout_s)
+
+    def _ready(self):
+        return self._link.state.ready == 1
+
+
+class SuctionGripper:
+    """A cup on a vacuum pump: it sucks, holds, and blows off."""
+
+    name = "suction"
+    # In percent, and in seconds.
+    defaults = {"vacuum_sensor_threshold": 18.0, "blow_off_seconds": 0.4}
+
+    def __init__(self, link):
+        self._link = link
+
+    def stop(self, block, timeout_s):
+        return self._link.command("release", block, lambda: not (self.sucking() or self.blowing()),
+                                  max(self._link.parameters["blow_off_seconds"], timeout_s))
+
+    def command_suction(self, block, timeout_s):
+        return self._link.command("go", block, self.vacuum, timeout_s, {"grip_attempt_seconds": timeout_s})
+
+    def command_position(self, position, block, timeout_s):
+        return self.open(block, timeout_s) if position >= OPEN else self.close(block, timeout_s)
+
+    def open(self, block, timeout_s):
+        return self.stop(block, timeout_s)
+
+    def close(self, block, timeout_s):
+        return self.command_suction(block, timeout_s)
+
+    def vacuum_sensor(self):
+        """Vacuum in percent; the sensor counts to 255."""
+        return float(self._link.details.get("vacuum sensor", 0.0)) / 255.0 * 100.0
+
+    def vacuum(self):
+        return bool(self._link.details.get("vacuum", False))
+
+    def blowing(self):
+        return bool(self._link.details.get("blowing", False))
+
+    def sucking(self):
+        return bool(self._link.details.get("sucking", False))
+
+
+# By EndEffectorProperties.ui_type; 0 is an arm without a gripper.
+TYPES = {1: SuctionGripper, 2: ElectricGripper, 3: CustomGripper}
+
+
+def judge_firmware(date, dates):
+    """Compare a gripper's firmware date with a row of VERSIONS_SDK2GRIPPER: return (fits, what there is to say)."""
+    try:
+        found = datetime.strptime(date, DATE_FORMAT)
+    except ValueError:
+        return False, "its firmware date is %r, which is not like %s" % (date, dates["warn"])
+    if found <= datetime.strptime(dates["fail"], DATE_FORMAT):
+        return False, "its firmware of %s is too old for this SDK: newer than %s is needed" % (date, dates["fail"])
+    if found <= datetime.strptime(dates["warn"], DATE_FORMAT):
+        return True, "its firmware of %s is old; this SDK was made for newer than %s" % (date, dates["warn"])
+    return True, ""

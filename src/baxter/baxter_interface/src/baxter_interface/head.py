@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The head: it turns, and it nods."""
+import rospy
+from baxter_core_msgs.msg import HeadPanCommand, HeadState
+from std_msgs.msg import Bool
+
+from baxter_dataflow import wait_for
+
+from . import startup
+from .joint_checks import require_number
+from .settings import HEAD_PAN_ANGLE_TOLERANCE
+
+
+class Head:
+    """The robot's head. Angles are in rad, positive to the robot's left.
+
+    Waits up to 30 s of wall time for a robot that is still starting, and 5 s for the head of one that is up.
+    Raises OSError with errno ETIMEDOUT if it does not report, rospy.ROSInitException before rospy.init_node.
+    """
+
+    def __init__(self):
+        self._last = None
+        self._pan_publisher = rospy.Publisher("/robot/head/command_head_pan", HeadPanCommand, queue_size=10)
+        self._nod_publisher = rospy.Publisher("/robot/head/command_head_nod", Bool, queue_size=10)
+        topic = "/robot/head/head_state"
+        self._subscriber = rospy.Subscriber(topic, HeadState, self._on_state, queue_size=1)
+        try:
+            startup.wait_for_part(topic, lambda: self._last is not None)
+        except BaseException:
+            for end in (self._subscriber, self._pan_publisher, self._nod_publisher):
+                end.unregister()
+            raise
+        startup.wait_for_subscribers(self._pan_publisher)
+        startup.wait_for_subscribers(self._nod_publisher)
+
+    def pan(self):
+        """Return the head's angle [rad]."""
+        return self._last.pan
+
+    def nodding(self):
+        """Tell whether the head is nodding."""
+        return self._last.isNodding
+
+    def panning(self):
+        """Tell whether the head is turning."""
+        return self._last.isTurning
+
+    def set_pan(self, angle, speed=1.0, timeout=10.0, scale_speed=False):
+        """Turn the head and wait until it is within HEAD_PAN_ANGLE_TOLERANCE of `angle` [rad], -pi/2 to pi/2.
+
+        Parameters:
+            speed: share of full speed, 0.0 to 1.0; with `scale_speed` in percent. Out of range it is logged and sent.
+            timeout: longest time for it [s, ROS time]; 0 sends the command once and does not wait.
+        Raises OSError with errno ETIMEDOUT; ValueError for a number that is not finite.
+        """
+        angle = require_number(angle, "the head's angle [rad]")
+        ratio = require_number(speed, "the head's speed") / (100.0 if scale_speed else 1.0)
+        if not HeadPanCommand.MIN_SPEED_RATIO <= ratio <= HeadPanCommand.MAX_SPEED_RATIO:
+            rospy.logerr("head: the speed is %r, it should be from 0 to %d", speed, 100 if scale_speed else 1)
+        command = HeadPanCommand(target=angle, speed_ratio=ratio,
+                                 enable_pan_request=HeadPanCommand.REQUEST_PAN_ENABLE)
+        self._pan_publisher.publish(command)
+        if timeout != 0:
+            wait_for(lambda: abs(self.pan() - angle) <= HEAD_PAN_ANGLE_TOLERANCE, timeout, rate=100,
+                     body=lambda: self._pan_publisher.publish(command),
+                     timeout_msg="the head did not turn to %.3f rad within %.1f s; it turns from -1.57 to 1.57 rad, "
+                                 "while the robot is enabled" % (angle, timeout))
+
+    def command_nod(self, timeout=5.0):
+        """Nod once and wait for the end of it; `timeout` [s, ROS time] is for its start and again for its end.
+
+        With `timeout` 0 the command is sent once and not waited for. Raises OSError with errno ETIMEDOUT.
+        """
+        self._nod_publisher.publish(True)
+        if timeout != 0:
+            wait_for(self.nodding, timeout, rate=100, body=lambda: self._nod_publisher.publish(True),
+                     timeout_msg="the head did not begin to nod within %.1f s" % timeout)
+            wait_for(lambda: not self.nodding(), timeout, rate=100, body=lambda: self._nod_publisher.publish(False),
+                     timeout_msg="the head did not end its nod within %.1f s" % timeout)
+
+    def _on_state(self, message):
+        self._last = message

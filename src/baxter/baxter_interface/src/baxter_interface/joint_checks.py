@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a limb accepts: names and numbers, refused with a text that lists the right ones. Free of ROS."""
+import math
+from collections.abc import Mapping
+
+SIDES = ("left", "right")
+# From the shoulder to the wrist, the order of joint_names().
+JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+
+
+class UnknownNameError(ValueError, KeyError):
+    """A name that the robot does not have.
+
+    Also a KeyError: that is what a wrong name used to be in the SDK, and programs catch it.
+    """
+
+    # KeyError would print the text in quotes.
+    __str__ = Exception.__str__
+
+
+def require_side(side):
+    """Return `side` if it names a limb. Raises UnknownNameError."""
+    if side not in SIDES:
+        raise UnknownNameError("there is no limb %r: the limbs are %s" % (side, " and ".join(map(repr, SIDES))))
+    return side
+
+
+def limb_joint_names(side):
+    """List the seven joint names of a limb from shoulder to wrist. Raises UnknownNameError."""
+    return ["%s_%s" % (require_side(side), joint) for joint in JOINTS]
+
+
+def require_joint(name, known):
+    """Return `name` if it is among the `known` joint names. Raises UnknownNameError."""
+    if name not in known:
+        raise UnknownNameError("there is no joint %r here: the joints are %s" % (name, ", ".join(known)))
+    return name
+
+
+def require_number(value, what):
+    """Return `value` as a finite float. Raises ValueError that says `what` it was meant to be."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ValueError("%s must be a finite number, got %r" % (what, value))
+    return number
+
+
+def require_joint_values(values, known, unit):
+    """Return `values` (joint name → number [unit]) as a dict of finite floats.
+
+    Raises UnknownNameError for a joint that is not `known`, ValueError for a value that is no finite number,
+    TypeError for something that is no mapping.
+    """
+    if not isinstance(values, Mapping):
+        raise TypeError(
+            "joint values are a dict of joint name to number [%s], got %r; "
+            "a list can be paired with the names: dict(zip(limb.joint_names(), values))" % (unit, values))
+    return {
+        require_joint(name, known): require_number(value, "%s [%s]" % (name, unit))
+        for name, value in values.items()
+    }
+
+
+def require_count(value, largest, what):
+    """Return `value` as an int from 0 to `largest`. Raises ValueError that says `what` it was meant to be."""
+    number = require_number(value, what)
+    if number != int(number) or not 0 <= number <= largest:
+        raise ValueError("%s must be a whole number from 0 to %d, got %r" % (what, largest, value))
+    return int(number)

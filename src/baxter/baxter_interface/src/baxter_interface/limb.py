@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One arm: what it reports, and commands to it."""
+import collections
+import threading
+
+import rospy
+from baxter_core_msgs.msg import AssemblyState, EndpointState, JointCommand
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
+
+from baxter_dataflow.ros_clock import RosClock
+from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
+
+from . import settings, startup
+from .joint_checks import JOINTS, limb_joint_names, require_joint, require_joint_values, require_number, require_side
+from .joint_motion import Move
+
+# Joint angles of the neutral pose, the same on both arms [rad].
+NEUTRAL_POSE = dict(zip(JOINTS, (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True))
+# Commands per second during a move; the robot's own time-out asks for more than 5.
+COMMAND_RATE_HZ = 100.0
+
+
+class Limb:
+    """One of the two arms, "left" or "right".
+
+    Waits up to 30 s of wall time for a robot that is still starting. Angles are in rad, speeds in rad/s, torques in Nm,
+    end-point poses in the frame `base`. What the methods return is the caller's own copy.
+    Raises UnknownNameError (a ValueError and a KeyError) for another name, OSError with errno ETIMEDOUT if the robot
+    does not come up, rospy.ROSInitException before rospy.init_node.
+    """
+
+    Point = collections.namedtuple("Point", ["x", "y", "z"])
+    Quaternion = collections.namedtuple("Quaternion", ["x", "y", "z", "w"])
+
+    def __init__(self, limb):
+        self.name = require_side(limb)
+        self._joint_names = limb_joint_names(limb)
+        self._lock = threading.Lock()
+        self._angles, self._velocities, self._efforts = {}, {}, {}
+        self._endpoint = None
+        self._robot_state = None
+
+        prefix = "/robot/limb/%s/" % limb
+        # Latched, so that a setting made right after construction still reaches the robot.
+        self._speed_publisher = rospy.Publisher(prefix + "set_speed_ratio", Float64, latch=True, queue_size=10)
+        self._timeout_publisher = rospy.Publisher(prefix + "joint_command_timeout", Float64, latch=True, queue_size=10)
+        # The newest command is the only one that matters.
+        self._command_publisher = rospy.Publisher(
+            prefix + "joint_command", JointCommand, queue_size=1, tcp_nodelay=True)
+        # Subscribe last: from here on callbacks run on another thread.
+        self._subscribers = [
+            rospy.Subscriber("robot/state", AssemblyState, self._on_robot_state, queue_size=1),
+            rospy.Subscriber(prefix + "endpoint_state", EndpointState, self._on_endpoint_state, queue_size=1,
+                             tcp_nodelay=True),
+            rospy.Subscriber("robot/joint_states", JointState, self._on_joint_states, queue_size=1, tcp_nodelay=True),
+        ]
+        try:
+            startup.wait_for_start([
+                startup.message_arrives(rospy.resolve_name("robot/joint_states"), self._has_joint_states),
+                startup.message_arrives(prefix + "endpoint_state", lambda: self._endpoint is not None),
+            ])
+        except BaseException:
+            self._unregister()
+            raise
+        startup.wait_for_subscribers(self._command_publisher)
+
+    def joint_names(self):
+        """List the names of the seven joints from shoulder to wrist."""
+        return list(self._joint_names)
+
+    def joint_angle(self, joint):
+        """Return one joint's angle [rad]. Raises UnknownNameError."""
+        return self._reading(self._angles_by_name, joint)
+
+    def joint_angles(self):
+        """Return all joint angles as a dict of name to rad."""
+        return self._angles_by_name()
+
+    def joint_velocity(self, joint):
+        """Return one joint's speed [rad/s]. Raises UnknownNameError."""
+        return self._reading(self.joint_velocities, joint)
+
+    def joint_velocities(self):
+        """Return all joint speeds as a dict of name to rad/s."""
+        with self._lock:
+            return dict(self._velocities)
+
+    def joint_effort(self, joint):
+        """Return one joint's torque [Nm]. Raises UnknownNameError."""
+        return self._reading(self.joint_efforts, joint)
+
+    def joint_efforts(self):
+        """Return all joint torques as a dict of name to Nm."""
+        with self._lock:
+            return dict(self._efforts)
+
+    def endpoint_pose(self):
+        """Return the end-point's pose in `base`: {'position': Point [m], 'orientation': Quaternion}."""
+        pose = self._endpoint_state().pose
+        return {"position": self._point(pose.position),
+                "orientation": self.Quaternion(*(getattr(pose.orientation, axis) for axis in "xyzw"))}
+
+    def endpoint_velocity(self):
+        """Return the end-point's twist in `base`: {'linear': Point [m/s], 'angular': Point [rad/s]}."""
+        twist = self._endpoint_state().twist
+        return {"linear": self._point(twist.linear), "angular": self._point(twist.angular)}
+
+    def endpoint_effort(self):
+        """Return the wrench at the end-point: {'force': Point [N], 'torque': Point [Nm]}."""
+        wrench = self._endpoint_state().wrench
+        return {"force": self._point(wrench.force), "torque": self._point(wrench.torque)}
+
+    def set_command_timeout(self, timeout):
+        """Let the robot leave velocity, torque and raw mode when no command came for `timeout` [s] (0.2 at start)."""
+        self._timeout_publisher.publish(Float64(data=require_number(timeout, "the command time-out [s]")))
+
+    def exit_control_mode(self, timeout=0.2):
+        """Go back to holding the present joint angles in position mode, with the command time-out `timeout` [s]."""
+        self.set_command_timeout(timeout)
+        self.set_joint_positions(self.joint_angles())
+
+    def set_joint_position_speed(self, speed):
+        """Scale the speed of position mode by `speed`, 0.0 to 1.0; the robot clips it and keeps it."""
+        self._speed_publisher.publish(Float64(data=require_number(speed, "the speed ratio")))
+
+    def set_joint_positions(self, positions, raw=False):
+        """Command joint angles once, and return at once.
+
+        Parameters:
+            positions: dict of joint name to rad; joints left out keep their set-points.
+            raw: pass by the robot's own smoothing and collision avoidance; the commands must be smooth then.
+        Raises UnknownNameError, ValueError for a number that is not finite, TypeError for something that is no dict.
+        """
+        mode = JointCommand.RAW_POSITION_MODE if raw else JointCommand.POSITION_MODE
+        self._command(mode, positions, "rad")
+
+    def set_joint_velocities(self, velocities):
+        """Command joint speeds, a dict of name to rad/s; to be repeated within the command time-out. Raises so too."""
+        self._command(JointCommand.VELOCITY_MODE, velocities, "rad/s")
+
+    def set_joint_torques(self, torques):
+        """Command joint torques on top of gravity compensation, a dict of name to Nm; to be repeated. Raises so too."""
+        self._command(JointCommand.TORQUE_MODE, torques, "Nm")
+
+    def move_to_neutral(self, timeout=15.0):
+        """Move to the neutral pose and wait; `timeout` [s] and result as of move_to_joint_positions."""
+        target = {"%s_%s" % (self.name, joint): angle for joint, angle in NEUTRAL_POSE.items()}
+        return self.move_to_joint_positions(target, timeout)
+
+    def move_to_joint_positions(self, positions, timeout=15.0, threshold=settings.JOINT_ANGLE_TOLERANCE, test=None):
+        """Move smoothly to joint angles, in position mode, and wait until they are reached.
+
+        Parameters:
+            positions: dict of joint name to rad; joints left out keep their set-points.
+            timeout: longest time for it [s, ROS time]; negative or infinite means for ever.
+            threshold: error of each joint below which it has arrived [rad].
+            test: called at every step; when it returns True the arm stops.
+        Returns True on arrival: the exact target is commanded last and held. Returns False on time-out, when `test`
+        stopped it, when the robot is not enabled, and when no joints were given; one line of log says which, with the
+        joint that is farthest off.
+        Raises as set_joint_positions; rospy.ROSInterruptException when the node is shut down meanwhile.
+        """
+        target = require_joint_values(positions, self._joint_names, "rad")
+        if not target:
+            rospy.logerr("%s arm: no joints given: did IK find a solution?", self.name)
+            return False
+        threshold = require_number(threshold, "the threshold [rad]")
+
+        clock = RosClock()
+        watch, ticker = Stopwatch(clock.now()), Ticker(clock, COMMAND_RATE_HZ)
+        move = Move(self.joint_angles(), target, None if is_unlimited(timeout) else timeout, threshold)
+        while not rospy.is_shutdown():
+            step = move.step(watch.elapsed_s(clock.now()), self.joint_angles(), self.joint_velocities(),
+                             enabled=self._enabled(), aborted=bool(callable(test) and test()))
+            if step.command is not None:
+                self.set_joint_positions(step.command)
+            if step.failure:
+                rospy.logerr("%s arm: %s", self.name, step.failure)
+            if step.is_last:
+                return step.arrived
+            ticker.sleep()
+        raise rospy.ROSInterruptException("ROS shut down while the %s arm moved" % self.name)
+
+    def _command(self, mode, values, unit):
+        values = require_joint_values(values, self._joint_names, unit)
+        if not values:
+            rospy.logwarn_throttle(5.0, "%s arm: a command without joints is not sent" % self.name)
+            return
+        self._command_publisher.publish(
+            JointCommand(mode=mode, names=list(values), command=list(values.values())))
+
+    def _angles_by_name(self):
+        with self._lock:
+            return dict(self._angles)
+
+    def _reading(self, read_all, joint):
+        require_joint(joint, self._joint_names)
+        return read_all()[joint]
+
+    def _endpoint_state(self):
+        with self._lock:
+            return self._endpoint
+
+    def _point(self, vector):
+        return self.Point(vector.x, vector.y, vector.z)
+
+    def _enabled(self):
+        """Tell whether the robot says it is enabled; None if it says nothing."""
+        with self._lock:
+            state = self._robot_state
+        return None if state is None else state.enabled and not state.stopped
+
+    def _has_joint_states(self):
+        with self._lock:
+            return all(name in self._angles for name in self._joint_names)
+
+    def _on_joint_states(self, message):
+        # Others may publish here too (a gripper's driver, a tool with positions only): take what concerns this arm.
+        index = {name: i for i, name in enumerate(message.name)}
+        indices = {name: index[name] for name in self._joint_names if name in index}
+        with self._lock:
+            for readings, values in ((self._angles, message.position), (self._velocities, message.velocity),
+                                     (self._efforts, message.effort)):
+                if len(values) == len(message.name):
+                    readings.update((name, values[i]) for name, i in indices.items())
+
+    def _on_endpoint_state(self, message):
+        with self._lock:
+            self._endpoint = message
+
+    def _on_robot_state(self, message):
+        with self._lock:
+            self._robot_state = message
+
+    def _unregister(self):
+        for end in (*self._subscribers, self._speed_publisher, self._timeout_publisher, self._command_publisher):
+            end.unregister()

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Waiting for a robot that is still starting: its master, topics, parameters and clock; and what to say if they fail.
+
+Everything here waits in wall time, since ROS time may not run yet.
+"""
+import http.client
+import os
+import socket
+import sys
+import xml.parsers.expat
+import xmlrpc.client
+from urllib.parse import urlparse
+
+import rosgraph
+import rospy
+import rospy.impl.simtime
+
+from .patience import Condition, wait_in_order
+
+# Longest wait for a robot that is still starting [s, wall].
+STARTUP_TIMEOUT_S = 30.0
+# Longest wait for one part of a robot that is up [s, wall]: a part that it does not have need not cost more.
+PART_TIMEOUT_S = 5.0
+# Longest wait for one answer over the network [s].
+ANSWER_TIMEOUT_S = 2.0
+
+_LAUNCH_HINT = "is the robot or the simulator running (roslaunch baxter_gazebo baxter_world.launch)?"
+# All the ways in which asking the master can fail: not there, not a master, an answer that is an error.
+_MASTER_ERRORS = (OSError, http.client.HTTPException, xmlrpc.client.Error, xml.parsers.expat.ExpatError,
+                  rosgraph.MasterException, rospy.ROSException)
+
+
+def init_node(name, topic="robot/state", **options):
+    """Wait for the master and for a publisher of `topic`, then call rospy.init_node(name, **options).
+
+    The order matters when a program starts together with roslaunch: rospy.init_node looks at /use_sim_time once, and
+    roslaunch sets that parameter a moment after the master is up.
+    Raises OSError with errno ETIMEDOUT that says what was found and what would be right.
+    """
+    topic = rospy.resolve_name(topic)
+    # rospy's log works only after init_node.
+    wait_in_order([master_answers(), topic_published(topic)], STARTUP_TIMEOUT_S,
+                  say=lambda text: print(text, file=sys.stderr, flush=True))
+    rospy.init_node(name, **options)
+
+
+def wait_for_start(conditions, timeout_s=None):
+    """Wait, as an initialised node, for the master, for `conditions` in their order, and for the clock to run.
+
+    Parameters: `timeout_s` [s, wall], None for STARTUP_TIMEOUT_S.
+    Raises OSError with errno ETIMEDOUT or ESHUTDOWN; rospy.ROSInitException before rospy.init_node.
+    """
+    if not rospy.core.is_initialized():
+        raise rospy.ROSInitException("this program is no ROS node yet: call rospy.init_node(name) first")
+    wait_in_order([master_answers(), *conditions, clock_runs()], STARTUP_TIMEOUT_S if timeout_s is None else timeout_s,
+                  say=rospy.logwarn, is_shutdown=rospy.is_shutdown)
+
+
+def wait_for_part(topic, has_arrived):
+    """Wait for a robot that is still starting, then for `has_arrived()`, set by a subscriber of `topic` (resolved).
+
+    Raises as wait_for_start.
+    """
+    state_topic = rospy.resolve_name("robot/state")
+    wait_for_start([Condition("a robot from %s" % rosgraph.get_master_uri(),
+                              lambda: bool(_publishers(state_topic) or _publishers(topic)),
+                              lambda: _explain_topic(state_topic))])
+    wait_for_start([message_arrives(topic, has_arrived)], PART_TIMEOUT_S)
+
+
+def master_answers():
+    """Condition: a ROS master answers where ROS_MASTER_URI points."""
+    uri = rosgraph.get_master_uri()
+    url = urlparse(uri)
+    try:
+        host, port = url.hostname, url.port
+    except ValueError:
+        host = port = None
+    if not host or not port:
+        raise ValueError("ROS_MASTER_URI is %r; it should look like http://localhost:11311" % uri)
+    last_error = []
+
+    def is_met():
+        try:
+            # XML-RPC has no time-out of its own, so see first whether anybody listens there.
+            socket.create_connection((host, port), timeout=ANSWER_TIMEOUT_S).close()
+            _master().getPid()
+        except _MASTER_ERRORS as error:
+            last_error[:] = [error]
+            return False
+        return True
+
+    def explain():
+        return "%s. ROS_MASTER_URI says %s: %s" % (last_error[0], uri, _LAUNCH_HINT)
+
+    return Condition("a ROS master at %s" % uri, is_met, explain)
+
+
+def topic_published(topic):
+    """Condition: the master knows a publisher of `topic` (a resolved name)."""
+    return Condition("%s from %s" % (topic, rosgraph.get_master_uri()),
+                     lambda: bool(_publishers(topic)), lambda: _explain_topic(topic))
+
+
+def message_arrives(topic, has_arrived):
+    """Condition: `has_arrived()`, set by a subscriber of `topic` (a resolved name)."""
+    return Condition("%s from %s" % (topic, rosgraph.get_master_uri()), has_arrived, lambda: _explain_topic(topic))
+
+
+def parameter_set(name):
+    """Condition: the parameter `name` (a resolved name) has a value."""
+    def is_met():
+        try:
+            return rospy.has_param(name)
+        except _MASTER_ERRORS:
+            return False
+
+    return Condition("the parameter %s from %s" % (name, rosgraph.get_master_uri()), is_met,
+                     lambda: "it is not set; %s" % _LAUNCH_HINT)
+
+
+def clock_runs():
+    """Condition: ROS time runs. Under /use_sim_time, makes this node follow /clock if it does not yet."""
+    def is_met():
+        try:
+            follow_simulated_time()
+        except _MASTER_ERRORS:
+            return False
+        return rospy.get_time() > 0.0
+
+    def explain():
+        publishers = _publishers("/clock")
+        if not publishers:
+            return ("the parameter /use_sim_time is true, but nobody publishes /clock. Start the simulator, or, "
+                    "for a real robot: rosparam set use_sim_time false")
+        return ("/clock is published by %s, but time stands at 0: is the simulation paused? "
+                "(rosservice call /gazebo/unpause_physics)" % ", ".join(publishers))
+
+    return Condition("simulated time on /clock", is_met, explain)
+
+
+def follow_simulated_time():
+    """Follow /clock if /use_sim_time is true and this node, started before it was set, runs on wall time."""
+    if not rospy.rostime.is_wallclock() or not rospy.get_param("/use_sim_time", False):
+        return
+    rospy.logwarn("/use_sim_time was set after this node had started: from now on it follows /clock")
+    rospy.impl.simtime.init_simtime()
+
+
+def wait_for_subscribers(publisher, timeout=1.0):
+    """Wait until all nodes that the master lists as subscribers of `publisher` have connected to it, if there are any.
+
+    The first message after a publisher was made is lost to whoever has not connected yet. Returns after `timeout` [s,
+    wall] in any case: a subscriber on the list may be dead.
+    """
+    try:
+        expected = len(_nodes_of(publisher.resolved_name, subscribers=True))
+    except _MASTER_ERRORS:
+        return
+    connected = Condition("", lambda: publisher.get_num_connections() >= expected, lambda: "")
+    try:
+        wait_in_order([connected], timeout, say=rospy.logdebug, is_shutdown=rospy.is_shutdown)
+    except OSError:
+        rospy.logdebug("%s: %d of %d subscribers connected within %.1f s", publisher.resolved_name,
+                       publisher.get_num_connections(), expected, timeout)
+
+
+def _master():
+    # Before init_node there is no node name; the master only wants to know who asks.
+    return rosgraph.Master("/baxter_interface_%d" % os.getpid())
+
+
+def _nodes_of(topic, subscribers=False):
+    published, subscribed, _services = _master().getSystemState()
+    return dict(subscribed if subscribers else published).get(topic, [])
+
+
+def _publishers(topic):
+    try:
+        return _nodes_of(topic)
+    except _MASTER_ERRORS:
+        return []
+
+
+def _explain_topic(topic):
+    """Say why no message of `topic` may have come, from what the master knows."""
+    try:
+        published = dict(_master().getSystemState()[0])
+    except _MASTER_ERRORS as error:
+        return "the master at %s is gone (%s)" % (rosgraph.get_master_uri(), error)
+    if topic in published:
+        names = ", ".join(published[topic])
+        return ("%s publishes it, but no message of use came. Paused (rosservice call /gazebo/unpause_physics), dead "
+                "(rosnode ping %s), or out of reach from this machine (ROS_IP, ROS_HOSTNAME)?"
+                % (names, published[topic][0]))
+    twins = sorted(name for name in published if name.endswith(topic) or topic.endswith(name))
+    if twins:
+        return "nobody publishes it, but there is %s: is this program in the wrong namespace (%s)?" % (
+            ", ".join(twins), rospy.get_namespace())
+    return "the master is up, but nobody publishes it: %s" % _LAUNCH_HINT

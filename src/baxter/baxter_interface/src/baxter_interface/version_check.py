@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Does this SDK fit the robot's software? Free of ROS."""
+import errno
+import re
+
+
+class VersionMismatch(OSError):
+    """The robot's software and this SDK do not fit together.
+
+    An OSError, like every refusal of RobotEnable, so that `except OSError` and `error.strerror` work on it. Uncaught it
+    ends a program with exit status 1, which is what a mismatch always did; a library itself ends no process.
+    """
+
+    def __init__(self, text):
+        super().__init__(errno.EPROTO, text)
+
+
+def require_compatible(robot_version, sdk_version, robots_by_sdk):
+    """Check the text of the robot's software version against a table of those that each SDK works with.
+
+    Only the first three numbers count: "1.2.0", "1.2.0.57" and "1.2.0-rc1" are the same robot software.
+    Raises VersionMismatch, which says what was found and how to put it right.
+    """
+    accepted = robots_by_sdk[sdk_version]
+    advice = (
+        "This SDK %s works with robot software %s. On the simulator: rosparam set /rethink/software_version %s.57; "
+        "on a robot: update it or use the SDK that belongs to it; RobotEnable(versioned=False) skips this check."
+        % (sdk_version, " or ".join(accepted), accepted[-1])
+    )
+    numbers = re.match(r"\d+\.\d+\.\d+", str(robot_version))
+    if numbers is None:
+        raise VersionMismatch(
+            "the robot's software version is %r, which does not begin with three numbers like 1.2.0. %s"
+            % (robot_version, advice))
+    if numbers.group() not in accepted:
+        raise VersionMismatch("the robot's software version is %s. %s" % (robot_version, advice))
