@@ -1,0 +1,302 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""RobotEnable and Limb against the fake robot, fault by fault."""
+import errno
+import threading
+import time
+import unittest
+
+import rospy
+from baxter_core_msgs.msg import JointCommand
+from std_msgs.msg import Bool, Float64
+from std_srvs.srv import Trigger
+
+from baxter_dataflow import wait_for
+from baxter_interface import CHECK_VERSION, Limb, RobotEnable, VersionMismatch
+from baxter_interface.limb import NEUTRAL_POSE
+
+DEADLINE_S = 5.0
+
+
+def set_knobs(**knobs):
+    """Set the fake robot's knobs, all others to their defaults; in force when this returns."""
+    if rospy.has_param("/fake_robot"):
+        rospy.delete_param("/fake_robot")
+    for name, value in knobs.items():
+        rospy.set_param("/fake_robot/" + name, value)
+    rospy.wait_for_service("/fake_robot/reload", DEADLINE_S)
+    rospy.ServiceProxy("/fake_robot/reload", Trigger)()
+
+
+class Recorder:
+    """Keeps the messages of a topic."""
+
+    def __init__(self, topic, kind):
+        self.messages = []
+        self._subscriber = rospy.Subscriber(topic, kind, self.messages.append)
+
+    def wait_for_last(self, is_it, what):
+        wait_for(lambda: self.messages and is_it(self.messages[-1]), DEADLINE_S, timeout_msg="no message: " + what)
+        return self.messages[-1]
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+class LogRecorder(Recorder):
+    def __init__(self):
+        from rosgraph_msgs.msg import Log
+        super().__init__("/rosout", Log)
+
+    def wait_for_text(self, text):
+        wait_for(lambda: any(text in message.msg for message in self.messages), DEADLINE_S,
+                 timeout_msg="no log line with %r in %s" % (text, [message.msg for message in self.messages]))
+
+
+class RobotEnableTest(unittest.TestCase):
+    def setUp(self):
+        set_knobs()
+        self.robot = RobotEnable(CHECK_VERSION)
+        wait_for(lambda: not (self.robot.state().enabled or self.robot.state().stopped), DEADLINE_S)
+
+    def test_enable_and_disable(self):
+        self.robot.enable()
+        self.assertTrue(self.robot.state().enabled)
+        self.robot.disable()
+        self.assertFalse(self.robot.state().enabled)
+
+    def test_enabling_an_enabled_robot_publishes_nothing(self):
+        self.robot.enable()
+        recorder = Recorder("/robot/set_super_enable", Bool)
+        self.robot.enable()
+        self.assertEqual(recorder.messages, [])
+        recorder.close()
+
+    def test_stop_disables_and_enable_resets_first(self):
+        self.robot.enable()
+        self.robot.stop()
+        self.assertTrue(self.robot.state().stopped)
+        self.robot.enable()
+        self.assertTrue(self.robot.state().enabled)
+        self.assertFalse(self.robot.state().stopped)
+
+    def test_reset_leaves_the_robot_disabled(self):
+        self.robot.enable()
+        self.assertTrue(self.robot.reset() in (True,))
+        self.assertFalse(self.robot.state().enabled)
+
+    def test_state_is_a_copy(self):
+        self.robot.state().enabled = True
+        self.assertFalse(self.robot.state().enabled)
+
+    def test_refused_enable_says_what_the_state_is(self):
+        set_knobs(refuse_enable=True)
+        begin_s = time.monotonic()
+        with self.assertRaises(OSError) as caught:
+            self.robot.enable()
+        self.assertEqual(caught.exception.errno, errno.ETIMEDOUT)
+        self.assertIn("failed to enable", caught.exception.strerror)
+        self.assertIn("enabled: False, stopped: False", caught.exception.strerror)
+        self.assertAlmostEqual(time.monotonic() - begin_s, 2.0, delta=0.5)
+
+    def test_pressed_stop_button_is_named_at_once(self):
+        set_knobs(stop_button=True)
+        wait_for(lambda: self.robot.state().stopped, DEADLINE_S)
+        with self.assertRaises(OSError) as caught:
+            self.robot.enable()
+        self.assertEqual(caught.exception.errno, errno.EREMOTEIO)
+        self.assertIn("stop button is pressed", caught.exception.strerror)
+
+    def test_error_that_stays_is_no_failure_of_reset(self):
+        set_knobs(sticky_error=True)
+        wait_for(lambda: self.robot.state().error, DEADLINE_S)
+        self.assertIs(self.robot.reset(), False)
+
+    def test_version_mismatch_raises_and_says_how_to_fix_it(self):
+        self.addCleanup(rospy.set_param, "/rethink/software_version", "1.2.0.57")
+        rospy.set_param("/rethink/software_version", "2.1.2")
+        self.assertFalse(self.robot.version_check())
+        with self.assertRaises(VersionMismatch) as caught:
+            RobotEnable(CHECK_VERSION)
+        self.assertIn("2.1.2", caught.exception.strerror)
+        self.assertIn("rosparam set", caught.exception.strerror)
+        RobotEnable(False)
+
+
+class LimbTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        set_knobs(enabled=True)
+        cls.limbs = {side: Limb(side) for side in ("left", "right")}
+
+    def setUp(self):
+        set_knobs(enabled=True)
+        self.log = LogRecorder()
+        self.addCleanup(self.log.close)
+
+    def commands_of(self, side):
+        recorder = Recorder("/robot/limb/%s/joint_command" % side, JointCommand)
+        self.addCleanup(recorder.close)
+        # The limb's first message must find the recorder connected.
+        connected = self.limbs[side]._command_publisher.get_num_connections
+        wait_for(lambda: connected() >= 2, DEADLINE_S)
+        return recorder
+
+    def test_names_and_state(self):
+        for side, limb in self.limbs.items():
+            self.assertEqual(limb.name, side)
+            names = [side + "_" + joint for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")]
+            self.assertEqual(limb.joint_names(), names)
+            for readings in (limb.joint_angles(), limb.joint_velocities(), limb.joint_efforts()):
+                self.assertEqual(sorted(readings), sorted(names))
+        # The fake's efforts count its joints in their alphabetical order.
+        self.assertEqual(self.limbs["left"].joint_effort("left_w2"), 6.0)
+        self.assertEqual(self.limbs["right"].joint_effort("right_e0"), 7.0)
+
+    def test_endpoint(self):
+        limb = self.limbs["right"]
+        self.assertEqual(limb.endpoint_pose(),
+                         {"position": Limb.Point(0.0, -0.5, 0.0), "orientation": Limb.Quaternion(0.0, 0.0, 0.0, 1.0)})
+        self.assertEqual(limb.endpoint_velocity(), {"linear": (0.0, 0.0, 0.0), "angular": (0.0, 0.0, 0.25)})
+        self.assertEqual(limb.endpoint_effort()["force"].x, 3.0)
+
+    def test_what_is_returned_is_a_copy(self):
+        limb = self.limbs["left"]
+        limb.joint_names().clear()
+        limb.joint_angles().clear()
+        limb.joint_velocities().clear()
+        self.assertEqual(len(limb.joint_names()), 7)
+        self.assertEqual(len(limb.joint_angles()), 7)
+        self.assertEqual(len(limb.joint_velocities()), 7)
+
+    def test_wrong_names_and_numbers_are_refused(self):
+        limb = self.limbs["left"]
+        for kind in (ValueError, KeyError):
+            with self.assertRaisesRegex(kind, "left"):
+                Limb("middle")
+            with self.assertRaisesRegex(kind, "left_s0"):
+                limb.joint_angle("s0")
+            with self.assertRaisesRegex(kind, "left_s0"):
+                limb.set_joint_positions({"right_s0": 0.0})
+            with self.assertRaisesRegex(kind, "left_s0"):
+                limb.move_to_joint_positions({"left_x": 0.0})
+        for command in (limb.set_joint_positions, limb.set_joint_velocities, limb.set_joint_torques,
+                        limb.move_to_joint_positions):
+            with self.assertRaisesRegex(ValueError, "left_s1.*finite"):
+                command({"left_s0": 0.0, "left_s1": float("nan")})
+        for setting in (limb.set_command_timeout, limb.set_joint_position_speed):
+            with self.assertRaisesRegex(ValueError, "finite"):
+                setting(float("inf"))
+
+    def test_modes_and_partial_commands(self):
+        limb, recorder = self.limbs["left"], self.commands_of("left")
+        for command, mode in (
+                (limb.set_joint_positions, JointCommand.POSITION_MODE),
+                (lambda values: limb.set_joint_positions(values, raw=True), JointCommand.RAW_POSITION_MODE),
+                (limb.set_joint_velocities, JointCommand.VELOCITY_MODE),
+                (limb.set_joint_torques, JointCommand.TORQUE_MODE)):
+            command({"left_w2": 0.25, "left_s0": -0.125})
+            message = recorder.wait_for_last(lambda message, mode=mode: message.mode == mode, "mode %d" % mode)
+            self.assertEqual(dict(zip(message.names, message.command, strict=True)),
+                             {"left_w2": 0.25, "left_s0": -0.125})
+
+    def test_first_command_after_construction_is_not_lost(self):
+        recorder = self.commands_of("right")
+        for turn in range(5):
+            angle = 0.01 * turn
+            Limb("right").set_joint_positions({"right_w2": angle})
+            recorder.wait_for_last(lambda message, angle=angle: message.command == (angle,), "command %d" % turn)
+
+    def test_settings_are_latched(self):
+        limb = self.limbs["left"]
+        limb.set_joint_position_speed(0.7)
+        limb.set_command_timeout(0.4)
+        late = [Recorder("/robot/limb/left/set_speed_ratio", Float64),
+                Recorder("/robot/limb/left/joint_command_timeout", Float64)]
+        late[0].wait_for_last(lambda message: message.data == 0.7, "speed ratio")
+        late[1].wait_for_last(lambda message: message.data == 0.4, "time-out")
+        limb.exit_control_mode()
+        late[1].wait_for_last(lambda message: message.data == 0.2, "time-out of exit_control_mode")
+
+    def test_both_arms_reach_neutral_in_a_few_seconds(self):
+        recorders = {side: self.commands_of(side) for side in self.limbs}
+        results = {}
+
+        def move(side):
+            results[side] = self.limbs[side].move_to_neutral()
+
+        self.limbs["left"].set_joint_positions({"left_s1": 1.047})
+        wait_for(lambda: self.limbs["left"].joint_angle("left_s1") > 1.0, DEADLINE_S)
+        begin_s = time.monotonic()
+        threads = [threading.Thread(target=move, args=(side,)) for side in self.limbs]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(20.0)
+        self.assertEqual(results, {"left": True, "right": True})
+        self.assertLess(time.monotonic() - begin_s, 4.5)
+        for side, recorder in recorders.items():
+            target = {"%s_%s" % (side, joint): angle for joint, angle in NEUTRAL_POSE.items()}
+            wait_for(lambda recorder=recorder, target=target:
+                     dict(zip(recorder.messages[-1].names, recorder.messages[-1].command, strict=True)) == target,
+                     DEADLINE_S, timeout_msg="the exact target is not the last command")
+            for name, angle in target.items():
+                self.assertAlmostEqual(self.limbs[side].joint_angle(name), angle, delta=0.001)
+
+    def test_commands_come_at_100_hz_and_without_jumps(self):
+        recorder = self.commands_of("left")
+        self.limbs["left"].move_to_joint_positions({"left_s0": -0.5})
+        begin_s = time.monotonic()
+        recorder.messages.clear()
+        self.assertTrue(self.limbs["left"].move_to_joint_positions({"left_s0": 0.5}))
+        duration_s = time.monotonic() - begin_s
+        commands = [message.command[0] for message in recorder.messages]
+        self.assertGreater(len(commands) / duration_s, 80.0)
+        self.assertLess(max(abs(b - a) for a, b in zip(commands, commands[1:], strict=False)), 0.05)
+
+    def test_no_joints_return_at_once_with_the_question(self):
+        begin_s = time.monotonic()
+        self.assertIs(self.limbs["left"].move_to_joint_positions({}), False)
+        self.assertLess(time.monotonic() - begin_s, 0.5)
+        self.log.wait_for_text("no joints given: did IK find a solution?")
+
+    def test_stuck_joint_is_reported(self):
+        set_knobs(enabled=True, stuck=["left_w1"])
+        off = self.limbs["left"].joint_angle("left_w1") + 0.5
+        self.assertIs(self.limbs["left"].move_to_joint_positions({"left_w1": off, "left_w2": 0.1}, timeout=2.5), False)
+        self.log.wait_for_text("left arm: not there after 2.5 s: left_w1 is 0.5000 rad from its target")
+
+    def test_own_test_stops_the_move(self):
+        limb, recorder = self.limbs["left"], self.commands_of("left")
+        self.assertTrue(limb.move_to_joint_positions({"left_s0": 0.0}))
+        self.assertIs(limb.move_to_joint_positions({"left_s0": 1.0}, test=lambda: limb.joint_angle("left_s0") > 0.3),
+                      False)
+        self.log.wait_for_text("stopped by the test")
+        stopped_at = recorder.messages[-1].command[0]
+        wait_for(lambda: abs(limb.joint_angle("left_s0") - stopped_at) < 0.01, DEADLINE_S)
+        self.assertLess(stopped_at, 0.5)
+
+    def test_loss_of_enable_ends_the_move(self):
+        limb = self.limbs["left"]
+        self.assertTrue(limb.move_to_joint_positions({"left_s0": 0.0}))
+        stopper = threading.Timer(0.5, lambda: set_knobs(enabled=False))
+        stopper.start()
+        begin_s = time.monotonic()
+        self.assertIs(limb.move_to_joint_positions({"left_s0": 1.5}), False)
+        self.assertLess(time.monotonic() - begin_s, 2.0)
+        stopper.join()
+        self.log.wait_for_text("the robot is not enabled")
+
+    def test_move_right_after_enable_is_not_refused(self):
+        for _ in range(5):
+            set_knobs(enabled=False)
+            robot = RobotEnable()
+            wait_for(lambda robot=robot: not robot.state().enabled, DEADLINE_S)
+            robot.enable()
+            self.assertTrue(self.limbs["left"].move_to_joint_positions({"left_w0": 0.0}))
+
+
+if __name__ == "__main__":
+    import rostest
+    rospy.init_node("sdk_robot_rostest")
+    rostest.rosrun("baxter_interface", "sdk_robot", "__main__")
