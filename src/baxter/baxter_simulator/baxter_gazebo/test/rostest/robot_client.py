@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the end-to-end tests need of a client: no SDK, only topics."""
+import collections
+import time
+
+import rospy
+from baxter_core_msgs.msg import AssemblyState, EndpointState, JointCommand
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Empty, Float64
+
+SIDES = ("left", "right")
+SUFFIXES = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
+
+
+def joints(side):
+    return ["%s_%s" % (side, suffix) for suffix in SUFFIXES]
+
+
+def wait_for(condition, what, timeout_s=20.0):
+    """Return the first true value of condition(); raise AssertionError that names `what` after timeout_s [wall s]."""
+    deadline = time.monotonic() + timeout_s
+    while time.monotonic() < deadline:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.005)
+    raise AssertionError("not within %g s: %s" % (timeout_s, what))
+
+
+class Latest:
+    """The newest message of a topic, or None."""
+
+    def __init__(self, topic, kind):
+        self.message = None
+        self._keep = rospy.Subscriber(topic, kind, self._on_message, tcp_nodelay=True)
+
+    def _on_message(self, message):
+        self.message = message
+
+
+class Robot:
+    """Topics of one Baxter; waits for `/robot/sim/started`."""
+
+    def __init__(self):
+        self.history = collections.deque(maxlen=5000)  # JointState, oldest first
+        self.state = None
+        self.endpoints, self.lines = {}, []
+        self._started = False
+        self._keep = [
+            rospy.Subscriber("/robot/joint_states", JointState, self.history.append, queue_size=100, tcp_nodelay=True),
+            rospy.Subscriber("/robot/state", AssemblyState, self._on_state, tcp_nodelay=True),
+            rospy.Subscriber("/robot/sim/started", Empty, self._on_started),
+            rospy.Subscriber("/rosout", Log, lambda msg: self.lines.append(msg.msg)),
+        ]
+        for side in SIDES:
+            self._keep.append(rospy.Subscriber("/robot/limb/%s/endpoint_state" % side, EndpointState,
+                                               lambda msg, side=side: self.endpoints.update({side: msg})))
+
+        def publisher(name, kind):
+            return rospy.Publisher("/robot/" + name, kind, queue_size=100, tcp_nodelay=True)
+
+        self.super_enable = publisher("set_super_enable", Bool)
+        self.super_stop = publisher("set_super_stop", Empty)
+        self.super_reset = publisher("set_super_reset", Empty)
+        self.commands = {side: publisher("limb/%s/joint_command" % side, JointCommand) for side in SIDES}
+        self.timeouts = {side: publisher("limb/%s/joint_command_timeout" % side, Float64) for side in SIDES}
+        self.ratios = {side: publisher("limb/%s/set_speed_ratio" % side, Float64) for side in SIDES}
+        wait_for(lambda: self._started, "/robot/sim/started", 60.0)
+        everything = [self.super_enable, self.super_stop, self.super_reset]
+        everything += [*self.commands.values(), *self.timeouts.values(), *self.ratios.values()]
+        wait_for(lambda: all(topic.get_num_connections() for topic in everything), "the robot listens to its topics")
+        wait_for(lambda: self.state and self.history, "the robot's first states")
+
+    def _on_state(self, msg):
+        self.state = msg
+
+    def _on_started(self, _):
+        self._started = True
+
+    @property
+    def positions(self):
+        """{joint: position} of the newest joint state."""
+        message = self.history[-1]
+        return dict(zip(message.name, message.position, strict=True))
+
+    @property
+    def velocities(self):
+        message = self.history[-1]
+        return dict(zip(message.name, message.velocity, strict=True))
+
+    def now(self):
+        """Simulation time of the newest joint state [s]."""
+        return self.history[-1].header.stamp.to_sec()
+
+    def wait_sim(self, seconds):
+        """Let so much simulation time pass."""
+        end = self.now() + seconds
+        wait_for(lambda: self.now() >= end, "%g s of simulation" % seconds, 10.0 + 5.0 * seconds)
+
+    def set_enabled(self, on):
+        self.super_enable.publish(on)
+        wait_for(lambda: self.state.enabled == on, "enabled is %s" % on, 5.0)
+
+    def restart(self):
+        """From any state to enabled, with the defaults of both limbs."""
+        self.super_reset.publish()
+        wait_for(lambda: not (self.state.enabled or self.state.stopped), "reset", 5.0)
+        for side in SIDES:
+            self.timeouts[side].publish(0.2)
+            self.ratios[side].publish(1.0)
+        self.set_enabled(True)
+
+    def command(self, mode, values):
+        """One message per limb for {joint: value}."""
+        for side in SIDES:
+            chosen = [name for name in values if name.startswith(side)]
+            if chosen:
+                self.commands[side].publish(JointCommand(mode, [values[name] for name in chosen], chosen))
+
+    def stream(self, mode, values, seconds):
+        """Repeat a command at 100 Hz of wall time for so much simulation time."""
+        end = self.now() + seconds
+        deadline = time.monotonic() + 10.0 + 5.0 * seconds
+        while self.now() < end:
+            assert time.monotonic() < deadline, "simulation time stands still"
+            self.command(mode, values() if callable(values) else values)
+            time.sleep(0.01)
+
+    def error(self, goal):
+        """Largest distance of a joint from {joint: angle} [rad]."""
+        positions = self.positions
+        return max(abs(positions[name] - angle) for name, angle in goal.items())
+
+    def move(self, goal, timeout_s=20.0):
+        """Position mode: send {joint: angle} once and wait until it is reached."""
+        self.command(POSITION, goal)
+        wait_for(lambda: self.error(goal) < 2e-3 and max(map(abs, self.velocities.values())) < 1e-3,
+                 "joints reach %s" % goal, timeout_s)
