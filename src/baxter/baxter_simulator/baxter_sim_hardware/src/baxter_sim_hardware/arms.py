@@ -1,0 +1,380 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Both arms' command modes, as one array of joints.
+
+Each tick turns the commands that came in and the measured joint state into what the joint drives shall do:
+
+- POSITION moves the set-point at no more than speed ratio times the model's velocity limit, with bounded acceleration.
+- VELOCITY is the same profile towards the joint limit ahead, cruising at the commanded speed; so it brakes in time.
+- RAW_POSITION follows a stream of set-points as it is, without smoothing, braking at its end or a speed ratio: what
+  arrives is passed on, bounded by the velocity limit and by the acceleration that the drives can follow.
+- TORQUE adds the command to the torque that balances gravity.
+
+In every mode the model's effort limit bounds what a drive adds to gravity compensation, which stands outside the clamp:
+a shoulder needs up to 57 Nm for the arm's weight alone, more than the 50 Nm that the physical robot's URDF allows it,
+and would sink in one posture out of twelve.
+
+Whatever is streamed (all but POSITION) expires joint by joint when its command is older than the limb's time-out;
+the joint then stops and holds. A command moves only the joints it names. In the mode that the limb is in already, the
+others go on with what they were told; a command in another mode makes them stop and hold.
+
+No set-point runs away from its joint: one that is pushed or blocked keeps its set-point within reach, so the arm comes
+back at the speed its mode allows, never with a snap.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import CommandRefused
+from .joint_command import CommandParser, Mode
+from .setpoint import MovingAverage, approach, stopping_point
+
+COMMAND_TIMEOUT_S = 0.2  # the robot's own
+SPEED_RATIO = {"sim": 1.0, "robot": 0.3}  # at start, by profile; 0.3 is what the physical robot starts with
+
+# Set-points accelerate by what the arm can follow nearly anywhere in its workspace within the effort limits [rad/s^2].
+# A stop decelerates harder, and harder still with the brakes on (disabled or stopped): from full speed, 1.5 rad/s at
+# the shoulder and 4 rad/s at the wrist, within about 0.02 rad. What the drives cannot follow, the reach bound catches.
+ACCELERATION = {"s0": 10.0, "s1": 10.0, "e0": 15.0, "e1": 15.0, "w0": 40.0, "w1": 40.0, "w2": 40.0}
+STOP_ACCELERATION_FACTOR = 3.0
+BRAKES_ACCELERATION_FACTOR = 12.0
+BRAKES_EFFORT_FACTOR = 8.0
+
+STREAM_GAP_S = 0.05  # raw commands that follow each other within this are one stream
+SMOOTHING_S = 0.02  # see setpoint.MovingAverage
+# A set-point leads its joint by no more than this [rad]. The joint motors answer an error of that size with what they
+# have; a larger one would only make them overshoot. In free motion the joints stay within a tenth of it.
+REACH_RAD = 1e-3
+AT_LIMIT = 0.999  # fraction of the velocity limit from which torque mode watches the limit
+SINK_DAMPING = 150.0  # [Nm s/rad] an unpowered arm with `disabled:=sink` gives way to gravity against this
+SINK_FRICTION = 1.0  # [Nm] what still damps a joint whose gravity torque vanishes
+
+_POSITION, _TORQUE, _RAW_POSITION = int(Mode.POSITION), int(Mode.TORQUE), int(Mode.RAW_POSITION)  # faster in arrays
+
+
+@dataclass(frozen=True)
+class LimbModel:
+    """One arm as the URDF has it: its side and the names of its seven joints, torso to wrist."""
+
+    side: str
+    joint_names: tuple
+
+
+@dataclass(frozen=True)
+class Drives:
+    """What the joint drives shall do in this tick; indices count the joints of the limits.
+
+    servo: indices of joints that follow servo_position [rad] and servo_velocity [rad/s] with up to servo_effort [Nm];
+    motor: indices of joints that are pushed towards motor_velocity [rad/s] by no more than motor_effort [Nm].
+    """
+
+    servo: np.ndarray
+    servo_position: np.ndarray
+    servo_velocity: np.ndarray
+    servo_effort: np.ndarray
+    motor: np.ndarray
+    motor_velocity: np.ndarray
+    motor_effort: np.ndarray
+
+
+class _Limb:
+    """What one arm does not share with the other."""
+
+    def __init__(self, model, limits):
+        self.parser = CommandParser(limits, model.joint_names)
+        self.index = np.array([limits.names.index(name) for name in model.joint_names])
+        self.mode = Mode.POSITION  # of the last command
+        self.speed_ratio = 1.0
+        self.timeout_s = COMMAND_TIMEOUT_S
+
+
+class Arms:
+    """The joint commands of all limbs, from message fields to drive set-points.
+
+    limbs: sequence of LimbModel; limits: JointLimits of all their joints, which fixes the order of every array here;
+    position: (n,) [rad] where the arms are now; speed_ratio: 0..1 at start; dt: length of a tick [s].
+    """
+
+    def __init__(self, limbs, limits, position, speed_ratio=1.0, dt=0.002):
+        self.limits = limits
+        self._limbs = {limb.side: _Limb(limb, limits) for limb in limbs}
+        for limb in self._limbs.values():
+            limb.speed_ratio = speed_ratio
+        self._dt = dt
+        self._acceleration = np.array([ACCELERATION[name.rsplit("_", 1)[1]] for name in limits.names])
+        count = len(limits.names)
+        self._all = np.arange(count)
+        self._none = np.zeros(0, dtype=int)
+        self._mode = np.full(count, Mode.POSITION, dtype=int)
+        self._value = np.zeros(count)  # last commanded velocity or torque
+        self._deadline = np.full(count, np.inf)
+        self._stream_goal = np.zeros(count)  # raw mode: where the target is on its way to, and how fast
+        self._stream_rate = np.zeros(count)
+        self._stream_stamp = np.full(count, -np.inf)
+        self._speed = np.zeros(count)
+        self._braking = np.zeros(count, dtype=bool)
+        self._brakes = False
+        self._smoothing = MovingAverage(max(1, round(SMOOTHING_S / dt)), position)
+        self.reset(position)
+
+    def reset(self, position):
+        """Forget every command and hold `position`, (n,) [rad]: after a reset of the world, or a teleport."""
+        everything = np.ones(len(self._mode), dtype=bool)
+        self._reference = np.array(position, dtype=float)
+        self._rate = np.zeros(len(position))
+        self._output = self._reference.copy()
+        self._output_rate = np.zeros(len(position))
+        self._smoothing.restart(everything, self._reference)
+        self._target = self._clamped(self._reference)
+        self._set_mode(everything, Mode.POSITION)
+        self._refresh_speed()
+
+    @property
+    def sides(self):
+        return tuple(self._limbs)
+
+    def joints_of(self, side):
+        """(k,) indices of one limb's joints, torso to wrist."""
+        return self._limbs[side].index
+
+    def modes(self, side):
+        """(k,) the Mode values that one limb's joints are in."""
+        return self._mode[self._limbs[side].index]
+
+    @property
+    def commanded_position(self):
+        """(n,) [rad] where the set-points are now."""
+        return self._output
+
+    @property
+    def commanded_velocity(self):
+        """(n,) [rad/s] how fast the set-points move now."""
+        return self._output_rate
+
+    @property
+    def commanded_torque(self):
+        """(n,) [Nm] what torque mode adds to gravity; zero for joints in other modes."""
+        return np.where(self._mode == Mode.TORQUE, self._value, 0.0)
+
+    # -- what clients say
+
+    def set_speed_ratio(self, side, ratio):
+        """Scale POSITION mode's speed; clipped to 0..1. Raises CommandRefused for NaN."""
+        if np.isnan(ratio):
+            raise CommandRefused("speed ratio is nan; it must be a number from 0 to 1")
+        self._limbs[side].speed_ratio = min(max(float(ratio), 0.0), 1.0)
+        self._refresh_speed()
+
+    def speed_ratio(self, side):
+        return self._limbs[side].speed_ratio
+
+    def set_timeout(self, side, seconds):
+        """How old a streamed command may get [s]. Raises CommandRefused for what is no positive number."""
+        if not seconds > 0.0:
+            raise CommandRefused("joint command time-out is %s s; it must be greater than 0" % seconds)
+        self._limbs[side].timeout_s = float(seconds)
+
+    def timeout(self, side):
+        return self._limbs[side].timeout_s
+
+    def command(self, side, mode, names, values, time_s, position, velocity):
+        """Take one JointCommand message.
+
+        time_s: now [s]; position, velocity: (n,) measured [rad, rad/s]. Returns the checked JointCommand.
+        Raises CommandRefused, in which case nothing has changed.
+        """
+        limb = self._limbs[side]
+        command = limb.parser.parse(mode, names, values)
+        named = np.zeros(len(self._mode), dtype=bool)
+        named[command.index] = True
+        if limb.mode is not command.mode:
+            bystander = np.zeros_like(named)
+            bystander[limb.index] = True
+            self._hold(bystander & ~named, position, velocity)
+            limb.mode = command.mode
+        self._follow_joint(named & (self._mode == Mode.TORQUE), position, velocity)
+        if command.mode is Mode.RAW_POSITION:
+            self._stream(command, time_s)
+        self._set_mode(named, command.mode)
+        if command.mode is Mode.POSITION:
+            self._target[command.index] = command.values
+        elif command.mode is Mode.VELOCITY:
+            ahead = np.where(command.values > 0.0, self.limits.upper[command.index], self.limits.lower[command.index])
+            self._target[command.index] = ahead
+            self._value[command.index] = command.values
+        elif command.mode is Mode.TORQUE:
+            self._value[command.index] = command.values
+        if command.mode is not Mode.POSITION:
+            self._deadline[command.index] = time_s + limb.timeout_s
+        self._refresh_speed()
+        return command
+
+    def stop(self, position, velocity, brakes):
+        """Stop every joint and hold it where it comes to rest; (n,) measured.
+
+        brakes: whether the brakes are on from now, which stop harder than the drives alone; until the next stop.
+        """
+        self._brakes = brakes
+        for limb in self._limbs.values():
+            limb.mode = Mode.POSITION
+        self._hold(np.ones(len(self._mode), dtype=bool), position, velocity)
+
+    # -- one tick
+
+    def update(self, time_s, position, velocity, gravity):
+        """Drives for the tick that starts at time_s [s].
+
+        position, velocity: (n,) measured [rad, rad/s]; gravity: (n,) [Nm] the torque that balances gravity here.
+        """
+        if not self._is_settled:
+            expired = self._deadline <= time_s + 1e-9
+            if expired.any():
+                self._hold(expired, position, velocity)
+            self._move_reference()
+        self._keep_within_reach(position, velocity)
+
+        bound = (BRAKES_EFFORT_FACTOR if self._brakes else 1.0) * self.limits.effort + np.abs(gravity)
+        in_torque = self._mode == _TORQUE
+        if self._is_settled or not in_torque.any():
+            return Drives(self._all, self._output, self._output_rate, bound, self._none, self._none, self._none)
+        self._follow_joint(in_torque, position, velocity)
+        motor = np.flatnonzero(in_torque)
+        servo = np.flatnonzero(~in_torque)
+        return Drives(servo, self._output[servo], self._output_rate[servo], bound[servo],
+                      motor, *self._torque_drive(motor, velocity[motor], gravity[motor]))
+
+    def sink(self, position, velocity, gravity):
+        """Drives for a tick without power: each joint gives way to gravity like a light body in a thick medium.
+
+        position, velocity, gravity: (n,) as in `update`. The drive pushes with no more than the weight itself.
+        """
+        self.reset(position)
+        limits = self.limits
+        fall = np.clip(-gravity / SINK_DAMPING, -limits.velocity, limits.velocity)
+        at_end = ((position <= limits.lower) & (fall < 0.0)) | ((position >= limits.upper) & (fall > 0.0))
+        return Drives(self._none, self._none, self._none, self._none,
+                      self._all, np.where(at_end, 0.0, fall), np.abs(gravity) + SINK_FRICTION)
+
+    # -- inside
+
+    def _torque_drive(self, joints, velocity, gravity):
+        """Command plus gravity as a motor that cannot run away: (velocity [rad/s], effort [Nm]), both (k,).
+
+        A velocity motor with a far target and a bounded effort exerts exactly that effort, and none beyond the target:
+        the velocity limit comes for free and holds within the tick, also for a wrist that 15 Nm would bring to 15 rad/s
+        in one. Where the joint is at its limit without being braked by the command, the motor holds it there.
+        """
+        command = self._value[joints]
+        limit = self.limits.velocity[joints]
+        total = command + gravity
+        at_limit = (np.abs(velocity) > AT_LIMIT * limit) & (command * velocity >= 0.0)
+        direction = np.where(at_limit, velocity, total)
+        effort = np.where(at_limit, self.limits.effort[joints] + np.abs(gravity), np.abs(total))
+        return np.copysign(limit, direction), effort
+
+    def _stream(self, command, time_s):
+        """Take a raw set-point: its target moves there at the stream's own pace, or is there at once if none runs."""
+        index = command.index
+        gap = np.maximum(time_s - self._stream_stamp[index], self._dt)
+        goes_on = (self._mode[index] == Mode.RAW_POSITION) & (gap <= STREAM_GAP_S)
+        self._target[index] = np.where(goes_on, self._target[index], command.values)
+        limit = self.limits.velocity[index]
+        self._stream_rate[index] = np.clip((command.values - self._target[index]) / gap, -limit, limit)
+        self._stream_goal[index] = command.values
+        self._stream_stamp[index] = time_s
+
+    def _move_stream(self, raw):
+        """Move the targets of raw mode by one tick; return their velocities, (n,) [rad/s], zero in other modes."""
+        ahead = np.where(raw, self._stream_goal - self._target, 0.0)
+        pace = np.minimum(np.abs(self._stream_rate), np.abs(ahead) / self._dt)
+        return np.copysign(pace, ahead)
+
+    def _move_reference(self):
+        acceleration = np.where(self._braking, self._stopping_acceleration(), self._acceleration)
+        before = self._output
+        raw = self._mode == _RAW_POSITION
+        if raw.any():
+            # The profile runs in a frame that moves with the target, so that a smooth stream is followed without lag.
+            target_rate = self._move_stream(raw)
+            offset, rate = approach(self._reference - self._target, self._rate - target_rate, 0.0,
+                                    self._speed - np.abs(target_rate), acceleration, self._dt)
+            self._target = self._target + target_rate * self._dt
+            reference, rate = self._target + offset, rate + target_rate
+        else:
+            reference, rate = approach(
+                self._reference, self._rate, self._target, self._speed, acceleration, self._dt)
+        direct = raw | self._braking
+        if direct.any():
+            self._smoothing.restart(direct, reference[direct])
+        self._reference = reference
+        self._rate = rate
+        self._output = self._smoothing.push(reference)
+        self._output_rate = (self._output - before) / self._dt
+        if self._braking.any():
+            self._braking &= reference != self._target
+            self._refresh_speed()
+        # Nothing to do until the next command or push: every set-point rests on its target.
+        if not rate.any() and (np.abs(self._output - self._target) < 1e-12).all() and (self._mode == _POSITION).all():
+            self._output = self._target.copy()
+            self._is_settled = True
+
+    def _keep_within_reach(self, position, velocity):
+        # The joints have not made this tick's step yet.
+        lead = self._output - self._output_rate * self._dt - position
+        far = np.abs(lead) > REACH_RAD
+        if far.any():
+            offset = np.clip(lead[far], -REACH_RAD, REACH_RAD) - lead[far]
+            self._reference[far] += offset
+            self._output[far] += offset
+            self._smoothing.shift(far, offset)
+            self._is_settled = False
+            self._rate[far] = velocity[far]
+            self._output_rate[far] = velocity[far]
+            # What brakes and slips stays where it stops; going back would be a motion that nobody asked for.
+            slipped = far & self._braking
+            self._target[slipped] = self._resting_point()[slipped]
+
+    def _resting_point(self):
+        """(n,) [rad] where the set-points come to rest if they brake now."""
+        return self._clamped(stopping_point(self._reference, self._rate, self._stopping_acceleration()))
+
+    def _stopping_acceleration(self):
+        return self._acceleration * (BRAKES_ACCELERATION_FACTOR if self._brakes else STOP_ACCELERATION_FACTOR)
+
+    def _hold(self, joints, position, velocity):
+        """Stop the joints in the mask and keep them where they come to rest."""
+        if not joints.any():
+            return
+        self._follow_joint(joints & (self._mode == Mode.TORQUE), position, velocity)
+        # Brake from where the drives are now, not from where smoothing would still take them.
+        self._reference = np.where(joints, self._output, self._reference)
+        self._rate = np.where(joints, self._output_rate, self._rate)
+        self._target = np.where(joints, self._resting_point(), self._target)
+        self._set_mode(joints, Mode.POSITION)
+        self._braking |= joints
+        self._refresh_speed()
+
+    def _follow_joint(self, joints, position, velocity):
+        """Put the set-points of joints that were driven by torque onto the joints themselves: no jump on return."""
+        if joints.any():
+            self._reference[joints] = self._output[joints] = position[joints]
+            self._rate[joints] = self._output_rate[joints] = velocity[joints]
+            self._smoothing.restart(joints, position[joints])
+
+    def _set_mode(self, joints, mode):
+        self._is_settled = False
+        self._mode[joints] = mode
+        self._value[joints] = 0.0
+        self._deadline[joints] = np.inf
+        self._braking &= ~joints
+
+    def _clamped(self, position):
+        return np.clip(position, self.limits.lower, self.limits.upper)
+
+    def _refresh_speed(self):
+        """Cruising speed of each joint's set-point [rad/s], by mode."""
+        ratio = np.ones(len(self._mode))
+        for limb in self._limbs.values():
+            ratio[limb.index] = limb.speed_ratio
+        limit = self.limits.velocity
+        self._speed = np.where(self._mode == Mode.POSITION, np.where(self._braking, 1.0, ratio) * limit, limit)
+        self._speed = np.where(self._mode == Mode.VELOCITY, np.abs(self._value), self._speed)

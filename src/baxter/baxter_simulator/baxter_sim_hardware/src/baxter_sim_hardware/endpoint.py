@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an arm feels and does at its end point."""
+import numpy as np
+
+# Added to the diagonal of J J^T: keeps the wrench finite where the arm is singular and changes it by less than 1e-4
+# of its value elsewhere (the smallest eigenvalue of J J^T is about 0.02 in the poses that people work in).
+_DAMPING = 1e-6
+
+
+def twist(jacobian, velocity):
+    """(6,) linear [m/s] and angular [rad/s] velocity of the tip in base, from (6, k) Jacobian and (k,) joint speeds."""
+    return jacobian @ velocity
+
+
+def contact_wrench(jacobian, effort, gravity):
+    """(6,) force [N] and torque [Nm] that the surroundings exert on the tip, in base, at the tip.
+
+    jacobian: (6, k), linear rows first; effort: (k,) [Nm] what the drives apply; gravity: (k,) [Nm] what balances
+    gravity. At rest the drives balance gravity and contact, effort = gravity - J^T w; least squares gives w.
+    """
+    gram = jacobian @ jacobian.T
+    gram.flat[::7] += _DAMPING
+    return np.linalg.solve(gram, jacobian @ (gravity - effort))

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The head: it pans, and it nods."""
+import math
+
+import numpy as np
+
+from .errors import CommandRefused
+from .setpoint import approach
+
+HEAD_JOINT = "head_pan"
+FULL_SPEED = 8.4  # [rad/s] at speed ratio 1: the physical robot's
+ACCELERATION = 30.0  # [rad/s^2] of the set-point; the joint follows that without overshooting
+NOD_S = 1.0  # the screen's way down and up again
+TURNING_SPEED = 0.01  # [rad/s] from which the head counts as turning
+
+
+class Head:
+    """Set-point of the pan joint, and the clock of a nod.
+
+    lower, upper: limits of the joint [rad]; pan: where it is now [rad]; dt: length of a tick [s].
+    """
+
+    def __init__(self, lower, upper, pan, dt=0.002):
+        self._lower, self._upper, self._dt = lower, upper, dt
+        self._acceleration = np.array([ACCELERATION])
+        self.reset(pan)
+
+    def reset(self, pan):
+        """Forget every command and hold `pan` [rad]."""
+        self.pan_enabled = True
+        self._nod_start = None
+        self.stop(pan)
+
+    def stop(self, pan):
+        """Hold `pan` [rad] at once, and take the next command from there."""
+        self._position, self._rate = np.array([pan]), np.zeros(1)
+        self._target, self._speed = self._position.copy(), np.array([FULL_SPEED])
+        self._resting = False
+
+    def command_pan(self, target, speed_ratio, enable=None):
+        """Turn to `target` [rad], clamped to the limits, at `speed_ratio` (0 to 1) of FULL_SPEED.
+
+        A ratio of 0 means full speed: the vendor's simulator turned at its own speed whatever the ratio, and clients
+        that leave the field at 0 expect the head to turn. enable: True or False switches panning on or off, None
+        leaves it; while it is off the head stays where it stopped. Raises CommandRefused for what is no number, and
+        for a negative ratio.
+        """
+        if not (math.isfinite(target) and math.isfinite(speed_ratio)) or speed_ratio < 0.0:
+            raise CommandRefused("target is %g rad and speed ratio %g; they must be an angle and a number from 0 to 1"
+                                 % (target, speed_ratio))
+        if enable is not None:
+            self.pan_enabled = enable
+        if self.pan_enabled:
+            self._target[0] = min(max(target, self._lower), self._upper)
+            self._speed[0] = FULL_SPEED * min(speed_ratio or 1.0, 1.0)
+        else:
+            self._target[0] = self._position[0]
+        self._resting = False
+
+    def nod(self, time_s):
+        """Begin to nod at time_s [s]; a nod under way is not begun anew."""
+        if not self.is_nodding(time_s):
+            self._nod_start = time_s
+
+    def is_nodding(self, time_s):
+        return self._nod_start is not None and 0.0 <= time_s - self._nod_start < NOD_S
+
+    def update(self):
+        """One tick: the set-point's (position (1,) [rad], velocity (1,) [rad/s]); None once it rests."""
+        if self._resting:
+            return None
+        self._position, self._rate = approach(
+            self._position, self._rate, self._target, self._speed, self._acceleration, self._dt)
+        # The tick after the arrival still tells the joint that the set-point no longer moves.
+        self._resting = self._position[0] == self._target[0] and self._rate[0] == 0.0
+        return self._position, self._rate

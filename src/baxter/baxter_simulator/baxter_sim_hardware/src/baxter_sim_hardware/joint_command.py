@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a joint command may say: modes, limits, and the checks that stand between a message and a motor.
+
+A command is one decision: it is refused as a whole (`CommandRefused`) when it is malformed, and clamped, value by
+value, when it asks for more than the joints can do. That is how the physical robot treats both cases; its own tucked
+pose, for one, lies 0.03 rad outside the URDF's limits.
+"""
+import math
+from collections import Counter
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from .errors import CommandRefused
+
+JOINT_SUFFIXES = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")  # torso to wrist
+
+
+class Mode(IntEnum):
+    """JointCommand.mode on the wire."""
+
+    POSITION = 1
+    VELOCITY = 2
+    TORQUE = 3
+    RAW_POSITION = 4
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of n joints, from the robot's URDF.
+
+    lower, upper: (n,) [rad]; velocity: (n,) [rad/s]; effort: (n,) [Nm].
+    """
+
+    names: tuple
+    lower: np.ndarray
+    upper: np.ndarray
+    velocity: np.ndarray
+    effort: np.ndarray
+
+    def __post_init__(self):
+        for field in ("lower", "upper", "velocity", "effort"):
+            value = np.array(getattr(self, field), dtype=float)
+            if value.shape != (len(self.names),):
+                raise ValueError("%s has shape %s, expected (%d,)" % (field, value.shape, len(self.names)))
+            value.setflags(write=False)
+            object.__setattr__(self, field, value)
+
+    def clamp(self, mode, index, values):
+        """`values` of the joints `index` brought inside what `mode` allows; same shape and unit."""
+        if mode is Mode.VELOCITY:
+            bound = self.velocity[index]
+            return np.clip(values, -bound, bound)
+        if mode is Mode.TORQUE:
+            bound = self.effort[index]
+            return np.clip(values, -bound, bound)
+        return np.clip(values, self.lower[index], self.upper[index])
+
+
+# A joint that rests on its limit is measured a little beyond it, and clients that start from where the arm is say so.
+WORTH_TELLING = 1e-3  # [rad, rad/s or Nm]
+
+
+@dataclass(frozen=True)
+class JointCommand:
+    """A checked command. index: (k,) ints into the limits' joints; values: (k,) [rad, rad/s or Nm by mode]."""
+
+    mode: Mode
+    index: np.ndarray
+    values: np.ndarray
+    clamped: tuple = ()  # names of the joints whose value was out of range by more than WORTH_TELLING
+
+
+class CommandParser:
+    """Turns the fields of a JointCommand message for one limb into a `JointCommand`.
+
+    limits: of all joints that the indices count in; names: the joints that this limb accepts.
+    """
+
+    def __init__(self, limits, names):
+        self._limits = limits
+        self._names = tuple(names)
+        self._index = {name: limits.names.index(name) for name in names}
+
+    def parse(self, mode, names, values):
+        """Check one command.
+
+        mode: int; names: sequence of str; values: sequence of float, one for each name.
+        Raises CommandRefused, naming what was wrong and what this limb accepts.
+        """
+        fault = self._fault(mode, names, values)
+        if fault:
+            raise CommandRefused("%s; this limb's joints are %s" % (fault, ", ".join(self._names)))
+        mode = Mode(mode)
+        index = np.array([self._index[name] for name in names])
+        wanted = np.array(values, dtype=float)
+        values = self._limits.clamp(mode, index, wanted)
+        outside = np.abs(values - wanted) > WORTH_TELLING
+        clamped = tuple(name for name, told in zip(names, outside, strict=True) if told)
+        return JointCommand(mode, index, values, clamped)
+
+    def _fault(self, mode, names, values):
+        """What is wrong with a command, or None."""
+        if mode not in Mode._value2member_map_:
+            return "unknown mode %d; modes are %s" % (mode, ", ".join("%d %s" % (known, known.name) for known in Mode))
+        if len(names) != len(values):
+            return "%d names but %d values, and each name needs one value" % (len(names), len(values))
+        if not names:
+            return "no joints named"
+        for name, value in zip(names, values, strict=True):
+            if name not in self._index:
+                return "unknown joint '%s'" % name
+            if not math.isfinite(value):
+                return "the value for %s is %s, and it must be a finite number" % (name, value)
+        if len(set(names)) != len(names):
+            repeated = sorted(name for name, count in Counter(names).items() if count > 1)
+            return "%s named more than once" % ", ".join(repeated)
+        return None

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Buttons, lights, wheels and the other single channels of the robot, and what writes to them.
+
+The names are the physical robot's. Documents leave open which of the torso's channels can be written; here what its
+name calls a sensor, an input or a switch is an input. Hand range and vacuum sensors belong to what they measure and
+are not listed here.
+"""
+from .errors import CommandRefused
+from .sides import SIDES
+
+NAVIGATORS = (*SIDES, *("torso_%s" % side for side in SIDES))
+BUTTONS = ("ok", "back", "show")  # of a navigator, in the order of its state message
+LIGHTS = ("inner", "outer")
+WHEEL_COUNTS = 256  # a wheel's counter wraps
+ANALOG_MAX = 65535  # the command message's uint16
+
+# {name: whether it is an input}
+DIGITAL = {
+    **{"%s_%s_light" % (navigator, light): False for navigator in NAVIGATORS for light in LIGHTS},
+    **{"%s_button_%s" % (navigator, button): True for navigator in NAVIGATORS for button in BUTTONS},
+    **{"%s_%s" % (side, name): True for side in SIDES
+       for name in ("lower_cuff", "lower_button", "upper_button", "shoulder_button")},
+    **{"%s_%s" % (side, name): False for side in SIDES for name in ("suck", "blow", "pneumatic", "hand_camera_power")},
+    **dict.fromkeys(("torso_camera_power", "head_red_light", "head_green_light", "head_yellow_light",
+                     "right_blue_light", "head_lcd_auto_config", "torso_brake", *("torso_ui_output%d" % number
+                                                                                  for number in range(4))), False),
+    **dict.fromkeys(("torso_brake_sensor", "torso_foot_pedal", "torso_digital_input0", "torso_process_sense0",
+                     "torso_process_sense1", "torso_safety_stop", "limit_switch_1", "limit_switch_2",
+                     "limit_switch_3", "motor_fault_signal"), True),
+}
+WHEELS = tuple("%s_wheel" % navigator for navigator in NAVIGATORS)
+ANALOG = {**dict.fromkeys(WHEELS, True), "torso_fan": False, "torso_lighting": False}
+
+
+def navigator_name(navigator):
+    """The name that topics give one of NAVIGATORS."""
+    return "%s_navigator" % navigator
+
+
+class Panel:
+    """The present value of every channel: `digital` {name: bool}, `analog` {name: int}; all zero at the start."""
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        """Everything released, dark and at zero."""
+        self.digital = dict.fromkeys(DIGITAL, False)
+        self.analog = dict.fromkeys(ANALOG, 0)
+
+    def set_digital(self, name, value):
+        """Switch an output. Raises CommandRefused for an unknown name and for an input."""
+        _require(name, DIGITAL, "digital output", is_input=False)
+        self.digital[name] = bool(value)
+
+    def set_analog(self, name, value):
+        """Set an output to an integer, 0 to 65535. Raises CommandRefused for what is not one, and for an input."""
+        _require(name, ANALOG, "analog output", is_input=False)
+        if not 0 <= value <= ANALOG_MAX:
+            raise CommandRefused("%s is told %s; it must be from 0 to %d" % (name, value, ANALOG_MAX))
+        self.analog[name] = int(value)
+
+    def press(self, name, pressed=True):
+        """Press or release a digital input. Raises CommandRefused for an unknown name and for an output."""
+        _require(name, DIGITAL, "digital input", is_input=True)
+        self.digital[name] = pressed
+
+    def turn(self, name, steps):
+        """Turn a wheel by so many counts. Raises CommandRefused for what is no wheel."""
+        _require(name, dict.fromkeys(WHEELS, True), "wheel", is_input=True)
+        self.analog[name] = (self.analog[name] + steps) % WHEEL_COUNTS
+
+    def navigator(self, navigator):
+        """(buttons, wheel, lights) of one of NAVIGATORS, in the order of BUTTONS and LIGHTS."""
+        return ([self.digital["%s_button_%s" % (navigator, button)] for button in BUTTONS],
+                self.analog["%s_wheel" % navigator],
+                [self.digital["%s_%s_light" % (navigator, light)] for light in LIGHTS])
+
+
+def _require(name, table, kind, is_input):
+    if table.get(name) is not is_input:
+        raise CommandRefused("'%s' is no %s; choices are %s" % (
+            name, kind, ", ".join(sorted(known for known, known_input in table.items() if known_input is is_input))))

@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Baxter as a model plugin of /gazebo: messages in and out, drives of the simulated joints. No decisions of its own."""
+import math
+
+import numpy as np
+import roslib.message
+from std_msgs.msg import Empty
+
+from baxter_sim_hardware import convert, endpoint, interface
+from baxter_sim_hardware.errors import CommandRefused, HardwareError
+from baxter_sim_hardware.gripper_topics import GripperTopics
+from baxter_sim_hardware.head_topics import HeadTopics
+from baxter_sim_hardware.joint_command import JointLimits
+from baxter_sim_hardware.limbs import BASE_FRAME, finger_openings, limbs_of, tip_of
+from baxter_sim_hardware.panel_topics import PanelTopics
+from baxter_sim_hardware.robot import Baxter
+from baxter_sim_hardware.robot_state import Event
+from baxter_sim_hardware.schedule import Schedule
+from baxter_sim_kinematics import Chain
+from gazebo_ros.model_plugin import ModelPlugin, PluginError
+
+PARAMETERS = "/baxter_sim_hardware/"
+QUEUE_DEPTH = 200  # messages between two ticks: 2 ms of a client that writes at 100 kHz
+WARN_PERIOD_S = 5.0  # [simulated s] between two warnings of one kind
+
+
+class BaxterPlugin(ModelPlugin):
+    """Wires one `Baxter` to one simulated model. Parameters: see launch/baxter_sdk_control.launch."""
+
+    @classmethod
+    def spawn_options(cls, robot, element):
+        return {"static": True}  # the pedestal stands on the floor and stays there
+
+    def __init__(self, context):
+        super().__init__(context)
+        self._model = context.model
+        try:
+            self._build(context)
+        except HardwareError as error:
+            raise PluginError("cannot be Baxter's brain for model '%s': %s" % (context.model.name, error)) from error
+        self._panel = PanelTopics(context)
+        self._open_topics(context)
+
+    def _build(self, context):
+        model, robot = context.model, context.robot
+        limbs = limbs_of(robot)
+        names = tuple(name for limb in limbs for name in limb.joint_names)
+        self._arm_index = model.index(names)
+        arm = self._arm_index
+        limits = JointLimits(names, model.lower[arm], model.upper[arm], model.max_velocity[arm], model.max_effort[arm])
+        self._limb_index = {limb.side: model.index(limb.joint_names) for limb in limbs}
+        self._chains = {limb.side: Chain.from_robot(robot, base=BASE_FRAME, tip=tip_of(limb.side)) for limb in limbs}
+        self._hold_other_joints(robot)
+        self._dt = context.world.time_step_s
+        self._baxter = Baxter(
+            limbs, limits, model.read_joints()[0][arm], dt=self._dt,
+            profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"))
+        self._head = HeadTopics(model, self._baxter.state, self._dt)
+        self._grippers = GripperTopics(model, finger_openings(robot), self._baxter.state, self._dt)
+        if self._switch("enable", False):
+            self._apply(Event.ENABLE)
+        self._alphabetical = np.argsort(model.joint_names)
+        self._joint_state_names = [model.joint_names[i] for i in self._alphabetical]
+        self._before = model.read_joints()
+        self._last_warning = {}
+
+    def _hold_other_joints(self, robot):
+        """Head straight, fingers open, and nothing left to dangle."""
+        model = self._model
+        fingers = finger_openings(robot)
+        if fingers:
+            model.set_joint_positions(model.index(fingers), np.array(list(fingers.values())))
+        others = np.setdiff1d(np.arange(len(model.joint_names)), self._arm_index)
+        model.drive_position(others, model.read_joints()[0][others], model.max_effort[others])
+        model.mark_start()
+
+    def _parameter(self, name, default):
+        return self.context.param(PARAMETERS + name, default)
+
+    def _switch(self, name, default):
+        """A parameter that is true or false. Another word in a launch file arrives as text, and would count as true."""
+        value = self._parameter(name, default)
+        if value not in (True, False):
+            raise PluginError("%s is %r; it must be true or false" % (name, value))
+        return bool(value)
+
+    def _open_topics(self, context):
+        """Open every row of the interface table; `sim/started` last, so that who hears it finds all the others."""
+        parts = (self._panel, self._head, self._grippers)
+        makers = {key: make for part in parts for key, make in part.makers.items()}
+        takers = {key: take for part in parts for key, take in part.takers.items()}
+        groups = {}  # rate -> (schedule, [(function that makes a message, part, publisher)])
+        self._takers = []  # (key, part, queue, function that takes a message)
+        self._inputs = {}  # key -> [(side, queue)]
+        rate = self._parameter("joint_state_rate", interface.JOINT_STATE_RATE_HZ)
+        if not (isinstance(rate, int | float) and math.isfinite(rate) and 0.0 < rate <= 1.0 / self._dt):
+            raise PluginError("joint_state_rate is %r; it must be a number of Hz above 0 and up to %g" % (
+                rate, 1.0 / self._dt))
+        started = None
+        for row in interface.TOPICS:
+            message = roslib.message.get_message_class(row.type)
+            for side, name in row.names():
+                if row.rate == interface.LATCHED:
+                    started = name, message
+                elif row.is_published:
+                    hz = rate if row.rate == interface.JOINT_STATE_RATE else row.rate
+                    make = makers.get(row.key) or getattr(self, "_" + row.key)
+                    group = groups.setdefault(row.rate, (Schedule(hz), []))[1]
+                    group.append((make, side, context.publisher(name, message)))
+                elif row.key in takers:
+                    self._takers.append((row.key, side, context.queue(name, message, QUEUE_DEPTH), takers[row.key]))
+                else:
+                    self._inputs.setdefault(row.key, []).append((side, context.queue(name, message, QUEUE_DEPTH)))
+        self._outputs = list(groups.values())
+        self._joint_state_schedule = groups[interface.JOINT_STATE_RATE][0]
+        self._started = context.publisher(*started, latch=True)
+        self._has_started = False
+
+    # -- the tick
+
+    def update(self, time_s, dt):
+        self._before = self._model.read_joints()
+        position, velocity = self._before[0][self._arm_index], self._before[1][self._arm_index]
+        self._take_messages(time_s, position, velocity)
+        arm = self._arm_index
+        gravity = self._model.gravity_efforts(self._before[0])[arm]
+        drives = self._baxter.update(time_s, position, velocity, gravity)
+        if len(drives.servo):
+            self._model.drive_position(arm[drives.servo], drives.servo_position, drives.servo_effort,
+                                       velocity=drives.servo_velocity)
+        if len(drives.motor):
+            self._model.drive_velocity(arm[drives.motor], drives.motor_velocity, drives.motor_effort)
+        self._head.update()
+        self._grippers.update(self._before)
+
+    def publish(self, time_s):
+        snapshot = None
+        for schedule, topics in self._outputs:
+            if not schedule.due(time_s):
+                continue
+            for make, part, publisher in topics:
+                if publisher.has_listeners:
+                    if snapshot is None:
+                        snapshot = _Snapshot(self._model, self._before, self._dt)
+                    publisher.publish(make(time_s, part, snapshot))
+        if not self._has_started:
+            self._started.publish(Empty())
+            self._has_started = True
+
+    def joints_set(self):
+        self._baxter.arms.reset(self._model.read_joints()[0][self._arm_index])
+        self._head.reset()
+        self._grippers.reset()
+
+    def reset(self):
+        self.joints_set()
+        self._panel.reset()
+        self._last_warning.clear()
+
+    # -- in
+
+    def _take_messages(self, time_s, position, velocity):
+        inputs, arms = self._inputs, self._baxter.arms
+        for _, queue in inputs["joint_state_publish_rate"]:
+            for msg in queue.drain():
+                self._set_joint_state_rate(msg.data, time_s)
+        for key, setter in (("set_speed_ratio", arms.set_speed_ratio), ("joint_command_timeout", arms.set_timeout)):
+            for side, queue in inputs[key]:
+                for msg in queue.drain():
+                    try:
+                        setter(side, msg.data)
+                    except CommandRefused as refusal:
+                        self._warn(time_s, (side, key), "%s limb: %s refused: %s" % (side, key, refusal))
+        for key, part, queue, take in self._takers:
+            for msg in queue.drain():
+                try:
+                    take(part, msg, time_s)
+                except CommandRefused as refusal:
+                    self._warn(time_s, (part, key), "%s refused: %s" % (key, refusal))
+        # In the order of Event: of all that arrived within one tick, a stop has the last word.
+        for _, queue in inputs["set_super_reset"]:
+            for _ in queue.drain():
+                self._apply(Event.RESET, time_s, position, velocity)
+        for _, queue in inputs["set_super_enable"]:
+            for msg in queue.drain():
+                self._apply(Event.ENABLE if msg.data else Event.DISABLE, time_s, position, velocity)
+        for _, queue in inputs["set_super_stop"]:
+            for _ in queue.drain():
+                self._apply(Event.STOP, time_s, position, velocity)
+        for side, queue in inputs["joint_command"]:
+            for msg in queue.drain():
+                self._command(side, msg, time_s, position, velocity)
+
+    def _apply(self, event, time_s=0.0, position=None, velocity=None):
+        if position is None:
+            position, velocity = (values[self._arm_index] for values in self._model.read_joints()[:2])
+        before = self._baxter.state.state
+        refusal = self._baxter.apply(event, position, velocity)
+        if refusal:
+            self._warn(time_s, event, "%s ignored: %s" % (event.value, refusal))
+        elif self._baxter.state.state is not before:
+            if not self._baxter.state.enabled:
+                self._head.stop()
+                self._grippers.stop()
+            self.context.log.info("Baxter is %s" % self._baxter.state.state.value)
+
+    def _command(self, side, msg, time_s, position, velocity):
+        try:
+            command = self._baxter.command(side, msg.mode, msg.names, msg.command, time_s, position, velocity)
+        except CommandRefused as refusal:
+            kind = (side, self._baxter.state.enabled)
+            self._warn(time_s, kind, "%s limb: joint command ignored: %s" % (side, refusal))
+            return
+        if command.clamped:
+            self._warn(time_s, (side, "clamped"), "%s limb: joint command clamped to the limits of %s" % (
+                side, ", ".join(command.clamped)))
+
+    def _set_joint_state_rate(self, hz, time_s):
+        if 1 <= hz <= 1000:
+            self._joint_state_schedule.set_rate(hz)
+        else:
+            self._warn(time_s, "rate", "joint_state_publish_rate %d Hz refused; it must be from 1 to 1000" % hz)
+
+    def _warn(self, time_s, kind, text):
+        """Warn once per kind and period."""
+        last = self._last_warning.get(kind)
+        if last is None or not last <= time_s < last + WARN_PERIOD_S:
+            self._last_warning[kind] = time_s
+            self.context.log.warn(text)
+
+    # -- out: one method per published row of the interface table
+
+    def _joint_states(self, time_s, side, snapshot):
+        order = self._alphabetical
+        return convert.joint_state(time_s, self._joint_state_names, snapshot.position[order],
+                                   snapshot.velocity[order], snapshot.effort[order])
+
+    def _state(self, time_s, side, snapshot):
+        return convert.assembly_state(self._baxter.state.assembly)
+
+    def _endpoint_state(self, time_s, side, snapshot):
+        index = self._limb_index[side]
+        pose, jacobian = self._chains[side].fk_and_jacobian(snapshot.position[index])
+        return convert.endpoint_state(
+            time_s, BASE_FRAME, pose, endpoint.twist(jacobian, snapshot.velocity[index]),
+            endpoint.contact_wrench(jacobian, snapshot.effort[index], snapshot.own_effort[index]))
+
+    def _gravity_compensation_torques(self, time_s, side, snapshot):
+        index, arms = self._limb_index[side], self._baxter.arms
+        joints = arms.joints_of(side)
+        return convert.sea_joint_state(
+            time_s, BASE_FRAME, self._chains[side].joint_names,
+            (arms.commanded_position[joints], arms.commanded_velocity[joints], arms.commanded_torque[joints]),
+            (snapshot.position[index], snapshot.velocity[index], snapshot.effort[index]), snapshot.gravity[index])
+
+
+class _Snapshot:
+    """The model's joints after a step; what is costly is computed once, and only if a message asks for it."""
+
+    def __init__(self, model, before, dt):
+        """before: `model.read_joints()` as it was when that step began."""
+        self.position, self.velocity, self.effort = model.read_joints()
+        self._model, self._before, self._dt = model, before, dt
+        self._gravity = self._own_effort = None
+
+    @property
+    def gravity(self):
+        """(n,) what balances gravity [Nm, N]."""
+        if self._gravity is None:
+            self._gravity = self._model.gravity_efforts(self.position)
+        return self._gravity
+
+    @property
+    def own_effort(self):
+        """(n,) what the robot's own weight, motion and joint damping took in the last step [Nm, N]; the rest of the
+        effort went into what the robot touches."""
+        if self._own_effort is None:
+            position, velocity, _ = self._before
+            acceleration = (self.velocity - velocity) / self._dt
+            self._own_effort = self._model.inverse_dynamics(position, velocity, acceleration)
+            self._own_effort += self._model.damping * velocity
+        return self._own_effort

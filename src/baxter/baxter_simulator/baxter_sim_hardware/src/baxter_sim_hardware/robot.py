@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Baxter's brain: who may move the arms, and what they do when nobody may."""
+from .arms import SPEED_RATIO, Arms
+from .errors import CommandRefused, HardwareError
+from .robot_state import RobotState
+
+DISABLED_BEHAVIOURS = ("hold", "sink")
+ENABLE_HINT = "the robot is disabled: enable it first (rosrun baxter_tools enable_robot.py -e)"
+
+
+class Baxter:
+    """The robot's state and its arms, one tick at a time.
+
+    limbs, limits, position, dt: as for `Arms`; profile: 'sim' or 'robot' (speed ratio at start);
+    disabled: what arms do without power, 'hold' or 'sink'.
+    """
+
+    def __init__(self, limbs, limits, position, dt=0.002, profile="sim", disabled="hold"):
+        if profile not in SPEED_RATIO:
+            raise HardwareError("profile is '%s'; choices are %s" % (profile, ", ".join(SPEED_RATIO)))
+        if disabled not in DISABLED_BEHAVIOURS:
+            raise HardwareError("disabled is '%s'; choices are %s" % (disabled, ", ".join(DISABLED_BEHAVIOURS)))
+        self.state = RobotState()
+        self.arms = Arms(limbs, limits, position, speed_ratio=SPEED_RATIO[profile], dt=dt)
+        self.arms.stop(position, 0.0 * position, brakes=True)
+        self._sinks = disabled == "sink"
+
+    def apply(self, event, position, velocity):
+        """Take an enable, disable, stop, reset ... event; (n,) measured. Returns why it was turned down, or None."""
+        was_enabled = self.state.enabled
+        refusal = self.state.apply(event)
+        if self.state.enabled != was_enabled:
+            # Nothing that was commanded before counts any more.
+            self.arms.stop(position, velocity, brakes=not self.state.enabled)
+        return refusal
+
+    def command(self, side, mode, names, values, time_s, position, velocity):
+        """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled."""
+        if not self.state.enabled:
+            raise CommandRefused(ENABLE_HINT)
+        return self.arms.command(side, mode, names, values, time_s, position, velocity)
+
+    def update(self, time_s, position, velocity, gravity):
+        """Drives of the arms for this tick, as `Arms.update`."""
+        if self._sinks and not self.state.enabled:
+            return self.arms.sink(position, velocity, gravity)
+        return self.arms.update(time_s, position, velocity, gravity)

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The whole robot without a ROS master: the plugin on a real physics world, its topics as plain lists."""
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import rospkg
+import yaml
+from baxter_core_msgs.msg import JointCommand
+from std_msgs.msg import Bool, Empty, Float64
+
+import xacro
+from baxter_sim_hardware import JOINT_SUFFIXES, Poses
+from baxter_sim_hardware.plugin import BaxterPlugin
+from bullet_sim import Pose, World
+from urdf_model import parse_urdf
+
+PACKAGE = Path(__file__).resolve().parents[2]
+SIDES = ("left", "right")
+NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINT_SUFFIXES)
+TICK_S = 0.002
+
+
+class _Inbox:
+    def __init__(self):
+        self.messages = []
+
+    def drain(self):
+        messages, self.messages = self.messages, []
+        return messages
+
+
+class _Outbox:
+    has_listeners = True
+
+    def __init__(self, lab):
+        self._lab = lab
+        self.messages = []  # (time_s, message)
+
+    def publish(self, message):
+        self.messages.append((self._lab.world.time_s, message))
+
+
+class _Log:
+    def __init__(self):
+        self.lines = []
+
+    def _take(self, text):
+        self.lines.append(text)
+
+    info = warn = error = _take
+
+
+class Lab:
+    """A world with Baxter in it. Arrays over the 14 arm joints are in the order of NAMES."""
+
+    def __init__(self, robot, pose="neutral", parameters=None, angles=None):
+        self.world = World(time_step_s=TICK_S)
+        self.robot, self.urdf_xml, self.namespace = robot, "", "/robot"
+        self.element = ElementTree.fromstring("<plugin/>")
+        self.model = self.world.spawn(robot, "baxter", Pose((0.0, 0.0, 0.93), (0.0, 0.0, 0.0, 1.0)),
+                                      **BaxterPlugin.spawn_options(robot, self.element))
+        self.arm = self.model.index(NAMES)
+        if angles is None:
+            poses = Poses(yaml.safe_load((PACKAGE / "config" / "poses.yaml").read_text()))
+            angles = [poses.angles(pose, name.split("_")[0])[name] for name in NAMES]
+        angles = np.clip(angles, self.model.lower[self.arm], self.model.upper[self.arm])
+        self.model.set_joint_positions(self.arm, angles)
+        self.parameters = {"/baxter_sim_hardware/" + key: value for key, value in (parameters or {}).items()}
+        self.log = _Log()
+        self.inboxes, self.outboxes, self.services = {}, {}, {}
+        self.plugin = BaxterPlugin(self)
+        self.effort_limit = self.model.max_effort[self.arm]
+
+    # -- what a plugin's context offers
+
+    def param(self, name, default=None):
+        return self.parameters.get(name, default)
+
+    def publisher(self, topic, msg_class, latch=False):
+        return self.outboxes.setdefault(topic, _Outbox(self))
+
+    def queue(self, topic, msg_class, depth):
+        return self.inboxes.setdefault(topic, _Inbox())
+
+    def service(self, name, srv_class, handler):
+        self.services[name] = handler
+
+    # -- what tests do with it
+
+    def send(self, topic, message):
+        self.inboxes[topic].messages.append(message)
+
+    def enable(self, on=True):
+        self.send("set_super_enable", Bool(on))
+        self.run(TICK_S)
+
+    def stop(self):
+        self.send("set_super_stop", Empty())
+
+    def command(self, mode, values, names=None):
+        """Send one message to each limb that has a joint in `names` (default: all 14)."""
+        values = dict(zip(names or NAMES, values, strict=True))
+        for side in SIDES:
+            chosen = [name for name in values if name.startswith(side)]
+            if chosen:
+                message = JointCommand(mode=mode, names=chosen, command=[float(values[name]) for name in chosen])
+                self.send("limb/%s/joint_command" % side, message)
+
+    def set_timeout(self, seconds):
+        for side in SIDES:
+            self.send("limb/%s/joint_command_timeout" % side, Float64(seconds))
+
+    def run(self, seconds, before=None, after=None):
+        """Tick for so long; `before(lab)` and `after(lab)` are called around each tick."""
+        for _ in range(round(seconds / TICK_S)):
+            if before:
+                before(self)
+            self.plugin.update(self.world.time_s, TICK_S)
+            self.world.step()
+            self.plugin.publish(self.world.time_s)
+            if after:
+                after(self)
+
+    def record(self, seconds, before=None):
+        """Tick for so long; return positions, velocities, efforts, each (ticks, 14)."""
+        rows = []
+        self.run(seconds, before, lambda lab: rows.append([values[lab.arm] for values in lab.model.read_joints()]))
+        return np.array(rows).transpose(1, 0, 2)
+
+    @property
+    def position(self):
+        return self.model.read_joints()[0][self.arm]
+
+    @property
+    def velocity(self):
+        return self.model.read_joints()[1][self.arm]
+
+    def last(self, topic):
+        return self.outboxes[topic].messages[-1][1]
+
+    def close(self):
+        self.world.close()
+
+
+@pytest.fixture(scope="session")
+def robot_file():
+    return rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
+
+
+@pytest.fixture(scope="session")
+def robot(robot_file):
+    return parse_urdf(xacro.process_file(robot_file).toxml(), source=robot_file)
+
+
+@pytest.fixture
+def make_lab(robot):
+    """Function that makes a Lab: make_lab(model=..., pose=..., parameters={...}, angles=...)."""
+    labs = []
+
+    def make(model=robot, **options):
+        labs.append(Lab(model, **options))
+        return labs[-1]
+
+    yield make
+    for lab in labs:
+        lab.close()
+
+
+@pytest.fixture
+def lab(make_lab):
+    """An enabled robot in neutral."""
+    made = make_lab(parameters={"enable": True})
+    made.run(0.1)
+    return made

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Buttons, lights, wheels: the core's rules, and the topics and the service that show and move them."""
+import pytest
+from baxter_core_msgs.msg import AnalogOutputCommand, DigitalOutputCommand
+from bullet_sim_msgs.srv import PressRequest
+
+from baxter_sim_hardware import CommandRefused
+from baxter_sim_hardware.panel import DIGITAL, NAVIGATORS, Panel
+
+
+def test_outputs_follow_and_inputs_refuse():
+    panel = Panel()
+    panel.set_digital("torso_left_outer_light", True)
+    assert panel.digital["torso_left_outer_light"]
+    assert sum(panel.digital.values()) == 1
+    for name in ("left_lower_cuff", "left_light", ""):
+        with pytest.raises(CommandRefused, match="'%s' is no digital output; choices are" % name):
+            panel.set_digital(name, True)
+
+
+@pytest.mark.parametrize("value", [0, 1, 37, 100, 65535])
+def test_analog_outputs_keep_the_integer(value):
+    panel = Panel()
+    panel.set_analog("torso_fan", value)
+    assert panel.analog["torso_fan"] == value
+
+
+@pytest.mark.parametrize("name, value", [("torso_fan", -1), ("torso_fan", 65536), ("left_wheel", 3), ("fan", 3)])
+def test_bad_analog_commands_change_nothing(name, value):
+    panel = Panel()
+    with pytest.raises(CommandRefused, match="must be from 0 to 65535|is no analog output; choices are torso_fan"):
+        panel.set_analog(name, value)
+    assert not any(panel.analog.values())
+
+
+@pytest.mark.parametrize("navigator", NAVIGATORS)
+def test_navigator_is_its_buttons_wheel_and_lights(navigator):
+    panel = Panel()
+    panel.press(navigator + "_button_back")
+    panel.turn(navigator + "_wheel", -3)
+    panel.set_digital(navigator + "_outer_light", True)
+    assert panel.navigator(navigator) == ([False, True, False], 253, [False, True])
+    panel.turn(navigator + "_wheel", 5)
+    panel.press(navigator + "_button_back", False)
+    assert panel.navigator(navigator) == ([False, False, False], 2, [False, True])
+    panel.reset()
+    assert panel.navigator(navigator) == ([False, False, False], 0, [False, False])
+
+
+def test_fingers_press_only_what_is_there():
+    panel = Panel()
+    with pytest.raises(CommandRefused, match="'left_inner_light' is no digital input; choices are left_button_back"):
+        panel.press("left_inner_light")
+    with pytest.raises(CommandRefused, match="'torso_fan' is no wheel; choices are left_wheel"):
+        panel.turn("torso_fan", 1)
+
+
+def test_one_light_shows_in_all_its_topics(make_lab):
+    lab = make_lab()
+    lab.send("digital_io/command", DigitalOutputCommand("right_inner_light", True))
+    lab.run(0.02)
+    state = lab.last("digital_io/right_inner_light/state")
+    assert (state.state, state.isInputOnly) == (1, False)
+    everything = lab.last("digital_io_states")
+    assert everything.names == list(DIGITAL)
+    assert [name for name, one in zip(everything.names, everything.states, strict=True) if one.state] == [
+        "right_inner_light"]
+    navigator = lab.last("navigators/right_navigator/state")
+    assert (navigator.light_names, navigator.lights) == (["inner", "outer"], [True, False])
+    assert lab.last("navigators_states").states[1] == navigator
+    lab.send("digital_io/command", DigitalOutputCommand("right_inner_light", False))
+    lab.run(0.02)
+    assert lab.last("navigators/right_navigator/state").lights == [False, False]
+
+
+def test_fan_shows_in_all_its_topics(make_lab):
+    lab = make_lab()
+    lab.send("analog_io/command", AnalogOutputCommand("torso_fan", 70))
+    lab.run(0.02)
+    assert lab.last("analog_io/torso_fan/state").value == 70.0
+    assert lab.last("analog_io/torso_fan/value_uint32").data == 70
+    everything = lab.last("analog_io_states")
+    assert dict(zip(everything.names, [one.value for one in everything.states], strict=True))["torso_fan"] == 70.0
+
+
+def test_refused_output_is_said_in_the_log(make_lab):
+    lab = make_lab()
+    lab.send("digital_io/command", DigitalOutputCommand("left_lower_cuff", True))
+    lab.run(0.02)
+    assert lab.last("digital_io/left_lower_cuff/state").state == 0
+    assert "digital_io_command refused: 'left_lower_cuff' is no digital output" in lab.log.lines[-1]
+
+
+def test_press_service(make_lab):
+    lab = make_lab()
+    press = lab.services["sim/press"]
+    assert press(PressRequest("left_lower_cuff", "press", 0)).success
+    assert press(PressRequest("torso_left_wheel", "turn", -1)).success
+    lab.run(0.02)
+    state = lab.last("digital_io/left_lower_cuff/state")
+    assert (state.state, state.isInputOnly) == (1, True)
+    assert lab.last("navigators/torso_left_navigator/state").wheel == 255
+    assert lab.last("analog_io/torso_left_wheel/value_uint32").data == 255
+    assert press(PressRequest("left_lower_cuff", "release", 0)).success
+    lab.run(0.02)
+    assert lab.last("digital_io/left_lower_cuff/state").state == 0
+    answer = press(PressRequest("left_lower_cuff", "squeeze", 0))
+    assert not answer.success and "choices are press, release, turn" in answer.status_message
+    answer = press(PressRequest("left_cuff", "press", 0))
+    assert not answer.success and "'left_cuff' is no digital input" in answer.status_message
+
+
+def test_reset_of_the_world_releases_everything(make_lab):
+    lab = make_lab()
+    lab.services["sim/press"](PressRequest("left_lower_cuff", "press", 0))
+    lab.plugin.reset()
+    lab.run(0.02)
+    assert lab.last("digital_io/left_lower_cuff/state").state == 0

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What spawn_baxter says when it cannot start."""
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+
+import pytest
+
+from gazebo_ros import gazebo_interface
+
+SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "spawn_baxter"
+WORDS = ["-urdf", "-param", "robot_description", "-model", "baxter"]
+
+
+@pytest.fixture
+def spawner(monkeypatch):
+    """The script as a module, on a parameter server whose content is `parameters`."""
+    loader = SourceFileLoader("spawn_baxter", str(SCRIPT))
+    module = module_from_spec(spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    module.parameters = {}
+    monkeypatch.setattr(module.rospy, "has_param", lambda name: name in module.parameters)
+    monkeypatch.setattr(module.rospy, "get_param", module.parameters.__getitem__)
+    return module
+
+
+def test_names_a_description_that_nobody_loaded(spawner, monkeypatch):
+    monkeypatch.setattr(gazebo_interface.wait_until, "__defaults__", (0.1,))
+    with pytest.raises(SystemExit, match="spawn_baxter: gave up .* the parameter robot_description"):
+        spawner.main(["start", *WORDS])
+
+
+def test_names_what_is_wrong_with_a_description(spawner):
+    spawner.parameters["robot_description"] = "<robot"
+    with pytest.raises(SystemExit, match="spawn_baxter: .*robot_description"):
+        spawner.main(["start", *WORDS])
+
+
+def test_lists_the_poses(spawner):
+    spawner.parameters["robot_description"] = "<robot name='empty'><link name='base'/></robot>"
+    with pytest.raises(SystemExit, match="unknown pose 'banana'; choices are start, neutral"):
+        spawner.main(["banana", *WORDS])

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every row of the enable/stop/reset table, and what each state puts on the wire."""
+import subprocess
+import sys
+
+import pytest
+
+from baxter_sim_hardware import Event, RobotState, State
+
+# Written out independently of the code: (state, event, state after, is a refusal).
+ROWS = """
+disabled enable enabled -
+disabled disable disabled -
+disabled stop stopped -
+disabled reset disabled -
+disabled press pressed -
+disabled release disabled -
+enabled enable enabled -
+enabled disable disabled -
+enabled stop stopped -
+enabled reset disabled -
+enabled press pressed -
+enabled release enabled -
+stopped enable stopped refused
+stopped disable stopped -
+stopped stop stopped -
+stopped reset disabled -
+stopped press pressed -
+stopped release stopped -
+pressed enable pressed refused
+pressed disable pressed -
+pressed stop pressed -
+pressed reset pressed refused
+pressed press pressed -
+pressed release released -
+released enable released refused
+released disable released -
+released stop released -
+released reset disabled -
+released press pressed -
+released release released -
+"""
+STATES = {"disabled": State.DISABLED, "enabled": State.ENABLED, "stopped": State.STOPPED,
+          "pressed": State.ESTOP_PRESSED, "released": State.ESTOP_RELEASED}
+EVENTS = {"enable": Event.ENABLE, "disable": Event.DISABLE, "stop": Event.STOP, "reset": Event.RESET,
+          "press": Event.ESTOP_PRESS, "release": Event.ESTOP_RELEASE}
+
+
+@pytest.mark.parametrize("row", ROWS.strip().splitlines())
+def test_transition(row):
+    before, event, after, refused = row.split()
+    robot = RobotState(STATES[before])
+    refusal = robot.apply(EVENTS[event])
+    assert robot.state is STATES[after]
+    assert (refusal is not None) == (refused == "refused")
+
+
+def test_every_pair_has_a_row():
+    assert len(ROWS.strip().splitlines()) == len(State) * len(Event)
+
+
+@pytest.mark.parametrize("name, fields", [  # ready enabled stopped error estop_button estop_source
+    ("disabled", (False, False, False, False, 0, 0)),
+    ("enabled", (True, True, False, False, 0, 0)),
+    ("stopped", (False, False, True, False, 2, 2)),
+    ("pressed", (False, False, True, False, 1, 1)),
+    ("released", (False, False, True, False, 3, 1)),
+])
+def test_wire_fields(name, fields):
+    assembly = RobotState(STATES[name]).assembly
+    assert (assembly.ready, assembly.enabled, assembly.stopped, assembly.error,
+            int(assembly.estop_button), int(assembly.estop_source)) == fields
+
+
+def test_refusal_says_what_to_do():
+    robot = RobotState(State.STOPPED)
+    assert "reset" in robot.apply(Event.ENABLE)
+
+
+def test_stop_has_the_last_word_of_a_tick():
+    assert list(Event).index(Event.STOP) > list(Event).index(Event.ENABLE) > list(Event).index(Event.RESET)
+
+
+def test_core_loads_without_ros():
+    """The core must import on a machine that has no ROS at all."""
+    ros = ("rospy", "roslib", "genpy", "std_msgs", "sensor_msgs", "geometry_msgs", "baxter_core_msgs", "gazebo_ros")
+    code = "import sys; sys.modules.update(dict.fromkeys(%r)); import baxter_sim_hardware" % (ros,)
+    subprocess.run([sys.executable, "-c", code], check=True)
