@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``python3 -m baxter_sim_kinematics``: compile everything into the cache, so that no start has to wait for it."""
+import numpy as np
+
+from baxter_sim_kinematics import Chain, warm_up
+
+# Compiled code does not depend on the robot: any chain will do.
+warm_up(Chain("base", "tip", [("turn", "revolute", "tip", np.eye(4), (0, 0, 1), -1.0, 1.0)]))

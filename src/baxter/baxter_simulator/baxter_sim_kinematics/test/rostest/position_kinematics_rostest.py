@@ -1,0 +1,243 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The IK service as clients meet it. This process plays the robot: the left arm's joints and a tf frame."""
+import concurrent.futures
+import math
+import random
+import struct
+import sys
+import time
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+import tf2_ros
+from baxter_core_msgs.srv import SolvePositionIK, SolvePositionIKRequest
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import JointState
+
+from baxter_sim_kinematics import Chain
+from urdf_model import parse_urdf
+from urdf_model.transforms import quaternion_from_matrix
+
+JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+NEUTRAL = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0)
+CURRENT = (0.1, -0.7, -0.2, 0.9, 0.1, 1.1, -0.3)
+# The labs' request, and the angles that their sheet prints for it.
+LAB_POSE = ((0.644, 0.0, 0.066), (-0.381, 0.923, -0.015, 0.052))
+LAB_ANGLES = (-1.0051802515115758, -1.0358377913378556, -0.33102594774694544, 1.7033657530084771, 0.3050684684989051,
+              0.8610601980794869, -1.4742358938106646)
+TOO_FAR = ((3.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
+SHELF_IN_BASE = (0.2, -0.1, 0.3)
+WAIT_S = 20.0
+
+
+def pose(position, quaternion, frame="base"):
+    message = PoseStamped()
+    message.header.frame_id = frame
+    message.pose.position.x, message.pose.position.y, message.pose.position.z = position
+    turn = message.pose.orientation
+    turn.x, turn.y, turn.z, turn.w = quaternion
+    return message
+
+
+def seed(side, values=NEUTRAL):
+    return JointState(name=["%s_%s" % (side, joint) for joint in JOINTS[:len(values)]], position=list(values))
+
+
+def wait_until(condition, what):
+    deadline = time.monotonic() + WAIT_S
+    while not condition():
+        if time.monotonic() > deadline:
+            raise AssertionError("waited %g s for %s" % (WAIT_S, what))
+        time.sleep(0.02)
+
+
+class PositionKinematics(unittest.TestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        robot = parse_urdf(rospy.get_param("robot_description"), source="robot_description")
+        cls.chains = {side: Chain.from_robot(robot, "base", side + "_gripper") for side in ("left", "right")}
+        cls.log = []
+        cls.rosout = rospy.Subscriber("/rosout", Log, lambda message: cls.log.append(message.msg))
+        cls.services = {}
+        for side in cls.chains:
+            name = "/ExternalTools/%s/PositionKinematicsNode/IKService" % side
+            rospy.wait_for_service(name, timeout=60.0)
+            cls.services[side] = rospy.ServiceProxy(name, SolvePositionIK)
+        cls.broadcaster = tf2_ros.StaticTransformBroadcaster()
+        shelf = TransformStamped(child_frame_id="shelf")
+        shelf.header.frame_id = "base"
+        shelf.transform.translation.x, shelf.transform.translation.y, shelf.transform.translation.z = SHELF_IN_BASE
+        shelf.transform.rotation.w = 1.0
+        cls.broadcaster.sendTransform(shelf)
+        # Only the left arm's joints are ever published: the right arm is the robot that has not spoken yet.
+        cls.joint_states = rospy.Publisher("/robot/joint_states", JointState, queue_size=1, latch=True)
+        message = seed("left", CURRENT)
+        message.header.stamp = rospy.Time(12.5)
+        cls.joint_states.publish(message)
+        wait_until(lambda: cls.joint_states.get_num_connections() == 2, "both nodes to subscribe to joint states")
+        wait_until(lambda: cls.ask("left", [pose(*LAB_POSE)]).joints[0].header.stamp == rospy.Time(12.5),
+                   "joint states to arrive at the left arm's node")
+
+    @classmethod
+    def ask(cls, side, poses, seeds=(), mode=SolvePositionIKRequest.SEED_AUTO):
+        return cls.services[side](SolvePositionIKRequest(pose_stamp=poses, seed_angles=list(seeds), seed_mode=mode))
+
+    def assert_solved(self, side, response, index, position, quaternion, seed_type):
+        self.assertTrue(response.isValid[index])
+        self.assertEqual(response.result_type[index], seed_type)
+        joints = response.joints[index]
+        self.assertEqual(joints.name, ["%s_%s" % (side, joint) for joint in JOINTS])
+        chain = self.chains[side]
+        tip = chain.fk(joints.position)
+        np.testing.assert_allclose(tip[:3, 3], position, atol=2e-6)
+        x, y, z, w = np.array(quaternion) / np.linalg.norm(quaternion)
+        np.testing.assert_allclose(tip[:3, 2], [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)],
+                                   atol=2e-6)
+        self.assertTrue((np.array(joints.position) >= chain.lower).all())
+        self.assertTrue((np.array(joints.position) <= chain.upper).all())
+
+    def assert_invalid(self, response, index=0, count=1):
+        self.assertEqual((len(response.isValid), len(response.result_type), len(response.joints)), (count,) * 3)
+        self.assertIs(response.isValid[index], False)
+        self.assertEqual(response.result_type[index], 0)
+        self.assertEqual((response.joints[index].name, list(response.joints[index].position)), ([], []))
+
+    def assert_logged(self, text, ask):
+        """The node says ``text`` in its log when ``ask`` is called; returns the response."""
+        del self.log[:]
+        response = ask()
+        wait_until(lambda: any(text in line for line in list(self.log)), "a log line with '%s', got %s"
+                   % (text, self.log))
+        return response
+
+    def test_lab_request_gives_the_angles_of_the_lab_sheet(self):
+        answers = [self.ask("left", [pose(*LAB_POSE)], [seed("left")], mode)
+                   for mode in (SolvePositionIKRequest.SEED_USER, SolvePositionIKRequest.SEED_AUTO) for _ in range(2)]
+        for answer in answers:
+            self.assert_solved("left", answer, 0, *LAB_POSE, 1)
+            np.testing.assert_allclose(answer.joints[0].position, LAB_ANGLES, atol=0.3)
+            self.assertEqual(answer.joints[0].position, answers[0].joints[0].position)
+            # How the vendor's clients read it.
+            self.assertEqual(struct.unpack("<%dB" % len(answer.result_type), answer.result_type), (1,))
+
+    def test_seed_modes_start_where_they_say(self):
+        tip = self.chains["left"].fk(CURRENT)
+        here = pose(tip[:3, 3], quaternion_from_matrix(tip))
+        for mode, expected in ((SolvePositionIKRequest.SEED_AUTO, 2), (SolvePositionIKRequest.SEED_CURRENT, 2)):
+            answer = self.ask("left", [here], mode=mode)
+            self.assertEqual(answer.result_type[0], expected)
+            np.testing.assert_allclose(answer.joints[0].position, CURRENT, atol=1e-5)
+        # Seeds are not looked at with CURRENT and NS_MAP.
+        answer = self.ask("left", [here], [seed("left", [1.0] * 7)], SolvePositionIKRequest.SEED_CURRENT)
+        np.testing.assert_allclose(answer.joints[0].position, CURRENT, atol=1e-5)
+        neutral = self.chains["left"].fk(NEUTRAL)
+        answer = self.ask("left", [pose(neutral[:3, 3], quaternion_from_matrix(neutral))], [seed("left", [1.0] * 7)],
+                          SolvePositionIKRequest.SEED_NS_MAP)
+        self.assertEqual(answer.result_type[0], 3)
+        np.testing.assert_allclose(answer.joints[0].position, NEUTRAL, atol=1e-5)
+
+    def test_right_arm_without_joint_states_starts_at_neutral_and_says_so(self):
+        neutral = self.chains["right"].fk(NEUTRAL)
+        there = [pose(neutral[:3, 3], quaternion_from_matrix(neutral))]
+        answer = self.assert_logged("no joint states", lambda: self.ask("right", there))
+        self.assertEqual(answer.result_type[0], 2)
+        np.testing.assert_allclose(answer.joints[0].position, NEUTRAL, atol=1e-5)
+
+    def test_user_seeds_that_cannot_be_used(self):
+        wrong_names = JointState(name=["a"] * 7, position=list(NEUTRAL))
+        for seeds, text in (([], "needs one seed_angles entry"), ([JointState()], "needs one seed_angles entry"),
+                            ([wrong_names], "no value for left_s0"), ([seed("right")], "no value for left_s0"),
+                            ([seed("left", NEUTRAL[:6])], "no value for left_w2"),
+                            ([JointState(position=list(NEUTRAL))], "0 joint names but 7 positions"),
+                            ([JointState(name=seed("left").name)], "7 joint names but 0 positions"),
+                            ([seed("left", (math.nan,) * 7)], "left_s0 = nan")):
+            answer = self.assert_logged(text, lambda seeds=seeds: self.ask("left", [pose(*LAB_POSE)], seeds,
+                                                                          SolvePositionIKRequest.SEED_USER))
+            self.assert_invalid(answer)
+        # AUTO says so and goes on with the current posture.
+        answer = self.assert_logged("left out", lambda: self.ask("left", [pose(*LAB_POSE)], [wrong_names]))
+        self.assert_solved("left", answer, 0, *LAB_POSE, 2)
+
+    def test_user_seed_outside_the_limits_is_clamped(self):
+        answer = self.ask("left", [pose(*LAB_POSE)], [seed("left", [9.0] * 7)], SolvePositionIKRequest.SEED_USER)
+        self.assert_solved("left", answer, 0, *LAB_POSE, 1)
+
+    def test_every_pose_is_answered_on_its_own(self):
+        answer = self.ask("left", [pose(*LAB_POSE), pose(*TOO_FAR), pose(*LAB_POSE)], [seed("left"), seed("left")])
+        self.assert_solved("left", answer, 0, *LAB_POSE, 1)
+        self.assert_invalid(answer, 1, 3)
+        self.assert_solved("left", answer, 2, *LAB_POSE, 2)
+        self.assertEqual(len(self.ask("left", []).isValid), 0)
+
+    def test_failure_is_explained(self):
+        # The shoulder turned backwards, farther than it goes.
+        tip = self.chains["left"].fk((2.4, -0.3, 0.0, 0.6, 0.0, 0.9, 0.0))
+        behind = (tip[:3, 3], quaternion_from_matrix(tip))
+        for question, text in ((TOO_FAR, "out of reach"), (behind, "joint limit: left_s0"),
+                               (((0.6, 0.2, 0.1), (0, 0, 0, 0)), "length 0"),
+                               (((0.6, 0.2, 0.1), (0, 0, 0, 3)), "length 3"),
+                               (((math.nan, 0.2, 0.1), (0, 0, 0, 1)), "finite")):
+            answer = self.assert_logged(text, lambda question=question: self.ask("left", [pose(*question)]))
+            self.assert_invalid(answer)
+        answer = self.assert_logged("seed_mode 9 is unknown", lambda: self.ask("left", [pose(*LAB_POSE)], mode=9))
+        self.assert_invalid(answer)
+
+    def test_poses_in_other_frames(self):
+        position, quaternion = LAB_POSE
+        on_shelf = np.subtract(position, SHELF_IN_BASE)
+        for frame in ("shelf", "/shelf"):
+            answer = self.ask("left", [pose(on_shelf, quaternion, frame)], [seed("left")])
+            self.assert_solved("left", answer, 0, position, quaternion, 1)
+        stamped = pose(on_shelf, quaternion, "shelf")
+        stamped.header.stamp = rospy.Time(99.0)
+        self.assert_solved("left", self.ask("left", [stamped], [seed("left")]), 0, position, quaternion, 1)
+        self.assert_solved("left", self.ask("left", [pose(*LAB_POSE, "/base")], [seed("left")]), 0, *LAB_POSE, 1)
+        answer = self.assert_logged("no frame_id", lambda: self.ask("left", [pose(*LAB_POSE, "")], [seed("left")]))
+        self.assert_solved("left", answer, 0, *LAB_POSE, 1)
+
+    def test_unknown_frames_hold_a_request_for_a_second_at_most(self):
+        start = time.monotonic()
+        answer = self.assert_logged("cannot relate frame 'nowhere'",
+                                    lambda: self.ask("left", [pose(*LAB_POSE, "nowhere")] * 20))
+        self.assert_invalid(answer, 19, 20)
+        self.assertLess(time.monotonic() - start, 5.0)
+
+    def test_many_connections_at_once_get_the_same_answer(self):
+        def answer(_):
+            return self.ask("left", [pose(*LAB_POSE)] * 20, [seed("left")] * 20).joints[-1].position
+
+        with concurrent.futures.ThreadPoolExecutor(8) as pool:
+            self.assertEqual(len(set(pool.map(answer, range(32)))), 1)
+
+    def test_thousand_malformed_requests_leave_the_service_working(self):
+        dice = random.Random(1)
+        odd = (0.0, -1.0, 0.3, 1e-320, 1e308, -1e308, math.nan, math.inf, -math.inf)
+        for _ in range(1000):
+            poses = [pose([dice.choice(odd) for _ in range(3)], [dice.choice(odd) for _ in range(4)],
+                          dice.choice(["base", "base", "", "/", "//base", "\u00fc", "base"]))
+                     for _ in range(dice.randrange(4))]
+            seeds = [JointState(name=[dice.choice(["left_s0", "left_e1", "", "x" * 300, "head_pan"])
+                                      for _ in range(dice.randrange(9))],
+                                position=[dice.choice(odd) for _ in range(dice.randrange(9))])
+                     for _ in range(dice.randrange(4))]
+            answer = self.ask("left", poses, seeds, dice.randrange(256) if dice.random() < 0.3 else dice.randrange(4))
+            self.assertEqual({len(answer.joints), len(answer.isValid), len(answer.result_type)}, {len(poses)})
+        answer = self.ask("left", [pose(*LAB_POSE)], [seed("left")])
+        self.assert_solved("left", answer, 0, *LAB_POSE, 1)
+
+    def test_names_that_clients_rely_on(self):
+        self.assertEqual(rospy.get_param("/root_name"), "base")
+        for side in self.chains:
+            self.assertEqual(rospy.get_param("/%s_tip_name" % side), side + "_gripper")
+            self.assertEqual(rospy.get_param("/robot_config/%s_config/joint_names" % side),
+                             ["%s_%s" % (side, joint) for joint in JOINTS])
+
+
+if __name__ == "__main__":
+    rospy.init_node("position_kinematics_rostest", disable_rostime=True)
+    rostest.rosrun("baxter_sim_kinematics", "position_kinematics", PositionKinematics, sys.argv)

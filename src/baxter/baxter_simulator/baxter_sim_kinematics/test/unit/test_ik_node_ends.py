@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Ctrl-C while the node is starting: it ends at once, whatever rospy is busy with."""
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from socketserver import ThreadingMixIn
+from xmlrpc.server import SimpleXMLRPCServer
+
+import pytest
+import yaml
+
+PACKAGE = Path(__file__).resolve().parents[2]
+NODE = "/ik_node_that_ends"
+
+
+class _Server(ThreadingMixIn, SimpleXMLRPCServer):
+    daemon_threads = True
+
+
+class _Master:
+    """As much of a ROS master as a starting node talks to. Calls `on_call(name, arguments)` before each answer."""
+
+    def __init__(self, parameters):
+        self._parameters = parameters
+        self.on_call = lambda name, arguments: None
+        self._server = _Server(("localhost", 0), logRequests=False, allow_none=True)
+        self._server.register_instance(self)
+        self.uri = "http://localhost:%d" % self._server.server_address[1]
+        threading.Thread(target=self._server.serve_forever, daemon=True).start()
+
+    def close(self):
+        self._server.shutdown()
+        self._server.server_close()
+
+    def _dispatch(self, name, arguments):
+        self.on_call(name, arguments)
+        if name == "hasParam":
+            return 1, "", arguments[1] in self._parameters
+        if name == "getParam":
+            known = arguments[1] in self._parameters
+            return (1, "", self._parameters[arguments[1]]) if known else (-1, "not set", 0)
+        return 1, "", [] if name in ("registerPublisher", "registerSubscriber") else 1
+
+
+@pytest.fixture
+def master(baxter_xml):
+    master = _Master({
+        "/robot_description": baxter_xml,
+        NODE + "/limb": "left",
+        **{"%s/%s" % (NODE, name): value
+           for name, value in yaml.safe_load((PACKAGE / "config" / "null_space_postures.yaml").read_text()).items()},
+    })
+    yield master
+    master.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("call, subject", [
+    ("registerPublisher", "/rosout"), ("registerSubscriber", "/robot/joint_states"),
+    ("registerService", "/ExternalTools/left/PositionKinematicsNode/IKService")])
+def test_a_signal_during_a_registration_ends_the_node(master, call, subject, number):
+    reached = threading.Event()
+    environment = dict(os.environ, ROS_MASTER_URI=master.uri, ROS_HOSTNAME="localhost")
+    node = subprocess.Popen([sys.executable, str(PACKAGE / "nodes" / "position_kinematics"), "__name:=" + NODE[1:]],
+                            env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    def strike(name, arguments):
+        if name == call and arguments[1] == subject and not reached.is_set():
+            node.send_signal(number)
+            # rospy is in the middle of this call, with its lock in hand, when the signal is handled.
+            time.sleep(0.3)
+            reached.set()
+
+    master.on_call = strike
+    try:
+        assert reached.wait(60.0), "the node does not get as far as %s of %s" % (call, subject)
+        begin_s = time.monotonic()
+        output, _ = node.communicate(timeout=30.0)
+        assert time.monotonic() - begin_s < 3.0
+        assert "Traceback" not in output
+    finally:
+        node.kill()
