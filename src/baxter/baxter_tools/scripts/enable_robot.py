@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Print the robot's state; enable, disable, reset or stop it."""
+import argparse
+import sys
+
+import rospy
+
+from baxter_interface import CHECK_VERSION, RobotEnable, startup
+
+ACTIONS = {
+    "state": lambda robot: print(robot.state()),
+    "enable": RobotEnable.enable,
+    "disable": RobotEnable.disable,
+    "reset": RobotEnable.reset,
+    "stop": RobotEnable.stop,
+}
+
+
+def parse_arguments(argv):
+    parser = argparse.ArgumentParser(
+        prog="enable_robot.py", description=__doc__,
+        epilog="Options are carried out in the order given. A robot that is still starting is waited for, up to 30 s. "
+               "Exit status: 0 done, 1 something failed, 2 wrong options.")
+    for flags, action, text in (
+        (("-s", "--state"), "state", "print the robot's state"),
+        (("-e", "--enable"), "enable", "switch the motors on; a stopped robot is reset first"),
+        (("-d", "--disable"), "disable", "switch the motors off"),
+        (("-r", "--reset"), "reset", "clear a stop or an error"),
+        (("-S", "--stop"), "stop", "stop the robot, as its stop button would"),
+    ):
+        parser.add_argument(*flags, dest="actions", action="append_const", const=action, default=[], help=text)
+    actions = parser.parse_args(argv).actions
+    if not actions:
+        parser.print_usage()
+    return actions
+
+
+def main():
+    actions = parse_arguments(rospy.myargv()[1:])
+    if not actions:
+        return 0
+    try:
+        startup.init_node("rsdk_robot_enable")
+        robot = RobotEnable(CHECK_VERSION)
+        for action in actions:
+            ACTIONS[action](robot)
+    except (OSError, ValueError, rospy.ROSException) as error:
+        print("enable_robot.py: %s" % (getattr(error, "strerror", None) or error), file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
