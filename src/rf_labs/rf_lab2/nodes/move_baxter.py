@@ -1,0 +1,113 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Move both arms of Baxter to neutral, then one gripper to a pose that the IK service solves."""
+import argparse
+import math
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import rospy
+from baxter_core_msgs.srv import SolvePositionIK, SolvePositionIKRequest
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from std_msgs.msg import Header
+
+from baxter_interface import CHECK_VERSION, Limb, RobotEnable, startup
+from rf_lab2.poses import pose_difference, unit_quaternion
+
+SIDES = ("left", "right")
+# The lab's pose of the left gripper in `base`.
+LAB_POINT = (0.644, 0.0, 0.066)
+LAB_QUATERNION = (-0.381, 0.923, -0.015, 0.052)
+SERVICE_TIMEOUT_S = 30.0
+
+
+class MoveFailed(Exception):
+    """The arm is not where it was to go; the text says why."""
+
+
+def finite_number(word):
+    value = float(word)
+    if not math.isfinite(value):
+        raise ValueError(word)
+    return value
+
+
+def parse_arguments(argv):
+    parser = argparse.ArgumentParser(prog="move_baxter.py", description=__doc__,
+                                     epilog="Exit status: 0 the arm is there, 1 it is not, 2 wrong options.")
+    parser.add_argument("--arm", choices=SIDES, default="left", help="the arm to move (default: %(default)s)")
+    parser.add_argument("--point", type=finite_number, nargs=3, default=LAB_POINT, metavar=("X", "Y", "Z"),
+                        help="position of the gripper in base [m] (default: %s %s %s)" % LAB_POINT)
+    parser.add_argument("--quaternion", type=float, nargs=4, default=LAB_QUATERNION, metavar=("X", "Y", "Z", "W"),
+                        help="its orientation (default: %s %s %s %s)" % LAB_QUATERNION)
+    arguments = parser.parse_args(argv)
+    try:
+        arguments.quaternion = unit_quaternion(arguments.quaternion)
+    except ValueError as error:
+        parser.error(str(error))
+    return arguments
+
+
+def move_to_neutral(limbs):
+    """Move all limbs at the same time. Raises MoveFailed."""
+    with ThreadPoolExecutor(len(limbs)) as pool:
+        arrived = list(pool.map(Limb.move_to_neutral, limbs))
+    if not all(arrived):
+        raise MoveFailed("not every arm reached neutral; the lines above say why")
+
+
+def solve_ik(arm, point, quaternion):
+    """Ask the robot for joint angles (dict of name to rad) that put the gripper of `arm` at a pose in `base`.
+
+    Raises MoveFailed if there are none, rospy.ServiceException or rospy.ROSException if the service does not answer.
+    """
+    name = "/ExternalTools/%s/PositionKinematicsNode/IKService" % arm
+    rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
+    pose = PoseStamped(header=Header(stamp=rospy.Time.now(), frame_id="base"),
+                       pose=Pose(position=Point(*point), orientation=Quaternion(*quaternion)))
+    response = rospy.ServiceProxy(name, SolvePositionIK)(SolvePositionIKRequest(pose_stamp=[pose]))
+    if not response.isValid or not response.isValid[0]:
+        raise MoveFailed("no joint angles put the %s gripper at %s, quaternion %s: out of reach, or against a joint "
+                         "limit (the log of the IK node says which)" % (arm, list(point), list(quaternion)))
+    return dict(zip(response.joints[0].name, response.joints[0].position, strict=True))
+
+
+def move_baxter(arm, point, quaternion):
+    RobotEnable(CHECK_VERSION).enable()
+    limbs = {side: Limb(side) for side in SIDES}
+    # Both arms leave their start pose, so that the one that works afterwards has room.
+    rospy.loginfo("moving both arms to neutral")
+    move_to_neutral(list(limbs.values()))
+
+    angles = solve_ik(arm, point, quaternion)
+    print(angles, flush=True)
+    rospy.loginfo("moving the %s arm to the pose", arm)
+    if not limbs[arm].move_to_joint_positions(angles):
+        raise MoveFailed("the %s arm did not get to the pose; the line above says why" % arm)
+    reached = limbs[arm].endpoint_pose()
+    rospy.loginfo("the %s gripper is %.1f mm and %.4f rad from the pose", arm,
+                  *scaled_difference(reached, point, quaternion))
+    for limb in limbs.values():
+        limb.exit_control_mode()
+
+
+def scaled_difference(reached, point, quaternion):
+    distance_m, angle_rad = pose_difference(reached["position"], reached["orientation"], point, quaternion)
+    return 1000.0 * distance_m, angle_rad
+
+
+def main():
+    arguments = parse_arguments(rospy.myargv()[1:])
+    try:
+        startup.init_node("move_baxter")
+        move_baxter(arguments.arm, arguments.point, arguments.quaternion)
+    except (MoveFailed, OSError, ValueError, rospy.ROSException, rospy.ServiceException) as error:
+        print("move_baxter.py: %s" % (getattr(error, "strerror", None) or error), file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
