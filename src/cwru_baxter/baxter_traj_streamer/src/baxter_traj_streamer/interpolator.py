@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The action server ``trajActionServer``: glue between goals, judging and the robot's joint commands."""
+import threading
+
+import actionlib
+import numpy as np
+import rospy
+from baxter_core_msgs.msg import JointCommand
+
+from .errors import GoalRefused
+from .judging import judge
+from .motion import Motion
+from .msg import trajAction, trajFeedback, trajResult
+from .settings import SIDES
+
+ACTION_NAME = "trajActionServer"
+_FEEDBACK_PERIOD_S = 0.1
+
+
+class Interpolator:
+    """Streams one goal after the other; call :meth:`run` in the thread that shall do so.
+
+    A goal that is refused disturbs nothing. An accepted one stops the goal before it, smoothly, and begins then.
+    """
+
+    def __init__(self, robot, limits, settings):
+        self._robot = robot
+        self._limits = limits
+        self._settings = settings
+        self._lock = threading.Condition()
+        self._next = None
+        self._current = None
+        self._cancelled = False
+        self._count = 0
+        self._publishers = {side: rospy.Publisher("/robot/limb/%s/joint_command" % side, JointCommand, queue_size=1,
+                                                  tcp_nodelay=True) for side in SIDES}
+        self._server = actionlib.ActionServer(ACTION_NAME, trajAction, self._on_goal, self._on_cancel,
+                                              auto_start=False)
+
+    def run(self):
+        """Serve until the node is shut down."""
+        self._server.start()
+        while not rospy.is_shutdown():
+            with self._lock:
+                # Woken by a goal; the time-out is for the shutdown.
+                self._lock.wait_for(lambda: self._next is not None, timeout=0.5)
+                if self._next is None:
+                    continue
+                self._current, self._next = self._next, None
+                self._cancelled = False
+                handle = self._current
+            try:
+                self._follow(handle)
+            finally:
+                with self._lock:
+                    self._current = None
+
+    # -- rospy's threads ------------------------------------------------------------------------------------------
+
+    def _on_goal(self, handle):
+        with self._lock:
+            busy = self._current is not None
+            try:
+                # While an arm moves nobody knows where this goal would begin; that is judged when it does.
+                self._judge(handle, None if busy else self._robot.angles())
+            except GoalRefused as refusal:
+                rospy.logwarn("goal refused: %s", refusal)
+                handle.set_rejected(self._result(handle), str(refusal))
+                return
+            if self._next is not None:
+                self._next.set_canceled(self._result(self._next), "a newer goal came before this one had begun")
+            self._next = handle
+            self._lock.notify()
+
+    def _on_cancel(self, handle):
+        with self._lock:
+            if self._next is not None and handle == self._next:
+                self._next = None
+                handle.set_canceled(self._result(handle), "cancelled before it had begun")
+            elif self._current is not None and handle == self._current:
+                self._cancelled = True
+
+    # -- the loop -------------------------------------------------------------------------------------------------
+
+    def _judge(self, handle, measured):
+        why = self._robot.why_not_ready()
+        if why:
+            raise GoalRefused("robot", why)
+        trajectory = handle.get_goal().trajectory
+        points = [(point.time_from_start.to_sec(), point.positions, point.velocities, point.accelerations)
+                  for point in trajectory.points]
+        return judge(trajectory.joint_names, points, self._limits, measured, self._settings)
+
+    def _follow(self, handle):
+        try:
+            plan = self._judge(handle, self._robot.angles())
+        except GoalRefused as refusal:
+            rospy.logwarn("goal refused: %s", refusal)
+            handle.set_rejected(self._result(handle), str(refusal))
+            return
+        self._count += 1
+        handle.set_accepted()
+        end, text = self._stream(handle, plan)
+        if text:
+            rospy.logwarn("goal %d: %s", self._count, text)
+        end(self._result(handle), text)
+
+    def _stream(self, handle, plan):
+        """Move the arms; returns how the goal ends: the handle's method, and a text."""
+        now = rospy.get_time()
+        motion = Motion(plan, now, self._settings.stop_deceleration)
+        rate = rospy.Rate(self._settings.rate_hz)
+        feedback_due = now
+        settled_by = None
+        while not rospy.is_shutdown():
+            now = rospy.get_time()
+            if why := self._robot.why_not_ready():
+                return handle.set_aborted, why
+            with self._lock:
+                wanted = not self._cancelled and self._next is None
+            if not wanted:
+                motion.stop(now)
+            target = motion.positions(now)
+            self._command(plan.joint_names, target, JointCommand.RAW_POSITION_MODE)
+            if now >= feedback_due:
+                handle.publish_feedback(trajFeedback(fdbk=motion.percent(now)))
+                feedback_due = now + _FEEDBACK_PERIOD_S
+            if motion.is_at_rest(now):
+                settled_by = settled_by or now + self._settings.settle_time_s
+                late = self._farthest(plan.joint_names, target)
+                if late is None or now >= settled_by:
+                    # Without a stream the robot would hold where it happens to be.
+                    self._command(plan.joint_names, target, JointCommand.POSITION_MODE)
+                    if motion.stopping:
+                        return handle.set_canceled, "stopped at %d %% of the way" % motion.percent(now)
+                    if late is None:
+                        handle.publish_feedback(trajFeedback(fdbk=100))
+                        return handle.set_succeeded, ""
+                    return handle.set_aborted, late
+            try:
+                rate.sleep()
+            except rospy.ROSTimeMovedBackwardsException:
+                return handle.set_aborted, "time went backwards: the simulation was reset"
+            except rospy.ROSInterruptException:
+                break
+        return handle.set_aborted, "the trajectory server was shut down"
+
+    def _farthest(self, names, target):
+        """What is wrong with the joint that is farthest from its target; None if all are near."""
+        angles = self._robot.angles()
+        error = np.array([angles[name] for name in names]) - target
+        joint = int(np.argmax(np.abs(error)))
+        if abs(error[joint]) <= self._settings.goal_tolerance:
+            return None
+        return "%s is %.4f rad from its goal, %g are accepted (goal_tolerance) after %g s (settle_time_s)" % (
+            names[joint], error[joint], self._settings.goal_tolerance, self._settings.settle_time_s)
+
+    def _command(self, names, positions, mode):
+        for side, publisher in self._publishers.items():
+            own = [i for i, name in enumerate(names) if name.startswith(side)]
+            if own:
+                publisher.publish(JointCommand(mode=mode, names=[names[i] for i in own],
+                                               command=[positions[i] for i in own]))
+
+    def _result(self, handle):
+        """``return_val`` counts the goals that were followed, as the notes' server does."""
+        return trajResult(return_val=self._count, traj_id=handle.get_goal().traj_id)

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Judges a goal before anything moves. Free of ROS."""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from joint_trajectory import Trajectory
+from joint_trajectory.segment import CUBIC, LINEAR, QUINTIC, constant, splines
+
+from .errors import GoalRefused
+from .settings import SIDES, arm_joint_names
+
+KNOWN_JOINTS = tuple(name for side in SIDES for name in arm_joint_names(side))
+_FIELDS = ("positions", "velocities", "accelerations")
+# Where the curve between two points is compared with the limits: shares of the time between them.
+_PLACES = np.linspace(0.0, 1.0, 33)
+# Rounding must not refuse a curve that just touches a limit.
+_ROUNDING = 1e-6
+
+
+class JointLimit(NamedTuple):
+    """``lower``, ``upper`` [rad], ``velocity`` [rad/s]."""
+
+    lower: float
+    upper: float
+    velocity: float
+
+
+class Plan(NamedTuple):
+    """What a goal that was accepted does: ``joint_names`` (k), ``trajectory`` from time 0 on, ``goal`` (k,) [rad]."""
+
+    joint_names: tuple
+    trajectory: Trajectory
+    goal: np.ndarray
+
+    @property
+    def duration_s(self):
+        return self.trajectory.end_time
+
+
+def judge(joint_names, points, limits, measured, settings):
+    """Make a :class:`Plan`, or raise :class:`GoalRefused`.
+
+    joint_names: any joints of the arms in any order; empty: the right arm from torso to tool flange.
+    points: rows of (time from start [s], positions, velocities, accelerations), the latter two may be empty.
+    limits: {joint: JointLimit}; measured: {joint: angle [rad]} or None: the robot may yet move, so leave the start
+    unjudged, from then on at the first point. settings: :class:`~.settings.Settings`.
+    """
+    names = tuple(joint_names) or tuple(arm_joint_names("right"))
+    _judge_names(names)
+    if not points:
+        raise GoalRefused("empty", "the trajectory has no points; give it at least one after time 0")
+    if len(points) > settings.max_points:
+        raise GoalRefused("too_long", "the trajectory has %d points; at most %d are accepted (max_points)" % (
+            len(points), settings.max_points), value=len(points), limit=settings.max_points)
+    for index, point in enumerate(points):
+        _judge_numbers(index, point, names)
+    times = np.array([point[0] for point in points], dtype=float)
+    _judge_times(times, settings)
+    positions = np.array([point[1] for point in points], dtype=float)
+    start = _start(names, positions[0], limits, measured)
+    bounds = _bounds(names, limits, start, settings.limit_slack)
+    _judge_positions(positions, names, bounds)
+    if times[0] == 0.0:
+        _judge_start(positions[0], start, names, settings.start_tolerance)
+    trajectory = _interpolate(times, positions, points, start, settings.interpolation)
+    _judge_curve(trajectory, names, bounds, first_point=1 if times[0] == 0.0 else 0)
+    return Plan(names, trajectory, positions[-1])
+
+
+def _judge_names(names):
+    for index, name in enumerate(names):
+        if name not in KNOWN_JOINTS:
+            raise GoalRefused("joints", "joint_names has %r, which is no joint of an arm; they are %s and the same of "
+                              "the left arm" % (name, ", ".join(arm_joint_names("right"))), joint=name)
+        if name in names[:index]:
+            raise GoalRefused("joints", "joint_names has %s more than once" % name, joint=name)
+
+
+def _judge_numbers(index, point, names):
+    if not math.isfinite(point[0]):
+        raise GoalRefused("number", "point %d: time_from_start is %r, not a finite number" % (index, point[0]), index,
+                          value=point[0])
+    for field, values in zip(_FIELDS, point[1:], strict=True):
+        if len(values) != len(names) and (len(values) or field == "positions"):
+            raise GoalRefused("size", "point %d has %d %s, expected %d, one for each of %s" % (
+                index, len(values), field, len(names), ", ".join(names)), index, value=len(values), limit=len(names))
+        for name, value in zip(names, values):  # noqa: B905 (the values may be left out)
+            if not math.isfinite(value):
+                raise GoalRefused("number", "point %d, %s: %s has %r, not a finite number" % (
+                    index, name, field, value), index, name, value)
+
+
+def _judge_times(times, settings):
+    if times[0] < 0.0:
+        raise GoalRefused("time", "point 0 is due at %.9g s; times from start begin at 0" % times[0], 0, None, times[0],
+                          0.0)
+    backwards = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(backwards):
+        index = int(backwards[0]) + 1
+        raise GoalRefused("time", "time_from_start must increase: point %d is due at %.9g s, the one before at %.9g s"
+                          % (index, times[index], times[index - 1]), index, None, times[index], times[index - 1])
+    if times[-1] == 0.0:
+        raise GoalRefused("time", "point 0 is the only one and is due at 0 s; give it a time_from_start above 0", 0,
+                          None, 0.0, 0.0)
+    if times[-1] > settings.max_duration_s:
+        index = int(np.argmax(times > settings.max_duration_s))
+        raise GoalRefused("too_long", "point %d is due at %.9g s; a trajectory may last %g s (max_duration_s)" % (
+            index, times[index], settings.max_duration_s), index, None, times[index], settings.max_duration_s)
+
+
+def _start(names, first, limits, measured):
+    """(k,) [rad]: where the robot is, or, where that is unknown, the place within the limits nearest to ``first``."""
+    for name in names:
+        if name not in limits:
+            raise GoalRefused("joints", "the robot's description gives no limits for %s" % name, joint=name)
+        if measured is not None and name not in measured:
+            raise GoalRefused("joints", "the robot does not report %s; it reports %s" % (
+                name, ", ".join(sorted(measured)) or "nothing yet"), joint=name)
+    if measured is not None:
+        return np.array([measured[name] for name in names])
+    return np.clip(first, [limits[name].lower for name in names], [limits[name].upper for name in names])
+
+
+def _bounds(names, limits, start, slack):
+    """(3, k): lower, upper, velocity; a joint that stands beyond its limit may stay as far out, but go no farther."""
+    table = np.array([limits[name] for name in names]).T
+    table[0] = np.minimum(table[0], start) - slack
+    table[1] = np.maximum(table[1], start) + slack
+    return table
+
+
+def _judge_positions(positions, names, bounds):
+    beyond = np.argwhere((positions < bounds[0]) | (positions > bounds[1]))
+    if len(beyond):
+        index, joint = (int(i) for i in beyond[0])
+        _refuse_position("point %d" % index, index, names[joint], positions[index, joint], bounds[:, joint])
+
+
+def _refuse_position(where, index, name, value, bounds):
+    limit = bounds[0] if value < bounds[0] else bounds[1]
+    raise GoalRefused("limit", "%s, %s: %.6f rad is beyond its limit of %.6f rad" % (where, name, value, limit), index,
+                      name, float(value), float(limit))
+
+
+def _judge_start(first, start, names, tolerance):
+    jump = np.abs(first - start)
+    if (jump > tolerance).any():
+        joint = int(np.argmax(jump))
+        raise GoalRefused("start", "point 0, %s: %.6f rad at once, but the robot is at %.6f rad, and at most %g rad "
+                          "between them are accepted (start_tolerance); begin where the robot is, or give point 0 a "
+                          "time_from_start" % (names[joint], first[joint], start[joint], tolerance), 0, names[joint],
+                          float(first[joint]), tolerance)
+
+
+def _interpolate(times, positions, points, start, interpolation):
+    """The curve from rest at ``start`` through the points; a point at time 0 is taken for the start itself."""
+    count = len(start)
+    rows = [[values if len(values) else np.zeros(count) for values in point[2:]] for point in points]
+    velocities, accelerations = np.array(rows, dtype=float).transpose(1, 0, 2)
+    degrees = np.array([_degree(point) for point in points])
+    rest = np.zeros((1, count))
+    first = 1 if times[0] == 0.0 else 0
+    start_degree = degrees[0] if first else QUINTIC
+    times = np.concatenate([[0.0], times[first:]])
+    positions = np.concatenate([[start], positions[first:]])
+    velocities = np.concatenate([rest, velocities[first:]])
+    accelerations = np.concatenate([rest, accelerations[first:]])
+    degrees = np.concatenate([[start_degree], degrees[first:]])
+    if interpolation == "smooth" and (degrees[1:] == LINEAR).all():
+        velocities = smooth_velocities(times, positions)
+        degrees = np.full(len(times), CUBIC)
+    coefficients = splines(times, positions, velocities, accelerations, degrees)
+    return Trajectory(times, np.concatenate([coefficients, constant(positions[-1])[None]]), np.full(count, times[-1]))
+
+
+def _degree(point):
+    if not len(point[2]):
+        return LINEAR
+    return QUINTIC if len(point[3]) else CUBIC
+
+
+def smooth_velocities(times, positions):
+    """Velocities (m, k) with which cubics through ``positions`` (m, k) do not overshoot; 0 at both ends.
+
+    At a turning point 0, else the harmonic mean of the slopes beside it (F. N. Fritsch, J. Butland 1984).
+    """
+    slopes = np.diff(positions, axis=0) / np.diff(times)[:, None]
+    before, after = slopes[:-1], slopes[1:]
+    product = before * after
+    total = before + after
+    velocities = np.zeros_like(positions)
+    np.divide(2.0 * product, total, out=velocities[1:-1], where=product > 0.0)
+    return velocities
+
+
+def _judge_curve(trajectory, names, bounds, first_point):
+    """Raise where the curve between the points, (pieces, places, joints), is too fast or leaves the limits."""
+    duration = np.diff(trajectory.starts)
+    coefficients = trajectory.coefficients[:-1]
+    powers = np.arange(6)
+    s = duration[:, None, None] * _PLACES[:, None]
+    position = np.einsum("mpi,mik->mpk", s ** powers, coefficients)
+    slope = np.einsum("mpi,mik->mpk", s ** powers[:-1], coefficients[:, 1:] * powers[1:, None])
+    fast = np.argwhere(np.abs(slope) > bounds[2] * (1.0 + _ROUNDING))
+    if len(fast):
+        piece, _, joint = (int(i) for i in fast[0])
+        index = piece + first_point
+        value, limit = float(np.abs(slope[piece, :, joint]).max()), float(bounds[2, joint])
+        raise GoalRefused("velocity", "on the way to point %d, %s: %.6f rad/s is beyond its limit of %.6f rad/s" % (
+            index, names[joint], value, limit), index, names[joint], value, limit)
+    beyond = np.argwhere((position < bounds[0] - _ROUNDING) | (position > bounds[1] + _ROUNDING))
+    if len(beyond):
+        piece, place, joint = (int(i) for i in beyond[0])
+        index = piece + first_point
+        _refuse_position("on the way to point %d" % index, index, names[joint], position[piece, place, joint],
+                         bounds[:, joint])

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One plan being carried out: where the joints shall be, and how they stop early. Free of ROS."""
+import math
+
+import numpy as np
+
+# Places at which the rest of the way is searched for its highest velocity.
+_PLACES = 200
+
+
+class Motion:
+    """A :class:`~.judging.Plan` from ``start_time`` [s] on.
+
+    A stop keeps to the way that was judged: time along it slows down evenly, until it stands. The deceleration is then
+    at most ``stop_deceleration`` [rad/s^2] more than the trajectory's own acceleration.
+    """
+
+    def __init__(self, plan, start_time, stop_deceleration):
+        self.plan = plan
+        self._start_time = start_time
+        self._stop_deceleration = stop_deceleration
+        self._stop_time = None
+        self._stop_duration_s = 0.0
+
+    def positions(self, time_s):
+        """(k,) [rad] at ``time_s``."""
+        return self.plan.trajectory.sample(self._way_time(time_s))[0]
+
+    def stop(self, time_s):
+        """Come to rest from ``time_s`` on, which is not before the last time asked for."""
+        if self._stop_time is not None:
+            return
+        here = self._way_time(time_s)
+        rest = np.linspace(here, max(here, self.plan.duration_s), _PLACES)
+        fastest = max(float(np.abs(self.plan.trajectory.sample(t)[1]).max()) for t in rest)
+        self._stop_duration_s = fastest / self._stop_deceleration
+        self._stop_time = time_s
+
+    @property
+    def stopping(self):
+        """Whether :meth:`stop` was called."""
+        return self._stop_time is not None
+
+    def is_at_rest(self, time_s):
+        """Whether nothing moves any more: the end was reached, or the stop is over."""
+        if self.stopping and time_s >= self._stop_time + self._stop_duration_s:
+            return True
+        return self._way_time(time_s) >= self.plan.duration_s
+
+    def percent(self, time_s):
+        """How much of the time along the way has passed, 0 to 100."""
+        return int(math.floor(100.0 * min(1.0, self._way_time(time_s) / self.plan.duration_s)))
+
+    def _way_time(self, time_s):
+        """Time along the way [s], not below 0."""
+        if self._stop_time is None:
+            return max(0.0, time_s - self._start_time)
+        since = min(time_s - self._stop_time, self._stop_duration_s)
+        here = max(0.0, self._stop_time - self._start_time)
+        if self._stop_duration_s <= 0.0:
+            return here
+        return here + since - since * since / (2.0 * self._stop_duration_s)

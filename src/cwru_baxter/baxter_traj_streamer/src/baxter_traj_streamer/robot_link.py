@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the streamer hears from the robot."""
+import threading
+
+import rospy
+from baxter_core_msgs.msg import AssemblyState
+from sensor_msgs.msg import JointState
+
+from baxter_interface import startup
+
+
+class RobotLink:
+    """Joint angles and the robot's state, kept up to date.
+
+    Joints are found by name in every message: robots leave some out, and change their order.
+    """
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._angles = {}
+        self._state = None
+        # Subscribe last: from here on callbacks run on another thread.
+        self._subscribers = [
+            rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=1),
+            rospy.Subscriber("robot/joint_states", JointState, self._on_joint_states, queue_size=1, tcp_nodelay=True)]
+
+    def wait(self):
+        """Wait for the robot as baxter_interface does. Raises OSError with errno ETIMEDOUT that says what lacks."""
+        startup.wait_for_start([
+            startup.message_arrives(rospy.resolve_name("robot/joint_states"), lambda: bool(self.angles())),
+            startup.message_arrives(rospy.resolve_name("robot/state"), lambda: self._state is not None)])
+
+    def angles(self):
+        """{joint: angle [rad]}, as last reported; a copy."""
+        with self._lock:
+            return dict(self._angles)
+
+    def why_not_ready(self):
+        """Why the arms will not move, in words; empty while they will."""
+        state = self._state
+        if state is None:
+            return "the robot does not report its state (/robot/state); is it running?"
+        if state.stopped:
+            return "the robot is stopped; release the button, then: rosrun baxter_tools enable_robot.py -r"
+        if not state.enabled:
+            return "the robot is disabled; rosrun baxter_tools enable_robot.py -e"
+        return ""
+
+    def _on_state(self, message):
+        self._state = message
+
+    def _on_joint_states(self, message):
+        with self._lock:
+            self._angles.update(zip(message.name, message.position))  # noqa: B905 (a robot may send fewer)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Settings and joint limits from where ROS keeps them."""
+import pathlib
+
+import rospkg
+import rospy
+import yaml
+
+import urdf_model
+
+from .judging import KNOWN_JOINTS, JointLimit
+from .settings import Settings, SettingsError
+
+# Parameters of this name override config/streamer.yaml.
+NAMESPACE = "/baxter_traj_streamer"
+
+
+def read_settings():
+    """Settings from config/streamer.yaml and the parameters below NAMESPACE. Raises SettingsError."""
+    path = pathlib.Path(rospkg.RosPack().get_path("baxter_traj_streamer")) / "config" / "streamer.yaml"
+    return Settings(yaml.safe_load(path.read_text(encoding="utf-8")), rospy.get_param(NAMESPACE, {}))
+
+
+def read_limits():
+    """{joint: JointLimit} of both arms, from robot_description. Raises SettingsError, urdf_model.UrdfError."""
+    if not rospy.has_param("robot_description"):
+        raise SettingsError("the parameter robot_description is not set; the joints' limits are read from its URDF")
+    joints = urdf_model.parse_urdf(rospy.get_param("robot_description"), source="robot_description").joints
+    found = {name: joints[name].limit for name in KNOWN_JOINTS if name in joints}
+    return {name: JointLimit(limit.lower, limit.upper, limit.velocity) for name, limit in found.items()
+            if None not in (limit.lower, limit.upper, limit.velocity)}

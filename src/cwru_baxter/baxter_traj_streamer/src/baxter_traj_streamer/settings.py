@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joint names and settings, from config/streamer.yaml, which explains each. Free of ROS."""
+import math
+
+SIDES = ("right", "left")
+# From torso to tool flange, the order of all 7-vectors here.
+JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+INTERPOLATIONS = ("smooth", "linear")
+_POSITIVE = ("min_segment_s", "rate_hz", "start_tolerance", "max_duration_s", "max_points", "stop_deceleration",
+             "goal_tolerance", "settle_time_s", "speed_scale_factor")
+
+
+class SettingsError(ValueError):
+    """A setting that cannot be used; the text says what was found and what would be right."""
+
+
+def arm_joint_names(side):
+    """The seven joint names of one arm, from torso to tool flange. Raises SettingsError for an unknown side."""
+    if side not in SIDES:
+        raise SettingsError("there is no arm %r: the arms are %s" % (side, " and ".join(SIDES)))
+    return ["%s_%s" % (side, joint) for joint in JOINTS]
+
+
+class Settings:
+    """The checked content of streamer.yaml as attributes of the same names.
+
+    defaults: that content; overrides: dict with some of the same keys. Raises SettingsError.
+    """
+
+    def __init__(self, defaults, overrides=None):
+        overrides = overrides or {}
+        if unknown := sorted(set(overrides) - set(defaults)):
+            raise SettingsError("unknown setting %s; there are %s" % (", ".join(unknown), ", ".join(sorted(defaults))))
+        for name, value in {**defaults, **overrides}.items():
+            setattr(self, name, value)
+        for name in _POSITIVE:
+            _require_positive(name, getattr(self, name))
+        if self.speed_scale_factor > 1.0:
+            raise SettingsError("speed_scale_factor is %r; it must be at most 1" % self.speed_scale_factor)
+        if self.interpolation not in INTERPOLATIONS:
+            raise SettingsError("interpolation is %r; choices are %s" % (self.interpolation, ", ".join(INTERPOLATIONS)))
+        if set(self.max_velocity) != set(JOINTS):
+            raise SettingsError("max_velocity names %s; it must name %s" % (
+                ", ".join(self.max_velocity), ", ".join(JOINTS)))
+        for joint, value in self.max_velocity.items():
+            _require_positive("max_velocity of %s" % joint, value)
+
+    def planning_velocity(self):
+        """Velocities of the seven joints that arrival times are computed with [rad/s], scale factor included."""
+        return [self.max_velocity[joint] * self.speed_scale_factor for joint in JOINTS]
+
+    def pose(self, name, side):
+        """The seven angles [rad] of a named pose. Raises SettingsError for an unknown pose or side."""
+        arm_joint_names(side)
+        if name not in self.poses:
+            raise SettingsError("unknown pose %r; choices are %s" % (name, ", ".join(self.poses)))
+        (given, angles), = self.poses[name].items()
+        return [angles[joint] * (1 if side == given else self.mirror[joint]) for joint in JOINTS]
+
+
+def _require_positive(name, value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not (math.isfinite(value) and value > 0.0):
+        raise SettingsError("%s is %r; it must be a number above 0" % (name, value))

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Arrival times of paths. Free of ROS."""
+import numpy as np
+
+
+def transition_time(difference, velocity, scale=1.0):
+    """Shortest time [s] in which all joints can move by ``difference`` (n,) [rad], accelerations left aside.
+
+    ``velocity`` (n,) [rad/s]: limits, multiplied by ``scale``. Raises ValueError for sizes that differ or numbers that
+    are not finite.
+    """
+    difference = np.asarray(difference, dtype=float)
+    velocity = np.asarray(velocity, dtype=float)
+    if difference.shape != velocity.shape:
+        raise ValueError("got %d joint differences, expected %d" % (difference.size, velocity.size))
+    if not np.isfinite(difference).all():
+        raise ValueError("joint differences must be finite, got %s" % difference.tolist())
+    return float(np.max(np.abs(difference) / (velocity * scale)))
+
+
+def arrival_times(path, velocity, min_segment_s):
+    """When each of m poses ``path`` (m, n) [rad] is reached: list of m times [s], the first 0. Raises ValueError."""
+    times = [0.0]
+    for here, there in zip(path[:-1], path[1:], strict=True):
+        step = transition_time(np.subtract(there, here), velocity)
+        times.append(times[-1] + max(step, min_segment_s))
+    return times

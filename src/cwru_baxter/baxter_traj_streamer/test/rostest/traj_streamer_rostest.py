@@ -1,0 +1,200 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""trajActionServer and its clients against a fake robot."""
+import math
+import subprocess
+import time
+import unittest
+
+import actionlib
+import numpy as np
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from baxter_core_msgs.msg import JointCommand
+from baxter_traj_streamer.msg import trajAction, trajGoal
+from std_msgs.msg import Bool
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from baxter_traj_streamer.settings import SIDES, arm_joint_names
+from baxter_traj_streamer.streamer import BaxterTrajStreamer
+
+DEADLINE_S = 30.0
+
+
+def wait_until(condition, what):
+    end = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < end, "waited %g s in vain: %s" % (DEADLINE_S, what)
+        time.sleep(0.005)
+
+
+class Client:
+    """One goal, with all that is told about it."""
+
+    def __init__(self):
+        self.action = actionlib.SimpleActionClient("trajActionServer", trajAction)
+        assert self.action.wait_for_server(rospy.Duration(DEADLINE_S)), "no trajActionServer"
+        self.feedback = []
+
+    def send(self, names, points, traj_id=0):
+        trajectory = JointTrajectory(joint_names=names)
+        trajectory.points = [JointTrajectoryPoint(positions=positions, time_from_start=rospy.Duration.from_sec(time_s))
+                             for time_s, positions in points]
+        self.action.send_goal(trajGoal(trajectory=trajectory, traj_id=traj_id),
+                              feedback_cb=lambda message: self.feedback.append(message.fdbk))
+
+    def wait_until_moving(self):
+        wait_until(lambda: any(percent >= 20 for percent in self.feedback), "the goal to be a fifth done")
+
+    def end(self):
+        """State, text, result."""
+        assert self.action.wait_for_result(rospy.Duration(DEADLINE_S)), "the goal did not end"
+        return self.action.get_state(), self.action.get_goal_status_text(), self.action.get_result()
+
+
+class TrajStreamerTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.streamer = BaxterTrajStreamer()
+        cls.enable = rospy.Publisher("/robot/set_super_enable", Bool, queue_size=1)
+        cls.commands = []
+        cls.subscribers = [rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, cls.on_command)
+                           for side in SIDES]
+
+    @classmethod
+    def on_command(cls, message):
+        cls.commands.append((time.monotonic(), message))
+
+    def setUp(self):
+        wait_until(lambda: self.enable.get_num_connections() > 0, "the robot to listen")
+        self.set_enabled(True)
+        self.commands.clear()
+        self.client = Client()
+
+    def set_enabled(self, enabled):
+        self.enable.publish(Bool(data=enabled))
+        wait_until(lambda: (self.streamer.robot.why_not_ready() == "") == enabled, "enabled to be %s" % enabled)
+
+    def angles(self, names):
+        found = self.streamer.robot.angles()
+        return np.array([found[name] for name in names])
+
+    def raw_stream(self, joint):
+        return [(stamp, message.command[message.names.index(joint)]) for stamp, message in list(self.commands)
+                if message.mode == JointCommand.RAW_POSITION_MODE and joint in message.names]
+
+    def move(self, names, by, duration_s, **options):
+        goal = self.angles(names) + by
+        self.client.send(names, [(0.0, self.angles(names)), (duration_s, goal)], **options)
+        return goal
+
+    def test_joints_of_both_arms_in_any_order(self):
+        names = ["left_w1", "right_e1", "left_e0"]
+        goal = self.move(names, [0.2, 0.3, -0.2], 1.0, traj_id=42)
+        state, text, result = self.client.end()
+        self.assertEqual(state, GoalStatus.SUCCEEDED, text)
+        self.assertEqual(result.traj_id, 42)
+        self.assertGreaterEqual(result.return_val, 1)
+        np.testing.assert_allclose(self.angles(names), goal, atol=0.01)
+        self.assertEqual(self.client.feedback, sorted(self.client.feedback))
+        self.assertGreaterEqual(len(self.client.feedback), 5)
+        stream = self.raw_stream("right_e1")
+        period = np.diff([stamp for stamp, _ in stream])
+        self.assertAlmostEqual(float(np.mean(period)), 0.01, delta=0.002)
+        # No step is longer than the way's top speed allows, with a command or two lost.
+        self.assertLess(np.abs(np.diff([value for _, value in stream])).max(), 0.02)
+        # At last the goal itself, in the mode that holds.
+        last = next(message for _, message in reversed(self.commands) if "right_e1" in message.names)
+        self.assertEqual(last.mode, JointCommand.POSITION_MODE)
+
+    def test_refused_goals_move_nothing_and_say_why(self):
+        names = ["right_e1", "left_w1"]
+        here = self.angles(names)
+        before = self.angles(arm_joint_names("right") + arm_joint_names("left"))
+        for points, words in (
+                ([], ("no points",)),
+                ([(1.0, [here[0], math.nan])], ("point 0", "left_w1", "nan")),
+                ([(1.0, here), (0.5, here)], ("point 1", "0.5 s")),
+                ([(9.0, [9.0, here[1]])], ("point 0", "right_e1", "9.0", "limit")),
+                ([(0.0, here - 0.4), (5.0, here)], ("point 0", "start_tolerance")),
+                ([(0.1, here - [0.4, 0.0])], ("point 0", "right_e1", "rad/s", "1.5"))):
+            self.client.send(names, points)
+            state, text, _ = self.client.end()
+            self.assertEqual(state, GoalStatus.REJECTED, text)
+            for word in words:
+                self.assertIn(word, text)
+        self.client.send(["right_e9", "left_w1"], [(1.0, here)])
+        state, text, _ = self.client.end()
+        self.assertEqual(state, GoalStatus.REJECTED)
+        self.assertIn("right_e9", text)
+        self.assertEqual(self.commands, [])
+        after = self.angles(arm_joint_names("right") + arm_joint_names("left"))
+        np.testing.assert_allclose(after, before, atol=0.001)
+
+    def test_cancel_stops_smoothly(self):
+        names = ["right_e1"]
+        goal = self.move(names, [0.5], 1.0)
+        self.client.wait_until_moving()
+        self.client.action.cancel_goal()
+        state, text, _ = self.client.end()
+        self.assertEqual(state, GoalStatus.PREEMPTED, text)
+        self.assertGreater(goal[0] - self.angles(names)[0], 0.02)
+        stream = np.array([value for _, value in self.raw_stream("right_e1")])
+        # The last steps dwindle: none is a jump, the very last is nothing.
+        self.assertLess(np.abs(np.diff(stream)).max(), 0.03)
+        self.assertLess(abs(stream[-1] - stream[-2]), 1e-3)
+
+    def test_newer_goal_takes_over_and_a_bad_one_does_not(self):
+        names = ["left_e1"]
+        self.move(names, [0.5], 1.5)
+        self.client.wait_until_moving()
+        bad = Client()
+        bad.send(names, [(1.0, [math.nan])])
+        self.assertEqual(bad.end()[0], GoalStatus.REJECTED)
+        self.assertEqual(self.client.action.get_state(), GoalStatus.ACTIVE)
+        newer = Client()
+        newer.send(names, [(2.0, [0.6])])
+        state, text, _ = newer.end()
+        self.assertEqual(state, GoalStatus.SUCCEEDED, text)
+        self.assertEqual(self.client.end()[0], GoalStatus.PREEMPTED)
+        np.testing.assert_allclose(self.angles(names), [0.6], atol=0.01)
+
+    def test_disabled_robot_gets_no_commands(self):
+        self.set_enabled(False)
+        self.move(["right_w0"], [0.2], 1.0)
+        state, text, _ = self.client.end()
+        self.assertEqual(state, GoalStatus.REJECTED)
+        self.assertIn("enable_robot.py -e", text)
+        self.assertEqual(self.commands, [])
+
+    def test_disabling_aborts(self):
+        self.move(["right_w0"], [0.5], 2.0)
+        self.client.wait_until_moving()
+        self.set_enabled(False)
+        state, text, _ = self.client.end()
+        self.assertEqual(state, GoalStatus.ABORTED)
+        self.assertIn("disabled", text)
+
+    def test_library_commands_a_pose(self):
+        pose = self.streamer.get_qvec_left_arm()
+        pose[6] += 0.1
+        self.streamer.cmd_pose_left(pose)
+        wait_until(lambda: abs(self.streamer.get_qvec_left_arm()[6] - pose[6]) < 0.001, "w2 to follow")
+
+    def test_pre_pose_client_moves_either_arm_and_the_arm_arrives_without_it(self):
+        for side in SIDES:
+            run = subprocess.run(["rosrun", "baxter_traj_streamer", "traj_action_client_pre_pose", side, "--wait", "1"],
+                                 capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertIn("the arm moves on", run.stdout + run.stderr)
+            pose = self.streamer.settings.pose("pre_pose", side)
+            wait_until(lambda: np.abs(self.angles(arm_joint_names(side)) - pose).max() < 0.01, "the pre-pose")  # noqa: B023
+            # The goal outlives its client, and must not outlive this test.
+            wait_until(lambda: self.commands[-1][1].mode == JointCommand.POSITION_MODE, "the stream to end")
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("traj_streamer_rostest")
+    rostest.rosrun("baxter_traj_streamer", "traj_streamer", TrajStreamerTest)
