@@ -1,0 +1,61 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Three robots in one world move at the same time, each by its own commands and nobody else's."""
+
+import time
+import unittest
+
+import actionlib
+import rospy
+import rostest
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+import baxter_interface
+
+ANNO_JOINTS = ["joint_%d" % number for number in range(1, 7)]
+GOALS = {
+    "left_anno": [0.4, -0.3, 0.3, 0.2, -0.4, 0.5],
+    "right_anno": [-0.5, -0.2, 0.4, -0.3, 0.3, -0.6],
+}
+NEUTRAL = {"s0": 0.0, "s1": -0.55, "e0": 0.0, "e1": 0.75, "w0": 0.0, "w1": 1.26, "w2": 0.0}
+
+
+class ThreeRobots(unittest.TestCase):
+    def test_all_arrive_where_they_were_sent(self):
+        clients = {}
+        for name in GOALS:
+            action = f"/{name}/probot_anno/arm_joint_controller/follow_joint_trajectory"
+            clients[name] = actionlib.SimpleActionClient(action, FollowJointTrajectoryAction)
+            self.assertTrue(clients[name].wait_for_server(rospy.Duration(40)), f"no action server {action}")
+        for name, goal in GOALS.items():
+            message = FollowJointTrajectoryGoal()
+            message.trajectory.joint_names = ANNO_JOINTS
+            still = [0.0] * 6
+            message.trajectory.points = [JointTrajectoryPoint(goal, still, still, [], rospy.Duration(3.0))]
+            clients[name].send_goal(message)
+        self.assertTrue(baxter_interface.Limb("left").move_to_neutral())
+        for name, client in clients.items():
+            self.assertTrue(client.wait_for_result(rospy.Duration(20)), f"{name} does not finish")
+            self.assertEqual(client.get_result().error_code, FollowJointTrajectoryResult.SUCCESSFUL, name)
+        for name, goal in GOALS.items():
+            state = rospy.wait_for_message(f"/{name}/probot_anno/joint_states", JointState, timeout=10)
+            for joint, wanted in zip(ANNO_JOINTS, goal, strict=True):
+                self.assertAlmostEqual(
+                    state.position[state.name.index(joint)], wanted, delta=0.005, msg=f"{name} {joint}"
+                )
+        state = rospy.wait_for_message("/robot/joint_states", JointState, timeout=10)
+        self.assert_at(state, {"left_" + joint: angle for joint, angle in NEUTRAL.items()})
+
+    def assert_at(self, state, wanted):
+        for joint, angle in wanted.items():
+            self.assertAlmostEqual(state.position[state.name.index(joint)], angle, delta=0.005, msg=joint)
+
+
+if __name__ == "__main__":
+    rospy.init_node("three_robots")
+    deadline = time.monotonic() + 40
+    while rospy.get_time() == 0.0 and time.monotonic() < deadline:
+        rospy.rostime.wallsleep(0.05)
+    rostest.rosrun("workspace_tests", "three_robots", ThreeRobots)

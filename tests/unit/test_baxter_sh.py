@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""baxter.sh: how it is called, and which ROS variables a command then sees. Nothing here sets up or builds."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+ROS_VARIABLES = ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_IP")
+# Stand-ins for the resolver and the routing table, so that the tests need no network.
+FAKE_TOOLS = {
+    "getent": 'case $2 in baxter.local | 10.42.0.2) echo "10.42.0.2 STREAM" ;; *) exit 2 ;; esac',
+    "ip": 'echo "10.42.0.2 dev eth1 src 10.42.0.1 uid 0"',
+}
+
+
+@pytest.fixture
+def variables_after(tmp_path):
+    """Call a function of environment.bash with some variables set; the ROS variables that a child then sees."""
+    for name, body in FAKE_TOOLS.items():
+        (tmp_path / name).write_text(f"#!/bin/bash\n{body}\n")
+        (tmp_path / name).chmod(0o755)
+
+    def call(function, **variables):
+        script = f'LAB_ROOT="{ROOT}"; source "{ROOT}/tools/environment.bash"; {function} && env'
+        environment = {"PATH": f"{tmp_path}:/usr/bin:/bin", **variables}
+        done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        pairs = (line.split("=", 1) for line in done.stdout.splitlines() if "=" in line)
+        return {name: value for name, value in pairs if name in ROS_VARIABLES}
+
+    return call
+
+
+LOCAL = {"ROS_MASTER_URI": "http://localhost:11311", "ROS_HOSTNAME": "localhost"}
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, LOCAL),
+        ({"ROS_IP": "192.168.0.4", "ROS_HOSTNAME": "desk.local"}, LOCAL),
+        ({"ROS_MASTER_URI": "http://baxter.local:11311"}, LOCAL),
+        ({"ROS_MASTER_URI": "http://localhost:11411"}, {**LOCAL, "ROS_MASTER_URI": "http://localhost:11411"}),
+        ({"ROS_MASTER_URI": "http://127.0.0.1:11411/"}, {**LOCAL, "ROS_MASTER_URI": "http://127.0.0.1:11411/"}),
+        ({"ROS_MASTER_URI": "http://localhost.example.org:11411"}, LOCAL),
+    ],
+    ids=["nothing set", "an address set", "a robot's master", "another port", "by address", "a name that looks local"],
+)
+def test_sim_stays_on_this_machine(variables_after, given, expected):
+    assert variables_after("use_loopback", **given) == expected
+
+
+ROBOT = {"ROS_MASTER_URI": "http://baxter.local:11311"}
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, {**ROBOT, "ROS_IP": "10.42.0.1"}),
+        ({"ROS_IP": "10.9.9.9"}, {**ROBOT, "ROS_IP": "10.9.9.9"}),
+        ({"ROS_HOSTNAME": "desk.local"}, {**ROBOT, "ROS_HOSTNAME": "desk.local"}),
+        ({"ROS_HOSTNAME": "localhost"}, {**ROBOT, "ROS_IP": "10.42.0.1"}),
+        ({"ROS_IP": "127.0.0.1"}, {**ROBOT, "ROS_IP": "10.42.0.1"}),
+    ],
+    ids=["found from the route", "own address wins", "own name wins", "left over from sim", "loopback address"],
+)
+def test_robot_is_told_an_address_that_it_can_reach(variables_after, given, expected):
+    assert variables_after("use_robot baxter.local", **given) == expected
+
+
+def test_robot_by_address(variables_after):
+    assert variables_after("use_robot 10.42.0.2") == {"ROS_MASTER_URI": "http://10.42.0.2:11311", "ROS_IP": "10.42.0.1"}
+
+
+def baxter(*arguments, script=ROOT / "baxter.sh", **options):
+    options.update(capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    return subprocess.run([str(script), *arguments], **options)
+
+
+def test_help_needs_no_set_up_and_works_through_a_link(tmp_path):
+    (tmp_path / "lab").symlink_to(ROOT / "baxter.sh")
+    done = baxter("help", script=tmp_path / "lab", cwd="/", env={"PATH": "/usr/bin:/bin"})
+    assert done.returncode == 0
+    for mode in ("sim", "HOST", "setup", "test", "doctor"):
+        assert f"\n  {mode}" in done.stdout
+
+
+def test_unknown_option_and_unknown_host_are_refused():
+    assert baxter("--simulate").returncode == 2
+    done = baxter("no-such-host.invalid", "true")
+    assert done.returncode == 2
+    assert "no-such-host.invalid" in done.stderr and "help" in done.stderr
+
+
+def copy_of_tools(folder):
+    """As much of the workspace as the scripts need to run, without a build."""
+    folder.mkdir(parents=True)
+    subprocess.run(["cp", "-r", str(ROOT / "baxter.sh"), str(ROOT / "tools"), str(folder)], check=True)
+    for name in ("requirements.txt", "requirements-nodeps.txt"):
+        subprocess.run(["cp", str(ROOT / name), str(folder)], check=True)
+    (folder / "src").mkdir()
+    return folder
+
+
+def test_path_with_spaces_is_refused_in_words(tmp_path):
+    copy = copy_of_tools(tmp_path / "my workspace")
+    done = baxter("sim", "true", script=copy / "baxter.sh")
+    assert done.returncode == 1
+    assert "spaces" in done.stderr and str(copy) in done.stderr
+
+
+def test_failing_step_is_named_with_command_and_log(tmp_path):
+    """An apt that fails: the first step ends with what was run, where its log is, and how the log ends."""
+    copy = copy_of_tools(tmp_path / "ws")
+    (copy / "tools" / "apt_packages.txt").write_text("no-such-package-anywhere\n")
+    fake = tmp_path / "bin"
+    fake.mkdir()
+    for name, body in {"apt-get": "echo 'E: the archive is on fire'; exit 100", "sudo": 'exec "$@"'}.items():
+        (fake / name).write_text(f"#!/bin/bash\n{body}\n")
+        (fake / name).chmod(0o755)
+    setup = (copy / "tools" / "setup.bash").read_text()
+    (copy / "tools" / "setup.bash").write_text(setup.replace("export PATH=", f"export PATH={fake}:"))
+    done = baxter("setup", script=copy / "baxter.sh", env={**os.environ})
+    assert done.returncode == 100
+    for text in ("step 'Debian packages'", "apt-get update", ".baxter/logs/apt.log", "the archive is on fire"):
+        assert text in done.stderr
+
+
+def fingerprint(folder):
+    script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; fingerprint'
+    return subprocess.run(["bash", "-c", script, "x", str(folder)], capture_output=True, text=True, check=True).stdout
+
+
+def test_set_up_is_stale_when_what_it_reads_has_changed(tmp_path):
+    copy = copy_of_tools(tmp_path / "ws")
+    seen = [fingerprint(copy)]
+    for change in ("src/foo/package.xml", "src/foo/msg/Bar.msg", "src/foo/urdf/foo.xacro", "requirements.txt"):
+        (copy / change).parent.mkdir(parents=True, exist_ok=True)
+        (copy / change).write_text("changed")
+        seen.append(fingerprint(copy))
+    (copy / "src/foo/node.py").write_text("print()")
+    assert fingerprint(copy) == seen[-1]  # Python needs no build
+    assert len(set(seen)) == len(seen)
+
+
+def test_failing_set_up_leaves_the_earlier_build_usable_and_is_tried_once(tmp_path):
+    """A student's package that does not configure must not lock its author out, nor slow down every command."""
+    copy = copy_of_tools(tmp_path / "ws")
+    (copy / "tools" / "setup.bash").write_text('echo tried >>"$LAB_ROOT/tries"; exit 7\n')
+    assert baxter("sim", "true", script=copy / "baxter.sh").returncode == 7  # nothing to fall back on
+    for name in ("devel/setup.bash", ".baxter/build.stamp", ".venv/bin/python3"):
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).touch(mode=0o755)
+    for _ in range(2):
+        done = baxter("sim", "bash", "-c", "echo works; exit 3", script=copy / "baxter.sh")
+        assert (done.returncode, done.stdout) == (3, "works\n")
+        assert "set-up has failed" in done.stderr
+    assert (copy / "tries").read_text() == "tried\n" * 2
+    assert baxter("test", script=copy / "baxter.sh").returncode == 7  # tests of a stale build would say nothing

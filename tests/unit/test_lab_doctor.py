@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The doctor's verdicts on faked environments, and its deadline."""
+
+import socket
+import threading
+import time
+from dataclasses import replace
+
+import pytest
+
+from lab_doctor.checks import Level, examine
+from lab_doctor.facts import Facts, Listener, Master, PythonFacts, Topics
+from lab_doctor.probe import ask_master, clock_offset_s, gather, parse_listeners, resolve
+
+ENABLED = {"enabled": True, "stopped": False, "error": False}
+HEALTHY_LAB = Facts(
+    root="/ws",
+    variables={"ROS_MASTER_URI": "http://localhost:11311", "ROS_HOSTNAME": "localhost", "ROS_IP": ""},
+    addresses={"localhost": ("127.0.0.1", True)},
+    master=Master(use_sim_time=True, publishers={"/clock": ["/gazebo"], "/robot/joint_states": ["/gazebo"]}),
+    topics=Topics(clock_messages=900, clock_advanced=True, robot_state=ENABLED),
+    is_built=True,
+    is_fresh=True,
+    python=PythonFacts("/ws/.venv/bin/python3", {"numpy": "1.24.2"}),
+    listeners=[],
+    display=":0",
+)
+ON_ROBOT = replace(
+    HEALTHY_LAB,
+    variables={"ROS_MASTER_URI": "http://baxter.local:11311", "ROS_HOSTNAME": "", "ROS_IP": "10.0.0.7"},
+    addresses={"baxter.local": ("10.0.0.2", False), "10.0.0.7": ("10.0.0.7", True)},
+    master=Master(clock_offset_s=0.01, publishers={"/robot/joint_states": ["/realtime_loop"]}),
+    topics=Topics(robot_state=ENABLED),
+)
+
+
+def with_variables(facts, **variables):
+    return replace(facts, variables={**facts.variables, **variables})
+
+
+def with_state(**fields):
+    return replace(HEALTHY_LAB, topics=replace(HEALTHY_LAB.topics, robot_state={**ENABLED, **fields}))
+
+
+def with_master(facts, **fields):
+    return replace(facts, master=replace(facts.master, **fields))
+
+
+@pytest.mark.parametrize("facts", [HEALTHY_LAB, ON_ROBOT], ids=["simulator", "robot"])
+def test_healthy_lab_has_nothing_wrong(facts):
+    assert [finding for finding in examine(facts) if finding.level is not Level.OK] == []
+
+
+SICK = {
+    # name: (facts, topic of the finding, text in what, text in fix)
+    "not built": (replace(HEALTHY_LAB, is_built=False), "build", "not built", "setup"),
+    "stale build": (replace(HEALTHY_LAB, is_fresh=False), "build", "changed", "setup"),
+    "pyenv first": (replace(HEALTHY_LAB, python=PythonFacts("/opt/pyenv/python3")), "python", "/opt/pyenv", "setup"),
+    "python hangs": (replace(HEALTHY_LAB, python=None), "python", "did not finish", "setup"),
+    "no rospy": (
+        replace(HEALTHY_LAB, python=PythonFacts("/ws/.venv/bin/python3", {}, {"rospy": "ImportError: gone"})),
+        "python", "cannot import rospy: ImportError: gone", "setup",
+    ),
+    "numpy 2": (
+        replace(HEALTHY_LAB, python=PythonFacts("/ws/.venv/bin/python3", {"numpy": "2.1.0"})),
+        "python", "numpy is 2.1.0", "uninstall numpy",
+    ),
+    "mangled uri": (with_variables(HEALTHY_LAB, ROS_MASTER_URI="localhost:11311"), "network", "http://HOST", "export"),
+    "no port": (with_variables(HEALTHY_LAB, ROS_MASTER_URI="http://robot"), "network", "http://HOST", "export"),
+    "bad port": (with_variables(HEALTHY_LAB, ROS_MASTER_URI="http://a:99999"), "network", "http://HOST", "export"),
+    "template hostname": (
+        with_variables(ON_ROBOT, ROS_HOSTNAME="your_hostname.local", ROS_IP=""),
+        "network", "your_hostname.local does not resolve", "./baxter.sh baxter.local",
+    ),
+    "address of another machine": (
+        replace(ON_ROBOT, addresses={**ON_ROBOT.addresses, "10.0.0.7": ("10.0.0.7", False)}),
+        "network", "no address of this machine", "unset ROS_IP",
+    ),
+    "localhost to a robot": (
+        with_variables(ON_ROBOT, ROS_HOSTNAME="localhost", ROS_IP=""), "network", "cannot call", "unset ROS_HOSTNAME",
+    ),
+    "robot unknown": (
+        replace(ON_ROBOT, addresses={**ON_ROBOT.addresses, "baxter.local": (None, False)}),
+        "network", "does not resolve", "/etc/hosts",
+    ),
+    "no lab": (replace(HEALTHY_LAB, master=Master(error="refused"), topics=None), "master", "refused", "roslaunch"),
+    "robot off": (replace(ON_ROBOT, master=None, topics=None), "master", "did not answer in time", "ping baxter.local"),
+    "no clock": (
+        replace(HEALTHY_LAB, topics=Topics(robot_state=ENABLED)), "clock", "nothing arrives on /clock", "use_sim_time",
+    ),
+    "paused": (
+        replace(HEALTHY_LAB, topics=replace(HEALTHY_LAB.topics, clock_advanced=False)), "clock", "paused", "unpause",
+    ),
+    "two times": (with_master(HEALTHY_LAB, use_sim_time=False), "clock", "use_sim_time is not set", "true"),
+    "robot's clock ahead": (with_master(ON_ROBOT, clock_offset_s=3.2), "clock", "3.2 s ahead", "time server"),
+    "robot's clock behind": (with_master(ON_ROBOT, clock_offset_s=-3.2), "clock", "3.2 s behind", "time server"),
+    "two simulators": (
+        with_master(HEALTHY_LAB, publishers={"/clock": ["/gazebo", "/gazebo_2"]}),
+        "simulator", "/gazebo_2", "rosnode kill",
+    ),
+    "dead simulator": (with_master(HEALTHY_LAB, dead_nodes=["/gazebo"]), "simulator", "died", "rosnode cleanup"),
+    "stopped": (with_state(stopped=True, enabled=False), "robot", "stopped", "-r"),
+    "error": (with_state(error=True), "robot", "error", "-r"),
+    "silent robot": (replace(HEALTHY_LAB, topics=Topics(5, True)), "robot", "/robot/state", "roslaunch"),
+    "messages not built": (
+        replace(HEALTHY_LAB, topics=Topics(error="ImportError: baxter_core_msgs")),
+        "robot", "baxter_core_msgs", "setup",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SICK)
+def test_fault_is_named_with_its_fix(name):
+    facts, topic, what, fix = SICK[name]
+    wrong = [finding for finding in examine(facts) if finding.level is Level.WRONG]
+    assert {finding.topic for finding in wrong} >= {topic}
+    finding = next(finding for finding in wrong if finding.topic == topic)
+    assert what in finding.what
+    assert fix in finding.fix
+
+
+NOTED = {
+    "disabled": (with_state(enabled=False), "robot", "enable_robot.py -e"),
+    "open port": (
+        replace(HEALTHY_LAB, listeners=[Listener("robot_state_publisher", 5, "0.0.0.0", 40001)]), "ports", "nft",
+    ),
+    "no screen": (replace(HEALTHY_LAB, display=""), "display", "desktop"),
+    "two names": (with_variables(HEALTHY_LAB, ROS_IP="127.0.0.1"), "network", "unset"),
+}
+
+
+@pytest.mark.parametrize("name", NOTED)
+def test_note_has_a_fix_and_is_not_wrong(name):
+    facts, topic, fix = NOTED[name]
+    findings = [finding for finding in examine(facts) if finding.level is not Level.OK]
+    assert [(finding.topic, finding.level) for finding in findings] == [(topic, Level.NOTE)]
+    assert fix in findings[0].fix
+
+
+def test_ports_are_no_matter_with_a_robot():
+    facts = replace(ON_ROBOT, listeners=[Listener("rosout", 5, "0.0.0.0", 40001)])
+    assert "ports" not in {finding.topic for finding in examine(facts)}
+
+
+def test_only_ros_processes_beyond_loopback_are_listed():
+    text = (
+        'LISTEN 0 5 127.0.0.1:11311 0.0.0.0:* users:(("rosmaster",pid=10,fd=3))\n'
+        'LISTEN 0 5 0.0.0.0:40001 0.0.0.0:* users:(("robot_state_pub",pid=11,fd=9))\n'
+        'LISTEN 0 5 *:22 *:* users:(("sshd",pid=12,fd=3))\n'
+        "LISTEN 0 5 0.0.0.0:631 0.0.0.0:*\n"
+    )
+    commands = {
+        10: "/usr/bin/python3 rosmaster",
+        11: "/usr/lib/robot_state_publisher/robot_state_publisher __name:=rsp __log:=/x",
+        12: "sshd: /usr/sbin/sshd",
+    }
+    assert parse_listeners(text, commands.get) == [Listener("rsp", 11, "0.0.0.0", 40001)]
+
+
+def test_own_and_foreign_addresses_are_told_apart():
+    assert resolve("127.0.0.1") == ("127.0.0.1", True)
+    assert resolve("192.0.2.77") == ("192.0.2.77", False)  # reserved for documentation
+    assert resolve("no-such-host.invalid") == (None, False)
+
+
+@pytest.fixture
+def silent_server():
+    """A port that takes connections and never answers, as a hung master does."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield server.getsockname()[1]
+
+
+def test_hung_master_does_not_hang_the_doctor(silent_server, tmp_path):
+    started = time.monotonic()
+    facts = gather(tmp_path, {"ROS_MASTER_URI": f"http://localhost:{silent_server}", "ROS_HOSTNAME": "localhost"})
+    assert time.monotonic() - started < 5.0
+    assert facts.master is None or facts.master.error
+    assert facts.topics is None
+    assert not facts.is_built
+
+
+def test_refused_connection_is_an_error_text():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    assert "111" in ask_master(f"http://127.0.0.1:{port}").error  # its text depends on the locale
+
+
+@pytest.mark.parametrize("offset_s", [7.5, -40.0])
+def test_clock_offset_is_read_from_the_date_line(offset_s):
+    from email.utils import formatdate
+    from http.server import BaseHTTPRequestHandler, HTTPServer
+
+    class Skewed(BaseHTTPRequestHandler):
+        def date_time_string(self, timestamp=None):
+            return formatdate(time.time() + offset_s, usegmt=True)
+
+        def do_GET(self):
+            self.send_response(501)
+            self.end_headers()
+
+        def log_message(self, *args):
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Skewed)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        measured = clock_offset_s(f"http://127.0.0.1:{server.server_port}", timeout_s=3.0)
+    finally:
+        server.shutdown()
+        server.server_close()
+    assert measured == pytest.approx(offset_s, abs=0.2)

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The test runner must not miss a failure: discovery, selection, counting, and what a test leaves behind."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lab_tests import comma_locale, processes, rostests
+from lab_tests.discovery import Rostest, SelectionError, select, take_inventory
+from lab_tests.results import read_junit, read_rostest_results
+
+MANIFEST = "<package format='3'><name>%s</name></package>"
+PASSING = "<testsuite tests='2'><testcase name='a' classname='T'/><testcase name='b' classname='T'/></testsuite>"
+FAILING = "<testsuite tests='1'><testcase name='a' classname='T'><failure message='1 is not 2'/></testcase></testsuite>"
+CRASHED = "<testsuite tests='1'><testcase name='testx' classname='R'><error message='none'/></testcase></testsuite>"
+RAN = "<testsuite tests='1'><testcase name='testx' classname='R'/></testsuite>"
+
+
+@pytest.fixture
+def workspace(tmp_path):
+    """Two packages, an ignored one, and cross-package tests."""
+    files = {
+        "src/group/alpha/package.xml": MANIFEST % "alpha",
+        "src/group/alpha/test/unit/test_alpha.py": "",
+        "src/group/alpha/test/unit/helper.py": "",
+        "src/group/alpha/test/rostest/alpha.test": "<launch/>",
+        "src/group/alpha/test/rostest/alpha_soak.test": "<launch><!-- long --></launch>",
+        "src/beta/package.xml": MANIFEST % "beta",
+        "src/beta/test/unit/test_beta.py": "",
+        "src/copy/CATKIN_IGNORE": "",
+        "src/copy/alpha/package.xml": MANIFEST % "alpha",
+        "src/copy/alpha/test/unit/test_copy.py": "",
+        "tests/package.xml": MANIFEST % "workspace_tests",
+        "tests/unit/test_whole.py": "",
+        "tests/rostest/whole.test": "<launch/>",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def chosen(workspace, *arguments, long=False):
+    selection = select(take_inventory(workspace), list(arguments), long)
+    units = [Path(target).name for target in selection.unit_targets]
+    return selection, units, [test.path.name for test in selection.rostests]
+
+
+def test_everything_runs_without_names(workspace):
+    selection, units, rostest_names = chosen(workspace)
+    assert selection.linters == ["ruff", "catkin_lint"]
+    assert units == ["test_alpha.py", "test_beta.py", "test_whole.py"]
+    assert rostest_names == ["alpha.test", "whole.test"]
+
+
+def test_long_brings_in_long_rostests(workspace):
+    assert "alpha_soak.test" in chosen(workspace, long=True)[2]
+
+
+@pytest.mark.parametrize(
+    ("name", "units", "rostest_names"),
+    [
+        ("alpha", ["test_alpha.py"], ["alpha.test"]),  # a package, though a test file is called so too
+        ("beta", ["test_beta.py"], []),
+        ("workspace_tests", ["test_whole.py"], ["whole.test"]),
+        ("test_alpha", ["test_alpha.py"], []),
+        ("test_alpha.py::test_one", ["test_alpha.py::test_one"], []),
+        ("whole.test", [], ["whole.test"]),
+        ("alpha_soak", [], ["alpha_soak.test"]),
+    ],
+)
+def test_names_select(workspace, name, units, rostest_names):
+    selection, found_units, found_rostests = chosen(workspace, name)
+    assert (found_units, found_rostests, selection.linters) == (units, rostest_names, [])
+
+
+def test_what_is_named_twice_runs_once(workspace):
+    assert chosen(workspace, "alpha", "test_alpha", "alpha.test")[1:] == (["test_alpha.py"], ["alpha.test"])
+
+
+def test_path_selects(workspace):
+    path = workspace / "src/beta/test/unit/test_beta.py"
+    assert chosen(workspace, str(path))[1:] == (["test_beta.py"], [])
+
+
+def test_pytest_arguments_run_the_unit_layer_alone(workspace):
+    selection, units, rostest_names = chosen(workspace, "-k", "alpha", "-x")
+    assert (selection.pytest_arguments, len(units), rostest_names) == (["-k", "alpha", "-x"], 3, [])
+
+
+def test_unknown_name_lists_the_packages(workspace):
+    with pytest.raises(SelectionError, match="gamma.*alpha, beta, workspace_tests"):
+        chosen(workspace, "gamma")
+
+
+@pytest.mark.parametrize(
+    ("files", "passed", "failed"),
+    [
+        ({"rostest-x.xml": RAN, "T.xml": PASSING}, 2, 0),
+        ({"rostest-x.xml": RAN, "T.xml": FAILING}, 0, 1),
+        ({"rostest-x.xml": CRASHED}, 0, 1),
+        ({"rostest-x.xml": RAN}, 0, 1),  # the test node ran to its end and tested nothing
+        ({}, 0, 1),
+        ({"rostest-x.xml": RAN, "T.xml": "<testsuite"}, 0, 1),  # its writer died half-way
+    ],
+    ids=["passes", "fails", "crashes", "tests nothing", "no results", "cut off"],
+)
+def test_rostest_results_are_counted(tmp_path, files, passed, failed):
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    tally = read_rostest_results(tmp_path)
+    assert (tally.passed, tally.failed, len(tally.details)) == (passed, failed, failed)
+
+
+def test_failure_text_is_kept(tmp_path):
+    (tmp_path / "a.xml").write_text(FAILING)
+    assert "1 is not 2" in read_junit(tmp_path / "a.xml").details[0]
+
+
+def test_processes_left_behind_are_found_and_ended():
+    child = subprocess.Popen(["sleep", "60"], env={**os.environ, processes.MARKER: "unit-test"}, start_new_session=True)
+    try:
+        assert list(processes.wait_until_gone("unit-test", 0.2)) == [child.pid]
+        processes.kill_all("unit-test")
+        assert child.wait(5) != 0
+        assert processes.wait_until_gone("unit-test", 5.0) == {}
+    finally:
+        child.kill()
+        child.wait()
+
+
+FAKE_ROSTEST = """#!/bin/bash
+# Plays one of rostest's fates; the .test file's name says which.
+case $1 in
+    *leaves.test) setsid sleep 60 & ;;
+    *hangs.test) sleep 60 ;;
+    *dies.test) exit 1 ;;
+esac
+echo "<testsuite><testcase name='a' classname='T'/></testsuite>" >$ROS_TEST_RESULTS_DIR/T.xml
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "passed", "failed", "detail"),
+    [
+        ("works", 1, 0, None),
+        ("leaves", 1, 1, "left processes behind"),
+        ("hangs", 0, 1, "not finished after"),
+        ("dies", 0, 1, "no test"),
+    ],
+)
+def test_every_fate_of_a_rostest_is_counted(tmp_path, monkeypatch, name, passed, failed, detail):
+    fake = tmp_path / "bin" / "rostest"
+    fake.parent.mkdir()
+    fake.write_text(FAKE_ROSTEST)
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{fake.parent}:{os.environ['PATH']}")
+    monkeypatch.setattr(rostests, "LEFTOVER_GRACE_S", 0.2)
+    test = Rostest(tmp_path / f"{name}.test", "alpha", False)
+    tally = rostests.run(test, tmp_path / "work", time_limit_s=1.0)
+    assert (tally.passed, tally.failed) == (passed, failed)
+    assert detail is None or detail in tally.details[0]
+
+
+def test_comma_locale_is_in_force(tmp_path):
+    environment = comma_locale.environment(tmp_path)
+    program = "import locale; locale.setlocale(locale.LC_ALL, ''); print(locale.format_string('%.1f', 0.5))"
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "0,5\n"

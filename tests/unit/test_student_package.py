@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A student's own package as the lab sheet makes it, in a shell that was open before the package was there.
+
+Runs in a scratch workspace that holds a copy of lab_environment and uses this workspace's virtual environment.
+"""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.build
+
+NODE = """#!/usr/bin/env python
+import sys
+import pybullet
+import rospy
+print("node on", sys.prefix)
+"""
+TEST_NODE = """#!/usr/bin/env python3
+import sys, unittest
+import rostest
+
+class WhichPython(unittest.TestCase):
+    def test_prefix(self):
+        self.assertTrue(sys.prefix.endswith(".venv"), sys.prefix)
+
+rostest.rosrun("foo", "which_python", WhichPython)
+"""
+LAUNCH = '<launch><test test-name="which_python" pkg="foo" type="which_python.py"/></launch>'
+
+
+def run(script, cwd, shell="bash", **variables):
+    """Run a script in a fresh shell whose PATH starts with another Python, as pyenv's and conda's users have it."""
+    decoy = cwd / "decoy"
+    decoy.mkdir(exist_ok=True)
+    for name in ("python", "python3"):
+        (decoy / name).write_text("#!/bin/sh\necho the wrong python >&2; exit 9\n")
+        (decoy / name).chmod(0o755)
+    environment = {"PATH": f"{decoy}:/usr/bin:/bin", "HOME": str(cwd), "LANG": "C.UTF-8", **variables}
+    done = subprocess.run(
+        [shell, "-c", script], cwd=cwd, env=environment, capture_output=True, text=True, stdin=subprocess.DEVNULL
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("student")
+    shutil.copytree(ROOT / "src/compat/lab_environment", folder / "src/compat/lab_environment")
+    (folder / ".venv").symlink_to(ROOT / ".venv")
+    configure = f"catkin_make -DPYTHON_EXECUTABLE={folder}/.venv/bin/python3"
+    session = f"""
+        set -e
+        {configure} >first_build.txt 2>&1 || {{ cat first_build.txt; exit 1; }}
+        source devel/setup.bash
+        cd src
+        catkin_create_pkg foo rospy
+        mkdir -p foo/scripts foo/test
+        cat >foo/scripts/node.py <<'END'\n{NODE}END
+        cat >foo/test/which_python.py <<'END'\n{TEST_NODE}END
+        echo '{LAUNCH}' >foo/test/which_python.test
+        chmod +x foo/scripts/node.py foo/test/which_python.py
+        cd ..
+        catkin_make
+        rosrun foo node.py >node.txt
+        (rostest foo which_python.test || echo "exit code $?") >rostest.txt 2>&1
+    """
+    run(session, folder, ROS_TEST_RESULTS_DIR=str(folder / "results"), ROS_LOG_DIR=str(folder / "log"))
+    return folder
+
+
+def test_new_package_runs_in_the_open_shell(workspace):
+    assert (workspace / "node.txt").read_text() == f"node on {workspace}/.venv\n"
+
+
+def test_rostest_runs_on_its_own_under_our_python(workspace):
+    output = (workspace / "rostest.txt").read_text()
+    assert "exit code" not in output, output
+    assert "* TESTS: 1" in output and "* FAILURES: 0" in output, output
+
+
+@pytest.mark.parametrize("shell", ["bash", "sh", "zsh"])
+def test_setup_file_is_sufficient_and_idempotent(workspace, shell):
+    if shutil.which(shell) is None:
+        pytest.skip(f"{shell} is not installed")
+    setup = f"{workspace}/devel/setup.{shell}"
+    variables = 'echo "$PATH|$ROS_MASTER_URI|$ROS_HOSTNAME|$(command -v python)"'
+    once, twice = run(f". {setup} && {variables} && . {setup} && {variables}", workspace, shell).splitlines()
+    path, master, hostname, python = once.split("|")
+    assert once == twice
+    assert path.split(":")[0] == f"{workspace}/.venv/bin" and path.count("/.venv/bin") == 1
+    assert (master, hostname) == ("http://localhost:11311", "localhost")
+    assert python == f"{workspace}/.venv/bin/python"
+
+
+def test_hook_keeps_what_the_user_set(workspace):
+    script = '. devel/setup.sh && echo "$ROS_MASTER_URI|${ROS_HOSTNAME-unset}|${ROS_IP-unset}"'
+    robot = run(script, workspace, "sh", ROS_MASTER_URI="http://baxter.local:11311", ROS_IP="10.42.0.1")
+    assert robot == "http://baxter.local:11311|unset|10.42.0.1\n"
+    assert run(script, workspace, "sh", ROS_HOSTNAME="desk.local") == "http://localhost:11311|desk.local|unset\n"
+
+
+def test_bash_has_the_rosbash_functions(workspace):
+    script = "source devel/setup.bash && roscd foo && pwd && complete -p rosrun"
+    assert run(script, workspace).startswith(f"{workspace}/src/foo\n")
+
+
+def test_install_space_works_too(workspace):
+    run("source devel/setup.bash && catkin_make install", workspace)
+    imports = "python3 -c 'import rospy, pybullet'"
+    script = f"source install/setup.bash && command -v python3 && {imports} && rospack find foo"
+    python, package = run(script, workspace).splitlines()[-2:]
+    assert python == f"{workspace}/.venv/bin/python3"
+    assert package == f"{workspace}/install/share/foo"
