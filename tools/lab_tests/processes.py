@@ -27,17 +27,25 @@ def marked(value: str) -> dict[int, str]:
 
 
 def wait_until_gone(value: str, timeout_s: float) -> dict[int, str]:
-    """What is still alive after at most timeout_s."""
+    """What is still alive after at most timeout_s.
+
+    Gone means not found twice in a row: a process shows no environment for the moment in which it becomes another
+    program, and a list of processes may miss one that was born meanwhile.
+    """
     deadline = time.monotonic() + timeout_s
-    while (alive := marked(value)) and time.monotonic() < deadline:
+    was_gone = False
+    while True:
+        alive = marked(value)
+        if (not alive and was_gone) or (alive and time.monotonic() >= deadline):
+            return alive
+        was_gone = not alive
         time.sleep(0.05)
-    return alive
 
 
 def kill_all(value: str):
     """End every marked process, and what it starts meanwhile."""
     for _ in range(5):
-        alive = marked(value)
+        alive = wait_until_gone(value, 0.0)
         if not alive:
             return
         for pid in alive:

@@ -104,9 +104,15 @@ class Robot:
         wait_for(lambda: self.state.enabled == on, "enabled is %s" % on, 5.0)
 
     def restart(self):
-        """From any state to enabled, with the defaults of both limbs."""
-        self.super_reset.publish()
-        wait_for(lambda: not (self.state.enabled or self.state.stopped), "reset", 5.0)
+        """From any state to enabled, with the defaults of both limbs.
+
+        Each step waits for the robot to show it: two topics are two connections, and the later message may overtake.
+        """
+        if self.state.stopped or self.state.error:
+            self.super_reset.publish()
+            wait_for(lambda: not (self.state.stopped or self.state.error), "reset", 5.0)
+        elif self.state.enabled:
+            self.set_enabled(False)
         for side in SIDES:
             self.timeouts[side].publish(0.2)
             self.ratios[side].publish(1.0)
