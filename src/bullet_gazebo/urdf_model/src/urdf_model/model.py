@@ -126,7 +126,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class TransmissionJoint:
-    name: str
+    name: str  # empty where the description has none
     hardware_interfaces: tuple[str, ...]
 
 
@@ -135,7 +135,7 @@ class Transmission:
     name: str
     type: str
     joints: tuple[TransmissionJoint, ...]
-    reductions: tuple[float, ...]  # mechanicalReduction of each actuator
+    reductions: tuple[float, ...]  # mechanicalReduction of each actuator; 1 where there is none or no number
     actuators: tuple[str, ...]
 
 

@@ -284,16 +284,15 @@ class _Reader:
         kind = (element.findtext("type") or element.get("type") or "").strip()
         found = []
         for joint in element.iterchildren("joint"):
-            joint_name = self.name(joint)
-            if joint_name not in joints:
+            joint_name = joint.get("name", "")
+            if joint_name and joint_name not in joints:
                 self.warn(joint, "transmission '%s' names joint '%s', which does not exist" % (name, joint_name))
             interfaces = tuple((e.text or "").strip() for e in joint.iterchildren("hardwareInterface"))
             found.append(TransmissionJoint(joint_name, interfaces))
         reductions, actuators = [], []
         for actuator in element.iterchildren("actuator"):
             actuators.append(actuator.get("name", ""))
-            text = actuator.findtext("mechanicalReduction")
-            reductions.append(1.0 if text is None else self.parse_float(text, actuator, "mechanicalReduction"))
+            reductions.append(_reduction(actuator.findtext("mechanicalReduction")))
         return Transmission(name, kind, tuple(found), tuple(reductions), tuple(actuators))
 
     def gazebo_reference(self, element, link):
@@ -395,3 +394,12 @@ class _Reader:
         if not math.isfinite(value):
             raise self.error(element, "%s='%s' is not finite" % (key, text))
         return value
+
+
+def _reduction(text):
+    # No fault of a transmission makes a body: whoever drives joints by it says what is wrong (controller_manager).
+    try:
+        number = float(text)
+    except (TypeError, ValueError):
+        return 1.0
+    return number if math.isfinite(number) else 1.0

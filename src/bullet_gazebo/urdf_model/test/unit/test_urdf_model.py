@@ -190,6 +190,17 @@ def test_what_can_be_mended_is_a_warning(xml, message):
     assert any(message in warning for warning in parse_urdf(xml).warnings)
 
 
+@pytest.mark.parametrize("text", ["fifty", "", "nan", "2,5"])
+def test_a_reduction_that_is_no_number_leaves_the_robot_alone(text):
+    robot = parse_urdf(edit("<mechanicalReduction>50<", "<mechanicalReduction>%s<" % text))
+    assert robot.transmissions[0].reductions == (1.0,) and robot.warnings == []
+
+
+def test_a_transmission_whose_joint_has_no_name_leaves_the_robot_alone():
+    robot = parse_urdf(edit('<joint name="shoulder"><hard', "<joint><hard"))
+    assert robot.transmissions[0].joints[0].name == "" and robot.warnings == []
+
+
 angles = st.floats(-math.pi, math.pi)
 
 

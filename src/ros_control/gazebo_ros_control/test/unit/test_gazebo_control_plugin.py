@@ -186,5 +186,19 @@ def test_a_description_without_hardware_is_one_error(simulate, found, other, tex
     assert "model 'arm' has no controllers" in simulator.log.of("error")[0] and text in simulator.log.of("error")[0]
 
 
+@pytest.mark.parametrize(("found", "other", "text"), [
+    ('<actuator name="m"/>', '<actuator name="m"><mechanicalReduction>ten</mechanicalReduction></actuator>',
+     "transmission 't' (line 5): mechanicalReduction is 'ten', expected a number"),
+    ("</robot>", """<transmission name="u"><type>transmission_interface/SimpleTransmission</type><joint>
+  <hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint><actuator name="m"/>
+</transmission></robot>""", "transmission 'u' (line 7) is left out: it lacks a <joint> with a name")])
+def test_a_faulty_transmission_is_one_line_and_the_robot_lives(simulate, found, other, text):
+    simulator = simulate(urdf=(URDF % 2).replace(found, other))
+    assert len(simulator.log.lines) == 1 and text in simulator.log.of("warn")[0]
+    simulator.start().target = 0.5
+    simulator.run(300)
+    assert simulator.model.read_joints()[0][0] == pytest.approx(0.5, abs=1e-4)
+
+
 def test_slashes_in_types_survive_the_parameter_server():
     assert _flat({"a": {"B": "m:C", "d": {"E": "n:F"}}, "g": "h:I"}) == {"a/B": "m:C", "a/d/E": "n:F", "g": "h:I"}
