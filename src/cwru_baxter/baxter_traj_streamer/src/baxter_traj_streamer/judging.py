@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from joint_trajectory import Trajectory
+from joint_trajectory import Trajectory, smooth_velocities
 from joint_trajectory.segment import CUBIC, LINEAR, QUINTIC, constant, splines
 
 from .errors import GoalRefused
@@ -179,20 +179,6 @@ def _degree(point):
     if not len(point[2]):
         return LINEAR
     return QUINTIC if len(point[3]) else CUBIC
-
-
-def smooth_velocities(times, positions):
-    """Velocities (m, k) with which cubics through ``positions`` (m, k) do not overshoot; 0 at both ends.
-
-    At a turning point 0, else the harmonic mean of the slopes beside it (F. N. Fritsch, J. Butland 1984).
-    """
-    slopes = np.diff(positions, axis=0) / np.diff(times)[:, None]
-    before, after = slopes[:-1], slopes[1:]
-    product = before * after
-    total = before + after
-    velocities = np.zeros_like(positions)
-    np.divide(2.0 * product, total, out=velocities[1:-1], where=product > 0.0)
-    return velocities
 
 
 def _judge_curve(trajectory, names, bounds, first_point):

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from baxter_traj_streamer.errors import GoalRefused
-from baxter_traj_streamer.judging import KNOWN_JOINTS, JointLimit, judge, smooth_velocities
+from baxter_traj_streamer.judging import KNOWN_JOINTS, JointLimit, judge
 from baxter_traj_streamer.motion import Motion
 from baxter_traj_streamer.settings import JOINTS, SIDES, Settings, SettingsError, arm_joint_names
 from baxter_traj_streamer.timing import arrival_times, transition_time
@@ -217,11 +217,6 @@ def test_velocities_of_points_are_used():
     trajectory = plan_for([point(0.0, 0.0, 0.0, velocities=[0.0, 0.0]), point(1.0, 0.3, 0.0, velocities=[0.4, 0.0]),
                            point(2.0, 0.5, 0.0, velocities=[0.0, 0.0])]).trajectory
     assert trajectory.sample(1.0)[1] == pytest.approx([0.4, 0.0])
-
-
-def test_smooth_velocities_do_not_divide_by_zero():
-    positions = np.array([[0.0, 1.0], [0.0, 0.0], [0.0, 1.0], [0.0, 2.0]])
-    assert smooth_velocities(np.arange(4.0), positions).tolist() == [[0, 0], [0, 0], [0, 1], [0, 0]]
 
 
 def test_the_way_begins_where_the_robot_is():

@@ -4,9 +4,13 @@ from .command import Command, joint_indices
 from .errors import (
     AllPointsInPast,
     BeforeTrajectory,
+    BeyondLimit,
+    BeyondPosition,
+    BeyondVelocity,
     JointNamesError,
     MissingJoints,
     NoJointNames,
+    NoPoints,
     NoPositions,
     NotFinite,
     RepeatedJoints,
@@ -17,19 +21,26 @@ from .errors import (
 )
 from .follower import Follower
 from .goal_monitor import GoalMonitor, Outcome, Verdict
+from .limits import Limits
 from .replacement import Replacement, replace
+from .segment import smooth_velocities
 from .tolerances import Tolerances, bounds, merge_tolerances
 from .trajectory import Trajectory, hold, stop
 
 __all__ = [
     "AllPointsInPast",
     "BeforeTrajectory",
+    "BeyondLimit",
+    "BeyondPosition",
+    "BeyondVelocity",
     "Command",
     "Follower",
     "GoalMonitor",
     "JointNamesError",
+    "Limits",
     "MissingJoints",
     "NoJointNames",
+    "NoPoints",
     "NoPositions",
     "NotFinite",
     "Outcome",
@@ -47,5 +58,6 @@ __all__ = [
     "joint_indices",
     "merge_tolerances",
     "replace",
+    "smooth_velocities",
     "stop",
 ]

@@ -43,6 +43,35 @@ class MissingJoints(JointNamesError):
                          % ", ".join(names))
 
 
+class NoPoints(TrajectoryError):
+    """A trajectory without points, where that does not mean anything."""
+
+    def __init__(self):
+        super().__init__("the trajectory has no points; give it at least one, with a time_from_start above 0")
+
+
+class BeyondLimit(TrajectoryError):
+    """``joint`` would go beyond its ``limit`` with ``value``, ``time_s`` [s] after the start of the trajectory."""
+
+    def __init__(self, joint, value, limit, time_s, text):
+        super().__init__("%s would have to %s" % (joint, text % (value, time_s, limit)))
+        self.joint, self.value, self.limit, self.time_s = joint, value, limit, time_s
+
+
+class BeyondPosition(BeyondLimit):
+    """A place [rad or m] that the joint cannot reach."""
+
+    def __init__(self, joint, value, limit, time_s):
+        super().__init__(joint, value, limit, time_s, "be at %f at %.3f s; its limit is %f")
+
+
+class BeyondVelocity(BeyondLimit):
+    """A way that the joint cannot make in the time given [rad/s or m/s]."""
+
+    def __init__(self, joint, value, limit, time_s):
+        super().__init__(joint, value, limit, time_s, "move at %f per s from %.3f s on; its limit is %f per s")
+
+
 class NoPositions(TrajectoryError):
     """A point without positions."""
 

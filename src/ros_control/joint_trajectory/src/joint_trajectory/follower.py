@@ -27,9 +27,11 @@ class Follower:
         What was passed with the command that is being watched.
     """
 
-    def __init__(self, joint_names, continuous=None, stop_duration_s=0.0, allow_partial=False):
+    def __init__(self, joint_names, continuous=None, stop_duration_s=0.0, allow_partial=False, smooth=False,
+                 limits=None):
         """``continuous`` (n,) bool: joints that turn without end; ``stop_duration_s`` [s]: how long a stop may take,
-        0: stand at once where the joints are; ``allow_partial``: commands need not name all joints.
+        0: stand at once where the joints are; ``allow_partial``: commands need not name all joints; ``smooth``: see
+        :func:`.replace`; ``limits`` (:class:`Limits`): what goes beyond them is refused.
 
         Nothing may be asked of it before :meth:`start`.
         """
@@ -38,6 +40,8 @@ class Follower:
         self._continuous = np.zeros(count, dtype=bool) if continuous is None else np.asarray(continuous, dtype=bool)
         self._stop_duration_s = stop_duration_s
         self._allow_partial = allow_partial
+        self._smooth = smooth
+        self._limits = limits
         self.trajectory = None
         self.desired = np.zeros((3, count))
         self.error = np.zeros((3, count))
@@ -68,7 +72,11 @@ class Follower:
         if not len(command.times):
             self.stop(now, position, goal)
             return None
-        replacement = replace(self.trajectory, command, now, self.joint_names, self._continuous, self._allow_partial)
+        replacement = replace(self.trajectory, command, now, self.joint_names, self._continuous, self._allow_partial,
+                              self._smooth)
+        if self._limits is not None:
+            self._limits.check(replacement.trajectory, float(replacement.begins.min()),
+                               float(replacement.begins.max()))
         self.trajectory = replacement.trajectory
         self._watch(goal, tolerances, replacement.begins)
         return replacement

@@ -7,7 +7,7 @@ import numpy as np
 
 from .command import joint_indices
 from .errors import AllPointsInPast
-from .segment import QUINTIC, constant, shifted, splines
+from .segment import CUBIC, LINEAR, QUINTIC, constant, shifted, smooth_velocities, splines
 from .trajectory import Trajectory
 
 # How close to half a turn two ways round count as equally short [rad].
@@ -24,7 +24,7 @@ class Replacement(NamedTuple):
     late_s: float
 
 
-def replace(current, command, now, joint_names, continuous, allow_partial=False):
+def replace(current, command, now, joint_names, continuous, allow_partial=False, smooth=False):
     """Follow ``current`` until ``command`` begins, then the command: a :class:`Replacement`.
 
     ``current``: :class:`Trajectory` of ``joint_names``; ``command``: :class:`Command` with points; ``now`` [s]: the
@@ -35,16 +35,20 @@ def replace(current, command, now, joint_names, continuous, allow_partial=False)
     or ``now``, whichever is later, to the first point that is left. Continuous joints take the shorter way round: all
     their points are shifted by whole turns. Joints that the command does not name stay on their current trajectory.
 
+    ``smooth``: for joints that must not be jerked. Points without velocities get some, so that the curve has no kinks
+    and does not overshoot; the last point is one of rest, whatever it says; and a point due at the very start of the
+    command is taken for the place where the joints are then.
+
     Raises :class:`JointNamesError` and :class:`AllPointsInPast`.
     """
     named = joint_indices(command.joint_names, joint_names, allow_partial)
     start = now if command.start_time is None else command.start_time
     times = start + command.times
-    dropped = int(np.searchsorted(times, now, side="right"))
+    bridge_start = max(start, now)
+    dropped = int(np.searchsorted(times, bridge_start if smooth else now, side="right"))
     if dropped == len(times):
         raise AllPointsInPast(dropped, now - times[-1])
 
-    bridge_start = max(start, now)
     from_state = current.sample(bridge_start)[:, named]
     positions = command.positions[dropped:].copy()
     for column in np.flatnonzero(continuous[named]):
@@ -58,15 +62,26 @@ def replace(current, command, now, joint_names, continuous, allow_partial=False)
         positions = np.concatenate([from_state[:1], positions])
         velocities = np.concatenate([from_state[1:2], velocities])
         accelerations = np.concatenate([from_state[2:], accelerations])
+    if smooth:
+        velocities, accelerations, degrees = _smoothed(times, positions, velocities, accelerations, degrees)
     coefficients = np.concatenate([splines(times, positions, velocities, accelerations, degrees),
                                    constant(positions[-1])[None]])
 
-    late_s = now - (start + command.times[0]) if dropped else 0.0
+    late_s = max(now - (start + command.times[0]), 0.0) if dropped else 0.0
     begins = np.full(len(joint_names), now, dtype=float)
     begins[named] = bridge_start
     end_times = current.end_times.copy()
     end_times[named] = times[-1]
     return Replacement(_merged(current, now, times, coefficients, named, end_times), begins, dropped, late_s)
+
+
+def _smoothed(times, positions, velocities, accelerations, degrees):
+    """Velocities for the points that have none, and rest at the last one."""
+    velocities = np.where((degrees == LINEAR)[:, None], smooth_velocities(times, positions), velocities)
+    velocities[-1] = 0.0
+    accelerations = accelerations.copy()
+    accelerations[-1] = 0.0
+    return velocities, accelerations, np.maximum(degrees, CUBIC)
 
 
 def whole_turns(position, target):

@@ -50,6 +50,19 @@ def splines(times, positions, velocities, accelerations, degrees):
     return coefficients
 
 
+def smooth_velocities(times, positions):
+    """Velocities (m, k) with which cubics through ``positions`` (m, k) do not overshoot; 0 at both ends.
+
+    At a turning point 0, else the harmonic mean of the slopes beside it (F. N. Fritsch, J. Butland 1984).
+    """
+    slopes = np.diff(positions, axis=0) / np.diff(times)[:, None]
+    before, after = slopes[:-1], slopes[1:]
+    product = before * after
+    velocities = np.zeros_like(positions)
+    np.divide(2.0 * product, before + after, out=velocities[1:-1], where=product > 0.0)
+    return velocities
+
+
 def constant(position):
     """The polynomial (6, k) that stays at ``position`` (k,)."""
     coefficients = np.zeros((6, len(position)))

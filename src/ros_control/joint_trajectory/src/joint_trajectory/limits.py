@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where joints can go, and how fast."""
+import numpy as np
+
+from .errors import BeyondPosition, BeyondVelocity
+
+# Where the curve between two points is compared with the limits: shares of the time between them.
+_PLACES = np.linspace(0.0, 1.0, 9)
+
+
+class Limits:
+    """Bounds of n joints: ``lower``, ``upper`` (n,) [rad or m], ``velocity`` (n,) [per s]; inf where there is none.
+
+    ``slack`` [rad or m] is how far beyond a position limit a trajectory may lead, and by how much a joint may lag
+    behind when the way between two points is too fast for it. Positions that were measured need some: joints rest a
+    little beyond their limits, and readings that were recorded at one rate and played back at another go in steps.
+    """
+
+    def __init__(self, joint_names, lower, upper, velocity, slack=0.0):
+        self._joint_names = list(joint_names)
+        self._lower, self._upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+        self._velocity = np.asarray(velocity, dtype=float)
+        self._slack = slack
+
+    def check(self, trajectory, begin_s, zero_s):
+        """Look at a :class:`Trajectory` from ``begin_s`` [s] on; errors count their times from ``zero_s`` [s].
+
+        A joint that is beyond its limit to begin with may stay so, but go no farther.
+        Raises :class:`BeyondPosition`, :class:`BeyondVelocity`.
+        """
+        first = max(int(np.searchsorted(trajectory.starts, begin_s, side="right")) - 1, 0)
+        begins = np.maximum(trajectory.starts[first:-1], begin_s)
+        duration = trajectory.starts[first + 1:] - begins
+        # Piece, place, joint.
+        s = (begins - trajectory.starts[first:-1])[:, None] + duration[:, None] * _PLACES
+        position = np.einsum("mpi,mik->mpk", s[:, :, None] ** np.arange(6), trajectory.coefficients[first:-1])
+        if not len(position):
+            return
+        lower = np.minimum(self._lower, position[0, 0]) - self._slack
+        upper = np.maximum(self._upper, position[0, 0]) + self._slack
+        beyond = np.argwhere((position < lower) | (position > upper))
+        if len(beyond):
+            piece, place, joint = beyond[0]
+            value = float(position[piece, place, joint])
+            bound = self._lower if value < self._lower[joint] else self._upper
+            raise BeyondPosition(self._joint_names[joint], value, float(bound[joint]),
+                                 float(begins[piece] + duration[piece] * _PLACES[place] - zero_s))
+        distance = np.abs(position[:, -1] - position[:, 0])
+        fast = np.argwhere(distance > self._velocity * duration[:, None] + self._slack)
+        if len(fast):
+            piece, joint = fast[0]
+            raise BeyondVelocity(self._joint_names[joint], float(distance[piece, joint] / duration[piece]),
+                                 float(self._velocity[joint]), float(begins[piece] - zero_s))
