@@ -30,10 +30,11 @@ _DEFAULT_DAMPING = 1.0
 _RIGID_N_PER_M = 1e8
 
 
-def build(client, merged, pose, static, shapes, warn):
+def build(client, merged, pose, static, shapes, warn, mesh_cuts=None):
     """Create the multibody of ``merged`` (urdf_model.MergedRobot) with its root body at ``pose``.
 
-    Returns (body id, inertial offset (4, 4) of the root link). ``static`` fixes the root in the world.
+    Returns (body id, inertial offset (4, 4) of the root link). ``static`` fixes the root in the world;
+    ``mesh_cuts``: as for ``World.spawn``.
     """
     root = merged.links[merged.root]
     body_of = {joint.child: joint for joint in merged.joints.values()}
@@ -51,7 +52,7 @@ def build(client, merged, pose, static, shapes, warn):
         mass, principal, offset = _inertial(link, warn)
         moments.append(principal)
         columns["linkMasses"].append(mass)
-        columns["linkCollisionShapeIndices"].append(shapes.compound(link.collisions, concave=False))
+        columns["linkCollisionShapeIndices"].append(shapes.compound(link.collisions, False, mesh_cuts))
         columns["linkVisualShapeIndices"].append(NO_SHAPE)
         columns["linkPositions"].append(joint.origin[:3, 3].tolist())
         columns["linkOrientations"].append(quaternion_from_matrix(joint.origin).tolist())
@@ -64,7 +65,7 @@ def build(client, merged, pose, static, shapes, warn):
     start = Pose.from_matrix(pose.matrix())
     body = pybullet.createMultiBody(
         baseMass=root_mass,
-        baseCollisionShapeIndex=shapes.compound(root.collisions, concave=static),
+        baseCollisionShapeIndex=shapes.compound(root.collisions, static, mesh_cuts),
         basePosition=start.position,
         baseOrientation=start.quaternion,
         baseInertialFramePosition=root_offset[:3, 3].tolist(),

@@ -12,6 +12,7 @@ import pybullet
 from urdf_model import Box, Cylinder, Mesh, Plane, Sphere
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
+from .convex_parts import cut
 from .errors import BulletSimError
 
 NO_SHAPE = -1
@@ -28,25 +29,26 @@ class MeshCache:
     def __init__(self, folder=None):
         base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
         self.folder = Path(folder or os.path.join(base, "bullet_sim", "meshes"))
-        self._known = {}  # (path, size, time of change) -> Wavefront file
+        self._known = {}  # (path, size, time of change, planes) -> Wavefront file
 
-    def wavefront(self, path):
+    def wavefront(self, path, planes=()):
         """Return the path of a Wavefront copy of the mesh at ``path``, in metres, z up.
 
+        ``planes``: as for ``convex_parts.cut``; given, the copy holds one object for each part.
         Raises BulletSimError when the mesh cannot be read.
         """
         try:
             status = os.stat(path)
-            key = (str(path), status.st_size, status.st_mtime_ns)
+            key = (str(path), status.st_size, status.st_mtime_ns, planes)
             if key not in self._known or not self._known[key].exists():
-                digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:32]
-                target = self.folder / (digest + ".obj")
-                self._known[key] = target if target.exists() else self._convert(path, target)
+                content = Path(path).read_bytes() + (repr(planes).encode() if planes else b"")
+                target = self.folder / (hashlib.sha256(content).hexdigest()[:32] + ".obj")
+                self._known[key] = target if target.exists() else self._convert(path, target, planes)
         except OSError as error:
             raise BulletSimError("mesh %s cannot be read: %s" % (path, error.strerror)) from None
         return str(self._known[key])
 
-    def _convert(self, path, target):
+    def _convert(self, path, target, planes):
         import trimesh  # 0.1 s to import, and needed only the first time that a mesh is seen
 
         try:
@@ -57,9 +59,12 @@ class MeshCache:
             raise BulletSimError("mesh %s cannot be read: %s" % (path, error)) from None
         if len(mesh.faces) == 0:
             raise BulletSimError("mesh %s holds no triangles" % path)
-        lines = ["o mesh"]
-        lines += ["v %.9g %.9g %.9g" % tuple(vertex) for vertex in mesh.vertices]
-        lines += ["f %d %d %d" % tuple(face) for face in mesh.faces + 1]
+        if planes:
+            lines = _parts_as_wavefront(cut(mesh.triangles, planes))
+        else:
+            lines = ["o mesh"]
+            lines += ["v %.9g %.9g %.9g" % tuple(vertex) for vertex in mesh.vertices]
+            lines += ["f %d %d %d" % tuple(face) for face in mesh.faces + 1]
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError:
@@ -70,6 +75,19 @@ class MeshCache:
             part.write("\n".join(lines) + "\n")
         os.replace(part.name, str(target))
         return target
+
+
+def _parts_as_wavefront(parts):
+    """Return the lines of a file with one object for each list of points; Bullet makes a convex hull of each."""
+    lines, first = [], 1
+    for number, points in enumerate(parts):
+        lines.append("o part%d" % number)
+        lines += ["v %.9g %.9g %.9g" % point for point in points]
+        # Only which points belong together counts for a hull; faces say so, three points at a time.
+        last = first + len(points) - 1
+        lines += ["f %d %d %d" % (i, min(i + 1, last), min(i + 2, last)) for i in range(first, last + 1, 3)]
+        first = last + 1
+    return lines
 
 
 class MeshFiles:
@@ -83,12 +101,15 @@ class MeshFiles:
         """Whether there is such a file, which is all that matters for drawing."""
         return self._find_mesh(mesh.filename) is not None
 
-    def wavefront(self, mesh):
-        """Return the file to collide with; raises BulletSimError when the mesh cannot be found or read."""
+    def wavefront(self, mesh, planes=()):
+        """Return the file to collide with; raises BulletSimError when the mesh cannot be found or read.
+
+        ``planes``: as for MeshCache.
+        """
         path = self._find_mesh(mesh.filename)
         if path is None:
             raise BulletSimError("mesh %s cannot be found" % mesh.filename)
-        return self._cache.wavefront(path)
+        return self._cache.wavefront(path, planes)
 
 
 class ShapeStore:
@@ -99,28 +120,30 @@ class ShapeStore:
         self._mesh_files = mesh_files
         self._shapes = {}
 
-    def compound(self, shapes, concave):
+    def compound(self, shapes, concave, mesh_cuts=None):
         """Return PyBullet's id of the compound of ``shapes`` (urdf_model.Shape), or -1 for none.
 
         ``concave`` keeps meshes as triangles (only for bodies that never move); otherwise they are their convex hull.
+        ``mesh_cuts``: as for ``World.spawn``; such a mesh becomes the convex hulls of its parts in either case.
         Raises BulletSimError for a mesh that cannot be found or read.
         """
         parts = []
         for shape in shapes:
-            geometry, origin, file = shape.geometry, shape.origin, None
+            geometry, origin, file, planes = shape.geometry, shape.origin, None, ()
             if isinstance(geometry, Mesh):
-                file = self._mesh_files.wavefront(geometry)
+                planes = (mesh_cuts or {}).get(shape.link, ())
+                file = self._mesh_files.wavefront(geometry, planes)
             elif isinstance(geometry, Plane) and (len(shapes) > 1 or not np.allclose(origin, np.eye(4), atol=1e-12)):
                 geometry, origin = Box(_SLAB_M), origin @ pose_matrix((0.0, 0.0, -_SLAB_M[2] / 2.0))
-            parts.append((geometry, file, origin))
+            parts.append((geometry, file, origin, concave and not planes))
         if not parts:
             return NO_SHAPE
-        key = (concave,) + tuple((geometry, file, origin.tobytes()) for geometry, file, origin in parts)
+        key = tuple((geometry, file, origin.tobytes(), hollow) for geometry, file, origin, hollow in parts)
         if key not in self._shapes:
-            self._shapes[key] = self._create(parts, concave)
+            self._shapes[key] = self._create(parts)
         return self._shapes[key]
 
-    def _create(self, parts, concave):
+    def _create(self, parts):
         if isinstance(parts[0][0], Plane):
             return pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
         columns = {
@@ -134,14 +157,14 @@ class ShapeStore:
             "collisionFramePositions": [],
             "collisionFrameOrientations": [],
         }
-        for geometry, file, origin in parts:
+        for geometry, file, origin, hollow in parts:
             columns["shapeTypes"].append(_SHAPE_TYPES[type(geometry)])
             columns["halfExtents"].append([side / 2.0 for side in getattr(geometry, "size", (0.0, 0.0, 0.0))])
             columns["radii"].append(getattr(geometry, "radius", 0.0))
             columns["lengths"].append(getattr(geometry, "length", 0.0))
             columns["fileNames"].append(file or "")
             columns["meshScales"].append(list(getattr(geometry, "scale", (1.0, 1.0, 1.0))))
-            columns["flags"].append(pybullet.GEOM_FORCE_CONCAVE_TRIMESH if concave and file else 0)
+            columns["flags"].append(pybullet.GEOM_FORCE_CONCAVE_TRIMESH if hollow and file else 0)
             columns["collisionFramePositions"].append(origin[:3, 3].tolist())
             columns["collisionFrameOrientations"].append(quaternion_from_matrix(origin).tolist())
         shape = pybullet.createCollisionShapeArray(**columns, physicsClientId=self._client)

@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pybullet
 
-from urdf_model import Link, Plane, Robot, Shape, merge_fixed
+from urdf_model import Link, Mesh, Plane, Robot, Shape, merge_fixed
 
 from .builder import build
 from .errors import BulletSimError
@@ -20,6 +20,11 @@ def plain_path(uri):
     """Return the file that ``uri`` (a path or file://…) names, or None: for a world without packages."""
     path = uri[len("file://") :] if uri.startswith("file://") else uri
     return path if os.path.isfile(path) else None
+
+
+def _has_mesh(link):
+    """Whether a link is missing altogether, or has a mesh to collide with."""
+    return link is None or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)
 
 
 class World:
@@ -100,12 +105,16 @@ class World:
         for model in self.models.values():
             model.wake()
 
-    def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=()):
+    def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=(), mesh_cuts=None):
         """Put ``robot`` (urdf_model.Robot) into the world as ``name``, its frame at ``pose``; return its Model.
 
         The frame of a robot from a URDF is that of its root link. What stands in for meshes that are missing is told
         to ``warn``.
         ``static`` fixes the root; by default only a robot whose root link is called "world" is fixed, as in Gazebo.
+        ``self_collision_pairs``: as for ``Model.set_self_collision_pairs``.
+        ``mesh_cuts``: {link: planes}, as for ``convex_parts.cut``, in the mesh's axes [m], has the collision meshes of
+        those links cut and stood in for by the convex hulls of the parts. Where such a mesh is missing, the pairs of
+        its body are left out: what stands in for it is too rough to fold an arm around.
         Raises BulletSimError when the name is taken or empty or the pose is not finite.
         """
         if not name:
@@ -119,11 +128,20 @@ class World:
             self._warn("model '%s': %s" % (name, mended))
         merged = merge_fixed(robot)
         body, root_offset = build(
-            self._client, merged, pose, static, self._shapes, lambda text: self._warn("model '%s': %s" % (name, text))
+            self._client,
+            merged,
+            pose,
+            static,
+            self._shapes,
+            lambda text: self._warn("model '%s': %s" % (name, text)),
+            mesh_cuts,
         )
         model = Model(self._client, name, robot, merged, body, root_offset, static, self)
         if self_collision_pairs:
-            model.set_self_collision_pairs(self_collision_pairs)
+            rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
+            model.set_self_collision_pairs(
+                [pair for pair in self_collision_pairs if all(merged.frames[link].link not in rough for link in pair)]
+            )
         self.models[name] = model
         return model
 

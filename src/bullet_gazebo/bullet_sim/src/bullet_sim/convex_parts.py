@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A mesh cut along planes into parts whose convex hulls, together, are a better stand-in for it than one hull.
+
+Bullet collides convex shapes quickly and robustly, but not moving or thin-walled triangle meshes. Where a shape is
+hollow is known to who knows the robot; so the planes are given, nothing is searched for.
+"""
+
+AXES = "xyz"
+
+
+def cut(triangles, planes):
+    """Return the parts of a mesh as lists of points (x, y, z), parts without points left out.
+
+    triangles: sequence of (3, 3) corners; planes: sequence of (axis "x", "y" or "z", offset), each cutting all of the
+    mesh, or of (axis, offset, low, high), which cut only those parts that lie between low and high along z. A triangle
+    that crosses a plane is cut there, so that the hulls of neighbours meet in the plane.
+    """
+    parts = [[[tuple(map(float, corner)) for corner in triangle] for triangle in triangles]]
+    for axis, offset, *limits in planes:
+        halves = []
+        for polygons in parts:
+            if limits and not _lies_between(polygons, *limits):
+                halves.append(polygons)
+                continue
+            for sign in (1.0, -1.0):
+                kept = [_clip(polygon, AXES.index(axis), offset, sign) for polygon in polygons]
+                halves.append([polygon for polygon in kept if polygon])
+        parts = halves
+    return [sorted({point for polygon in polygons for point in polygon}) for polygons in parts if polygons]
+
+
+def _lies_between(polygons, low, high):
+    heights = [point[2] for polygon in polygons for point in polygon]
+    return all(low <= height <= high for height in heights)
+
+
+def _clip(polygon, axis, offset, sign):
+    """Return what of a convex polygon lies on one side of a plane; empty where that is no more than an edge.
+
+    A polygon in the plane itself belongs to neither side: it would give the hull of the side that is hollow a lid.
+    """
+    heights = [sign * (point[axis] - offset) for point in polygon]
+    if max(heights) <= 0.0:
+        return []
+    if min(heights) >= 0.0:
+        return polygon
+    kept = []
+    for i, (point, height) in enumerate(zip(polygon, heights, strict=True)):
+        before, height_before = polygon[i - 1], heights[i - 1]
+        if (height < 0.0) != (height_before < 0.0):
+            share = height_before / (height_before - height)
+            crossing = [a + share * (b - a) for a, b in zip(before, point, strict=True)]
+            crossing[axis] = offset
+            kept.append(tuple(crossing))
+        if height >= 0.0:
+            kept.append(point)
+    return kept
