@@ -16,6 +16,7 @@ from baxter_sim_hardware.panel_topics import PanelTopics
 from baxter_sim_hardware.robot import Baxter
 from baxter_sim_hardware.robot_state import Event
 from baxter_sim_hardware.schedule import Schedule
+from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
@@ -29,7 +30,8 @@ class BaxterPlugin(ModelPlugin):
 
     @classmethod
     def spawn_options(cls, robot, element):
-        return {"static": True}  # the pedestal stands on the floor and stays there
+        # The pedestal stands on the floor and stays there.
+        return {"static": True, "self_collision_pairs": self_collision_pairs(robot.links), "mesh_cuts": MESH_CUTS}
 
     def __init__(self, context):
         super().__init__(context)

@@ -14,6 +14,7 @@ import xacro
 from baxter_sim_hardware import JOINT_SUFFIXES, Poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
+from gazebo_ros.resources import ResourceFinder
 from urdf_model import parse_urdf
 
 PACKAGE = Path(__file__).resolve().parents[2]
@@ -55,8 +56,9 @@ class _Log:
 class Lab:
     """A world with Baxter in it. Arrays over the 14 arm joints are in the order of NAMES."""
 
-    def __init__(self, robot, pose="neutral", parameters=None, angles=None):
-        self.world = World(time_step_s=TICK_S)
+    def __init__(self, robot, pose="neutral", parameters=None, angles=None, meshes=False):
+        """meshes: whether the body collides as it looks; without, it is passed through, which loads faster."""
+        self.world = World(time_step_s=TICK_S, **({"find_mesh": ResourceFinder()} if meshes else {}))
         self.robot, self.urdf_xml, self.namespace = robot, "", "/robot"
         self.element = ElementTree.fromstring("<plugin/>")
         self.model = self.world.spawn(robot, "baxter", Pose((0.0, 0.0, 0.93), (0.0, 0.0, 0.0, 1.0)),
@@ -156,7 +158,7 @@ def robot(robot_file):
 
 @pytest.fixture
 def make_lab(robot):
-    """Function that makes a Lab: make_lab(model=..., pose=..., parameters={...}, angles=...)."""
+    """Function that makes a Lab: make_lab(model=..., pose=..., parameters={...}, angles=..., meshes=...)."""
     labs = []
 
     def make(model=robot, **options):

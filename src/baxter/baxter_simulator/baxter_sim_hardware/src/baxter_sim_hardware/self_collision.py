@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which parts of Baxter can hit which, and the convex pieces that stand in for its body.
+
+Left out are pairs that a joint's limits keep apart and pairs whose shapes, thick cylinders with a wide bend between
+them, overlap although the robot's covers do not: neighbours and their neighbours along an arm, the upper arm and the
+torso, the two fingers of a hand (their boxes overlap by 5 mm when it is closed).
+"""
+from .sides import SIDES
+
+BODY = "base"
+# An arm from torso to wrist; the links of the description, of which several are one body.
+SHOULDER, UPPER_ARM = "upper_shoulder", "lower_shoulder"
+BEYOND_UPPER_ARM = ("upper_elbow", "lower_elbow", "upper_forearm", "lower_forearm", "wrist")
+HAND = ("lower_forearm", "wrist")
+
+# Planes through the meshes of the body [m, in the link's frame]: where its outline changes. Above -0.64 the pedestal
+# is a column, below it has legs; the torso has lugs for the arms from 0.08 to 0.17, a ledge up to 0.22, its back and
+# chest up to 0.48, handles up to 0.62, and a neck above.
+MESH_CUTS = {
+    "pedestal": (("z", -0.64), *((axis, offset, -2.0, -0.64) for axis in "xy" for offset in (-0.17, 0.17))),
+    "torso": (("z", 0.08), ("z", 0.17), ("z", 0.22), ("z", 0.48), ("z", 0.7),
+              *(("y", offset, 0.08, 0.17) for offset in (-0.17, 0.17)),
+              *(("y", offset, 0.48, 0.7) for offset in (-0.09, 0.09))),
+}
+
+
+def self_collision_pairs(links):
+    """[(link, link)] of those that collide, for a Baxter with these link names (any container)."""
+    arms = {side: _Arm(side, links) for side in SIDES}
+    left, right = (arms[side] for side in SIDES)
+    # The shoulders' first links stand still but for a turn, far apart.
+    pairs = [(a, b) for a in left.everything for b in right.everything
+             if not (a in left.shoulder and b in right.shoulder)]
+    for arm in arms.values():
+        pairs += [(BODY, link) for link in arm.beyond_upper_arm]
+        pairs += [(link, other) for link in (*arm.shoulder, *arm.upper_arm) for other in arm.hand]
+    return [pair for pair in pairs if all(link in links for link in pair)]
+
+
+class _Arm:
+    """One arm's link names, as far as this robot has them."""
+
+    def __init__(self, side, links):
+        def named(*suffixes):
+            return tuple("%s_%s" % (side, suffix) for suffix in suffixes)
+
+        fingers = tuple(sorted(link for link in links
+                               if link.startswith("%s_gripper_" % side[0]) and link.endswith("_finger")))
+        self.shoulder, self.upper_arm = named(SHOULDER), named(UPPER_ARM)
+        self.beyond_upper_arm = named(*BEYOND_UPPER_ARM) + fingers
+        self.hand = named(*HAND) + fingers
+        self.everything = self.shoulder + self.upper_arm + self.beyond_upper_arm

@@ -1,0 +1,115 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""What Baxter's self-collision costs: the physics step with it, without it, and while parts press on each other.
+
+    python tests/bench/self_collision_bench.py
+
+The worlds take turns, step by step, so that what else the machine does hits all of them.
+"""
+import argparse
+import statistics
+import time
+
+import numpy as np
+import rospkg
+import yaml
+
+import xacro
+from baxter_sim_hardware import JOINT_SUFFIXES, Poses
+from baxter_sim_hardware.plugin import BaxterPlugin
+from bullet_sim import Pose, World
+from gazebo_ros.resources import ResourceFinder
+from urdf_model import parse_urdf
+
+SIDES = ("left", "right")
+NAMES = [f"{side}_{joint}" for side in SIDES for joint in JOINT_SUFFIXES]
+PRESSING = {  # where the arms start, and where they are told to go, through each other or the body
+    "arm on arm": (dict.fromkeys(NAMES, 0.0), {"left_s0": -1.5, "right_s0": 1.5}),
+    "hand on body": ("neutral", {"left_s0": -1.7, "left_s1": -0.3, "left_e1": 2.6}),
+    "both hands": ("neutral", {"left_s0": -1.7, "left_s1": -0.3, "left_e1": 2.6,
+                               "right_s0": 1.7, "right_s1": -0.3, "right_e1": 2.6}),
+}
+
+
+class Lab:
+    """Baxter with its arms held, with or without self-collision."""
+
+    def __init__(self, robot, with_pairs):
+        options = BaxterPlugin.spawn_options(robot, None)
+        if not with_pairs:
+            options["self_collision_pairs"] = ()
+        self.world = World(find_mesh=ResourceFinder())
+        self.model = self.world.spawn(robot, "baxter", Pose((0.0, 0.0, 0.93)), **options)
+        self.everything = np.arange(len(self.model.joint_names))
+        self.times = []
+
+    def place(self, angles):
+        index = self.model.index(list(angles))
+        wanted = np.clip(list(angles.values()), self.model.lower[index], self.model.upper[index])
+        self.model.set_joint_positions(index, wanted)
+        self.aim(self.model.read_joints()[0])
+
+    def aim(self, position):
+        self.model.drive_position(self.everything, position, self.model.max_effort)
+
+    def go(self, goal, seconds=4.0):
+        """Ramp the joints to {joint: angle}; what is in the way stops them, while they go on pushing."""
+        start = self.model.read_joints()[0]
+        end = start.copy()
+        end[self.model.index(list(goal))] = list(goal.values())
+        ticks = round(seconds / self.world.time_step_s)
+        for tick in range(ticks):
+            here = self.model.read_joints()[0]
+            self.aim(np.clip(start + (end - start) * tick / ticks, here - 1e-2, here + 1e-2))
+            self.world.step()
+
+    def step(self):
+        begin = time.perf_counter()
+        self.world.step()
+        self.times.append(time.perf_counter() - begin)
+
+    def touches(self):
+        return sum(contact.model_a == contact.model_b for contact in self.world.contacts(self.model)
+                   if contact.distance <= 0.0)
+
+
+def measure(labs, steps):
+    for lab in labs:
+        lab.times = []
+    for _ in range(steps):
+        for lab in labs:
+            lab.step()
+    return [1e6 * statistics.median(lab.times) for lab in labs]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=2000, help="ticks to time (default %(default)s)")
+    steps = parser.parse_args().steps
+    packages = rospkg.RosPack()
+    file = packages.get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
+    robot = parse_urdf(xacro.process_file(file).toxml(), source=file)
+    poses = Poses(yaml.safe_load(open(packages.get_path("baxter_sim_hardware") + "/config/poses.yaml")))
+
+    def angles(pose):
+        return {name: poses.angles(pose, name.split("_")[0])[name] for name in NAMES}
+
+    bare, whole = Lab(robot, False), Lab(robot, True)
+    print("%-14s %10s %10s %7s %9s" % ("", "without", "with", "ratio", "contacts"))
+    for pose in poses.names:
+        for lab in (bare, whole):
+            lab.place(angles(pose))
+            lab.step()
+        off, on = measure((bare, whole), steps)
+        print("%-14s %7.0f us %7.0f us %7.2f %9d" % (pose, off, on, on / off, whole.touches()))
+    for title, (start, goal) in PRESSING.items():
+        start = start if isinstance(start, dict) else angles(start)
+        for lab in (bare, whole):
+            lab.place(start)
+        whole.go(goal)
+        off, on = measure((bare, whole), steps)
+        print("%-14s %7.0f us %7.0f us %7.2f %9d" % (title, off, on, on / off, whole.touches()))
+
+
+if __name__ == "__main__":
+    main()
