@@ -170,7 +170,7 @@ class World:
     def delete(self, name):
         """Remove a model. Raises BulletSimError when there is none of that name."""
         model = self._model(name)
-        pybullet.removeBody(model.body, physicsClientId=self._client)
+        model.remove()
         del self.models[name]
         self.note_weightless(model, False)
         self._touched = [other for other in self._touched if other is not model]
@@ -228,6 +228,15 @@ class World:
         starts, ends = np.asarray(starts, dtype=float), np.asarray(ends, dtype=float)
         hits = pybullet.rayTestBatch(starts.tolist(), ends.tolist(), physicsClientId=self._client)
         return np.array([hit[2] if hit[0] >= 0 else 1.0 for hit in hits])
+
+    def first_hits(self, starts, ends):
+        """Cast rays as ``ray_test_batch`` does; return [(name of the model that is hit first or None, fraction)].
+
+        A ray that starts inside a convex shape passes out of it unhindered.
+        """
+        names = {model.body: model.name for model in self.models.values()}
+        hits = pybullet.rayTestBatch(list(starts), list(ends), physicsClientId=self._client)
+        return [(names.get(hit[0]), hit[2]) for hit in hits]
 
     def close(self):
         """Give the physics client back. The world is of no use afterwards."""

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a gripper needs of the physics: coupled joints, contact forces, firm friction, rays that say whom they meet."""
+
+import numpy as np
+import pytest
+
+from bullet_sim import Pose, World
+from urdf_model import parse_urdf
+
+FINGER = """<link name="%(n)s"><inertial><mass value="0.02"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial>
+  <collision><origin xyz="0 %(y)g 0"/><geometry><box size="0.04 0.01 0.04"/></geometry></collision></link>
+  <joint name="%(n)s" type="prismatic"><parent link="world"/><child link="%(n)s"/><axis xyz="0 1 0"/>
+    <limit lower="%(lower)g" upper="%(upper)g" effort="20" velocity="1"/></joint>"""
+VICE = "<robot name='vice'><link name='world'/>%s%s</robot>" % (
+    FINGER % {"n": "l", "y": 0.02, "lower": 0.0, "upper": 0.05},
+    FINGER % {"n": "r", "y": -0.02, "lower": -0.05, "upper": 0.0})
+BOX = """<robot name="box"><link name="box"><inertial><mass value="0.2"/>
+  <inertia ixx="1e-4" iyy="1e-4" izz="1e-4"/></inertial>
+  <collision><geometry><box size="0.04 0.04 0.04"/></geometry></collision></link></robot>"""
+OPEN = np.array([0.04, -0.04])
+
+
+@pytest.fixture
+def world():
+    world = World()
+    yield world
+    world.close()
+
+
+@pytest.fixture
+def vice(world):
+    vice = world.spawn(parse_urdf(VICE), "vice", Pose((0, 0, 1)))
+    vice.set_joint_positions(np.arange(2), OPEN)
+    vice.drive_position(np.arange(2), OPEN, np.full(2, 20.0))
+    return vice
+
+
+def squeeze(world, vice, effort, seconds=0.5):
+    vice.drive_position(np.arange(2), np.zeros(2), np.full(2, effort))
+    for _ in range(round(seconds / world.time_step_s)):
+        world.step()
+
+
+def test_coupled_joints_share_what_drives_one_of_them(world, vice):
+    vice.couple(0, 1, -1.0)
+    vice.release(np.array([1]))
+    vice.drive_position(np.array([0]), np.array([0.01]), np.array([20.0]))
+    for _ in range(250):
+        world.step()
+    np.testing.assert_allclose(vice.read_joints()[0], [0.01, -0.01], atol=1e-4)
+
+
+def test_ratio_of_a_coupling(world, vice):
+    vice.set_joint_positions(np.arange(2), np.array([0.02, -0.01]))
+    vice.couple(0, 1, -0.5)
+    vice.release(np.array([1]))
+    vice.drive_position(np.array([0]), np.array([0.04]), np.array([20.0]))
+    for _ in range(250):
+        world.step()
+    np.testing.assert_allclose(vice.read_joints()[0], [0.04, -0.02], atol=1e-4)
+
+
+def test_a_coupled_model_can_be_deleted(world, vice):
+    vice.couple(0, 1, -1.0)
+    world.delete("vice")
+    world.step()
+    again = world.spawn(parse_urdf(VICE), "vice", Pose((0, 0, 1)))
+    again.couple(0, 1, -1.0)
+    world.step()
+
+
+def test_what_is_held_presses_back_and_does_not_creep(world, vice):
+    box = world.spawn(parse_urdf(BOX), "box", Pose((0, 0, 1)))
+    vice.couple(0, 1, -1.0)
+    for link in ("l", "r"):
+        vice.grip_firmly(link)
+    squeeze(world, vice, 6.0)
+    np.testing.assert_allclose(vice.contact_force("l"), [0, 6, 0], atol=0.3)
+    np.testing.assert_allclose(vice.contact_force("r"), [0, -6, 0], atol=0.3)
+    before = box.base_pose().position[2]
+    squeeze(world, vice, 6.0, seconds=5.0)
+    assert box.base_pose().position[2] == pytest.approx(before, abs=2e-5)
+
+
+def test_too_weak_a_grip_lets_go(world, vice):
+    box = world.spawn(parse_urdf(BOX), "box", Pose((0, 0, 1)))
+    vice.couple(0, 1, -1.0)
+    for link in ("l", "r"):
+        vice.grip_firmly(link)
+    squeeze(world, vice, 0.5)  # 2 x 0.5 N of friction for a weight of 2 N
+    assert box.base_pose().position[2] < 0.9
+
+
+def test_rays_say_whom_they_meet(world):
+    world.spawn(parse_urdf(BOX), "box", Pose((0, 0, 1)), static=True)
+    hits = world.first_hits([(0, 0, 2), (1, 0, 2), (0, 0, 1.0)], [(0, 0, 1), (1, 0, 1), (0, 0, 2)])
+    assert hits[0] == ("box", pytest.approx(0.98, abs=1e-6))
+    assert hits[1] == hits[2] == (None, 1.0)
