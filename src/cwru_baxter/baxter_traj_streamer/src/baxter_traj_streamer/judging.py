@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Judges a goal before anything moves. Free of ROS."""
+import functools
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from joint_trajectory import Trajectory, smooth_velocities
-from joint_trajectory.segment import CUBIC, LINEAR, QUINTIC, constant, splines
+from joint_trajectory import Trajectory
 
+from .curve import fastest, has_positions_only, interpolate, joined
 from .errors import GoalRefused
 from .settings import SIDES, arm_joint_names
 
 KNOWN_JOINTS = tuple(name for side in SIDES for name in arm_joint_names(side))
+RIGHT_ARM = tuple(arm_joint_names("right"))
 _FIELDS = ("positions", "velocities", "accelerations")
 # Where the curve between two points is compared with the limits: shares of the time between them.
 _PLACES = np.linspace(0.0, 1.0, 33)
@@ -43,30 +45,65 @@ def judge(joint_names, points, limits, measured, settings):
     """Make a :class:`Plan`, or raise :class:`GoalRefused`.
 
     joint_names: any joints of the arms in any order; empty: the right arm from torso to tool flange.
-    points: rows of (time from start [s], positions, velocities, accelerations), the latter two may be empty.
+    points: rows of (time from start [s], positions, velocities, accelerations), the latter two may be empty. With
+    positions only and all times 0 the times are up to us: as short as the limits allow.
     limits: {joint: JointLimit}; measured: {joint: angle [rad]} or None: the robot may yet move, so leave the start
     unjudged, from then on at the first point. settings: :class:`~.settings.Settings`.
     """
-    names = tuple(joint_names) or tuple(arm_joint_names("right"))
+    names = tuple(joint_names) or RIGHT_ARM
+    if settings.joints == "right_arm":
+        names = RIGHT_ARM
     _judge_names(names)
     if not points:
-        raise GoalRefused("empty", "the trajectory has no points; give it at least one after time 0")
+        raise GoalRefused("empty", "the trajectory has no points; give it at least one")
     if len(points) > settings.max_points:
         raise GoalRefused("too_long", "the trajectory has %d points; at most %d are accepted (max_points)" % (
             len(points), settings.max_points), value=len(points), limit=settings.max_points)
     for index, point in enumerate(points):
         _judge_numbers(index, point, names)
     times = np.array([point[0] for point in points], dtype=float)
-    _judge_times(times, settings)
+    positions_only = has_positions_only(points)
+    timeless = positions_only and settings.interpolation != "linear" and not times.any()
+    if not timeless:
+        _judge_times(times, settings)
     positions = np.array([point[1] for point in points], dtype=float)
     start = _start(names, positions[0], limits, measured)
     bounds = _bounds(names, limits, start, settings.limit_slack)
-    _judge_positions(positions, names, bounds)
-    if times[0] == 0.0:
-        _judge_start(positions[0], start, names, settings.start_tolerance)
-    trajectory = _interpolate(times, positions, points, start, settings.interpolation)
-    _judge_curve(trajectory, names, bounds, first_point=1 if times[0] == 0.0 else 0)
-    return Plan(names, trajectory, positions[-1])
+    if settings.check_limits:
+        _judge_positions(positions, names, bounds)
+    at_once = times[0] == 0.0
+    near = bool((np.abs(positions[0] - start) <= settings.start_tolerance).all())
+    if at_once and not near and not timeless and settings.start == "refuse":
+        _refuse_start(positions[0], start, names, settings.start_tolerance)
+    if timeless or (positions_only and settings.interpolation == "time_optimal"):
+        # A first point that is where the robot is stands for that; another is a place to go to.
+        rest = points[1:] if near and at_once and len(points) > 1 else points
+        trajectory = fastest(start, rest, *_pace(names, bounds, settings))
+        if trajectory.end_time > settings.max_duration_s:
+            raise GoalRefused("too_long", "the trajectory lasts %.9g s at best; it may last %g s (max_duration_s)" % (
+                trajectory.end_time, settings.max_duration_s), value=trajectory.end_time, limit=settings.max_duration_s)
+        return Plan(names, trajectory, positions[-1])
+    curve = functools.partial(interpolate, times, points, interpolation=settings.interpolation)
+    lead_in = None
+    if settings.start == "jump":
+        trajectory = curve(start=None)
+    elif at_once and not near:
+        # "blend": to the first point at planning pace, and on from there.
+        trajectory = curve(start=positions[0])
+        velocity, acceleration = _pace(names, bounds, settings)
+        lead_in = fastest(start, points[:1], velocity * settings.speed_scale_factor, acceleration)
+    else:
+        trajectory = curve(start=start)
+    if settings.check_limits:
+        _judge_curve(trajectory, names, bounds, first_point=1 if at_once else 0)
+    return Plan(names, joined(lead_in, trajectory) if lead_in else trajectory, positions[-1])
+
+
+def _pace(names, bounds, settings):
+    """Velocities [rad/s] and accelerations [rad/s^2] (k,) for ways whose times are up to us."""
+    velocity, acceleration = ([table[name.rpartition("_")[2]] for name in names]
+                              for table in (settings.max_velocity, settings.max_acceleration))
+    return np.minimum(velocity, bounds[2]), np.array(acceleration)
 
 
 def _judge_names(names):
@@ -144,41 +181,12 @@ def _refuse_position(where, index, name, value, bounds):
                       name, float(value), float(limit))
 
 
-def _judge_start(first, start, names, tolerance):
-    jump = np.abs(first - start)
-    if (jump > tolerance).any():
-        joint = int(np.argmax(jump))
-        raise GoalRefused("start", "point 0, %s: %.6f rad at once, but the robot is at %.6f rad, and at most %g rad "
-                          "between them are accepted (start_tolerance); begin where the robot is, or give point 0 a "
-                          "time_from_start" % (names[joint], first[joint], start[joint], tolerance), 0, names[joint],
-                          float(first[joint]), tolerance)
-
-
-def _interpolate(times, positions, points, start, interpolation):
-    """The curve from rest at ``start`` through the points; a point at time 0 is taken for the start itself."""
-    count = len(start)
-    rows = [[values if len(values) else np.zeros(count) for values in point[2:]] for point in points]
-    velocities, accelerations = np.array(rows, dtype=float).transpose(1, 0, 2)
-    degrees = np.array([_degree(point) for point in points])
-    rest = np.zeros((1, count))
-    first = 1 if times[0] == 0.0 else 0
-    start_degree = degrees[0] if first else QUINTIC
-    times = np.concatenate([[0.0], times[first:]])
-    positions = np.concatenate([[start], positions[first:]])
-    velocities = np.concatenate([rest, velocities[first:]])
-    accelerations = np.concatenate([rest, accelerations[first:]])
-    degrees = np.concatenate([[start_degree], degrees[first:]])
-    if interpolation == "smooth" and (degrees[1:] == LINEAR).all():
-        velocities = smooth_velocities(times, positions)
-        degrees = np.full(len(times), CUBIC)
-    coefficients = splines(times, positions, velocities, accelerations, degrees)
-    return Trajectory(times, np.concatenate([coefficients, constant(positions[-1])[None]]), np.full(count, times[-1]))
-
-
-def _degree(point):
-    if not len(point[2]):
-        return LINEAR
-    return QUINTIC if len(point[3]) else CUBIC
+def _refuse_start(first, start, names, tolerance):
+    joint = int(np.argmax(np.abs(first - start)))
+    raise GoalRefused("start", "point 0, %s: %.6f rad at once, but the robot is at %.6f rad, and at most %g rad "
+                      "between them are accepted (start_tolerance); begin where the robot is, or give point 0 a "
+                      "time_from_start" % (names[joint], first[joint], start[joint], tolerance), 0, names[joint],
+                      float(first[joint]), tolerance)
 
 
 def _judge_curve(trajectory, names, bounds, first_point):

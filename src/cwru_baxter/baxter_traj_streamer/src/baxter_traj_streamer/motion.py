@@ -49,7 +49,9 @@ class Motion:
 
     def percent(self, time_s):
         """How much of the time along the way has passed, 0 to 100."""
-        return int(math.floor(100.0 * min(1.0, self._way_time(time_s) / self.plan.duration_s)))
+        # A goal where the robot already is lasts no time at all.
+        share = self._way_time(time_s) / self.plan.duration_s if self.plan.duration_s > 0.0 else 1.0
+        return int(math.floor(100.0 * min(1.0, share)))
 
     def _way_time(self, time_s):
         """Time along the way [s], not below 0."""

@@ -5,7 +5,10 @@ import math
 SIDES = ("right", "left")
 # From torso to tool flange, the order of all 7-vectors here.
 JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
-INTERPOLATIONS = ("smooth", "linear")
+# What these settings may be; the first is the default.
+_CHOICES = {"interpolation": ("fields", "linear", "cubic", "quintic", "time_optimal"),
+            "start": ("refuse", "blend", "jump"), "joints": ("any", "right_arm")}
+_SWITCHES = ("check_limits", "feedback", "preemption", "stop_when_client_leaves")
 _POSITIVE = ("min_segment_s", "rate_hz", "start_tolerance", "max_duration_s", "max_points", "stop_deceleration",
              "goal_tolerance", "settle_time_s", "speed_scale_factor")
 
@@ -37,13 +40,18 @@ class Settings:
             _require_positive(name, getattr(self, name))
         if self.speed_scale_factor > 1.0:
             raise SettingsError("speed_scale_factor is %r; it must be at most 1" % self.speed_scale_factor)
-        if self.interpolation not in INTERPOLATIONS:
-            raise SettingsError("interpolation is %r; choices are %s" % (self.interpolation, ", ".join(INTERPOLATIONS)))
-        if set(self.max_velocity) != set(JOINTS):
-            raise SettingsError("max_velocity names %s; it must name %s" % (
-                ", ".join(self.max_velocity), ", ".join(JOINTS)))
-        for joint, value in self.max_velocity.items():
-            _require_positive("max_velocity of %s" % joint, value)
+        for name, choices in _CHOICES.items():
+            if getattr(self, name) not in choices:
+                raise SettingsError("%s is %r; choices are %s" % (name, getattr(self, name), ", ".join(choices)))
+        for name in _SWITCHES:
+            if not isinstance(getattr(self, name), bool):
+                raise SettingsError("%s is %r; it must be true or false" % (name, getattr(self, name)))
+        for table in ("max_velocity", "max_acceleration"):
+            values = getattr(self, table)
+            if set(values) != set(JOINTS):
+                raise SettingsError("%s names %s; it must name %s" % (table, ", ".join(values), ", ".join(JOINTS)))
+            for joint, value in values.items():
+                _require_positive("%s of %s" % (table, joint), value)
 
     def planning_velocity(self):
         """Velocities of the seven joints that arrival times are computed with [rad/s], scale factor included."""

@@ -59,7 +59,8 @@ def test_left_pre_pose_mirrors_the_right_one():
 
 
 @pytest.mark.parametrize("overrides", [
-    {"speed_scale_factor": 0.0}, {"speed_scale_factor": 1.5}, {"interpolation": "cubic"}, {"rate": 100.0},
+    {"speed_scale_factor": 0.0}, {"speed_scale_factor": 1.5}, {"rate": 100.0}, {"interpolation": "smooth"},
+    {"start": "hop"}, {"joints": "left_arm"}, {"feedback": 1}, {"max_acceleration": {"s0": 1.0}},
     {"max_velocity": {"s0": 1.0}}, {"max_velocity": dict.fromkeys(JOINTS, math.nan)}, {"rate_hz": "fast"}])
 def test_unusable_settings_are_refused(overrides):
     with pytest.raises(SettingsError):
@@ -122,7 +123,10 @@ REFUSED = {
     "short velocities": ([point(1.0, 0.0, 0.0, velocities=[0.0])], {}, ("size", 0, None)),
     "same time": ([point(1.0, 0.0, 0.0), point(1.0, 0.0, 0.1)], {}, ("time", 1, None)),
     "negative time": ([point(-1.0, 0.0, 0.0), point(1.0, 0.0, 0.1)], {}, ("time", 0, None)),
-    "at once only": ([point(0.0, 0.0, 0.0)], {}, ("time", 0, None)),
+    "at once only": ([point(0.0, 0.0, 0.0)], {"interpolation": "linear"}, ("time", 0, None)),
+    "at once with velocities": ([point(0.0, 0.0, 0.0, velocities=[0.0, 0.0])], {}, ("time", 0, None)),
+    "too long at best": ([point(0.0, 1.9, 0.0), point(0.0, -1.9, 0.0)], {"max_duration_s": 5.0},
+                         ("too_long", None, None)),
     "too long": ([point(1.0, 0.0, 0.0), point(601.0, 0.0, 0.1)], {}, ("too_long", 1, None)),
     "too many": ([point(1.0 + i, 0.0, 0.0) for i in range(4)], {"max_points": 3}, ("too_long", None, None)),
     "above limit": ([point(9.0, 0.0, 2.1)], {}, ("limit", 0, "left_w2")),
@@ -157,7 +161,7 @@ def test_five_hundred_random_spoilt_goals_are_refused_each_for_its_reason():
     source = random.Random(5)
 
     def spoil(kind, points, names):
-        index, joint = source.randrange(1, len(points)), source.randrange(len(names))
+        index, joint = source.randrange(2, len(points)), source.randrange(len(names))
         time_s, positions, _, _ = points[index]
         if kind == "number":
             positions[joint] = source.choice([math.nan, math.inf, -math.inf])
@@ -177,7 +181,7 @@ def test_five_hundred_random_spoilt_goals_are_refused_each_for_its_reason():
     for number in range(500):
         kind = ("number", "time", "size", "limit", "velocity", "start", "joints")[number % 7]
         names = source.sample(KNOWN_JOINTS, source.randrange(2, 15))
-        points = [point(float(i), *(source.uniform(-0.1, 0.1) for _ in names)) for i in range(source.randrange(2, 6))]
+        points = [point(float(i), *(source.uniform(-0.1, 0.1) for _ in names)) for i in range(source.randrange(3, 6))]
         points[0][1][:] = [0.0] * len(names)
         plan_for(points, names)
         spoil(kind, points, names)
@@ -224,7 +228,7 @@ def test_the_way_begins_where_the_robot_is():
     assert trajectory.sample(0.0)[0] == pytest.approx([0.0, 0.0])
 
 
-@pytest.mark.parametrize("interpolation", ["smooth", "linear"])
+@pytest.mark.parametrize("interpolation", ["fields", "linear", "quintic", "time_optimal"])
 def test_stop_keeps_to_the_way_and_decelerates_within_the_bound(interpolation):
     plan = plan_for([point(0.0, 0.0, 0.0), point(2.0, 1.5, -0.5)], interpolation=interpolation)
     motion = Motion(plan, 10.0, SETTINGS.stop_deceleration)
