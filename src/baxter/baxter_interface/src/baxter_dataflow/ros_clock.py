@@ -2,6 +2,7 @@
 """ROS time as a clock to wait on."""
 import time
 
+import rosgraph
 import rospy
 
 from .waiting import Stopwatch
@@ -13,7 +14,13 @@ LOOK_UP_S = 0.2
 
 
 class RosClock:
-    """ROS time (wall time, or /clock under use_sim_time), with a warning when simulated time stands still."""
+    """ROS time (wall time, or /clock under use_sim_time), with a warning when simulated time stands still.
+
+    `gives_up()` ends a sleep, and is asked several times a second; by default that is at shutdown.
+    """
+
+    def __init__(self, gives_up=rospy.is_shutdown):
+        self._gives_up = gives_up
 
     def now(self):
         """Read the time [s]; under simulated time 0 until the first /clock message.
@@ -26,20 +33,36 @@ class RosClock:
         return rospy.is_shutdown()
 
     def sleep(self, duration_s):
-        """Sleep for `duration_s` of ROS time. Returns early at shutdown; time that jumps back is no error."""
+        """Sleep for `duration_s` of ROS time. Returns early when it gives up; time that jumps back is no error."""
         if rospy.rostime.is_wallclock():
             time.sleep(max(0.0, duration_s))
             return
         ticked = rospy.rostime.get_rostime_cond()
         watch = Stopwatch(self.now())
         last_s, moved_at_s = self.now(), time.monotonic()
-        while watch.elapsed_s(self.now()) < duration_s and not rospy.is_shutdown():
+        while watch.elapsed_s(self.now()) < duration_s and not self._gives_up():
             with ticked:
                 ticked.wait(LOOK_UP_S)
             if self.now() != last_s:
                 last_s, moved_at_s = self.now(), time.monotonic()
             elif time.monotonic() - moved_at_s > STALL_NOTICE_S:
-                rospy.logwarn(
-                    "simulated time stands still at %.3f s: is the simulation paused or gone? "
-                    "(rosservice call /gazebo/unpause_physics)", last_s)
+                _tell_of_silence(last_s)
                 moved_at_s = time.monotonic()
+
+
+def _tell_of_silence(time_s):
+    """Say that simulated time stands still at `time_s`; shut this node down if a new master has taken over.
+
+    A node registers once; a master that was started anew does not know it, and would never connect it to anything.
+    """
+    uri = rosgraph.get_master_uri()
+    try:
+        rosgraph.Master(rospy.get_name()).lookupNode(rospy.get_name())
+    except rosgraph.MasterError:
+        rospy.logerr("the ROS master at %s was restarted and does not know this program: start it again", uri)
+        rospy.signal_shutdown("the ROS master was restarted")
+    except OSError as error:
+        rospy.logwarn("simulated time stands still at %.3f s: the ROS master at %s is gone (%s)", time_s, uri, error)
+    else:
+        rospy.logwarn("simulated time stands still at %.3f s: is the simulation paused or gone? "
+                      "(rosservice call /gazebo/unpause_physics)", time_s)

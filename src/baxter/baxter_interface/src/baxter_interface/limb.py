@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One arm: what it reports, and commands to it."""
 import collections
+import copy
 import threading
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState, EndpointState, JointCommand
+from baxter_core_msgs.srv import SolvePositionIK, SolvePositionIKRequest
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
@@ -14,11 +17,17 @@ from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
 from . import settings, startup
 from .joint_checks import JOINTS, limb_joint_names, require_joint, require_joint_values, require_number, require_side
 from .joint_motion import Move
+from .services import call_service
 
 # Joint angles of the neutral pose, the same on both arms [rad].
 NEUTRAL_POSE = dict(zip(JOINTS, (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True))
 # Commands per second during a move; the robot's own time-out asks for more than 5.
 COMMAND_RATE_HZ = 100.0
+IK_TIMEOUT_S = 5.0
+
+
+class NoIKSolution(ValueError):
+    """No joint angles put the end-point where it was asked to be."""
 
 
 class Limb:
@@ -182,6 +191,31 @@ class Limb:
             ticker.sleep()
         raise rospy.ROSInterruptException("ROS shut down while the %s arm moved" % self.name)
 
+    def ik(self, pose, seed=None, timeout=IK_TIMEOUT_S):
+        """Ask the robot for joint angles that put the end-point at `pose`; the arm does not move.
+
+        Parameters:
+            pose: what endpoint_pose() returns, geometry_msgs Pose or PoseStamped, or (position, orientation) as
+                sequences x y z [m] and x y z w; in the frame `base` unless stamped with another.
+            seed: dict of joint name to rad near which to look first, for some or all joints (default: where it is).
+            timeout: longest wait for the service, and again for its answer [s, wall].
+        Returns a dict of joint name to rad, as move_to_joint_positions takes it.
+        Raises NoIKSolution (a ValueError); OSError with errno ETIMEDOUT if there is no service; ValueError, KeyError or
+        TypeError for a pose or a seed that is none.
+        """
+        request = SolvePositionIKRequest(pose_stamp=[_pose_stamped(pose)])
+        if seed is not None:
+            seed = {**self.joint_angles(), **require_joint_values(seed, self._joint_names, "rad")}
+            request.seed_angles = [JointState(name=list(seed), position=list(seed.values()))]
+        name = "/ExternalTools/%s/PositionKinematicsNode/IKService" % self.name
+        answer = call_service(name, SolvePositionIK, request, timeout_s=timeout)
+        if not answer.result_type or answer.result_type[0] == answer.RESULT_INVALID:
+            point = request.pose_stamp[0].pose.position
+            raise NoIKSolution("the %s arm has no solution for the end-point at x y z %.3f %.3f %.3f in %s with this "
+                               "orientation; the log of the kinematics node says why"
+                               % (self.name, point.x, point.y, point.z, request.pose_stamp[0].header.frame_id))
+        return dict(zip(answer.joints[0].name, answer.joints[0].position, strict=True))
+
     def _command(self, mode, values, unit):
         values = require_joint_values(values, self._joint_names, unit)
         if not values:
@@ -236,3 +270,33 @@ class Limb:
     def _unregister(self):
         for end in (*self._subscribers, self._speed_publisher, self._timeout_publisher, self._command_publisher):
             end.unregister()
+
+
+def _pose_stamped(pose):
+    """Return a pose in any of the forms that Limb.ik takes as a PoseStamped. Raises TypeError, ValueError."""
+    if isinstance(pose, PoseStamped):
+        stamped = copy.deepcopy(pose)
+    elif isinstance(pose, Pose):
+        stamped = PoseStamped(pose=pose)
+    else:
+        try:
+            position, orientation = (pose["position"], pose["orientation"]) if isinstance(pose, dict) else pose
+            stamped = PoseStamped(pose=Pose(_numbers(Point, position), _numbers(Quaternion, orientation)))
+        except (KeyError, TypeError, ValueError) as error:
+            raise type(error)("a pose is what endpoint_pose() returns, a Pose or PoseStamped, or a position x y z [m] "
+                              "with an orientation x y z w, got %r" % (pose,)) from error
+    stamped.header.frame_id = stamped.header.frame_id or "base"
+    for part in (stamped.pose.position, stamped.pose.orientation):
+        for axis in part.__slots__:
+            require_number(getattr(part, axis), "the pose's %s" % axis)
+    return stamped
+
+
+def _numbers(kind, values):
+    if isinstance(values, kind):
+        return values
+    values = tuple(values)
+    if len(values) != len(kind.__slots__):
+        raise ValueError("%d numbers where %d are due" % (len(values), len(kind.__slots__)))
+    return kind(*(require_number(value, "the pose's %s" % axis)
+                  for axis, value in zip(kind.__slots__, values, strict=True)))

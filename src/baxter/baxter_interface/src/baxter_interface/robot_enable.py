@@ -3,6 +3,7 @@
 import copy
 import errno
 import threading
+import time
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState
@@ -34,6 +35,7 @@ class RobotEnable:
     def __init__(self, versioned=False):
         self._lock = threading.Lock()
         self._state = None
+        self._heard_at_s = None
         self._subscriber = rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=1)
         conditions = [startup.message_arrives(self._subscriber.resolved_name, lambda: self._state is not None)]
         if versioned:
@@ -50,6 +52,11 @@ class RobotEnable:
         """Return the last state that the robot reported, as a copy (baxter_core_msgs/AssemblyState)."""
         with self._lock:
             return copy.copy(self._state)
+
+    def silence_s(self):
+        """Return how long ago the robot reported its state [s, wall]; one that is there does so all the time."""
+        with self._lock:
+            return time.monotonic() - self._heard_at_s
 
     def enable(self):
         """Switch the motors on; a stopped robot is reset first.
@@ -104,6 +111,7 @@ class RobotEnable:
     def _on_state(self, message):
         with self._lock:
             self._state = message
+            self._heard_at_s = time.monotonic()
 
     def _request(self, topic, message, timeout_s, is_done, verb):
         """Publish `message` at 100 Hz until `is_done(state)`. Raises OSError with errno ETIMEDOUT or ESHUTDOWN."""

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the robot's command-line programs share: start and end, an enabled robot, and a loop that notices its loss."""
+import errno
+import os
+import signal
+import sys
+
+import rospy
+
+from baxter_dataflow.ros_clock import RosClock
+from baxter_dataflow.waiting import Ticker
+
+from . import startup
+from .joint_motion import DISABLED_GRACE_S
+from .robot_enable import RobotEnable
+from .settings import CHECK_VERSION
+
+# A robot that has reported nothing for this long is lost [s, wall]; it reports 100 times a second.
+LOST_AFTER_S = 5.0
+# Nor is there a use in telling a robot something at the end that has been silent for this long [s, wall].
+SILENT_AFTER_S = 1.0
+
+
+class ProgramFailed(OSError):
+    """A program's aim was not reached; the text says which and why."""
+
+    def __init__(self, text, number=errno.EIO):
+        super().__init__(number, text)
+
+
+class RobotLost(ProgramFailed):
+    """The robot was disabled, stopped or restarted, or has fallen silent, while a program worked with it."""
+
+
+def run(node_name, body, **options):
+    """Run a program: wait for the robot, become the node `node_name`, call `body()`; return the exit status.
+
+    `options` go to rospy.init_node. The status is 0 after success, 1 after an OSError, a ValueError or a ROSException,
+    with one line on stderr, and 130 after Ctrl-C. `body` meets Ctrl-C and SIGTERM as KeyboardInterrupt, with ROS still
+    running, so that its `finally` and `with` can leave the robot in order.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        startup.init_node(node_name, disable_signals=True, **options)
+        body()
+    except KeyboardInterrupt:
+        return 130
+    except (OSError, ValueError, rospy.ROSException) as error:
+        print("%s: %s" % (os.path.basename(sys.argv[0]), getattr(error, "strerror", None) or error), file=sys.stderr)
+        return 1
+    finally:
+        rospy.signal_shutdown("the program has ended")
+    return 0
+
+
+def expect(done, text):
+    """Raise ProgramFailed with `text` unless `done`: for moves, which return whether they succeeded."""
+    if not done:
+        raise ProgramFailed(text)
+
+
+class EnabledRobot:
+    """The robot, enabled as long as a `with` lasts; disabled at its end if it was so before.
+
+    Raises as RobotEnable and its enable().
+    """
+
+    def __init__(self, versioned=CHECK_VERSION):
+        self.switch = RobotEnable(versioned)
+        self._was_enabled = self.switch.state().enabled
+        self._disabled_since_s = None
+
+    def __enter__(self):
+        self.switch.enable()
+        return self
+
+    def __exit__(self, kind, error, traceback):
+        if self._was_enabled or rospy.is_shutdown() or isinstance(error, RobotLost):
+            return
+        if self.switch.silence_s() > SILENT_AFTER_S:
+            rospy.logwarn("the robot says nothing any more: it is not disabled")
+            return
+        self.switch.disable()
+
+    def beats(self, rate_hz):
+        """Yield `rate_hz` times a second of ROS time until ROS shuts down, as long as the robot is enabled and there.
+
+        A paused or absent simulation is waited for, aloud. Raises RobotLost.
+        """
+        clock = RosClock()
+        ticker = Ticker(clock, rate_hz)
+        while not rospy.is_shutdown():
+            yield
+            ticker.sleep()
+            self._check(clock.now())
+
+    def _check(self, now_s):
+        if self.switch.silence_s() > LOST_AFTER_S and rospy.rostime.is_wallclock():
+            raise RobotLost("lost the robot: it has reported nothing for %.0f s" % LOST_AFTER_S)
+        state = self.switch.state()
+        if state.enabled and not state.stopped:
+            self._disabled_since_s = None
+        elif self._disabled_since_s is None or now_s < self._disabled_since_s:
+            self._disabled_since_s = now_s
+        elif now_s - self._disabled_since_s >= DISABLED_GRACE_S:
+            raise RobotLost("lost the robot: it was %s. Enable it, and start this program again (rosrun baxter_tools "
+                            "enable_robot.py -e)" % ("stopped" if state.stopped else "disabled, or restarted"))

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Run a procedure of the robot's own, such as taring or calibrating an arm, and wait for its end."""
+import rospy
+from baxter_core_msgs.msg import RobustControllerStatus
+
+from baxter_dataflow.ros_clock import RosClock
+from baxter_dataflow.waiting import Stopwatch, Ticker
+
+from . import startup
+from .robust_dialogue import Dialogue, Report, State
+
+RATE_HZ = 20.0
+
+
+class RobustController:
+    """A procedure below `namespace`, such as "/robustcontroller/left/Tare".
+
+    Parameters:
+        enable_msg, disable_msg: the messages that begin and end it, of one type; sent to `namespace`/enable.
+        timeout: longest time for it [s, ROS time].
+    Raises rospy.ROSInitException before rospy.init_node.
+    """
+
+    STATE_IDLE = int(State.IDLE)
+    STATE_STARTING = int(State.STARTING)
+    STATE_RUNNING = int(State.RUNNING)
+    STATE_STOPPING = int(State.STOPPING)
+
+    def __init__(self, namespace, enable_msg, disable_msg, timeout=60):
+        self._namespace = namespace
+        self._messages = {True: enable_msg, False: disable_msg}
+        self._timeout_s = timeout
+        self._report = None
+        self._dialogue = None
+        self._publisher = rospy.Publisher(namespace + "/enable", type(enable_msg), queue_size=10)
+        self._subscriber = rospy.Subscriber(namespace + "/status", RobustControllerStatus, self._on_status,
+                                            queue_size=10)
+
+    @property
+    def state(self):
+        """One of the STATE_ constants."""
+        return int(self._dialogue.state if self._dialogue else State.IDLE)
+
+    def run(self):
+        """Run the procedure and wait for its end.
+
+        Raises OSError: errno EIO if the robot reports a failure, ENOMSG if it ended without saying how, ETIMEDOUT,
+        ECONNABORTED if ROS shut down meanwhile.
+        """
+        status = self._subscriber.resolved_name
+        startup.wait_for_start([startup.topic_published(status)], startup.PART_TIMEOUT_S)
+        startup.wait_for_subscribers(self._publisher)
+        # What it said before it was told to run belongs to an earlier run.
+        self._report = None
+        clock = RosClock()
+        watch, ticker = Stopwatch(clock.now()), Ticker(clock, RATE_HZ)
+        self._dialogue = dialogue = Dialogue(self._timeout_s)
+        try:
+            while dialogue.state is not State.IDLE:
+                if rospy.is_shutdown():
+                    dialogue.abort(watch.elapsed_s(clock.now()))
+                    break
+                request = dialogue.step(watch.elapsed_s(clock.now()), self._report)
+                if request is not None:
+                    self._publisher.publish(self._messages[request])
+                ticker.sleep()
+        except BaseException:
+            # Ctrl-C, say: the arm should not go on by itself. It would end anyway without further requests.
+            if not rospy.is_shutdown():
+                self._publisher.publish(self._messages[False])
+            raise
+        if dialogue.failure:
+            number, text = dialogue.failure
+            raise OSError(number, "%s: %s" % (self._namespace, text))
+
+    def _on_status(self, message):
+        self._report = Report(message.isEnabled, message.complete,
+                              tuple(code for code in (*message.errorCodes, *message.labels) if code))

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calling a service of the robot with a time limit, and one line of reason when it fails."""
+import errno
+import threading
+
+import rospy
+
+
+class ServiceUnavailable(OSError, rospy.ROSException):
+    """A service that is not there, or does not answer in time.
+
+    Also a ROSException: that is what waiting for a service in vain used to raise in the SDK.
+    """
+
+    def __init__(self, text):
+        OSError.__init__(self, errno.ETIMEDOUT, text)
+
+
+def wait_for_service(name, timeout_s):
+    """Wait until the service `name` (absolute) answers, `timeout_s` [s, wall] at most. Raises ServiceUnavailable."""
+    try:
+        rospy.wait_for_service(name, timeout_s)
+    except rospy.ROSException as failure:
+        raise ServiceUnavailable(
+            "there is no service %s after %.0f s: does this robot or simulator have it (rosservice list)?"
+            % (name, timeout_s)) from failure
+
+
+def call_service(name, kind, *arguments, timeout_s=5.0):
+    """Call the service `name` of type `kind`, waiting for it and then for its answer, `timeout_s` [s, wall] each.
+
+    Raises ServiceUnavailable, OSError with errno EIO if the service refused the call.
+    """
+    wait_for_service(name, timeout_s)
+    answers, failures = [], []
+
+    def call():
+        try:
+            answers.append(rospy.ServiceProxy(name, kind)(*arguments))
+        except Exception as failure:  # handed to the caller below: this is another thread
+            failures.append(failure)
+
+    # rospy's own call has no time limit: a server that was stopped would hold its clients for ever.
+    caller = threading.Thread(target=call, name="call " + name, daemon=True)
+    caller.start()
+    caller.join(timeout_s)
+    if answers:
+        return answers[0]
+    if not failures:
+        raise ServiceUnavailable("the service %s did not answer within %.0f s" % (name, timeout_s))
+    if isinstance(failures[0], rospy.ServiceException):
+        raise OSError(errno.EIO, "the service %s failed: %s" % (name, failures[0])) from failures[0]
+    raise failures[0]
