@@ -130,7 +130,8 @@ def _inertial(link, warn):
     """Return mass, principal moments (3,) and the inertial frame (4, 4) of a link that moves."""
     mass = link.inertial.mass
     if mass <= 0.0:
-        warn("link '%s' moves and has no mass; it gets %g kg" % (link.name, _LEAST_MASS_KG))
+        warn("link '%s' moves and has no mass, so it gets %g kg; give it a positive <mass> in its <inertial>"
+             % (link.name, _LEAST_MASS_KG))
         mass = _LEAST_MASS_KG
     moments, axes = principal_axes(link.inertial.inertia)
     return mass, np.maximum(moments, _LEAST_INERTIA_PER_MASS_M2 * mass), rigid(axes, link.inertial.centre)

@@ -165,3 +165,20 @@ def test_a_chain_without_meshes_collides_after_one_warning():
     assert world.ray_test_batch([(1, 0, 0.2)], [(0, 0, 0.2)])[0] == pytest.approx(0.94, abs=0.01)
     assert all(link.visuals for link in merge_fixed(model.robot).links.values())
     world.close()
+
+
+def test_a_moving_link_without_mass_is_one_line_and_falls_like_any_other():
+    told = []
+    world = World(warn=told.append)
+    joint = JOINT.replace('type="continuous"', 'type="prismatic"').replace(
+        "</joint>", '<axis xyz="0 0 1"/><limit lower="-9" upper="9" effort="1" velocity="9"/></joint>'
+    )
+    xml = '<robot name="r"><link name="a">%s</link><link name="b">%s</link>%s</robot>' % (
+        INERTIAL % (1, 1, 1, 1), INERTIAL % (0, 0, 0, 0), joint % ("j", "a", "b", "0 0 0"))
+    model = world.spawn(parse_urdf(xml), "weightless", static=True)
+    model.drive_effort(np.array([0]), np.zeros(1))
+    for _ in range(100):
+        world.step()
+    assert len(told) == 1 and "'weightless'" in told[0] and "'b'" in told[0] and "positive <mass>" in told[0]
+    assert model.read_joints()[0][0] == pytest.approx(-0.5 * 9.81 * 0.2**2, rel=0.05)
+    world.close()

@@ -99,7 +99,8 @@ class Spawner:
         self._finder.forget_missing()
         robot, mended = with_stand_ins(robot, self._mesh_files)
         if mended:
-            self._log.warn("model '%s': %s" % (name, mended))
+            self._log.warn("model '%s': %s (are the files there, and the packages in ROS_PACKAGE_PATH?)"
+                           % (name, mended))
         if mended or drawing is None:
             drawing = None if is_floor(robot) else drawing_urdf(merge_fixed(robot))
         options = {"static": urdf_extras.is_static(robot), **options}

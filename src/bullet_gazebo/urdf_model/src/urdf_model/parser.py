@@ -33,9 +33,9 @@ JOINT_TYPES = MOVABLE_TYPES + ("fixed", "floating", "planar")
 def parse_urdf(xml, source="robot_description"):
     """Return the Robot that ``xml`` (str or bytes) describes. ``source`` names it in messages.
 
-    Things that can be mended (a mass of zero, an inertia that no body can have) are listed in ``Robot.warnings``.
-    Raises UrdfError for what cannot: malformed XML, another root element, duplicate or unknown names, a tree with no or
-    several roots, numbers that are not finite.
+    Things that can be mended (an inertia that no body can have, a joint that nothing drives) are listed in
+    ``Robot.warnings``. Raises UrdfError for what cannot: malformed XML, another root element, duplicate or unknown
+    names, a tree with no or several roots, numbers that are not finite.
     """
     return _Reader(xml, source).robot()
 
@@ -78,7 +78,6 @@ class _Reader:
         if not links:
             raise self.error(self.root, "robot '%s' has no <link>" % name)
         root = self.tree_root(name, links, joints)
-        self.check_masses(links, joints, root)
         for joint in joints.values():
             if joint.mimic is not None and joint.mimic.joint not in joints:
                 raise UrdfError(
@@ -135,17 +134,6 @@ class _Reader:
                 % (self.source, roots[0], ", ".join(sorted(set(links) - reached)))
             )
         return roots[0]
-
-    def check_masses(self, links, joints, root):
-        moved = {joint.child for joint in joints.values() if joint.movable}
-        for link in links.values():
-            if link.inertial is None:
-                continue
-            if link.inertial.mass <= 0.0 and link.name in moved:
-                self.warnings.append(
-                    "%s, line %s: link '%s' is moved by a joint and has mass %g; give it a positive <mass>"
-                    % (self.source, link.line, link.name, link.inertial.mass)
-                )
 
     # -- elements -----------------------------------------------------------------------------------------------
 
