@@ -10,6 +10,18 @@ MAX_CATCH_UP = 2.0
 YIELD_EVERY = 10
 
 
+def ticks_between(rate, tick_rate):
+    """After how many ticks something is due again that shall happen ``rate`` times a second [Hz, simulation time].
+
+    At every tick where that is more often than ticks come (``tick_rate`` [Hz]: a world may have long ones), at the
+    nearest rate where it is no divisor. Raises ``ValueError`` for a rate that is not positive.
+    """
+    if not rate > 0.0:
+        raise ValueError("the rate is %g Hz, expected a positive number, at most the tick rate of %g Hz"
+                         % (rate, tick_rate))
+    return max(1, round(tick_rate / rate))
+
+
 class Pacer:
     """Lets one tick after another happen at the right wall time.
 

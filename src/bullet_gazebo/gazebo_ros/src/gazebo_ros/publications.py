@@ -9,7 +9,7 @@ from gazebo_msgs.msg import LinkStates, ModelStates, PerformanceMetrics
 from rosgraph_msgs.msg import Clock
 
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
-from gazebo_ros.pacing import RateMeter, SlownessWatch
+from gazebo_ros.pacing import RateMeter, SlownessWatch, ticks_between
 
 _CLOCK_MESSAGE = struct.Struct("<III")
 _CLOCK_BYTES = 8
@@ -25,16 +25,13 @@ class Publications:
     """Call :meth:`on_tick` after each tick, :meth:`on_turn` at each turn of the loop."""
 
     def __init__(self, simulation, ros, snapshot, log, clock_rate):
-        """``clock_rate`` [Hz] divides the tick rate; raises ``ValueError`` otherwise.
+        """``clock_rate`` [Hz]: of /clock, as near as ticks come; raises ``ValueError`` where it is not positive.
 
         ``snapshot``: :class:`SnapshotWriter`.
         """
         tick_rate = 1.0 / simulation.step_s
-        self._clock_divisor = round(tick_rate / clock_rate) if clock_rate > 0.0 else 0
-        if not self._clock_divisor or abs(self._clock_divisor * clock_rate - tick_rate) > 1e-6 * tick_rate:
-            raise ValueError("clock_rate is %g Hz, expected a divisor of the tick rate, %g Hz"
-                             % (clock_rate, tick_rate))
-        self._states_divisor = max(1, round(tick_rate / STATES_RATE))
+        self._clock_divisor = ticks_between(clock_rate, tick_rate)
+        self._states_divisor = ticks_between(STATES_RATE, tick_rate)
         self._simulation = simulation
         self._snapshot = snapshot
         self._log = log

@@ -2,7 +2,7 @@
 """Pacing against a clock that only moves when somebody sleeps or works."""
 import pytest
 
-from gazebo_ros.pacing import MAX_CATCH_UP, MAX_DEBT_S, Pacer, RateMeter, SlownessWatch
+from gazebo_ros.pacing import MAX_CATCH_UP, MAX_DEBT_S, Pacer, RateMeter, SlownessWatch, ticks_between
 
 
 class FakeClock:
@@ -119,3 +119,16 @@ def test_slowness_is_relative_to_what_was_asked_for():
     assert not watch.is_news(0.5, 0.5)
     assert watch.is_news(0.9, 2.0)
     assert not watch.is_news(0.9, 0.0)
+
+
+@pytest.mark.parametrize(("rate", "tick_rate", "ticks"), [
+    (500.0, 500.0, 1), (100.0, 500.0, 5), (500.0, 1000.0, 2), (500.0, 100.0, 1), (500.0, 1.0 / 0.003, 1),
+    (100.0, 1.0 / 0.003, 3)])
+def test_a_rate_is_as_near_as_ticks_come(rate, tick_rate, ticks):
+    assert ticks_between(rate, tick_rate) == ticks
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan")])
+def test_a_rate_that_is_not_positive_is_refused(rate):
+    with pytest.raises(ValueError, match="expected a positive number, at most the tick rate of 500 Hz"):
+        ticks_between(rate, 500.0)
