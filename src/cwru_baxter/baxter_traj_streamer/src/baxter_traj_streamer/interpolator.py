@@ -2,15 +2,15 @@
 """The action server ``trajActionServer``: glue between goals, judging and the robot's joint commands."""
 import threading
 
-import actionlib
 import numpy as np
 import rospy
 from baxter_core_msgs.msg import JointCommand
 
+from .action_server import TrajServer
 from .errors import GoalRefused
 from .judging import judge
 from .motion import Motion
-from .msg import trajAction, trajFeedback, trajResult
+from .msg import trajFeedback, trajResult
 from .settings import SIDES
 
 ACTION_NAME = "trajActionServer"
@@ -34,8 +34,7 @@ class Interpolator:
         self._count = 0
         self._publishers = {side: rospy.Publisher("/robot/limb/%s/joint_command" % side, JointCommand, queue_size=1,
                                                   tcp_nodelay=True) for side in SIDES}
-        self._server = actionlib.ActionServer(ACTION_NAME, trajAction, self._on_goal, self._on_cancel,
-                                              auto_start=False)
+        self._server = TrajServer(ACTION_NAME, self._on_goal, self._on_cancel)
 
     def run(self):
         """Serve until the node is shut down."""
@@ -77,7 +76,7 @@ class Interpolator:
             if self._next is not None and handle == self._next:
                 self._next = None
                 handle.set_canceled(self._result(handle), "cancelled before it had begun")
-            elif self._current is not None and handle == self._current:
+            elif self._settings.preemption and self._current is not None and handle == self._current:
                 self._cancelled = True
 
     # -- the loop -------------------------------------------------------------------------------------------------
@@ -116,13 +115,12 @@ class Interpolator:
             now = rospy.get_time()
             if why := self._robot.why_not_ready():
                 return handle.set_aborted, why
-            with self._lock:
-                wanted = not self._cancelled and self._next is None
-            if not wanted:
+            left_alone = self._settings.stop_when_client_leaves and not self._server.has_client(handle)
+            if left_alone or self._is_unwanted():
                 motion.stop(now)
             target = motion.positions(now)
             self._command(plan.joint_names, target, JointCommand.RAW_POSITION_MODE)
-            if now >= feedback_due:
+            if self._settings.feedback and now >= feedback_due:
                 handle.publish_feedback(trajFeedback(fdbk=motion.percent(now)))
                 feedback_due = now + _FEEDBACK_PERIOD_S
             if motion.is_at_rest(now):
@@ -132,9 +130,13 @@ class Interpolator:
                     # Without a stream the robot would hold where it happens to be.
                     self._command(plan.joint_names, target, JointCommand.POSITION_MODE)
                     if motion.stopping:
-                        return handle.set_canceled, "stopped at %d %% of the way" % motion.percent(now)
+                        stopped = "stopped at %d %% of the way" % motion.percent(now)
+                        if left_alone:
+                            return handle.set_aborted, stopped + ": the program that sent the goal is gone"
+                        return handle.set_canceled, stopped
                     if late is None:
-                        handle.publish_feedback(trajFeedback(fdbk=100))
+                        if self._settings.feedback:
+                            handle.publish_feedback(trajFeedback(fdbk=100))
                         return handle.set_succeeded, ""
                     return handle.set_aborted, late
             try:
@@ -144,6 +146,11 @@ class Interpolator:
             except rospy.ROSInterruptException:
                 break
         return handle.set_aborted, "the trajectory server was shut down"
+
+    def _is_unwanted(self):
+        """Whether the goal at hand was cancelled, or a newer one waits that may take over."""
+        with self._lock:
+            return self._cancelled or (self._settings.preemption and self._next is not None)
 
     def _farthest(self, names, target):
         """What is wrong with the joint that is farthest from its target; None if all are near."""

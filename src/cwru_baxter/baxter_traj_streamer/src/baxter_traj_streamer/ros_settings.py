@@ -15,10 +15,16 @@ from .settings import Settings, SettingsError
 NAMESPACE = "/baxter_traj_streamer"
 
 
-def read_settings():
-    """Settings from config/streamer.yaml and the parameters below NAMESPACE. Raises SettingsError."""
-    path = pathlib.Path(rospkg.RosPack().get_path("baxter_traj_streamer")) / "config" / "streamer.yaml"
-    return Settings(yaml.safe_load(path.read_text(encoding="utf-8")), rospy.get_param(NAMESPACE, {}))
+def read_settings(changes=None):
+    """Settings from config/streamer.yaml; ``changes``, another file there, and the parameters below NAMESPACE override
+    it. Raises SettingsError."""
+    overrides = {**(_read(changes) if changes else {}), **rospy.get_param(NAMESPACE, {})}
+    return Settings(_read("streamer.yaml"), overrides)
+
+
+def _read(name):
+    path = pathlib.Path(rospkg.RosPack().get_path("baxter_traj_streamer")) / "config" / name
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
 
 
 def read_limits():

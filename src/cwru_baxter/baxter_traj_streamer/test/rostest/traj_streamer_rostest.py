@@ -3,91 +3,32 @@
 """trajActionServer and its clients against a fake robot."""
 import math
 import subprocess
-import time
-import unittest
+import sys
 
-import actionlib
 import numpy as np
 import rospy
-from actionlib_msgs.msg import GoalStatus
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from baxter_core_msgs.msg import JointCommand
-from baxter_traj_streamer.msg import trajAction, trajGoal
-from std_msgs.msg import Bool
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from rosgraph_msgs.msg import Log
+from traj_rostest_kit import DEADLINE_S, Client, FakeRobotTest, wait_until
 
 from baxter_traj_streamer.settings import SIDES, arm_joint_names
-from baxter_traj_streamer.streamer import BaxterTrajStreamer
 
-DEADLINE_S = 30.0
-
-
-def wait_until(condition, what):
-    end = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < end, "waited %g s in vain: %s" % (DEADLINE_S, what)
-        time.sleep(0.005)
-
-
-class Client:
-    """One goal, with all that is told about it."""
-
-    def __init__(self):
-        self.action = actionlib.SimpleActionClient("trajActionServer", trajAction)
-        assert self.action.wait_for_server(rospy.Duration(DEADLINE_S)), "no trajActionServer"
-        self.feedback = []
-
-    def send(self, names, points, traj_id=0):
-        trajectory = JointTrajectory(joint_names=names)
-        trajectory.points = [JointTrajectoryPoint(positions=positions, time_from_start=rospy.Duration.from_sec(time_s))
-                             for time_s, positions in points]
-        self.action.send_goal(trajGoal(trajectory=trajectory, traj_id=traj_id),
-                              feedback_cb=lambda message: self.feedback.append(message.fdbk))
-
-    def wait_until_moving(self):
-        wait_until(lambda: any(percent >= 20 for percent in self.feedback), "the goal to be a fifth done")
-
-    def end(self):
-        """State, text, result."""
-        assert self.action.wait_for_result(rospy.Duration(DEADLINE_S)), "the goal did not end"
-        return self.action.get_state(), self.action.get_goal_status_text(), self.action.get_result()
+# A client of the version without traj_id, as its packages would make it.
+OTHER_VERSION = """
+import genpy.dynamic, rospy, sys
+kind = genpy.dynamic.generate_dynamic("cwru_action/trajActionGoal", sys.stdin.read())["cwru_action/trajActionGoal"]
+rospy.init_node("other_version")
+publisher = rospy.Publisher("/trajActionServer/goal", kind, queue_size=1, latch=True)
+message = kind()
+message.goal_id.id = "goal of the other version"
+message.header.frame_id = "frame"
+publisher.publish(message)
+rospy.spin()
+"""
 
 
-class TrajStreamerTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.streamer = BaxterTrajStreamer()
-        cls.enable = rospy.Publisher("/robot/set_super_enable", Bool, queue_size=1)
-        cls.commands = []
-        cls.subscribers = [rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, cls.on_command)
-                           for side in SIDES]
-
-    @classmethod
-    def on_command(cls, message):
-        cls.commands.append((time.monotonic(), message))
-
-    def setUp(self):
-        wait_until(lambda: self.enable.get_num_connections() > 0, "the robot to listen")
-        self.set_enabled(True)
-        self.commands.clear()
-        self.client = Client()
-
-    def set_enabled(self, enabled):
-        self.enable.publish(Bool(data=enabled))
-        wait_until(lambda: (self.streamer.robot.why_not_ready() == "") == enabled, "enabled to be %s" % enabled)
-
-    def angles(self, names):
-        found = self.streamer.robot.angles()
-        return np.array([found[name] for name in names])
-
-    def raw_stream(self, joint):
-        return [(stamp, message.command[message.names.index(joint)]) for stamp, message in list(self.commands)
-                if message.mode == JointCommand.RAW_POSITION_MODE and joint in message.names]
-
-    def move(self, names, by, duration_s, **options):
-        goal = self.angles(names) + by
-        self.client.send(names, [(0.0, self.angles(names)), (duration_s, goal)], **options)
-        return goal
-
+class TrajStreamerTest(FakeRobotTest):
     def test_joints_of_both_arms_in_any_order(self):
         names = ["left_w1", "right_e1", "left_e0"]
         goal = self.move(names, [0.2, 0.3, -0.2], 1.0, traj_id=42)
@@ -174,6 +115,42 @@ class TrajStreamerTest(unittest.TestCase):
         state, text, _ = self.client.end()
         self.assertEqual(state, GoalStatus.ABORTED)
         self.assertIn("disabled", text)
+
+    def test_the_other_version_of_the_action_is_refused_with_a_line_that_says_which_to_use(self):
+        from baxter_traj_streamer.msg import trajActionGoal
+        text = trajActionGoal._full_text.replace("int32 traj_id\n", "").replace("baxter_traj_streamer/", "cwru_action/")
+        log, states = [], {}
+        subscribers = [
+            rospy.Subscriber("/rosout", Log, lambda message: log.append(message.msg)),
+            rospy.Subscriber("/trajActionServer/status", GoalStatusArray, lambda message: states.update(
+                {goal.goal_id.id: (goal.status, goal.text) for goal in message.status_list}))]
+        other = subprocess.Popen([sys.executable, "-c", OTHER_VERSION], stdin=subprocess.PIPE, text=True)
+        try:
+            other.stdin.write(text)
+            other.stdin.close()
+            wait_until(lambda: any("cwru_action/trajActionGoal" in line and "use baxter_traj_streamer/traj" in line
+                                   for line in log), "a line about the version")
+            wait_until(lambda: "goal of the other version" in states, "the goal's state")
+        finally:
+            other.terminate()
+            other.wait(timeout=DEADLINE_S)
+            for subscriber in subscribers:
+                subscriber.unregister()
+        state, words = states["goal of the other version"]
+        self.assertEqual(state, GoalStatus.REJECTED)
+        self.assertIn("traj_id", words)
+        self.assertEqual(self.commands, [])
+
+    def test_goal_without_times_is_followed_as_fast_as_the_limits_allow(self):
+        names = ["right_w0", "right_w1"]
+        goal = self.angles(names) + [0.4, 0.2]
+        self.client.send(names, [(0.0, self.angles(names)), (0.0, goal)])
+        state, text, _ = self.client.end()
+        self.assertEqual(state, GoalStatus.SUCCEEDED, text)
+        np.testing.assert_allclose(self.angles(names), goal, atol=0.01)
+        stream = self.raw_stream("right_w0")
+        # 0.4 rad at up to 2 rad/s^2, never 1 rad/s: 0.9 s.
+        self.assertAlmostEqual(len(stream) / 100.0, 0.9, delta=0.3)
 
     def test_library_commands_a_pose(self):
         pose = self.streamer.get_qvec_left_arm()

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An action server for ``traj`` that knows its clients: which version they speak, and whether they are there."""
+import actionlib
+import rospy
+from actionlib.status_tracker import StatusTracker
+from actionlib_msgs.msg import GoalID, GoalStatus
+from std_msgs.msg import Header
+
+from .msg import trajAction, trajActionGoal
+
+# Size of a Header on the wire without its frame_id [bytes]: seq, stamp, length.
+_HEADER_SIZE = 16
+
+
+class _GoalOfAnyVersion(rospy.AnyMsg):
+    """Lets goals of another version in, so that they can be answered; tools still see the type that is served."""
+
+    __slots__ = []
+    _type = trajActionGoal._type
+
+
+class TrajServer(actionlib.ActionServer):
+    """``actionlib.ActionServer`` of ``traj`` with ``traj_id``; who speaks another version is told which one to use."""
+
+    def __init__(self, name, goal_callback, cancel_callback):
+        super().__init__(name, trajAction, goal_callback, cancel_callback, auto_start=False)
+        self.ActionGoal = _GoalOfAnyVersion
+        self._told = set()
+
+    def has_client(self, handle):
+        """Whether the program that sent the goal is still connected."""
+        caller = handle.goal._connection_header["callerid"]
+        return any(connection.callerid_pub == caller for connection in self._connections())
+
+    def internal_goal_callback(self, message):
+        """Goals come in here, as bytes."""
+        header = message._connection_header
+        if header["md5sum"] == trajActionGoal._md5sum:
+            goal = trajActionGoal()
+            goal.deserialize(message._buff)
+            goal._connection_header = header
+            super().internal_goal_callback(goal)
+            return
+        # Whatever the version, a goal begins with these two, and states of goals are the same in all.
+        start = _HEADER_SIZE + len(Header().deserialize(message._buff).frame_id.encode())
+        goal_id = GoalID().deserialize(message._buff[start:])
+        tracker = StatusTracker(goal=trajActionGoal(goal_id=goal_id))
+        tracker.status.status = GoalStatus.REJECTED
+        self._told.add(header["callerid"])
+        tracker.status.text = self._wrong_version(header["callerid"], header["type"], header["md5sum"])
+        tracker.handle_destruction_time = rospy.Time.now()
+        rospy.logerr("goal refused: %s", tracker.status.text)
+        with self.lock:
+            self.status_list.append(tracker)
+            self.publish_status()
+
+    def publish_status(self):
+        """Called a few times a second: a client of another version may never come as far as to send a goal."""
+        super().publish_status()
+        for connection in self._connections():
+            caller, version = connection.callerid_pub, connection.md5sum
+            if version and version != trajActionGoal._md5sum and caller not in self._told:
+                self._told.add(caller)
+                rospy.logerr(self._wrong_version(caller, connection.type, version))
+
+    def _wrong_version(self, caller, kind, version):
+        return "%s speaks another version of the action (%s, md5sum %s); use baxter_traj_streamer/traj, whose goal " \
+            "has trajectory and traj_id (%s, md5sum %s)" % (
+                caller, kind, version, trajActionGoal._type, trajActionGoal._md5sum)
+
+    def _connections(self):
+        # Only the implementation knows who is at the other end.
+        return list(self.goal_sub.impl.connections) if self.goal_sub and self.goal_sub.impl else []

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the rostests of trajActionServer share."""
+import time
+import unittest
+
+import actionlib
+import numpy as np
+import rospy
+from baxter_core_msgs.msg import JointCommand
+from baxter_traj_streamer.msg import trajAction, trajGoal
+from std_msgs.msg import Bool
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from baxter_traj_streamer.settings import SIDES
+from baxter_traj_streamer.streamer import BaxterTrajStreamer
+
+DEADLINE_S = 30.0
+
+
+def wait_until(condition, what):
+    end = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < end, "waited %g s in vain: %s" % (DEADLINE_S, what)
+        time.sleep(0.005)
+
+
+class Client:
+    """One goal, with all that is told about it."""
+
+    def __init__(self):
+        self.action = actionlib.SimpleActionClient("trajActionServer", trajAction)
+        assert self.action.wait_for_server(rospy.Duration(DEADLINE_S)), "no trajActionServer"
+        self.feedback = []
+
+    def send(self, names, points, traj_id=0):
+        trajectory = JointTrajectory(joint_names=names)
+        trajectory.points = [JointTrajectoryPoint(positions=positions, time_from_start=rospy.Duration.from_sec(time_s))
+                             for time_s, positions in points]
+        self.action.send_goal(trajGoal(trajectory=trajectory, traj_id=traj_id),
+                              feedback_cb=lambda message: self.feedback.append(message.fdbk))
+
+    def wait_until_moving(self):
+        wait_until(lambda: any(percent >= 20 for percent in self.feedback), "the goal to be a fifth done")
+
+    def end(self):
+        """State, text, result."""
+        assert self.action.wait_for_result(rospy.Duration(DEADLINE_S)), "the goal did not end"
+        return self.action.get_state(), self.action.get_goal_status_text(), self.action.get_result()
+
+
+class FakeRobotTest(unittest.TestCase):
+    """Against the SDK's fake robot, enabled."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.streamer = BaxterTrajStreamer()
+        cls.enable = rospy.Publisher("/robot/set_super_enable", Bool, queue_size=1)
+        cls.commands = []
+        cls.subscribers = [rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, cls.on_command)
+                           for side in SIDES]
+
+    @classmethod
+    def on_command(cls, message):
+        cls.commands.append((time.monotonic(), message))
+
+    def setUp(self):
+        wait_until(lambda: self.enable.get_num_connections() > 0, "the robot to listen")
+        self.set_enabled(True)
+        self.commands.clear()
+        self.client = Client()
+
+    def set_enabled(self, enabled):
+        self.enable.publish(Bool(data=enabled))
+        wait_until(lambda: (self.streamer.robot.why_not_ready() == "") == enabled, "enabled to be %s" % enabled)
+
+    def angles(self, names):
+        found = self.streamer.robot.angles()
+        return np.array([found[name] for name in names])
+
+    def raw_stream(self, joint):
+        return [(stamp, message.command[message.names.index(joint)]) for stamp, message in list(self.commands)
+                if message.mode == JointCommand.RAW_POSITION_MODE and joint in message.names]
+
+    def move(self, names, by, duration_s, **options):
+        goal = self.angles(names) + by
+        self.client.send(names, [(0.0, self.angles(names)), (duration_s, goal)], **options)
+        return goal
