@@ -206,6 +206,10 @@ class World:
         """Begin again at tick 0."""
         self.tick = 0
 
+    def detect_contacts(self):
+        """Find the contacts where everything stands now, without a step; ``contacts`` then returns them."""
+        pybullet.performCollisionDetection(physicsClientId=self._client)
+
     def contacts(self, model=None):
         """Return the contacts of the last step as a list of Contact; all, or those that involve one Model."""
         body = {} if model is None else {"bodyA": model.body}

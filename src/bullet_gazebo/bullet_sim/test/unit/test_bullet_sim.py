@@ -210,6 +210,12 @@ def test_free_box_falls_rests_and_is_reset(world):
     contact = world.contacts(box)[0]
     assert {contact.model_a, contact.model_b} == {"box", "ground_plane"}
     assert sum(c.force for c in world.contacts(box)) == pytest.approx(9.81, rel=0.05)
+    box.set_base_pose(Pose((0, 0, 0.5)))
+    world.detect_contacts()
+    assert world.contacts(box) == []
+    box.set_base_pose(Pose((0, 0, 0.04)))
+    world.detect_contacts()
+    assert min(c.distance for c in world.contacts(box)) == pytest.approx(-0.01, abs=1e-3)
     world.reset_models()
     assert box.base_pose().position == pytest.approx((0, 0, 0.5))
     np.testing.assert_allclose(box.base_twist()[0], 0, atol=1e-12)
