@@ -15,6 +15,7 @@ import rospy
 
 from bullet_sim import BulletSimError, World
 from gazebo_ros import snapshot
+from gazebo_ros.command_line import CommandLine
 from gazebo_ros.gazebo_services import GazeboServices
 from gazebo_ros.loop_log import LoopLog
 from gazebo_ros.loop_publisher import PublisherHub
@@ -40,6 +41,11 @@ _THREADS_END_S = 0.3
 def main(argv=None):
     """Run the simulator until a signal or a shutdown request ends it; returns the exit code."""
     argv = sys.argv if argv is None else argv
+    try:
+        line = CommandLine(rospy.myargv(argv)[1:])
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
     name = rosgraph.names.load_mappings(argv).get("__name", "gazebo")
     namespace = rosgraph.names.get_ros_namespace(argv=argv)
     node_name = rosgraph.names.ns_join(namespace, name)
@@ -66,7 +72,7 @@ def main(argv=None):
     code = 1
     try:
         with contextlib.ExitStack() as cleanup:
-            simulation = _build(log, cleanup)
+            simulation = _build(log, cleanup, line)
             gc.freeze()
             simulation.run(lambda: ending.is_set() or rospy.is_shutdown())
             code = 0
@@ -77,11 +83,16 @@ def main(argv=None):
     return code
 
 
-def _build(log, cleanup):
-    """Everything from the parameters to a simulation that is ready to run; what must be undone goes on ``cleanup``."""
+def _build(log, cleanup, line):
+    """Everything from the parameters to a simulation that is ready to run; what must be undone goes on ``cleanup``.
+
+    ``line``: :class:`CommandLine`, which goes before the parameters.
+    """
+    if line.ignored:
+        log.warn("these words of the command line have no effect here: %s" % " ".join(line.ignored))
     packages = rospkg.RosPack()
     share = packages.get_path("gazebo_ros")
-    world_name = rospy.get_param("~world_name", "worlds/empty.world")
+    world_name = line.world_name or rospy.get_param("~world_name", "worlds/empty.world")
     folders = ModelFolders(model_folders(packages))
     description = read_world(find_world(world_name, [share, *_resource_folders()]), folders)
     if description.warning:
@@ -95,15 +106,16 @@ def _build(log, cleanup):
     snapshot.remove_stale()
     writer = snapshot.SnapshotWriter()
     cleanup.callback(writer.close)
-    world = World(time_step_s=description.time_step_s, gravity=description.gravity,
-                  seed=int(rospy.get_param("~seed", 0)), find_mesh=finder, warn=log.warn)
+    seed = rospy.get_param("~seed", 0) if line.seed is None else line.seed
+    world = World(time_step_s=description.time_step_s, gravity=description.gravity, seed=int(seed), find_mesh=finder,
+                  warn=log.warn)
     cleanup.callback(world.close)
 
     hub, board = PublisherHub(), RequestBoard()
     cleanup.callback(board.close)
     ros = RosObjects(hub, board, log)
     simulation = Simulation(world, board, log, real_time_factor=float(rospy.get_param("~real_time_factor", 1.0)),
-                            paused=bool(rospy.get_param("~paused", False)), deliveries=ros.deliveries)
+                            paused=line.paused or bool(rospy.get_param("~paused", False)), deliveries=ros.deliveries)
     publications = Publications(simulation, ros, writer, log,
                                 clock_rate=float(rospy.get_param("~clock_rate", 1.0 / description.time_step_s)))
     spawner = Spawner(simulation, table, ros, finder, folders, log,
