@@ -3,4 +3,7 @@ from distutils.core import setup
 
 from catkin_pkg.python_setup import generate_distutils_setup
 
-setup(**generate_distutils_setup(packages=["baxter_interface", "baxter_dataflow"], package_dir={"": "src"}))
+PACKAGES = ["baxter_interface", "baxter_dataflow", "baxter_control", "joint_trajectory_action", "gripper_action",
+            "head_action"]
+
+setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

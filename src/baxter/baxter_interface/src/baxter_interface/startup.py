@@ -83,7 +83,7 @@ def master_answers():
     def is_met():
         try:
             # XML-RPC has no time-out of its own, so see first whether anybody listens there.
-            socket.create_connection((host, port), timeout=ANSWER_TIMEOUT_S).close()
+            connect(host, port)
             _master().getPid()
         except _MASTER_ERRORS as error:
             last_error[:] = [error]
@@ -94,6 +94,11 @@ def master_answers():
         return "%s. ROS_MASTER_URI says %s: %s" % (last_error[0], uri, _LAUNCH_HINT)
 
     return Condition("a ROS master at %s" % uri, is_met, explain)
+
+
+def connect(host, port):
+    """See whether anybody listens at a TCP port; raises OSError if not."""
+    socket.create_connection((host, port), timeout=ANSWER_TIMEOUT_S).close()
 
 
 def topic_published(topic):

@@ -40,7 +40,9 @@ class Limits:
         upper = np.maximum(self._upper, position[0, 0]) + self._slack
         beyond = np.argwhere((position < lower) | (position > upper))
         if len(beyond):
-            piece, place, joint = beyond[0]
+            piece, _, joint = beyond[0]
+            excess = np.maximum(position[piece] - upper, lower - position[piece])[:, joint]
+            place = int(np.argmax(excess))
             value = float(position[piece, place, joint])
             bound = self._lower if value < self._lower[joint] else self._upper
             raise BeyondPosition(self._joint_names[joint], value, float(bound[joint]),

@@ -1,0 +1,33 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Serve robot/end_effector/<gripper>/gripper_action for one gripper or both."""
+import argparse
+import sys
+
+import rospy
+from baxter_interface.cfg import GripperActionServerConfig
+from dynamic_reconfigure.server import Server
+
+from baxter_interface import CHECK_VERSION, Gripper, programs
+from baxter_interface.joint_checks import SIDES
+from baxter_interface.serving import serve
+from gripper_action.gripper_action import GripperActionServer
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("-g", "--gripper", choices=("both", *SIDES), default="both", help="which gripper (both)")
+    arguments = parser.parse_args(rospy.myargv()[1:])
+    sides = SIDES if arguments.gripper == "both" else (arguments.gripper,)
+
+    def body():
+        config = Server(GripperActionServerConfig, lambda config, level: config)
+        serve([lambda side=side: GripperActionServer(Gripper(side, CHECK_VERSION), config) for side in sides],
+              "gripper action server, grippers: %s" % " ".join(sides))
+
+    suffix = "" if arguments.gripper == "both" else "_" + arguments.gripper
+    return programs.run("rsdk_gripper_action_server%s" % suffix, body)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,28 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Serve robot/head/head_action."""
+import argparse
+import functools
+import sys
+
+import rospy
+from baxter_interface.cfg import HeadActionServerConfig
+from dynamic_reconfigure.server import Server
+
+from baxter_interface import programs
+from baxter_interface.serving import serve
+from head_action.head_action import HeadActionServer
+
+
+def main():
+    argparse.ArgumentParser(description=__doc__).parse_args(rospy.myargv()[1:])
+
+    def body():
+        config = Server(HeadActionServerConfig, lambda config, level: config)
+        serve([functools.partial(HeadActionServer, config)], "head action server")
+
+    return programs.run("rsdk_head_action_server", body)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

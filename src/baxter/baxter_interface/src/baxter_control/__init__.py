@@ -1,0 +1,5 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers that programs for the robot share."""
+from .pid import PID
+
+__all__ = ["PID"]

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A PID controller for one quantity. Loads without ROS; its time is ROS time unless it is given another."""
+
+
+def _ros_time():
+    import rospy  # Late, so that whoever brings a clock needs no ROS.
+
+    return rospy.get_time()
+
+
+class PID:
+    """Output = kp e + ki (integral of e) + kd (de/dt), for an error e that is told at times of the caller's choice.
+
+    Parameters: the gains; `now`, a function that reads a clock [s], ROS time by default.
+    """
+
+    def __init__(self, kp=0.0, ki=0.0, kd=0.0, now=_ros_time):
+        self._kp, self._ki, self._kd = kp, ki, kd
+        self._now = now
+        self.initialize()
+
+    def initialize(self):
+        """Forget the past: integral and derivative begin with the next error."""
+        self._integral = 0.0
+        self._last_error = None
+        self._last_s = 0.0
+
+    def set_kp(self, kp):
+        """Set the proportional gain [output per error]."""
+        self._kp = kp
+
+    def set_ki(self, ki):
+        """Set the integral gain [output per error and s]."""
+        self._ki = ki
+
+    def set_kd(self, kd):
+        """Set the derivative gain [output s per error]."""
+        self._kd = kd
+
+    def compute_output(self, error):
+        """Return the output for the present `error`.
+
+        The first call after initialize() has neither integral nor derivative, and so has one at which the clock did
+        not advance (a simulation that is paused or was reset) no derivative.
+        """
+        now_s = self._now()
+        derivative = 0.0
+        if self._last_error is not None:
+            step_s = now_s - self._last_s
+            if step_s > 0.0:
+                self._integral += error * step_s
+                derivative = (error - self._last_error) / step_s
+        self._last_error, self._last_s = error, now_s
+        return self._kp * error + self._ki * self._integral + self._kd * derivative

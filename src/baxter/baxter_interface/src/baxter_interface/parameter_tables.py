@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The action servers' parameters: names, defaults, ranges. The *.cfg files make dynamic_reconfigure types of them.
+
+Free of ROS and of the rest of the package: it is loaded while the workspace is being built.
+"""
+from typing import NamedTuple
+
+SIDES = ("left", "right")
+JOINTS = tuple("%s_%s" % (side, joint) for side in SIDES for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2"))
+
+
+class Parameter(NamedTuple):
+    """A number with its meaning, default and range."""
+
+    name: str
+    meaning: str
+    default: float
+    lowest: float
+    highest: float
+
+
+def trajectory_parameters(goal_time, stopped_velocity, path, goal, highest, gains=False):
+    """Parameters of the trajectory server in one mode.
+
+    goal_time [s], stopped_velocity [rad/s], path, goal [rad]: defaults; highest: of the tolerances' range;
+    gains: whether the joints have kp, ki, kd.
+    """
+    yield Parameter("goal_time", "how much later than planned a goal may be reached [s]", goal_time, 0.0, 120.0)
+    yield Parameter("stopped_velocity_tolerance", "velocity below which a joint has stopped at a goal [rad/s]; "
+                    "0 or less: any", stopped_velocity, -1.0, 1.0)
+    for joint in JOINTS:
+        yield Parameter(joint + "_goal", "position error of %s allowed at a goal [rad]; 0 or less: any" % joint,
+                        goal, -1.0, highest)
+        yield Parameter(joint + "_trajectory", "position error of %s allowed on the way [rad]; 0 or less: any" % joint,
+                        path, -1.0, highest)
+        if gains:
+            for gain, default, most, unit in (("kp", 2.0, 500.0, "1/s"), ("ki", 0.0, 100.0, "1/s^2"),
+                                              ("kd", 0.0, 100.0, "1")):
+                yield Parameter("%s_%s" % (joint, gain), "%s of %s, position error to velocity [%s]"
+                                % (gain, joint, unit), default, 0.0, most)
+
+
+POSITION = tuple(trajectory_parameters(0.1, 0.25, path=0.2, goal=-1.0, highest=1.0))
+POSITION_FF = tuple(trajectory_parameters(0.1, 0.20, path=0.35, goal=-1.0, highest=1.0))
+VELOCITY = tuple(trajectory_parameters(0.0, -1.0, path=-1.0, goal=-1.0, highest=3.0, gains=True))
+GRIPPER = tuple(
+    Parameter("%s_gripper_%s" % (side, name), meaning, default, lowest, highest)
+    for side in SIDES
+    for name, meaning, default, lowest, highest in (
+        ("timeout", "longest time for a goal [s]; below 0: any", 5.0, -1.0, 20.0),
+        ("goal", "position error at which a goal is reached [%]", 5.0, 0.0, 100.0),
+        ("velocity", "speed of the fingers [%]", 50.0, 0.0, 100.0),
+        ("moving_force", "force at which moving fingers grip, unless the goal says max_effort [%]", 40.0, 0.0, 100.0),
+        ("holding_force", "force of holding [%]", 30.0, 0.0, 100.0),
+        ("vacuum_threshold", "vacuum at which a cup holds, unless the goal says max_effort [%]", 18.0, 0.0, 100.0),
+        ("blow_off", "how long a release blows [s]", 0.0, 0.0, 100.0)))
+HEAD = (
+    Parameter("timeout", "longest time for a goal [s]; below 0: any", 5.0, -1.0, 20.0),
+    Parameter("goal", "position error at which a goal is reached [rad]", 0.1396263401, 0.0, 1.57),
+)
+
+
+def generate(table, name):
+    """Write the dynamic_reconfigure type `name` for a table of parameters, as a *.cfg file has to."""
+    from dynamic_reconfigure.parameter_generator_catkin import ParameterGenerator, double_t
+
+    generator = ParameterGenerator()
+    for parameter in table:
+        generator.add(parameter.name, double_t, 0, parameter.meaning, parameter.default, parameter.lowest,
+                      parameter.highest)
+    generator.generate("baxter_interface", "baxter_interface", name)

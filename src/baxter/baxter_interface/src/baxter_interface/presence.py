@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Is somebody there who publishes a topic, paused perhaps, or has he gone?"""
+import threading
+import time
+import xmlrpc.client
+from urllib.parse import urlparse
+
+import rosgraph
+import rospy
+
+from . import startup
+
+# After this much silence, see whether the topic's publisher is still there, and then as often as this [s, wall].
+SILENT_AFTER_S = 1.0
+_NO_ANSWER = (OSError, xmlrpc.client.Error, rosgraph.MasterException)
+
+
+class Presence:
+    """Watches over the publishers of `topic` (resolved name); `silence_s()` says how long none was heard [s, wall].
+
+    A simulation that is paused is silent, too, but not gone: its node answers. May be asked often, by any thread.
+    """
+
+    def __init__(self, topic, silence_s):
+        self._topic = topic
+        self._silence_s = silence_s
+        self._lock = threading.Lock()
+        self._probe_due_s = 0.0
+        self._gone = False
+
+    def is_gone(self):
+        """Whether nobody is there any more who publishes the topic."""
+        if self._silence_s() < SILENT_AFTER_S:
+            self._gone = False
+            return False
+        with self._lock:
+            due = time.monotonic() >= self._probe_due_s
+            if due:
+                self._probe_due_s = time.monotonic() + SILENT_AFTER_S
+        if due:
+            self._gone = not _has_living_publisher(self._topic)
+        return self._gone
+
+
+def _has_living_publisher(topic):
+    master = rosgraph.Master(rospy.get_name())
+    try:
+        nodes = dict(master.getSystemState()[0]).get(topic, [])
+    except _NO_ANSWER:
+        return False
+    for node in nodes:
+        try:
+            address = urlparse(master.lookupNode(node))
+            startup.connect(address.hostname, address.port)
+            return True
+        except _NO_ANSWER:
+            continue
+    return False

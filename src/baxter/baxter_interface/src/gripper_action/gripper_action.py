@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The action server that moves a gripper: robot/end_effector/<gripper>/gripper_action."""
+import errno
+import math
+
+import actionlib
+from control_msgs.msg import GripperCommandAction, GripperCommandFeedback, GripperCommandResult
+
+from baxter_interface import RobotEnable
+from baxter_interface.goal_loop import GoalLoop
+from baxter_interface.gripper_types import OPEN, clip_percent
+
+# A cup sucks for this long where a goal has no time-out [s].
+LONG_SUCTION_S = 3600.0
+
+
+class GripperActionServer:
+    """Moves a gripper (baxter_interface.Gripper, electric or suction) to the goal's `position`, 0 closed to 100 open.
+
+    `max_effort` is the force of an electric gripper, or the vacuum threshold of a cup [%]: 0 for the parameter, -1 for
+    100. A cup opens at 100 and sucks below. Parameters, from the mapping `reconfig_server.config` at each goal, for
+    each gripper by name: timeout [s] (below 0: none), goal, velocity, moving_force, holding_force,
+    vacuum_threshold [%], blow_off [s].
+    A goal ends once: succeeded (at the position, or stalled on something with the force asked for), aborted with a text
+    that says why, or preempted; when it is not reached the gripper is stopped. The result is the last feedback.
+    Clears errors of the gripper and calibrates it. Raises OSError if that fails, or with another kind of gripper.
+    """
+
+    def __init__(self, gripper, reconfig_server):
+        self._gripper = gripper
+        self._config = reconfig_server
+        self._robot = RobotEnable()
+        self._actions = {"electric": _Electric, "suction": _Suction}.get(gripper.type())
+        if self._actions is None:
+            raise OSError(errno.ENODEV, "%s is of type %s; this server moves electric and suction grippers"
+                          % (gripper.name, gripper.type()))
+        self._prepare()
+        self._server = actionlib.SimpleActionServer("robot/end_effector/%s/gripper_action" % gripper.name,
+                                                    GripperCommandAction, self._execute, auto_start=False)
+        self._loop = GoalLoop(self._server, self._robot, gripper.name)
+        self._server.start()
+
+    def clean_shutdown(self):
+        """End the goal, if there is one."""
+        self._loop.end()
+
+    def _prepare(self):
+        if self._gripper.error():
+            self._gripper.reset(block=True)
+        if self._gripper.error():
+            raise OSError(errno.EIO, "%s has an error that a reset does not clear" % self._gripper.name)
+        if self._gripper.type() == "electric" and not self._gripper.calibrated():
+            self._gripper.calibrate(block=True)
+            if not self._gripper.calibrated():
+                raise OSError(errno.EIO, "%s could not be calibrated: is the robot enabled "
+                              "(rosrun baxter_tools enable_robot.py -e)?" % self._gripper.name)
+
+    def _execute(self, goal):
+        position, effort = goal.command.position, goal.command.max_effort
+        settings = {name[len(self._gripper.name) + 1:]: value for name, value in self._config.config.items()
+                    if name.startswith(self._gripper.name)}
+        refusal = ""
+        if not math.isfinite(position) or not math.isfinite(effort):
+            refusal = "position and max_effort must be finite numbers, got %r and %r" % (position, effort)
+        action = self._actions(self._gripper, settings, position, effort)
+        result = GripperCommandResult()
+
+        def step():
+            result.position, result.effort, result.stalled, result.reached_goal = action.observe()
+            self._server.publish_feedback(GripperCommandFeedback(result.position, result.effort, result.stalled,
+                                                                 result.reached_goal))
+            if result.stalled or result.reached_goal:
+                return True
+            action.push()
+            return False
+
+        self._loop.run(
+            step, settings["timeout"], lambda: result, refusal, stop=lambda: self._gripper.stop(block=False),
+            missed=lambda: "%s is at %.1f %%, its goal is %.1f %%" % (
+                self._gripper.name, self._gripper.position(), position))
+
+
+def _effort(asked, default):
+    """The force [%] that a goal's max_effort means."""
+    return default if asked == 0.0 else 100.0 if asked == -1.0 else clip_percent(asked)
+
+
+class _Electric:
+    def __init__(self, gripper, settings, position, effort):
+        self._gripper = gripper
+        self._position = clip_percent(position)
+        self._dead_zone = settings["goal"]
+        self._force = _effort(effort, settings["moving_force"])
+        self._wanted = {"velocity": settings["velocity"], "moving_force": self._force,
+                        "holding_force": settings["holding_force"], "dead_zone": self._dead_zone}
+
+    def observe(self):
+        """(position [%], force [%], stalled, reached)."""
+        position, force = self._gripper.position(), self._gripper.force()
+        return (position, force, force > self._force or self._gripper.gripping(),
+                abs(position - self._position) < self._dead_zone)
+
+    def push(self):
+        if {name: self._gripper.parameters().get(name) for name in self._wanted} != self._wanted:
+            self._gripper.set_parameters(self._wanted)
+        self._gripper.command_position(self._position, block=False)
+
+
+class _Suction:
+    def __init__(self, gripper, settings, position, effort):
+        self._gripper = gripper
+        self._opens = position >= OPEN
+        self._timeout_s = settings["timeout"] if settings["timeout"] >= 0.0 else LONG_SUCTION_S
+        self._wanted = {"vacuum_sensor_threshold": _effort(effort, settings["vacuum_threshold"]),
+                        "blow_off_seconds": settings["blow_off"]}
+        self._pushed = False
+
+    def observe(self):
+        """(position [%], vacuum [%], stalled, reached)."""
+        reached = self._pushed and (not (self._gripper.sucking() or self._gripper.blowing()) if self._opens
+                                    else self._gripper.gripping())
+        return self._gripper.position(), self._gripper.vacuum_sensor(), False, reached
+
+    def push(self):
+        if self._pushed:
+            return
+        self._pushed = True
+        self._gripper.set_parameters(self._wanted)
+        if self._opens:
+            self._gripper.open(block=False)
+        else:
+            self._gripper.close(block=False, timeout=self._timeout_s)

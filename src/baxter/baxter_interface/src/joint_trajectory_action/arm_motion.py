@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One arm under the trajectory server: what it is commanded, tick by tick. Free of ROS; time is an argument."""
+import enum
+from typing import NamedTuple
+
+import numpy as np
+
+from baxter_control.pid import PID
+from joint_trajectory import Follower, Tolerances, bounds, merge_tolerances
+
+# How long a stop takes, from the velocity at hand to rest [s].
+STOP_DURATION_S = 0.25
+# How far beyond a limit of the robot's description a trajectory may lead, and by how much a joint may lag where it is
+# too fast [rad]. The robot's own tucked pose lies 0.03 rad beyond, and recordings of moves at full speed have steps of
+# one reading, 0.015 to 0.03 rad.
+LIMIT_SLACK_RAD = 0.05
+
+
+class Mode(enum.Enum):
+    """How an arm is commanded; the values are those of the server's option."""
+
+    POSITION = "position"
+    VELOCITY = "velocity"
+    POSITION_WITH_DYNAMICS = "position_w_id"
+
+
+class Settings(NamedTuple):
+    """What a goal is measured by unless it says so itself; n joints.
+
+    ``path``, ``goal`` (n,): position errors allowed on the way and at the end [rad]; ``stopped_velocity`` [rad/s];
+    0 or less: any. ``goal_time_s``: how much later the end may be reached. ``gains`` (3, n): kp, ki, kd of velocity
+    mode, velocity [rad/s] per position error [rad].
+    """
+
+    path: np.ndarray
+    goal: np.ndarray
+    stopped_velocity: float
+    goal_time_s: float
+    gains: np.ndarray
+
+    @classmethod
+    def from_config(cls, config, joint_names):
+        """From the server's parameters, a mapping; gains that a mode does not have are 0."""
+        def column(ending, *default):
+            return np.array([config.get(name + ending, *default) for name in joint_names], dtype=float)
+
+        return cls(column("_trajectory"), column("_goal"), float(config["stopped_velocity_tolerance"]),
+                   float(config["goal_time"]), np.array([column(gain, 0.0) for gain in ("_kp", "_ki", "_kd")]))
+
+
+class ArmMotion:
+    """Follows goals with n joints, and holds them after the last one until :meth:`release`.
+
+    Attributes
+    ----------
+    joint_names : list of n names
+    goal : object or None
+        What :meth:`begin` was given, until the goal has ended.
+    engaged : bool
+        Whether the joints are being commanded.
+    begin_s : float
+        When the present goal's trajectory began [s].
+    """
+
+    def __init__(self, joint_names, mode, period_s, limits=None):
+        """``mode``: :class:`Mode`; ``period_s`` [s] between ticks; ``limits``: :class:`joint_trajectory.Limits`."""
+        self.joint_names = list(joint_names)
+        self.goal = None
+        self.engaged = False
+        self.begin_s = 0.0
+        self._mode = mode
+        self._period_s = period_s
+        self._follower = Follower(self.joint_names, stop_duration_s=STOP_DURATION_S, allow_partial=True, smooth=True,
+                                  limits=limits)
+        self._named = np.zeros(len(self.joint_names), dtype=bool)
+        self._pids = []
+        self._now_s = 0.0
+        self._output = np.zeros((3, len(self.joint_names)))
+
+    def begin(self, command, now_s, position, goal, settings, path=(), goal_tolerances=(), goal_time_s=0.0):
+        """Follow ``command`` (:class:`joint_trajectory.Command`) from ``now_s`` [s] on.
+
+        ``position`` (n,): measured [rad]; ``goal``: any object. ``path``, ``goal_tolerances``: rows of (joint name,
+        position, velocity, acceleration), and ``goal_time_s``, as of :func:`joint_trajectory.merge_tolerances`; they
+        override ``settings`` (:class:`Settings`). Joints that the command does not name are left alone, or go on with
+        what they were told before. The goal before is forgotten: say so to its owner.
+
+        Returns the :class:`joint_trajectory.Replacement`. Raises :class:`joint_trajectory.TrajectoryError`; nothing
+        has changed then.
+        """
+        count = len(self.joint_names)
+        defaults = Tolerances(bounds(count, position=settings.path),
+                              bounds(count, position=settings.goal, velocity=settings.stopped_velocity),
+                              settings.goal_time_s)
+        tolerances = merge_tolerances(defaults, self.joint_names, path, goal_tolerances, goal_time_s)
+        # The end is commanded in the tick before it; whoever keeps up is still moving then.
+        tolerances = tolerances._replace(goal_time_s=tolerances.goal_time_s + 2.0 * self._period_s)
+        if not self.engaged:
+            self._follower.start(now_s, position, np.zeros(count))
+        replacement = self._follower.accept(command, now_s, position, goal, tolerances)
+        if not self.engaged:
+            self._named[:] = False
+            self._make_pids(settings)
+        self._named |= np.isin(self.joint_names, command.joint_names)
+        self._set_gains(settings)
+        self.goal, self.engaged = goal, True
+        self.begin_s = now_s if command.start_time is None else command.start_time
+        return replacement
+
+    def tick(self, now_s, position, velocity):
+        """Look at the measured ``position``, ``velocity`` (n,); returns the :class:`Verdict` if the goal ends now.
+
+        A goal that fails on the way stops the joints where they are; one that fails at its end holds the end.
+        """
+        self._now_s = now_s
+        verdict = self._follower.update(now_s, position, velocity)
+        if verdict is not None:
+            on_the_way = self._follower.trajectory.end_time > now_s
+            self.goal = None
+            self._follower.release()
+            if on_the_way:
+                self._follower.start(now_s, position, velocity)
+        # A command acts until the next one, so it says where to be then.
+        self._output[:] = self._follower.look_ahead(now_s + self._period_s)
+        if self._mode is Mode.VELOCITY:
+            self._correct()
+        return verdict
+
+    def command(self):
+        """What to command now: {joint name: rad, or rad/s in velocity mode} of the joints that goals have named."""
+        row = 1 if self._mode is Mode.VELOCITY else 0
+        return {name: float(value) for name, value, named
+                in zip(self.joint_names, self._output[row], self._named, strict=True) if named}
+
+    @property
+    def output(self):
+        """(3, n): position, velocity, acceleration that the last tick commands; read only."""
+        return self._output
+
+    @property
+    def desired(self):
+        """(3, n): position, velocity, acceleration wanted at the last tick; read only."""
+        return self._follower.desired
+
+    @property
+    def error(self):
+        """(3, n): wanted minus measured at the last tick; read only."""
+        return self._follower.error
+
+    def farthest(self, position):
+        """The joint that is farthest from its end of the trajectory: (name, error [rad])."""
+        end = self._follower.trajectory.sample(self._follower.trajectory.end_time)[0]
+        error = np.where(self._named, end - position, 0.0)
+        joint = int(np.argmax(np.abs(error)))
+        return self.joint_names[joint], float(error[joint])
+
+    def stop(self, now_s, position):
+        """End the goal, come to rest and hold."""
+        self.goal = None
+        self._follower.release()
+        self._follower.stop(now_s, position)
+
+    def release(self):
+        """End the goal and command nothing any more."""
+        self.goal = None
+        self.engaged = False
+        self._follower.release()
+
+    def _make_pids(self, settings):
+        self._pids = [PID(*gains, now=lambda: self._now_s) for gains in settings.gains.T.tolist()]
+
+    def _set_gains(self, settings):
+        for pid, (kp, ki, kd) in zip(self._pids, settings.gains.T.tolist(), strict=True):
+            pid.set_kp(kp)
+            pid.set_ki(ki)
+            pid.set_kd(kd)
+
+    def _correct(self):
+        for joint, pid in enumerate(self._pids):
+            self._output[1, joint] += pid.compute_output(float(self.error[0, joint]))

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Can this arm be commanded, and could it be all the time? What robot, cuff and clock say about that."""
+import threading
+import time
+
+import rospy
+from baxter_core_msgs.msg import AssemblyState, DigitalIOState
+from sensor_msgs.msg import JointState
+
+from baxter_interface import startup
+from baxter_interface.presence import Presence
+
+# Joint states come 50 times a second or more; older ones [s, ROS time] are no basis for motion.
+STALE_AFTER_S = 0.5
+ENABLE_HINT = "enable it: rosrun baxter_tools enable_robot.py -e"
+
+
+class RobotWatch:
+    """Watches the robot for one arm, "left" or "right".
+
+    A robot that is disabled for one message only has been disabled: what happens is kept until :meth:`begin`.
+    """
+
+    def __init__(self, side):
+        self._side = side
+        self._lock = threading.Lock()
+        self._state = None
+        self._cuff = False
+        self._event = ""
+        self._heard_ros_s = self._heard_wall_s = None
+        self._topic = rospy.resolve_name("robot/joint_states")
+        self._presence = Presence(self._topic, lambda: time.monotonic() - self._heard_wall_s)
+        self._subscribers = [
+            rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=1),
+            rospy.Subscriber("robot/joint_states", JointState, self._on_joint_states, queue_size=1, tcp_nodelay=True),
+            # A robot without a cuff is as good as one whose cuff nobody squeezes.
+            rospy.Subscriber("robot/digital_io/%s_lower_cuff/state" % side, DigitalIOState, self._on_cuff,
+                             queue_size=1)]
+        startup.wait_for_start([
+            startup.message_arrives(self._subscribers[0].resolved_name, lambda: self._state is not None),
+            startup.message_arrives(self._topic, lambda: self._heard_wall_s is not None)])
+
+    def begin(self):
+        """Forget what happened until now; return why the arm cannot be commanded, "" if it can."""
+        with self._lock:
+            self._event = ""
+            state, cuff = self._state, self._cuff
+        if self.is_gone() or self._age_s() > STALE_AFTER_S:
+            return "the robot reports no joint states on %s" % self._topic
+        if state.stopped:
+            return "the robot is stopped; reset and %s" % ENABLE_HINT
+        if not state.enabled:
+            return "the robot is not enabled; %s" % ENABLE_HINT
+        return "the %s cuff is squeezed" % self._side if cuff else ""
+
+    def trouble(self):
+        """What has happened since :meth:`begin` that ends a motion, "" if nothing has."""
+        with self._lock:
+            event = self._event
+        if event:
+            return event
+        if self.is_gone():
+            return "the robot was lost: nobody publishes %s any more" % self._topic
+        age_s = self._age_s()
+        if age_s > STALE_AFTER_S:
+            return "the robot has reported no joint states for %.1f s" % age_s
+        return ""
+
+    def is_enabled(self):
+        """Whether the robot says it is enabled."""
+        with self._lock:
+            return self._state.enabled and not self._state.stopped
+
+    def is_gone(self):
+        """Whether no node is there any more that publishes joint states. A paused simulation is not gone."""
+        return self._presence.is_gone()
+
+    def _age_s(self):
+        return rospy.get_time() - self._heard_ros_s
+
+    def _note(self, event):
+        self._event = self._event or event
+
+    def _on_state(self, message):
+        with self._lock:
+            self._state = message
+            if message.stopped:
+                self._note("the robot was stopped")
+            elif not message.enabled:
+                self._note("the robot was disabled")
+
+    def _on_cuff(self, message):
+        with self._lock:
+            self._cuff = message.state == DigitalIOState.PRESSED
+            if self._cuff:
+                self._note("the %s cuff was squeezed" % self._side)
+
+    def _on_joint_states(self, _message):
+        now_s = rospy.get_time()
+        with self._lock:
+            if self._heard_ros_s is not None and now_s < self._heard_ros_s:
+                self._note("time went back from %.3f to %.3f s: the simulation was reset or restarted"
+                           % (self._heard_ros_s, now_s))
+            self._heard_ros_s, self._heard_wall_s = now_s, time.monotonic()
+
