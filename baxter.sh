@@ -14,6 +14,8 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
 
   sim [COMMAND…]        the simulator on this machine (also: local; the default). Without a command: a shell.
                         A ROS_MASTER_URI that names this machine and another port is kept: several labs side by side.
+  sim --public[=ADDRESS] [COMMAND…]
+                        the same, open to other machines, which use it with ./baxter.sh ADDRESS
   HOST [COMMAND…]       a robot, by host name or IP address. ROS_IP is found from the route to it;
                         ROS_IP or ROS_HOSTNAME, if you have set one, wins.
   setup                 install and build what is missing; runs by itself the first time anything is used
@@ -66,7 +68,14 @@ main() {
             ;;
         sim | local | localhost | 127.*)
             bring_up_to_date || exit
-            use_loopback
+            case ${1:-} in
+                --public | --public=*)
+                    local address=${1#--public}
+                    use_public "${address#=}" || exit
+                    shift
+                    ;;
+                *) use_loopback ;;
+            esac
             use_build || exit
             enter "$@"
             ;;

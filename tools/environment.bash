@@ -27,6 +27,34 @@ use_loopback() {
     export ROS_MASTER_URI ROS_HOSTNAME=localhost
 }
 
+# use_public [ADDRESS]: the simulator on this machine, for other machines too: everything announces an address that they
+# can call. ADDRESS, or ROS_IP or ROS_HOSTNAME where one is set, or the address this machine has towards its network.
+use_public() {
+    local address=${1:-} variable=ROS_IP port=11311
+    if [[ -z $address && -n ${ROS_HOSTNAME:-} ]] && ! is_loopback "$ROS_HOSTNAME"; then
+        address=$ROS_HOSTNAME variable=ROS_HOSTNAME
+    elif [[ -z $address && -n ${ROS_IP:-} ]] && ! is_loopback "$ROS_IP"; then
+        address=$ROS_IP
+    fi
+    if [[ -z $address ]]; then
+        # The route to any address elsewhere names our own; no packet is sent. Without one, the first address there is.
+        address=$(ip -4 route get 192.0.2.1 2>/dev/null | sed -n 's/.* src \([0-9.]*\).*/\1/p')
+        [[ -n $address ]] || address=$(ip -4 -o address show scope global | sed -n '1s/.* inet \([0-9.]*\).*/\1/p')
+    fi
+    if [[ -z $address ]]; then
+        echo "baxter.sh: this machine has no address that other machines could reach. Connect it to a network, or use" \
+             "sim without --public." >&2
+        return 2
+    fi
+    if is_loopback "$(host_of "${ROS_MASTER_URI:-}")" || [[ $(host_of "${ROS_MASTER_URI:-}") == "$address" ]]; then
+        port=${ROS_MASTER_URI##*:}
+        port=${port%%/*}
+    fi
+    unset ROS_IP ROS_HOSTNAME
+    export ROS_MASTER_URI=http://$address:$port "$variable=$address"
+    echo "Open to every machine that reaches $address (docs/security.md). There: ./baxter.sh $address" >&2
+}
+
 # use_robot HOST: a master on another machine, which must be able to call us back at the address we announce.
 use_robot() {
     local host=$1 address source_address

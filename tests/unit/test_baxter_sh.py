@@ -75,6 +75,30 @@ def test_robot_by_address(variables_after):
     assert variables_after("use_robot 10.42.0.2") == {"ROS_MASTER_URI": "http://10.42.0.2:11311", "ROS_IP": "10.42.0.1"}
 
 
+OPEN = {"ROS_MASTER_URI": "http://10.42.0.1:11311", "ROS_IP": "10.42.0.1"}
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, OPEN),
+        ({"ROS_MASTER_URI": "http://localhost:11411", "ROS_HOSTNAME": "localhost"},
+         {"ROS_MASTER_URI": "http://10.42.0.1:11411", "ROS_IP": "10.42.0.1"}),
+        ({"ROS_IP": "10.9.9.9"}, {"ROS_MASTER_URI": "http://10.9.9.9:11311", "ROS_IP": "10.9.9.9"}),
+        ({"ROS_HOSTNAME": "desk.local"}, {"ROS_MASTER_URI": "http://desk.local:11311", "ROS_HOSTNAME": "desk.local"}),
+        ({"ROS_MASTER_URI": "http://baxter.local:11911"}, OPEN),
+    ],
+    ids=["found from the route", "left over from sim", "own address wins", "own name wins", "a robot's master"],
+)
+def test_public_announces_an_address_that_others_reach(variables_after, given, expected):
+    assert variables_after("use_public", **given) == expected
+
+
+def test_public_by_address(variables_after):
+    expected = {"ROS_MASTER_URI": "http://10.1.2.3:11311", "ROS_IP": "10.1.2.3"}
+    assert variables_after("use_public 10.1.2.3", ROS_IP="10.9.9.9") == expected
+
+
 def baxter(*arguments, script=ROOT / "baxter.sh", **options):
     options.update(capture_output=True, text=True, stdin=subprocess.DEVNULL)
     return subprocess.run([str(script), *arguments], **options)
