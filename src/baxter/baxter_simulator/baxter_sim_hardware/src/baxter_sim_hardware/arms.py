@@ -33,11 +33,15 @@ SPEED_RATIO = {"sim": 1.0, "robot": 0.3}  # at start, by profile; 0.3 is what th
 
 # Set-points accelerate by what the arm can follow nearly anywhere in its workspace within the effort limits [rad/s^2].
 # A stop decelerates harder, and harder still with the brakes on (disabled or stopped): from full speed, 1.5 rad/s at
-# the shoulder and 4 rad/s at the wrist, within about 0.02 rad. What the drives cannot follow, the reach bound catches.
+# the shoulder and 4 rad/s at the wrist, within 0.015 rad. What the drives cannot follow, the reach bound catches.
 ACCELERATION = {"s0": 10.0, "s1": 10.0, "e0": 15.0, "e1": 15.0, "w0": 40.0, "w1": 40.0, "w2": 40.0}
 STOP_ACCELERATION_FACTOR = 3.0
-BRAKES_ACCELERATION_FACTOR = 12.0
-BRAKES_EFFORT_FACTOR = 8.0
+BRAKES_ACCELERATION_FACTOR = 16.0
+BRAKES_EFFORT_FACTOR = 12.0
+BRAKES_REACH_RAD = 4e-3  # in place of REACH_RAD: a joint that brakes at 640 rad/s^2 may be a tick late
+# How long brakes push harder than the drives: every joint rests by then. Those that went on would make arms tremble
+# that were stopped while they press on something.
+BRAKES_S = 0.3
 
 STREAM_GAP_S = 0.05  # raw commands that follow each other within this are one stream
 SMOOTHING_S = 0.02  # see setpoint.MovingAverage
@@ -113,6 +117,7 @@ class Arms:
         self._speed = np.zeros(count)
         self._braking = np.zeros(count, dtype=bool)
         self._brakes = False
+        self._brake_ticks = 0  # left, of BRAKES_S
         self._smoothing = MovingAverage(max(1, round(SMOOTHING_S / dt)), position)
         self.reset(position)
 
@@ -214,6 +219,7 @@ class Arms:
         brakes: whether the brakes are on from now, which stop harder than the drives alone; until the next stop.
         """
         self._brakes = brakes
+        self._brake_ticks = round(BRAKES_S / self._dt) if brakes else 0
         for limb in self._limbs.values():
             limb.mode = Mode.POSITION
         self._hold(np.ones(len(self._mode), dtype=bool), position, velocity)
@@ -232,7 +238,9 @@ class Arms:
             self._move_reference()
         self._keep_within_reach(position, velocity)
 
-        bound = (BRAKES_EFFORT_FACTOR if self._brakes else 1.0) * self.limits.effort + np.abs(gravity)
+        bound = (BRAKES_EFFORT_FACTOR if self._brake_ticks else 1.0) * self.limits.effort + np.abs(gravity)
+        if self._brake_ticks:
+            self._brake_ticks -= 1
         in_torque = self._mode == _TORQUE
         if self._is_settled or not in_torque.any():
             return Drives(self._all, self._output, self._output_rate, bound, self._none, self._none, self._none)
@@ -310,7 +318,8 @@ class Arms:
         self._output = self._smoothing.push(reference)
         self._output_rate = (self._output - before) / self._dt
         if self._braking.any():
-            self._braking &= reference != self._target
+            # At the target and at rest: with the weaker acceleration of other motions it would overshoot.
+            self._braking &= (reference != self._target) | (rate != 0.0)
             self._refresh_speed()
         # Nothing to do until the next command or push: every set-point rests on its target.
         if not rate.any() and (np.abs(self._output - self._target) < 1e-12).all() and (self._mode == _POSITION).all():
@@ -320,9 +329,10 @@ class Arms:
     def _keep_within_reach(self, position, velocity):
         # The joints have not made this tick's step yet.
         lead = self._output - self._output_rate * self._dt - position
-        far = np.abs(lead) > REACH_RAD
+        reach = BRAKES_REACH_RAD if self._brake_ticks else REACH_RAD
+        far = np.abs(lead) > reach
         if far.any():
-            offset = np.clip(lead[far], -REACH_RAD, REACH_RAD) - lead[far]
+            offset = np.clip(lead[far], -reach, reach) - lead[far]
             self._reference[far] += offset
             self._output[far] += offset
             self._smoothing.shift(far, offset)
