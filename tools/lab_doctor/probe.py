@@ -18,7 +18,7 @@ from urllib.parse import urlparse
 from lab_doctor.checks import SIMULATOR_TOPICS, is_loopback
 from lab_doctor.facts import Facts, Listener, Master, PythonFacts, Topics
 
-DEADLINE_S = 4.0
+DEADLINE_S = 15.0
 CALL_TIMEOUT_S = 1.0
 CALLER_ID = "/lab_doctor"
 # Debian's roscpp nodes, and rospy nodes, carry their node name on the command line when roslaunch starts them.
