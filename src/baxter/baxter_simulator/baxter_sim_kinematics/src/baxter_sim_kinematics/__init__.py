@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Kinematics of a serial arm: forward, Jacobian, inverse with reasons for failure. Free of ROS."""
 
+from baxter_sim_kinematics.batch import BatchResult, solve_batch
 from baxter_sim_kinematics.chain import Chain, wrench_from_torques
+from baxter_sim_kinematics.collision import CollisionChecker, Touch
 from baxter_sim_kinematics.errors import ChainError, InvalidPosture, InvalidTarget, KinematicsError, NoSolution, Reason
-from baxter_sim_kinematics.ik import IkResult, pose_from_quaternion, solve, warm_up
+from baxter_sim_kinematics.ik import solve, solve_all, warm_up
 from baxter_sim_kinematics.posture_map import PostureMap
+from baxter_sim_kinematics.search import IkResult
+from baxter_sim_kinematics.target import pose_from_quaternion
 
 __all__ = [
+    "BatchResult",
     "Chain",
     "ChainError",
+    "CollisionChecker",
     "IkResult",
     "InvalidPosture",
     "InvalidTarget",
@@ -16,8 +22,11 @@ __all__ = [
     "NoSolution",
     "PostureMap",
     "Reason",
+    "Touch",
     "pose_from_quaternion",
     "solve",
+    "solve_all",
+    "solve_batch",
     "warm_up",
     "wrench_from_torques",
 ]

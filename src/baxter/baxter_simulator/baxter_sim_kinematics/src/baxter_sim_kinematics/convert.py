@@ -1,9 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where ROS messages meet this package's own types. Nothing else in the package knows messages."""
-from geometry_msgs.msg import Pose
+from baxter_kinematics_msgs.msg import IKVerdict
+from geometry_msgs.msg import Point, Pose, Quaternion
 from sensor_msgs.msg import JointState
 
-from baxter_sim_kinematics.ik import pose_from_quaternion
+from baxter_sim_kinematics.errors import NoSolution, Reason
+from baxter_sim_kinematics.target import pose_from_quaternion
+from urdf_model.transforms import quaternion_from_matrix
+
+_VERDICTS = {
+    Reason.OUT_OF_REACH: IKVerdict.OUT_OF_REACH,
+    Reason.JOINT_LIMIT: IKVerdict.JOINT_LIMIT,
+    Reason.NOT_CONVERGED: IKVerdict.NOT_CONVERGED,
+    Reason.SELF_COLLISION: IKVerdict.SELF_COLLISION,
+    Reason.WORLD_COLLISION: IKVerdict.WORLD_COLLISION,
+}
 
 
 def pose_matrix(pose):
@@ -27,4 +38,21 @@ def joint_state(chain, q, order, stamp):
     by_name = dict(zip(chain.joint_names, q.tolist(), strict=True))
     message = JointState(name=list(order), position=[by_name[name] for name in order])
     message.header.stamp = stamp
+    return message
+
+
+def pose_message(matrix):
+    """Return the geometry_msgs/Pose of a (4, 4) matrix."""
+    return Pose(Point(*matrix[:3, 3].tolist()), Quaternion(*quaternion_from_matrix(matrix).tolist()))
+
+
+def verdict(chain, error, target, order, stamp):
+    """Return the IKVerdict of the exception ``error`` about the PoseStamped ``target``; see :func:`joint_state`."""
+    message = IKVerdict(verdict=IKVerdict.INVALID_REQUEST, detail=str(error), target=target)
+    if isinstance(error, NoSolution):
+        message.verdict = _VERDICTS[error.reason]
+        message.joints_there = joint_state(chain, error.best, order, stamp)
+        message.nearest = pose_message(error.nearest)
+        message.short_m, message.short_rad = error.residual_m, error.residual_rad
+        message.joints, message.excess, message.links = list(error.joints), list(error.excess), list(error.pair)
     return message

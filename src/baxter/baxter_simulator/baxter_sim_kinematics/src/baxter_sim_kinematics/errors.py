@@ -33,24 +33,40 @@ class Reason(enum.Enum):
     OUT_OF_REACH = "out of reach"
     JOINT_LIMIT = "joint limit"
     NOT_CONVERGED = "not converged"
+    SELF_COLLISION = "self-collision"
+    WORLD_COLLISION = "collision with the world"
 
 
 class NoSolution(KinematicsError):
     """Inverse kinematics found no posture for ``target``.
 
     target: the (4, 4) pose asked for, tip in base [m].
-    reason: a :class:`Reason`; joints: names of the joints whose limits are in the way (only for JOINT_LIMIT).
+    reason: a :class:`Reason`.
     detail: one sentence that says what was found and what would help.
-    residual_m, residual_rad: how far from the target the best attempt inside the limits stayed; best: its joint values.
+    best: joint values (n,) inside the limits that put the tip as near the target as was found; nearest: its pose (4, 4)
+    there; residual_m, residual_rad: how far that is from the target. 0 in effect where a collision is the reason.
+    joints: names of the joints whose limits are in the way, excess: by how much each would have to go beyond [rad or m]
+    (only for JOINT_LIMIT).
+    pair: the two links that touch (only for collisions; a link of the world as "model/link").
     """
 
-    def __init__(self, target, reason, detail, residual_m, residual_rad, best, joints=()):
-        super().__init__("%s: %s (nearest attempt: %.4f m and %.4f rad away)"
-                         % (reason.value, detail, residual_m, residual_rad))
+    def __init__(self, target, reason, detail, residual_m, residual_rad, best, joints=(), excess=(), pair=(), *,
+                 nearest):
+        super().__init__("%s: %s%s" % (reason.value, detail, _nearest_sentence(nearest, residual_m, residual_rad)))
         self.target = target
         self.reason = reason
         self.detail = detail
         self.residual_m = residual_m
         self.residual_rad = residual_rad
         self.best = best
+        self.nearest = nearest
         self.joints = tuple(joints)
+        self.excess = tuple(excess)
+        self.pair = tuple(pair)
+
+
+def _nearest_sentence(nearest, residual_m, residual_rad):
+    if residual_m < 1e-5 and residual_rad < 1e-5:
+        return ""
+    return " (the nearest pose in reach is at %.3f %.3f %.3f, %.4f m and %.4f rad away)" % (
+        *nearest[:3, 3], residual_m, residual_rad)

@@ -7,9 +7,13 @@ A chain of n joints comes as plain arrays, every joint turned so that it moves a
   joint i - 1 moves; the last entry leads from the last joint to the tip;
 - ``prismatic`` (n,) bool; ``lower``, ``upper`` (n,) [rad or m], infinite where there is no limit.
 
+A target comes as a rotation (3, 3) and a position (3,), with ``rows`` of the pose error that count: 6 all of it; 5
+all but a turn about one axis; 3 the position alone. ``basis`` (3, 3) says which axis is free: see :func:`fill_basis`.
+
 Positions are in metres and angles in radians, everything in the base frame. The functions keep no state and release the
 GIL, so any number of threads may call them. Linear algebra is written out: the matrices are 7 x 7 at most, and numba's
-``numpy.linalg`` would need scipy.
+``numpy.linalg`` would need scipy. All of it stands in one file because numba's cache on disk notices a change of the
+file that a function is in, but not of the functions that it calls.
 """
 import math
 
@@ -132,8 +136,35 @@ def tip_and_jacobian(rotations, offsets, prismatic, q):
 
 
 @_compiled
-def fill_error(rotation, position, target_rotation, target_position, error):
-    """Pose error: translation [m], then the rotation vector [rad] that turns the tip into the target; base frame."""
+def fill_basis(target_rotation, axis, basis):
+    """Fill ``basis`` (3, 3): its last row is the target's ``axis`` (3,), given in the tip's frame, the others
+    complete it.
+
+    For a target that leaves the turn about that axis free. Base frame; ``axis`` has length 1.
+    """
+    for a in range(3):
+        basis[2, a] = (target_rotation[a, 0] * axis[0] + target_rotation[a, 1] * axis[1]
+                       + target_rotation[a, 2] * axis[2])
+    # The coordinate axis that is least along it is never parallel to it.
+    k = 0
+    for a in range(1, 3):
+        if abs(basis[2, a]) < abs(basis[2, k]):
+            k = a
+    length = math.sqrt(1.0 - basis[2, k] ** 2)
+    for a in range(3):
+        basis[0, a] = ((1.0 if a == k else 0.0) - basis[2, k] * basis[2, a]) / length
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        basis[1, a] = basis[2, b] * basis[0, c] - basis[2, c] * basis[0, b]
+
+
+@_compiled
+def fill_error(rotation, position, target_rotation, target_position, rows, basis, error):
+    """Pose error: translation [m], then the rotation vector [rad] that turns the tip into the target; base frame.
+
+    With 5 rows the rotation is the smallest that turns the tip's free axis into the target's; it has no part along that
+    axis, so that its components along the first two rows of ``basis`` are all of it.
+    """
     for a in range(3):
         error[a] = target_position[a] - position[a]
     m = np.empty((3, 3))
@@ -141,6 +172,22 @@ def fill_error(rotation, position, target_rotation, target_position, error):
         for b in range(3):
             m[a, b] = (target_rotation[a, 0] * rotation[b, 0] + target_rotation[a, 1] * rotation[b, 1]
                        + target_rotation[a, 2] * rotation[b, 2])
+    if rows == 5:
+        # The tip's axis now, along the rows of the basis: the third is the target's axis.
+        now = np.empty(3)
+        for a in range(3):
+            total = 0.0
+            for b in range(3):
+                for c in range(3):
+                    total += basis[a, c] * m[b, c] * basis[2, b]
+            now[a] = total
+        sine = math.sqrt(now[0] * now[0] + now[1] * now[1])
+        angle = math.atan2(sine, now[2])
+        scale = angle / sine if sine > 1e-9 else 1.0
+        error[3], error[4], error[5] = scale * now[1], -scale * now[0], 0.0
+        if sine <= 1e-9 and now[2] < 0.0:
+            error[3], error[4] = math.pi, 0.0
+        return
     x, y, z = 0.5 * (m[2, 1] - m[1, 2]), 0.5 * (m[0, 2] - m[2, 0]), 0.5 * (m[1, 0] - m[0, 1])
     sine, cosine = math.sqrt(x * x + y * y + z * z), 0.5 * (m[0, 0] + m[1, 1] + m[2, 2] - 1.0)
     angle = math.atan2(sine, cosine)
@@ -158,6 +205,17 @@ def fill_error(rotation, position, target_rotation, target_position, error):
         m[k, k] += 1.0
         scale = angle / math.sqrt(m[0, k] ** 2 + m[1, k] ** 2 + m[2, k] ** 2)
         error[3], error[4], error[5] = scale * m[0, k], scale * m[1, k], scale * m[2, k]
+
+
+@_compiled
+def _fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian):
+    """:func:`fill_jacobian`, its angular rows along ``basis`` where a turn is free."""
+    fill_jacobian(prismatic, axes, origins, position, jacobian)
+    if rows == 5:
+        for i in range(jacobian.shape[1]):
+            x, y, z = jacobian[3, i], jacobian[4, i], jacobian[5, i]
+            for a in range(3):
+                jacobian[3 + a, i] = basis[a, 0] * x + basis[a, 1] * y + basis[a, 2] * z
 
 
 @_compiled
@@ -200,11 +258,11 @@ def _back_substitute(factor, size, vector):
 
 
 @_compiled
-def _reach(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, rows, tolerance_m,
+def _reach(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, rows, basis, tolerance_m,
            tolerance_rad, max_iterations, q, best):
     """Levenberg-Marquardt from ``q`` (changed in place) towards the target, inside the limits.
 
-    ``rows`` is 6, or 3 to ignore orientation. ``best`` gets the visited posture with the least error. Returns
+    ``best`` gets the visited posture with the least error. Returns
     (solved, iterations, least error). The damping is the squared error itself (Sugihara, "Solvability-unconcerned
     inverse kinematics by the Levenberg-Marquardt method", IEEE T-RO 27(5), 2011): bold when near, careful when far.
     """
@@ -217,12 +275,12 @@ def _reach(rotations, offsets, prismatic, lower, upper, target_rotation, target_
     best[:] = q
     for iteration in range(max_iterations):
         place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position)
-        fill_error(rotation, position, target_rotation, target_position, error)
+        fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
         size = _length(error, 0, rows)
         if size < least:
             least = size
             best[:] = q
-        if _length(error, 0, 3) <= tolerance_m and (rows == 3 or _length(error, 3, 6) <= tolerance_rad):
+        if _length(error, 0, 3) <= tolerance_m and (rows == 3 or _length(error, 3, rows) <= tolerance_rad):
             best[:] = q
             return True, iteration, size
         if iteration % 8 == 7:
@@ -230,7 +288,7 @@ def _reach(rotations, offsets, prismatic, lower, upper, target_rotation, target_
             if least > 0.7 * mark:
                 return False, iteration + 1, least
             mark = least
-        fill_jacobian(prismatic, axes, origins, position, jacobian)
+        _fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
         damping = 0.5 * size * size + 1e-12
         for i in range(n):
             slope = 0.0
@@ -265,7 +323,7 @@ def _distance(a, b):
 
 
 @_compiled
-def _walk(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, rows, tolerance_m,
+def _walk(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, rows, basis, tolerance_m,
           tolerance_rad, max_iterations, seed, q, best):
     """Walk from the solution ``q`` towards ``seed`` without leaving the target: down the distance, in the null space.
 
@@ -283,14 +341,14 @@ def _walk(rotations, offsets, prismatic, lower, upper, target_rotation, target_p
     gain, longest, taken = 1.0, 0.4, 0.0
     for iteration in range(max_iterations):
         place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position)
-        fill_error(rotation, position, target_rotation, target_position, error)
-        on_target = _length(error, 0, 3) <= tolerance_m and (rows == 3 or _length(error, 3, 6) <= tolerance_rad)
+        fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
+        on_target = _length(error, 0, 3) <= tolerance_m and (rows == 3 or _length(error, 3, rows) <= tolerance_rad)
         if on_target:
             distance = _distance(q, seed)
             if distance < nearest:
                 nearest = distance
                 best[:] = q
-        fill_jacobian(prismatic, axes, origins, position, jacobian)
+        _fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
         # Joints that the step would push through their limit are taken out one round at a time.
         for _ in range(n):
             for row in range(rows):
@@ -419,9 +477,46 @@ def split_pose(pose, allowed, rotation, position):
 
 
 @_compiled
-def search(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, seed, rows, tolerance_m,
-           tolerance_rad, max_iterations, max_starts, wanted, solution):
-    """Look for postures that put the tip on the target, and keep the one nearest ``seed``.
+def _clamped(seed, lower, upper):
+    inside = np.empty(seed.shape[0])
+    for i in range(seed.shape[0]):
+        inside[i] = min(max(seed[i], lower[i]), upper[i])
+    return inside
+
+
+@_compiled
+def _fill_start(attempt, state, lower, upper, seed, start):
+    """Fill ``start`` (n,) with the posture that attempt number ``attempt`` begins at: the seed first, then random ones.
+
+    Depends on nothing but the arguments: ``state`` comes from the request, so the same request gives the same starts,
+    and a search can be taken up at any attempt.
+    """
+    n = seed.shape[0]
+    if attempt == 0:
+        start[:] = seed
+        return
+    # splitmix64 adds a constant at each step, so its state after any number of steps is known.
+    state += np.uint64((attempt - 1) * n) * np.uint64(0x9E3779B97F4A7C15)
+    for i in range(n):
+        state, bits = _mix(state)
+        fraction = float(bits >> np.uint64(11)) * 2.0 ** -53
+        low = lower[i] if lower[i] > -math.inf else seed[i] - math.pi
+        high = upper[i] if upper[i] < math.inf else seed[i] + math.pi
+        start[i] = min(max(low + fraction * (high - low), lower[i]), upper[i])
+
+
+@_compiled
+def _turn_towards(prismatic, lower, upper, goal, q):
+    """A joint without limits: of its many equal angles take the one nearest ``goal``."""
+    for i in range(q.shape[0]):
+        if not prismatic[i] and lower[i] == -math.inf and upper[i] == math.inf:
+            q[i] -= 2.0 * math.pi * round((q[i] - goal[i]) / (2.0 * math.pi))
+
+
+@_compiled
+def search(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, seed, goal, rows, basis,
+           tolerance_m, tolerance_rad, max_iterations, max_starts, wanted, solution):
+    """Look for postures that put the tip on the target, and keep the one nearest ``goal``, (n,) inside the limits.
 
     The first start is the seed, the others are random postures inside the limits whose generator is seeded by the
     request itself, so the same request gives the same answer bit for bit. Ends after ``wanted`` starts that arrived.
@@ -431,36 +526,23 @@ def search(rotations, offsets, prismatic, lower, upper, target_rotation, target_
     """
     n = seed.shape[0]
     q, best, start = np.empty(n), np.empty(n), np.empty(n)
-    seed = seed.copy()
-    for i in range(n):
-        seed[i] = min(max(seed[i], lower[i]), upper[i])
+    seed = _clamped(seed, lower, upper)
     state = _stir(_stir(_stir(np.uint64(n), target_position), target_rotation.ravel()), seed)
     found, starts, iterations, least, nearest = 0, 0, 0, math.inf, math.inf
     for attempt in range(max_starts):
         starts += 1
-        for i in range(n):
-            if attempt == 0:
-                start[i] = seed[i]
-            else:
-                state, bits = _mix(state)
-                fraction = float(bits >> np.uint64(11)) * 2.0 ** -53
-                low = lower[i] if lower[i] > -math.inf else seed[i] - math.pi
-                high = upper[i] if upper[i] < math.inf else seed[i] + math.pi
-                start[i] = min(max(low + fraction * (high - low), lower[i]), upper[i])
+        _fill_start(attempt, state, lower, upper, seed, start)
         q[:] = start
         solved, used, size = _reach(rotations, offsets, prismatic, lower, upper, target_rotation, target_position,
-                                    rows, tolerance_m, tolerance_rad, max_iterations, q, best)
+                                    rows, basis, tolerance_m, tolerance_rad, max_iterations, q, best)
         iterations += used
         if solved:
-            for i in range(n):
-                if not prismatic[i] and lower[i] == -math.inf and upper[i] == math.inf:
-                    # A joint without limits: of its many equal angles take the one nearest the seed.
-                    best[i] -= 2.0 * math.pi * round((best[i] - seed[i]) / (2.0 * math.pi))
+            _turn_towards(prismatic, lower, upper, goal, best)
             q[:] = best
             iterations += _walk(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, rows,
-                                tolerance_m, tolerance_rad, max_iterations, seed, q, best)
+                                basis, tolerance_m, tolerance_rad, max_iterations, goal, q, best)
             found += 1
-            distance = _distance(best, seed)
+            distance = _distance(best, goal)
             if distance < nearest:
                 nearest = distance
                 solution[:] = best
@@ -469,11 +551,148 @@ def search(rotations, offsets, prismatic, lower, upper, target_rotation, target_
         elif found == 0 and size < least:
             least = size
             solution[:] = best
+    error_m, error_rad = pose_error(rotations, offsets, prismatic, target_rotation, target_position, rows, basis,
+                                    solution)
+    return found, starts, iterations, error_m, error_rad
+
+
+@_compiled
+def pose_error(rotations, offsets, prismatic, target_rotation, target_position, rows, basis, q):
+    """Return the pose error of the posture ``q``: [m], [rad]."""
+    n = q.shape[0]
     axes, origins = np.empty((n, 3)), np.empty((n, 3))
     rotation, position, error = np.empty((3, 3)), np.empty(3), np.empty(6)
-    place_joints(rotations, offsets, prismatic, solution, axes, origins, rotation, position)
-    fill_error(rotation, position, target_rotation, target_position, error)
-    return found, starts, iterations, _length(error, 0, 3), _length(error, 3, 6)
+    place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position)
+    fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
+    return _length(error, 0, 3), _length(error, 3, 6)
+
+
+@_compiled
+def search_many(rotations, offsets, prismatic, lower, upper, target_rotations, target_positions, seeds, goals, rows,
+                bases, tolerance_m, tolerance_rad, max_iterations, max_starts, wanted, first, last, solutions,
+                outcomes):
+    """:func:`search` for the targets ``first`` to ``last`` - 1 of arrays with one entry a target.
+
+    Fills their rows of ``solutions`` (m, n) and ``outcomes`` (m, 5): what search returns.
+    """
+    for k in range(first, last):
+        found, starts, iterations, error_m, error_rad = search(
+            rotations, offsets, prismatic, lower, upper, target_rotations[k], target_positions[k], seeds[k], goals[k],
+            rows, bases[k], tolerance_m, tolerance_rad, max_iterations, max_starts, wanted, solutions[k])
+        outcomes[k, 0], outcomes[k, 1], outcomes[k, 2] = found, starts, iterations
+        outcomes[k, 3], outcomes[k, 4] = error_m, error_rad
+
+
+@_compiled
+def gather(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, seed, goal, rows, basis,
+           tolerance_m, tolerance_rad, max_iterations, first_start, max_starts, walked, apart, held, solutions):
+    """Collect solutions of one target that differ: in at least one joint by ``apart`` [rad or m] from each other.
+
+    Starts number ``first_start`` to ``max_starts`` - 1 of those that :func:`search` would try, until ``solutions``
+    (m, n), of which the first ``held`` rows hold some already, is full. With ``walked`` each is taken along its
+    self-motion to where it is nearest ``goal``; of two that are the same the first stays.
+    Returns (rows filled, starts, iterations).
+    """
+    n = seed.shape[0]
+    q, best, start = np.empty(n), np.empty(n), np.empty(n)
+    seed = _clamped(seed, lower, upper)
+    state = _stir(_stir(_stir(np.uint64(n), target_position), target_rotation.ravel()), seed)
+    starts, iterations = 0, 0
+    for attempt in range(first_start, max_starts):
+        if held >= solutions.shape[0]:
+            break
+        starts += 1
+        _fill_start(attempt, state, lower, upper, seed, start)
+        q[:] = start
+        solved, used, _ = _reach(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, rows,
+                                 basis, tolerance_m, tolerance_rad, max_iterations, q, best)
+        iterations += used
+        if not solved:
+            continue
+        _turn_towards(prismatic, lower, upper, goal, best)
+        if walked:
+            q[:] = best
+            iterations += _walk(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, rows,
+                                basis, tolerance_m, tolerance_rad, max_iterations, goal, q, best)
+        new = True
+        for k in range(held):
+            gap = 0.0
+            for i in range(n):
+                gap = max(gap, abs(best[i] - solutions[k, i]))
+            if gap < apart:
+                new = False
+                break
+        if new:
+            solutions[held] = best
+            held += 1
+    return held, starts, iterations
+
+
+@_compiled
+def nearest(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, seed, rows, basis,
+            metres_per_radian, max_iterations, max_starts, solution):
+    """The posture inside the limits whose tip comes nearest to a target that cannot be reached.
+
+    Near means sqrt(error [m]^2 + (metres_per_radian * error [rad])^2). Levenberg-Marquardt that only ever takes steps
+    downhill (the damping follows Nielsen, "Damping parameter in Marquardt's method", IMM-REP-1999-05), from the seed
+    and from random postures. Fills ``solution`` (n,); returns its pose error [m], [rad].
+    """
+    n = seed.shape[0]
+    axes, origins = np.empty((n, 3)), np.empty((n, 3))
+    rotation, position = np.empty((3, 3)), np.empty(3)
+    jacobian, error = np.empty((6, n)), np.empty(6)
+    normal, step, slope, q, tried = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    held = np.empty(n, dtype=np.bool_)
+    seed = _clamped(seed, lower, upper)
+    solution[:] = seed
+    state = _stir(_stir(_stir(np.uint64(n), target_position), target_rotation.ravel()), seed)
+    least = math.inf
+    for attempt in range(max_starts):
+        _fill_start(attempt, state, lower, upper, seed, q)
+        damping, growth, cost = 1e-2, 2.0, math.inf
+        tried[:] = q
+        for _ in range(max_iterations):
+            place_joints(rotations, offsets, prismatic, tried, axes, origins, rotation, position)
+            fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
+            for row in range(3, rows):
+                error[row] *= metres_per_radian
+            trial = _length(error, 0, rows) ** 2
+            if trial < cost:
+                gained = cost - trial
+                cost = trial
+                q[:] = tried
+                damping, growth = max(damping * 0.3, 1e-9), 2.0
+                if gained < 1e-10 * cost or cost < 1e-14:
+                    break
+                _fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
+                for i in range(n):
+                    for row in range(3, rows):
+                        jacobian[row, i] *= metres_per_radian
+                    slope[i] = 0.0
+                    for row in range(rows):
+                        slope[i] += jacobian[row, i] * error[row]
+                    held[i] = (q[i] <= lower[i] and slope[i] < 0.0) or (q[i] >= upper[i] and slope[i] > 0.0)
+            else:
+                damping, growth = damping * growth, growth * 2.0
+                if damping > 1e6:
+                    break
+            for i in range(n):
+                step[i] = 0.0 if held[i] else slope[i]
+                for j in range(i + 1):
+                    value = 0.0
+                    if not (held[i] or held[j]):
+                        for row in range(rows):
+                            value += jacobian[row, i] * jacobian[row, j]
+                    normal[i, j] = value
+                normal[i, i] += damping
+            _factorise(normal, n)
+            _back_substitute(normal, n, step)
+            for i in range(n):
+                tried[i] = min(max(q[i] + step[i], lower[i]), upper[i])
+        if cost < least:
+            least = cost
+            solution[:] = q
+    return pose_error(rotations, offsets, prismatic, target_rotation, target_position, rows, basis, solution)
 
 
 @_compiled

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-# How much one radian of turning counts, in metres of moving: about the length of a forearm.
-_METRES_PER_RADIAN = 0.3
+from baxter_sim_kinematics.target import METRES_PER_RADIAN
 
 
 class PostureMap:
@@ -32,4 +31,4 @@ def _separation(a, b):
     """Distance [m] between two poses, rotation weighed in."""
     cosine = 0.5 * (float(np.tensordot(a[:3, :3], b[:3, :3])) - 1.0)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
-    return math.hypot(float(np.linalg.norm(a[:3, 3] - b[:3, 3])), _METRES_PER_RADIAN * angle)
+    return math.hypot(float(np.linalg.norm(a[:3, 3] - b[:3, 3])), METRES_PER_RADIAN * angle)

@@ -14,6 +14,7 @@ import rospy
 import rostest
 import tf2_ros
 from baxter_core_msgs.srv import SolvePositionIK, SolvePositionIKRequest
+from baxter_kinematics_msgs.msg import IKReport, IKVerdict
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
@@ -63,7 +64,9 @@ class PositionKinematics(unittest.TestCase):
         cls.chains = {side: Chain.from_robot(robot, "base", side + "_gripper") for side in ("left", "right")}
         cls.log = []
         cls.rosout = rospy.Subscriber("/rosout", Log, lambda message: cls.log.append(message.msg))
-        cls.services = {}
+        cls.services, cls.reports = {}, []
+        cls.listener = rospy.Subscriber("/ExternalTools/left/PositionKinematicsNode/IKReport", IKReport,
+                                        cls.reports.append)
         for side in cls.chains:
             name = "/ExternalTools/%s/PositionKinematicsNode/IKService" % side
             rospy.wait_for_service(name, timeout=60.0)
@@ -186,6 +189,38 @@ class PositionKinematics(unittest.TestCase):
             self.assert_invalid(answer)
         answer = self.assert_logged("seed_mode 9 is unknown", lambda: self.ask("left", [pose(*LAB_POSE)], mode=9))
         self.assert_invalid(answer)
+
+    def report_on(self, *poses):
+        """Ask the left arm, and return the report that goes with the answer: the one with the same target."""
+        answer = self.ask("left", list(poses))
+
+        def mine():
+            return [report for report in list(self.reports) if [v.target for v in report.verdicts] == list(poses)]
+
+        wait_until(mine, "the report on the answer")
+        return answer, mine()[-1]
+
+    def test_report_says_why(self):
+        tip = self.chains["left"].fk((2.4, -0.3, 0.0, 0.6, 0.0, 0.9, 0.0))
+        behind = (tip[:3, 3], quaternion_from_matrix(tip))
+        too_far, empty = pose(*TOO_FAR), pose((0.6, 0.2, 0.1), (0, 0, 0, 0))
+        answer, report = self.report_on(pose(*LAB_POSE), too_far, pose(*behind), empty)
+        self.assertEqual((report.limb, report.header.frame_id), ("left", "base"))
+        self.assertEqual([v.verdict for v in report.verdicts], [
+            IKVerdict.SOLVED, IKVerdict.OUT_OF_REACH, IKVerdict.JOINT_LIMIT, IKVerdict.INVALID_REQUEST])
+        solved, far, limit, invalid = report.verdicts
+        self.assertEqual(solved.joints_there, answer.joints[0])
+        self.assertEqual(solved.detail, "")
+        # As far as it says, and the joint values lead there.
+        there = self.chains["left"].fk(far.joints_there.position)[:3, 3]
+        nearest = far.nearest.position
+        np.testing.assert_allclose([nearest.x, nearest.y, nearest.z], there, atol=1e-9)
+        self.assertAlmostEqual(far.short_m, np.linalg.norm(there - TOO_FAR[0]), places=9)
+        self.assertGreater(far.short_m, 1.5)
+        self.assertEqual(limit.joints, ["left_s0"])
+        self.assertGreater(limit.excess[0], 0.1)
+        self.assertIn("length 0", invalid.detail)
+        self.assertEqual(len(invalid.joints_there.position), 0)
 
     def test_poses_in_other_frames(self):
         position, quaternion = LAB_POSE

@@ -78,9 +78,8 @@ def test_a_signal_during_a_registration_ends_the_node(master, call, subject, num
     master.on_call = strike
     try:
         assert reached.wait(60.0), "the node does not get as far as %s of %s" % (call, subject)
-        begin_s = time.monotonic()
+        # A node that waits for a lock of its own main thread never ends; a loaded machine may take seconds.
         output, _ = node.communicate(timeout=30.0)
-        assert time.monotonic() - begin_s < 3.0
         assert "Traceback" not in output
     finally:
         node.kill()

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Inverse kinematics that keeps clear of the robot's own body and of the world."""
+from collections import Counter
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from baxter_sim_kinematics.errors import NoSolution, Reason
+from baxter_sim_kinematics.search import IkResult
+
+# Solutions that are looked at between two searches for more; the first are mostly free.
+_CHUNK = 6
+
+
+class Touch(NamedTuple):
+    """Two links that touch. link_a is the robot's; link_b too, or "model/link" of something in the world."""
+
+    link_a: str
+    link_b: str
+    with_world: bool
+    depth_m: float
+
+
+class CollisionChecker(Protocol):
+    """Says whether a posture touches anything. Not to be shared between threads unless its class says so."""
+
+    def contact(self, joint_names, q):
+        """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None where it is clear."""
+
+
+def first_free(search, found, checker):
+    """Return the IkResult of ``found`` if it is clear, else of a clear solution, of the first ones that are met the
+    nearest to the goal. Raises NoSolution that names the links that touch in most of the solutions.
+
+    All starts that ``search`` may make are made before it gives up.
+    """
+    names = search.chain.joint_names
+    touch = checker.contact(names, found.q)
+    if touch is None:
+        return IkResult(found.q, found.residual_m, found.residual_rad, found.iterations, found.starts - 1)
+    touches = Counter([touch[:3]])
+    solutions = np.empty((search.max_starts + 1, len(search.chain)))
+    solutions[0] = found.q
+    held, start, iterations = 1, 0, found.iterations
+    while start < search.max_starts:
+        room = solutions[: min(held + _CHUNK, len(solutions))]
+        count, used, more = search.gather(room, held, start, False)
+        start, iterations = start + used, iterations + more
+        new = solutions[held:count]
+        held = count
+        for q in new[np.argsort(np.linalg.norm(new - search.goal, axis=1), kind="stable")]:
+            touch = checker.contact(names, q)
+            if touch is None:
+                return IkResult(q.copy(), *search.residual(q), iterations, start - 1)
+            touches[touch[:3]] += 1
+        if not used:
+            break
+    (link_a, link_b, with_world), times = touches.most_common(1)[0]
+    reason = Reason.WORLD_COLLISION if with_world else Reason.SELF_COLLISION
+    raise NoSolution(
+        search.target.pose, reason, "%s touches %s in %d of the %d postures that reach the pose, and none of them is "
+        "clear; move the target or turn it" % (link_a, link_b, times, sum(touches.values())), found.residual_m,
+        found.residual_rad, found.q, pair=(link_a, link_b), nearest=search.chain.fk(found.q))

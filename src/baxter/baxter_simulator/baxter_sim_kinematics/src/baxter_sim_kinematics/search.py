@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One target and one chain, searched for under varying limits and budgets."""
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from baxter_sim_kinematics import kernels
+from baxter_sim_kinematics.target import METRES_PER_RADIAN
+
+# Random starts before a pose counts as unreachable. Of 100,000 random reachable Baxter poses none needed more than 100.
+MAX_STARTS = 200
+# Iterations of one start. Most arrive within 15; one that makes no progress is left earlier.
+MAX_ITERATIONS = 100
+# Solutions that differ by less than this in every joint [rad or m] are the same one.
+APART = 0.05
+# Starts and iterations for the nearest pose that can be reached; 40 starts agree with 400 to a millimetre.
+_NEAREST_STARTS = 40
+_NEAREST_ITERATIONS = 100
+
+
+@dataclass(frozen=True)
+class IkResult:
+    """A solution. q: joint values (n,) in chain order, inside the limits. residual_m, residual_rad: what is left of the
+    pose error. iterations, restarts: the effort, of all starts together."""
+
+    q: np.ndarray
+    residual_m: float
+    residual_rad: float
+    iterations: int
+    restarts: int
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search came to. arrived: starts that did; q: the chosen solution, or the best attempt where none did."""
+
+    arrived: int
+    starts: int
+    iterations: int
+    residual_m: float
+    residual_rad: float
+    q: np.ndarray
+
+
+class Search:
+    """``seed`` (n,): where it starts. ``goal`` (n,): the posture to which solutions should be near."""
+
+    def __init__(self, chain, target, seed, goal, tolerance_m, tolerance_rad, max_starts=MAX_STARTS,
+                 max_iterations=MAX_ITERATIONS):
+        """Raises ValueError for tolerances or budgets with which nothing can be found."""
+        if not (tolerance_m > 0.0 and tolerance_rad > 0.0 and max_starts >= 1 and max_iterations >= 1):
+            raise ValueError("tolerances must be positive and max_starts, max_iterations at least 1")
+        self.chain, self.target, self.seed, self.goal = chain, target, seed, goal
+        self.max_starts, self.max_iterations = int(max_starts), int(max_iterations)
+        self._tolerances = (float(tolerance_m), float(tolerance_rad))
+
+    def run(self, candidates, max_starts, max_iterations=MAX_ITERATIONS, limits=None, seed=None, goal=None, rows=None):
+        """Return what is Found. ``limits``: (lower, upper) in place of the chain's; ``rows``: of the error that
+        count.
+        """
+        q = np.empty(len(self.chain))
+        target = self.target
+        outcome = kernels.search(
+            *self.chain.arrays, *(limits or self.chain.limit_arrays), target.rotation, target.position,
+            self.seed if seed is None else seed, self.goal if goal is None else goal, rows or target.rows, target.basis,
+            *self._tolerances, max_iterations, max_starts, candidates, q)
+        return Found(*outcome, q)
+
+    def gather(self, solutions, held, first_start, walked, max_starts=None, limits=None, apart=APART):
+        """Fill rows ``held`` and on of ``solutions`` (m, n) with solutions that differ; start number ``first_start``
+        first.
+
+        Returns (rows filled, starts used, iterations).
+        """
+        target = self.target
+        return kernels.gather(
+            *self.chain.arrays, *(limits or self.chain.limit_arrays), target.rotation, target.position, self.seed,
+            self.goal, target.rows, target.basis, *self._tolerances, self.max_iterations, first_start,
+            self.max_starts if max_starts is None else max_starts, walked, float(apart), held, solutions)
+
+    def residual(self, q):
+        """Return the pose error of ``q`` (n,): [m], [rad]."""
+        target = self.target
+        return kernels.pose_error(*self.chain.arrays, target.rotation, target.position, target.rows, target.basis, q)
+
+    def nearest(self):
+        """Return (q, error [m], error [rad]): inside the limits, the tip as near the target as it gets."""
+        q = np.empty(len(self.chain))
+        errors = kernels.nearest(*self.chain.arrays, *self.chain.limit_arrays, self.target.rotation,
+                                 self.target.position, self.seed, self.target.rows, self.target.basis,
+                                 METRES_PER_RADIAN, _NEAREST_ITERATIONS, _NEAREST_STARTS, q)
+        return (q, *errors)
+
+    def free_limits(self, joint=None):
+        """Return (lower, upper) with no limit on ``joint`` (index), or on any joint."""
+        lower, upper = (limit.copy() for limit in self.chain.limit_arrays)
+        which = slice(None) if joint is None else joint
+        lower[which], upper[which] = -math.inf, math.inf
+        return lower, upper

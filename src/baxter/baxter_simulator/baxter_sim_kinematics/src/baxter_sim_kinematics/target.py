@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is asked of the tip: a pose, or as much of one as matters."""
+import math
+
+import numpy as np
+
+from baxter_sim_kinematics import kernels
+from baxter_sim_kinematics.errors import InvalidTarget
+
+# Off by less than this a rotation is taken for a rounded one and normalised (the labs' quaternion is off by 9e-4).
+ROUNDED = 1e-2
+# How much one radian of turning counts, in metres of moving, where poses are compared: about the length of a forearm.
+METRES_PER_RADIAN = 0.3
+
+
+def pose_from_quaternion(position, quaternion_xyzw):
+    """Return the pose (4, 4) at ``position`` (x, y, z) [m] with orientation (x, y, z, w).
+
+    A quaternion whose length is off by less than 0.01 is normalised. Raises InvalidTarget for any other length and for
+    numbers that are not finite.
+    """
+    numbers = [float(number) for number in (*position, *quaternion_xyzw)]
+    if len(numbers) != 7 or not all(map(math.isfinite, numbers)):
+        raise InvalidTarget("position and orientation must be seven finite numbers, got position %s and quaternion "
+                            "(x y z w) %s" % (numbers[:3], numbers[3:]), numbers)
+    length = math.sqrt(sum(number * number for number in numbers[3:]))
+    if abs(length - 1.0) > ROUNDED:
+        hint = "; the identity is 0 0 0 1" if length == 0.0 else ""
+        raise InvalidTarget("quaternion (x y z w) %s has length %.6g, a rotation needs length 1%s"
+                            % (numbers[3:], length, hint), numbers)
+    x, y, z, w = (number / length for number in numbers[3:])
+    return np.array([
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w), numbers[0]],
+        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w), numbers[1]],
+        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y), numbers[2]],
+        [0.0, 0.0, 0.0, 1.0],
+    ])
+
+
+class Target:
+    """A pose (4, 4) of the tip in the base frame, checked, and how much of it counts.
+
+    rotation (3, 3), orthonormal; position (3,) [m]; rows: 6 all, 5 all but a turn about an axis of the tip, 3 the
+    position alone; basis (3, 3): as the kernels want it.
+    """
+
+    def __init__(self, pose, position_only=False, free_axis=None):
+        """``free_axis`` (3,): the axis of the tip, in the tip's frame, about which any turn will do.
+
+        Raises InvalidTarget for what is no pose, ValueError for an axis that is no direction.
+        """
+        try:
+            matrix = np.array(pose, dtype=np.float64)
+        except (TypeError, ValueError):
+            matrix = np.empty(0)
+        if matrix.shape != (4, 4):
+            raise InvalidTarget("the target must be a 4 x 4 pose matrix, got %r" % (pose,), pose)
+        self.rotation, self.position, self.basis = np.empty((3, 3)), np.empty(3), np.eye(3)
+        if not kernels.split_pose(matrix, ROUNDED, self.rotation, self.position):
+            raise InvalidTarget("the target must hold a finite position and a rotation, got\n%s" % matrix, pose)
+        self.rows = 6
+        if free_axis is not None:
+            self.rows = 5
+            kernels.fill_basis(self.rotation, _direction(free_axis), self.basis)
+        if position_only:
+            self.rows = 3
+
+    @property
+    def pose(self):
+        """A new (4, 4) of what was asked for, made orthonormal."""
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = self.rotation, self.position
+        return pose
+
+
+def _direction(axis):
+    vector = np.array(axis, dtype=np.float64)
+    length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
+    if not math.isfinite(length) or length < 1e-9:
+        raise ValueError("the free axis must be a direction of three numbers, e.g. (0, 0, 1), got %r" % (axis,))
+    return vector / length

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Why a pose has no solution: asked only when a search has found none, by searching again with something let go."""
+import math
+
+import numpy as np
+
+from baxter_sim_kinematics.errors import NoSolution, Reason
+from baxter_sim_kinematics.search import MAX_ITERATIONS, MAX_STARTS
+
+# A pose error that stays above this with limits lifted is no matter of more iterations [m or rad].
+_CLEARLY_OFF = 1e-4
+# Starts for finding out why: the questions are easier than the search was.
+_STARTS_TO_EXPLAIN = 60
+# Walks towards the limit that a joint has broken; each gets about half of what is left to get.
+_PULLS = 5
+# Solutions without limits among which the one that breaks the limits least is looked for.
+_UNLIMITED = 48
+
+
+def beyond_reach(chain, target):
+    """Return the sentence that the target lies outside a ball which the arm cannot leave, or "" when it lies inside.
+
+    With the orientation given, the origin of a last revolute joint is known, so there is a ball for that as well.
+    """
+    over = math.dist(target.position, chain.shoulder) - chain.tip_reach_m
+    text = "the target lies at least %.3f m beyond the outstretched arm; move it"
+    if over <= 0.0 and chain.wrist_is_fixed and target.rows == 6:
+        wrist = target.position - target.rotation @ chain.wrist_in_tip
+        over = math.dist(wrist, chain.shoulder) - chain.wrist_reach_m
+        text = "in this orientation the wrist would have to be at least %.3f m beyond the outstretched arm; turn the " \
+            "target or move it"
+    if over <= 0.0:
+        return ""
+    return (text + " towards the shoulder at (%.3f %.3f %.3f) in %s") % (over, *chain.shoulder, chain.base)
+
+
+def explain(search, found):
+    """Raise the NoSolution that says why ``search`` came to ``found``, which has not arrived.
+
+    Returns a solution where the inquiry happens to meet one.
+    """
+    chain, target = search.chain, search.target
+    reach = beyond_reach(chain, target)
+    if reach:
+        raise _out_of_reach(search, reach)
+    if search.max_starts < MAX_STARTS or search.max_iterations < MAX_ITERATIONS:
+        full = search.run(1, MAX_STARTS)
+        if full.arrived:
+            raise _failure(search, Reason.NOT_CONVERGED, "no start out of %d came within the tolerance after %d "
+                           "iterations from this seed; allow more" % (search.max_starts, search.max_iterations),
+                           (found.q, found.residual_m, found.residual_rad))
+    lifted = search.run(1, MAX_STARTS, limits=search.free_limits(), seed=found.q, goal=found.q)
+    if lifted.arrived:
+        inside, over = _least_excess(search, found.q, lifted.q)
+        inside = inside or (None if over else _settled(search, lifted.q))
+        if inside:
+            return inside
+        named = sorted(over, key=lambda name: -abs(over[name]))
+        sentences = ", ".join(_excess_sentence(chain, name, over[name]) for name in named)
+        raise _failure(search, Reason.JOINT_LIMIT, "%s; change the orientation or bring the target nearer to the "
+                       "middle of the workspace" % sentences, search.nearest(), joints=named,
+                       excess=[abs(over[name]) for name in named])
+    if max(lifted.residual_m, 0.0 if target.rows == 3 else lifted.residual_rad) > _CLEARLY_OFF:
+        if target.rows > 3 and search.run(1, _STARTS_TO_EXPLAIN, rows=3).arrived:
+            raise _out_of_reach(search, "the point can be reached, but not in this orientation; turn the target or "
+                                "move it into the workspace")
+        raise _out_of_reach(search, "the arm does not get there even without its joint limits; move the target into "
+                            "the workspace")
+    raise _failure(search, Reason.NOT_CONVERGED, "%d starts came close but none within the tolerance; the target is at "
+                   "the edge of the workspace or near a singularity, move it a little or try another seed"
+                   % found.starts, (found.q, found.residual_m, found.residual_rad))
+
+
+def _out_of_reach(search, detail):
+    return _failure(search, Reason.OUT_OF_REACH, detail, search.nearest())
+
+
+def _failure(search, reason, detail, nearest, joints=(), excess=()):
+    q, residual_m, residual_rad = nearest
+    return NoSolution(search.target.pose, reason, detail, residual_m, residual_rad, q, joints, excess,
+                      nearest=search.chain.fk(q))
+
+
+def _least_excess(search, start, lifted):
+    """Return (a solution inside the limits after all or None, {joint name: signed excess} of who has to give way).
+
+    One joint alone if that is enough, and of those the one that has to go least far; else several together. ``lifted``:
+    a solution without limits.
+    """
+    chain = search.chain
+    alone = []
+    for joint in range(len(chain)):
+        limits = search.free_limits(joint)
+        found = search.run(8, _STARTS_TO_EXPLAIN, limits=limits, seed=start, goal=start)
+        if found.arrived:
+            for _ in range(_PULLS):
+                # Along the self-motion to where this joint is least beyond.
+                wrapped = _wrapped(chain, found.q)
+                found = search.run(1, 1, limits=limits, seed=wrapped, goal=np.clip(wrapped, *chain.limit_arrays))
+            over = _excess(chain, found.q)
+            inside = None if over else _settled(search, found.q)
+            if inside is not None:
+                return inside, {}
+            alone.append(over)
+    if not any(alone):
+        solutions = np.empty((_UNLIMITED, len(chain)))
+        solutions[0] = lifted
+        count, _, _ = search.gather(solutions, 1, 0, True, max_starts=MAX_STARTS, limits=search.free_limits())
+        alone = [_excess(chain, q) for q in solutions[:count]]
+    return None, min(filter(None, alone), key=lambda over: sum(map(abs, over.values())), default={})
+
+
+def _settled(search, q):
+    """Return what is Found from ``q``, turned into the limits, if that arrives; else None."""
+    inside = search.run(1, 1, seed=np.clip(_wrapped(search.chain, q), *search.chain.limit_arrays))
+    return inside if inside.arrived else None
+
+
+def _wrapped(chain, q):
+    """Turn revolute joints by whole turns to where they are inside their limits, or least outside."""
+    lower, upper = chain.limit_arrays
+    turns = np.round((q - chain.mid_range) / (2.0 * math.pi))
+    return np.where(chain.arrays[2] | ~np.isfinite(lower) | ~np.isfinite(upper), q, q - 2.0 * math.pi * turns)
+
+
+def _excess(chain, q):
+    """Return {joint name: how far beyond its limit [rad or m], negative below the lower} of ``q`` modulo whole
+    turns.
+    """
+    over = {}
+    for name, value, low, high in zip(chain.joint_names, _wrapped(chain, q), *chain.limit_arrays, strict=True):
+        if not low - 1e-9 <= value <= high + 1e-9:
+            over[name] = float(value - (low if value < low else high))
+    return over
+
+
+def _excess_sentence(chain, name, excess):
+    joint = chain.joint_names.index(name)
+    side, limit = ("lower", chain.lower[joint]) if excess < 0.0 else ("upper", chain.upper[joint])
+    return "%s would have to go to %.3f %s, its %s limit is %.3f" % (
+        name, limit + excess, "m" if chain.arrays[2][joint] else "rad", side, limit)
