@@ -145,7 +145,8 @@ def _resource_folders():
 
 def _tell_viewers(writer, publications, world, spawner):
     writer.write_scene([{"name": model.name, "joints": list(model.joint_names),
-                         "urdf": spawner.drawings.get(model.name)} for model in world.models.values()])
+                         "urdf": spawner.drawings.get(model.name), "sensors": spawner.sensors.get(model.name, [])}
+                        for model in world.models.values()])
     publications.write_snapshot()
 
 

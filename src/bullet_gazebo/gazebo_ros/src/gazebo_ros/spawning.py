@@ -7,9 +7,11 @@ the bodies.
 import gc
 
 import numpy as np
+from lxml import etree
 
 from bullet_sim import BulletSimError, MeshFiles, Pose, with_stand_ins
 from gazebo_ros import urdf_extras
+from gazebo_ros.drawn_sensor import DrawnSensor
 from gazebo_ros.model_plugin import PluginContext, PluginError
 from gazebo_ros.simulation import HostedPlugin
 from sdf_model import SdfError, parse_sdf_model
@@ -26,7 +28,7 @@ class Prepared:
     #: Where the model stands in the frame it is spawned in (4x4), which an SDF may say itself. None: there.
     origin = None
 
-    def __init__(self, name, xml, drawing, robot, namespace, start, plugins, parameters, options):
+    def __init__(self, name, xml, drawing, robot, namespace, start, plugins, sensors, parameters, options):
         self.name = name
         self.xml = xml
         self.drawing = drawing
@@ -34,6 +36,7 @@ class Prepared:
         self.namespace = namespace
         self.start = start
         self.plugins = plugins
+        self.sensors = sensors
         self.parameters = parameters
         self.options = options
 
@@ -56,6 +59,8 @@ class Spawner:
         self._mesh_files = MeshFiles(finder)
         #: What viewers draw of the models that were spawned here: {model name: URDF text, or None for a floor}.
         self.drawings = {}
+        #: The sensors that need pictures, for who draws them: {model name: list of dictionaries}.
+        self.sensors = {}
 
     def prepare(self, name, xml, namespace, parameters):
         """Any thread but the loop's: read a URDF. Raises :class:`SpawnRefused`.
@@ -90,7 +95,7 @@ class Spawner:
         self._check_name(name)
         try:
             start = urdf_extras.start_configuration(robot)
-            plugins, options = self._plugins(robot, namespace)
+            plugins, sensors, options = self._plugins(robot, namespace)
         except (urdf_extras.ExtrasError, PluginError) as error:
             raise SpawnRefused(str(error)) from error
         for warning in robot.warnings:
@@ -104,7 +109,8 @@ class Spawner:
         if mended or drawing is None:
             drawing = None if is_floor(robot) else drawing_urdf(merge_fixed(robot))
         options = {"static": urdf_extras.is_static(robot), **options}
-        return Prepared(name, xml, drawing, robot, namespace, start, plugins, parameters() if plugins else {}, options)
+        return Prepared(name, xml, drawing, robot, namespace, start, plugins, sensors, parameters() if plugins else {},
+                        options)
 
     def spawn(self, prepared, pose):
         """Loop thread: make the model at ``pose`` and start its plugins. Raises :class:`SpawnRefused`."""
@@ -118,6 +124,7 @@ class Spawner:
         try:
             self._set_start(model, prepared.start)
             self.drawings[prepared.name] = prepared.drawing
+            self.sensors[prepared.name] = prepared.sensors
             for plugin_class, element, namespace in prepared.plugins:
                 self._start_plugin(prepared, model.name, plugin_class, element, namespace)
         except (PluginError, BulletSimError) as error:
@@ -150,6 +157,7 @@ class Spawner:
         self._simulation.unhost(name)
         self._simulation.world.delete(name)
         self.drawings.pop(name, None)
+        self.sensors.pop(name, None)
 
     def _set_start(self, model, start):
         names = list(start)
@@ -179,23 +187,39 @@ class Spawner:
         simulation.host(HostedPlugin(plugin, context, model_name, label))
 
     def _plugins(self, robot, spawn_namespace):
-        found, options = [], {}
-        for element in urdf_extras.plugins(robot):
+        found, sensors, options = [], [], {}
+        for element in (*urdf_extras.plugins(robot), *urdf_extras.sensor_plugins(robot)):
             filename = element.get("filename") or ""
             plugin_class = self._table.find(filename)
             if plugin_class is None:
                 self._log.warn("model plugin '%s' is not known here and is left out; known plugins: %s"
                                % (filename, ", ".join(self._table.known)))
                 continue
+            namespace = urdf_extras.namespace_of(element, spawn_namespace)
+            if issubclass(plugin_class, DrawnSensor):
+                sensors.append(_drawn(robot, element, namespace))
+                continue
             options.update(plugin_class.spawn_options(robot, element))
-            found.append((plugin_class, element, urdf_extras.namespace_of(element, spawn_namespace)))
-        return found, options
+            found.append((plugin_class, element, namespace))
+        return found, sensors, options
 
     def _check_name(self, name):
         if not name:
             raise SpawnRefused("the model needs a name (model_name is empty)")
         if name in self.drawings:
             raise SpawnRefused("entity already exists: delete the model '%s' first or choose another name" % name)
+
+
+def _drawn(robot, plugin, namespace):
+    """What the scene says of a sensor that needs pictures."""
+    sensor, link = urdf_extras.sensor_of(plugin)
+    if sensor is None:
+        raise PluginError("plugin '%s' of '%s' stands outside of a <sensor>; expected <gazebo reference=\"LINK\">"
+                          "<sensor><plugin>" % (plugin.get("filename"), robot.name))
+    frame = merge_fixed(robot).frames[link]
+    return {"link": frame.link, "offset": frame.offset.ravel().tolist(), "member": link,
+            "xml": etree.tostring(sensor, encoding="unicode", with_tail=False),
+            "plugin": sensor.findall("plugin").index(plugin), "namespace": namespace}
 
 
 def is_floor(robot):

@@ -16,6 +16,30 @@ def plugins(robot):
     return [plugin for gazebo in robot.gazebo for plugin in gazebo.findall("plugin")]
 
 
+def sensor_plugins(robot):
+    """The ``<plugin>`` elements of the ``<sensor>`` elements of links.
+
+    Raises :class:`ExtrasError` for a sensor whose link the model does not have.
+    """
+    found = []
+    for gazebo in robot.gazebo:
+        for sensor in gazebo.findall("sensor"):
+            link = gazebo.get("reference")
+            if link not in robot.links:
+                raise ExtrasError("sensor '%s' is on link '%s', which '%s' does not have; links: %s"
+                                  % (sensor.get("name", ""), link, robot.name, ", ".join(robot.links)))
+            found += sensor.findall("plugin")
+    return found
+
+
+def sensor_of(plugin):
+    """The ``<sensor>`` that a plugin element stands in and the name of its link; ``(None, None)`` outside of one."""
+    sensor = plugin.getparent()
+    if sensor is None or sensor.tag != "sensor":
+        return None, None
+    return sensor, sensor.getparent().get("reference")
+
+
 def is_static(robot):
     """True or None (not said): ``<gazebo><static>true</static></gazebo>`` fixes a model in the world."""
     said = [(gazebo.findtext("static") or "").strip().lower() for gazebo in robot.gazebo]

@@ -145,6 +145,7 @@ class ModelReader:
             if name in parts.links:
                 raise document.error(link, "link '%s' stands twice" % name)
             parts.links[name] = (read_link(document, link, name), frames.where(name, link))
+            parts.gazebo += _sensors(link, name)
         if not parts.links:
             raise document.error(element, "model '%s' has no <link>" % element.get("name"))
         names = {joint.name for joint in parts.joints}
@@ -191,7 +192,20 @@ def _moved(parts, prefix, origin):
     for joint in parts.joints:
         joint.name, joint.frame = prefix + joint.name, origin @ joint.frame
         joint.parent, joint.child = (end if end == "world" else prefix + end for end in (joint.parent, joint.child))
+    for said in parts.gazebo:
+        if said.get("reference"):
+            said.set("reference", prefix + said.get("reference"))
     return Parts(links, parts.joints, parts.gazebo, parts.static)
+
+
+def _sensors(link, name):
+    """Return the <sensor> elements of a link as a <gazebo> element that refers to it, the way a URDF has them."""
+    found = link.findall("sensor")
+    if not found:
+        return []
+    holder = etree.Element("gazebo", reference=name)
+    holder.extend([copy.deepcopy(sensor) for sensor in found])
+    return [holder]
 
 
 def _plugins(document, element):

@@ -267,12 +267,12 @@ def test_what_cannot_be_had_is_a_line_and_the_rest_is_there(tmp_path, shelf):
 
 def test_what_is_not_understood_is_one_warning_with_file_and_lines(tmp_path, shelf):
     can = shelf.find("model://can")
-    can.write_text(sdf('<link name="l">\n<sensor name="s" type="ray"/></link>', name="can"))
+    can.write_text(sdf('<link name="l">\n<audio_sink name="s" type="ray"/></link>', name="can"))
     found = world(tmp_path, "<road/>\n<actor/>\n<road/>\n<include><uri>model://can</uri></include>\n"
                             "<scene/><gui/>", shelf)
     assert found.warning.count("not understood") == 1
     assert "road (%s line 3, 5)" % (tmp_path / "a.world") in found.warning and "actor (" in found.warning
-    assert "sensor (%s line 4)" % can in found.warning and "scene" not in found.warning
+    assert "audio_sink (%s line 4)" % can in found.warning and "scene" not in found.warning
 
 
 def test_an_include_in_a_circle_ends(tmp_path, shelf):

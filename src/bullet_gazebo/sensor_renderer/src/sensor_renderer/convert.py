@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From pictures to messages."""
+import sys
+
+import rospy
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, PointField
+
+from sensor_renderer.pictures import Cloud, encoded
+
+_BIG_ENDIAN = sys.byteorder == "big"
+_JPEG_QUALITY = 80  # image_transport's own default
+
+
+def header(message, time_s, frame):
+    """``message`` with its header filled: simulation time [s] and frame."""
+    message.header.stamp = rospy.Time.from_sec(time_s)
+    message.header.frame_id = frame
+    return message
+
+
+def image(picture, encoding):
+    """sensor_msgs/Image of a colour picture (height, width, 3)."""
+    data, step = encoded(picture, encoding)
+    return Image(height=picture.shape[0], width=picture.shape[1], encoding=encoding, is_bigendian=0, step=step,
+                 data=data)
+
+
+def depth_image(values):
+    """sensor_msgs/Image of float32 metres or uint16 millimetres (height, width)."""
+    height, width = values.shape
+    return Image(height=height, width=width, encoding="16UC1" if values.dtype.itemsize == 2 else "32FC1",
+                 is_bigendian=_BIG_ENDIAN, step=width * values.dtype.itemsize, data=values.tobytes())
+
+
+def compressed_image(picture):
+    """sensor_msgs/CompressedImage, JPEG, of a colour picture (height, width, 3)."""
+    import cv2
+
+    _, data = cv2.imencode(".jpg", picture[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    return CompressedImage(format="rgb8; jpeg compressed bgr8", data=data.tobytes())
+
+
+def camera_info(pinhole, baseline_m=0.0):
+    """sensor_msgs/CameraInfo of an ideal camera; ``baseline_m`` as stereo's second camera has it."""
+    fx, fy, cx, cy = pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy
+    return CameraInfo(
+        height=pinhole.height, width=pinhole.width, distortion_model="plumb_bob", D=[0.0] * 5,
+        K=[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0], R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        P=[fx, 0.0, cx, -fx * baseline_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0])
+
+
+def point_cloud(points):
+    """sensor_msgs/PointCloud2 of :meth:`Cloud.points`."""
+    height, width = points.shape[:2]
+    fields = [PointField(name, 4 * number, PointField.FLOAT32, 1) for number, name in enumerate(("x", "y", "z", "rgb"))]
+    return PointCloud2(height=height, width=width, fields=fields, is_bigendian=_BIG_ENDIAN,
+                       point_step=Cloud.POINT_BYTES, row_step=width * Cloud.POINT_BYTES, data=points.tobytes(),
+                       is_dense=False)

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Camera drivers: the topics that stand behind a sensor plugin's file name.
+
+A driver is made from a :class:`SensorEntry`. The node asks whether it is due and has it publish; both
+happen in the thread that draws. ``config/camera_drivers.yaml`` says which driver a file name means.
+"""
+import rospy
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
+
+from sensor_renderer import convert
+from sensor_renderer.pictures import Cloud, Noise, millimetres, within
+
+_SMALLEST_TIME_S = 1e-6
+
+
+class Topic:
+    """A publisher that knows whether somebody listens."""
+
+    def __init__(self, name, message_class, latch=False):
+        # A queue of one: a subscriber that has stopped reading loses pictures and holds nobody up.
+        self._publisher = rospy.Publisher(name, message_class, queue_size=1, latch=latch)
+        self.publish = self._publisher.publish
+        self.close = self._publisher.unregister
+
+    @property
+    def has_listeners(self):
+        """True while somebody is connected."""
+        return self._publisher.get_num_connections() > 0
+
+
+class Pace:
+    """Tells when the next picture is due, in simulation time."""
+
+    def __init__(self, rate):
+        """``rate`` [Hz]; 0: at every new state."""
+        self.period_s = 1.0 / rate if rate > 0.0 else _SMALLEST_TIME_S
+        self._next_s = None
+        self._last_s = None
+
+    def is_due(self, time_s):
+        """Whether a picture of the state at ``time_s`` is wanted. Time may have jumped back."""
+        if self._last_s is not None and time_s < self._last_s - _SMALLEST_TIME_S:
+            self._next_s = None
+        return self._next_s is None or time_s >= self._next_s - _SMALLEST_TIME_S
+
+    def took(self, time_s):
+        """A picture of ``time_s`` was taken. Being late does not make the pictures that follow come faster."""
+        self._last_s = time_s
+        following = (self._next_s if self._next_s is not None else time_s) + self.period_s
+        self._next_s = following if following > time_s else time_s + self.period_s
+
+
+class ColourTopics:
+    """Image, compressed image and camera_info of one colour camera."""
+
+    def __init__(self, image_topic, info_topics):
+        self.image = Topic(image_topic, Image)
+        self.compressed = Topic(image_topic + "/compressed", CompressedImage)
+        self.infos = [Topic(name, CameraInfo) for name in info_topics]
+        self.all = [self.image, self.compressed, *self.infos]
+
+    @property
+    def want_picture(self):
+        """Whether somebody wants to see."""
+        return self.image.has_listeners or self.compressed.has_listeners
+
+    def publish(self, time_s, frame, picture, encoding, info):
+        """``picture`` may be None when nobody wants it."""
+        for topic in self.infos:
+            if topic.has_listeners:
+                topic.publish(convert.header(info, time_s, frame))
+        if picture is not None and self.image.has_listeners:
+            self.image.publish(convert.header(convert.image(picture, encoding), time_s, frame))
+        if picture is not None and self.compressed.has_listeners:
+            self.compressed.publish(convert.header(convert.compressed_image(picture), time_s, frame))
+
+
+class Driver:
+    """Base class: what all cameras have."""
+
+    def __init__(self, entry):
+        """Raises :class:`sensor_renderer.errors.SensorError` for a sensor that cannot be used."""
+        self.entry = entry
+        self.topics = []
+        self._pace = Pace(entry.rate)
+
+    def name(self, text):
+        """A ROS name: relative ones live in the sensor's namespace."""
+        return text if text.startswith("/") else "%s/%s" % (self.entry.namespace, text)
+
+    def under_camera(self, text, camera_name):
+        """A topic below the camera's own name."""
+        return self.name(text if text.startswith("/") else "%s/%s" % (camera_name, text))
+
+    @property
+    def has_listeners(self):
+        """Whether anybody wants anything of this sensor."""
+        return any(topic.has_listeners for topic in self.topics)
+
+    def is_due(self, time_s):
+        """Whether there is anything to do for the state at ``time_s``."""
+        return self._pace.is_due(time_s) and self.has_listeners
+
+    def take(self, time_s, link_pose, draw):
+        """Publish what is seen at ``time_s`` from a sensor whose link stands at ``link_pose`` (4, 4).
+
+        ``draw(pinhole, pose, colour, depth)`` -> (picture, depth).
+        """
+        self._pace.took(time_s)
+        self.publish(time_s, link_pose, draw)
+
+    def publish(self, time_s, link_pose, draw):
+        """Draw and send what somebody listens to."""
+        raise NotImplementedError
+
+    def close(self):
+        """The sensor is gone."""
+        for topic in self.topics:
+            topic.close()
+
+
+class Camera(Driver):
+    """``libgazebo_ros_camera.so``, and ``libgazebo_ros_multicamera.so`` with a folder for each camera."""
+
+    def __init__(self, entry):
+        super().__init__(entry)
+        cameras = entry.cameras()
+        base = entry.text("cameraName", entry.name)
+        self._frame = entry.text("frameName", entry.member)
+        self._cameras = []
+        baseline = entry.number(entry.plugin, "hackBaseline", 0.0)
+        for camera in cameras:
+            folder = base if len(cameras) == 1 else "%s/%s" % (base, camera.name)
+            topics = ColourTopics(self.under_camera(entry.text("imageTopicName", "image_raw"), folder),
+                                  [self.under_camera(entry.text("cameraInfoTopicName", "camera_info"), folder)])
+            self._cameras.append((camera, topics, Noise(camera.noise) if camera.noise else None,
+                                  convert.camera_info(camera.pinhole, baseline)))
+            self.topics += topics.all
+
+    def publish(self, time_s, link_pose, draw):
+        for camera, topics, noise, info in self._cameras:
+            picture = None
+            if topics.want_picture:
+                picture, _ = draw(camera.pinhole, link_pose @ camera.offset, True, False)
+                picture = noise.add(picture) if noise else picture
+            topics.publish(time_s, self._frame, picture, camera.encoding, info)
+
+
+class DepthCamera(Driver):
+    """``libgazebo_ros_openni_kinect.so`` and ``libgazebo_ros_depth_camera.so``: colour, depth, points."""
+
+    def __init__(self, entry):
+        super().__init__(entry)
+        self._camera = entry.cameras()[0]
+        pinhole = self._camera.pinhole
+        base = entry.text("cameraName", entry.name)
+        self._frame = entry.text("frameName", entry.member)
+        self._nearest = entry.number(entry.plugin, "pointCloudCutoff", pinhole.near)
+        self._furthest = entry.number(entry.plugin, "pointCloudCutoffMax", pinhole.far)
+        self._in_millimetres = entry.text("useDepth16UC1Format", "false").lower() in ("1", "true")
+
+        def topic(tag, default, message_class):
+            return Topic(self.under_camera(entry.text(tag, default), base), message_class)
+
+        colour_name = self.under_camera(entry.text("imageTopicName", "rgb/image_raw"), base)
+        info_name = self.under_camera(entry.text("cameraInfoTopicName", "rgb/camera_info"), base)
+        self._colour = ColourTopics(colour_name, [info_name])
+        self._depth = topic("depthImageTopicName", "depth/image_raw", Image)
+        self._depth_info = topic("depthImageCameraInfoTopicName", "depth/camera_info", CameraInfo)
+        self._points = topic("pointCloudTopicName", "depth/points", PointCloud2)
+        self.topics = [*self._colour.all, self._depth, self._depth_info, self._points]
+        self._cloud = Cloud(pinhole)
+        self._noise = Noise(self._camera.noise) if self._camera.noise else None
+        self._info = convert.camera_info(pinhole, entry.number(entry.plugin, "hackBaseline", 0.0))
+        self._plain_info = convert.camera_info(pinhole)
+
+    def publish(self, time_s, link_pose, draw):
+        points = self._points.has_listeners
+        want_colour, want_depth = points or self._colour.want_picture, points or self._depth.has_listeners
+        picture = depth = None
+        if want_colour or want_depth:
+            picture, depth = draw(self._camera.pinhole, link_pose @ self._camera.offset, want_colour, want_depth)
+        if want_colour and self._noise:
+            picture = self._noise.add(picture)
+        if want_depth:
+            depth = within(depth, self._nearest, self._furthest)
+        self._colour.publish(time_s, self._frame, picture, self._camera.encoding, self._plain_info)
+        if self._depth_info.has_listeners:
+            self._depth_info.publish(convert.header(self._info, time_s, self._frame))
+        if depth is not None and self._depth.has_listeners:
+            values = millimetres(depth) if self._in_millimetres else depth
+            self._depth.publish(convert.header(convert.depth_image(values), time_s, self._frame))
+        if points:
+            found = self._cloud.points(depth, picture)
+            self._points.publish(convert.header(convert.point_cloud(found), time_s, self._frame))

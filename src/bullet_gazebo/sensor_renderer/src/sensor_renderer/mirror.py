@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The world as a picture needs it: what the snapshot lists, posed by our own forward kinematics. ROS-free."""
+from typing import NamedTuple
+
+import numpy as np
+
+from gazebo_ros.drawing import DrawingError
+from sensor_renderer import triangles
+from urdf_model import Mesh, merge_fixed, parse_urdf
+from urdf_model.transforms import axis_rotation, matrix_from_quaternion, rigid
+
+DEFAULT_COLOUR = (0.7, 0.7, 0.7, 1.0)
+#: How far the floor reaches [m]; its colour.
+FLOOR_HALF_M = 50.0
+FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
+
+
+class Part(NamedTuple):
+    """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1.
+
+    ``centre`` (3,) and ``radius`` [m] of a sphere about them, in the body's frame.
+    """
+
+    key: tuple
+    triangles: np.ndarray
+    colour: tuple
+    centre: np.ndarray
+    radius: float
+    is_floor: bool = False
+
+
+class Body:
+    """A model: its links as parts, and where they are."""
+
+    def __init__(self, links, joints):
+        """``links``: list of (name, parts), parents first; ``joints``: one ``urdf_model.Joint`` per link but the first.
+
+        """
+        self._joints = joints
+        self._index = {name: number for number, (name, _) in enumerate(links)}
+        self.parts = [parts for _, parts in links]
+        self.matrices = np.tile(np.eye(4), (len(links), 1, 1))
+        self._shown = None
+
+    @property
+    def size(self):
+        """How many values of a snapshot are this body's."""
+        return 7 + len(self._joints)
+
+    def set_state(self, values):
+        """Pose everything: ``values`` as the snapshot has them. Returns whether anything has moved."""
+        if self._shown is not None and np.array_equal(values, self._shown):
+            return False
+        self._shown = values.copy()
+        matrices = self.matrices
+        matrices[0] = rigid(matrix_from_quaternion(values[3:7]), values[:3])
+        for number, (joint, position) in enumerate(zip(self._joints, values[7:].tolist(), strict=True), 1):
+            motion = np.eye(4)
+            if joint.type == "prismatic":
+                motion[:3, 3] = joint.axis * position
+            else:
+                motion[:3, :3] = axis_rotation(joint.axis, position)
+            matrices[number] = matrices[self._index[joint.parent]] @ joint.origin @ motion
+        return True
+
+    def link_matrix(self, name):
+        """Pose (4, 4) of a body link's frame in the world; ``KeyError`` for an unknown one."""
+        return self.matrices[self._index[name]]
+
+
+class Mirror:
+    """All bodies of the world."""
+
+    def __init__(self, drawings, find_mesh, warn):
+        """``drawings``: a ``gazebo_ros.drawing.DrawingCache``; ``find_mesh(uri)`` -> path or None; ``warn(text)``."""
+        self._drawings = drawings
+        self._find_mesh = find_mesh
+        self._warn = warn
+        self._parts = {}
+        self._bodies = {}
+        #: Bodies by name, in the scene's order.
+        self.bodies = {}
+        #: Counts changes of what is to be seen.
+        self.version = 0
+
+    def set_scene(self, listed):
+        """Show what :meth:`gazebo_ros.snapshot.SnapshotWriter.write_scene` lists; what is known already stays."""
+        known = self._bodies
+        self._bodies = {}
+        for entry in listed:
+            name = entry["name"]
+            key = (entry["urdf"], tuple(entry["joints"]))
+            old = known.get(name)
+            self._bodies[name] = old if old is not None and old[0] == key else (key, self._build(entry))
+        self.bodies = {name: body for name, (_, body) in self._bodies.items()}
+        self.version += 1
+
+    def set_state(self, values):
+        """Move everything to where a snapshot's ``values`` say it is."""
+        start, moved = 0, False
+        for body in self.bodies.values():
+            moved |= body.set_state(values[start:start + body.size])
+            start += body.size
+        self.version += moved
+
+    def _build(self, entry):
+        if entry["urdf"] is None:
+            return Body([("", [_floor()])], [])
+        merged = merge_fixed(parse_urdf(entry["urdf"], source=entry["name"]))
+        joints = list(merged.joints.values())
+        order = [merged.root, *(joint.child for joint in joints)]
+        links = [(name, [part for shape in merged.links[name].visuals for part in self._parts_of(shape)])
+                 for name in order]
+        return Body(links, joints)
+
+    def _parts_of(self, shape):
+        geometry, colour = shape.geometry, shape.colour or DEFAULT_COLOUR
+        if not isinstance(geometry, Mesh):
+            return [self._placed((geometry,), lambda: triangles.of_primitive(geometry), shape.origin, colour)]
+        path = self._find_mesh(geometry.filename)
+        if path is None:
+            return []  # /gazebo has said so
+        try:
+            found = self._drawings.parts(path)
+        except DrawingError as error:
+            self._warn(str(error))
+            return []
+        scale = np.diag([*geometry.scale, 1.0])
+        return [self._placed((part.path, geometry.scale), lambda part=part: triangles.of_wavefront(part.path),
+                             shape.origin @ scale, part.colour or colour) for part in found]
+
+    def _placed(self, what, make, origin, colour):
+        key = (*what, origin.tobytes())
+        if key not in self._parts:
+            raw = make()
+            points = raw[:, :3] @ origin[:3, :3].T + origin[:3, 3]
+            normals = raw[:, 3:] @ np.linalg.inv(origin[:3, :3])
+            normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
+            low, high = points.min(axis=0), points.max(axis=0)
+            centre = (low + high) / 2.0
+            self._parts[key] = (np.hstack([points, normals]).astype(np.float32), centre,
+                                float(np.linalg.norm(points - centre, axis=1).max()))
+        found, centre, radius = self._parts[key]
+        return Part(key, found, tuple(colour), centre, radius)
+
+
+def _floor():
+    half = FLOOR_HALF_M
+    corners = [(-half, -half), (half, -half), (half, half), (-half, -half), (half, half), (-half, half)]
+    sheet = np.array([(x, y, 0.0, 0.0, 0.0, 1.0) for x, y in corners], dtype=np.float32)
+    return Part(("floor",), sheet, FLOOR_COLOUR, np.zeros(3), half * 1.5, is_floor=True)

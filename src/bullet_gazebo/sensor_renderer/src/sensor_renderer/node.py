@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The /sensor_renderer node: follows the simulator's snapshot and draws what somebody listens to."""
+import importlib
+import os
+import signal
+import sys
+import threading
+import time
+
+import rospkg
+import rospy
+import yaml
+
+from gazebo_ros.drawing import DrawingCache
+from gazebo_ros.resources import ResourceFinder
+from gazebo_ros.snapshot import SnapshotError, SnapshotReader
+from sensor_renderer.errors import RenderingError, SensorError
+from sensor_renderer.gl_renderer import GlRenderer
+from sensor_renderer.mirror import Mirror
+from sensor_renderer.sensor_element import SensorEntry
+
+# How often the snapshot is looked at while somebody listens, and while nobody does; how often a simulator is looked
+# for [s].
+_LOOK_S, _IDLE_S, _SEEK_S = 0.004, 0.05, 0.25
+
+
+class SensorRenderer:
+    """Sensors of the world by name, and the loop that serves them."""
+
+    def __init__(self, make_renderer, drivers):
+        """``make_renderer()`` -> ``GlRenderer`` or ``TinyRenderer``, called before the first picture; ``drivers``:
+        {file name: "module:Class"}."""
+        self._make_renderer = make_renderer
+        self._renderer = None
+        self._drivers = drivers
+        self._mirror = Mirror(DrawingCache(), ResourceFinder(), rospy.logwarn)
+        self._sensors = {}
+        self._revision = None
+        self._drawn_s = None
+
+    def run(self, stop):
+        """Serve until ``stop()``, across restarts of the simulator."""
+        while not stop():
+            reader = _find_snapshot(stop)
+            if reader is None:
+                return
+            self._revision = None
+            while not stop() and reader.is_alive:
+                began = time.monotonic()
+                try:
+                    self._turn(reader)
+                except SnapshotError as error:
+                    rospy.logwarn_throttle(10.0, str(error))
+                wanted = any(driver.has_listeners for driver in self._sensors.values())
+                time.sleep(max(0.0005, (_LOOK_S if wanted else _IDLE_S) - (time.monotonic() - began)))
+
+    def close(self):
+        """Close every sensor's topics."""
+        self._set_sensors([])
+
+    def _turn(self, reader):
+        snapshot = reader.read()
+        if snapshot is None:
+            return
+        if snapshot.revision != self._revision:
+            revision, bodies = reader.scene()
+            if revision != snapshot.revision:
+                return  # a state of the new scene follows
+            self._mirror.set_scene(bodies)
+            self._set_sensors(bodies)
+            self._revision = revision
+        due = [driver for driver in list(self._sensors.values()) if driver.is_due(snapshot.time_s)]
+        if not due or snapshot.time_s == self._drawn_s:
+            return
+        self._mirror.set_state(snapshot.values)
+        self._drawn_s = snapshot.time_s
+        for driver in due:
+            self._serve(driver, snapshot.time_s)
+
+    def _serve(self, driver, time_s):
+        entry = driver.entry
+        try:
+            pose = self._mirror.bodies[entry.model].link_matrix(entry.link)
+            driver.take(time_s, pose, self._draw)
+        except rospy.ROSException:
+            return  # the node is shutting down
+        except Exception as error:  # noqa: BLE001  (one sensor that fails must not blind the others)
+            rospy.logerr("%s failed and is left out from now on: %s: %s" % (entry, type(error).__name__, error))
+            self._sensors = {key: other for key, other in self._sensors.items() if other is not driver}
+            driver.close()
+
+    def _draw(self, pinhole, pose, colour, depth):
+        if self._renderer is None:
+            self._renderer = self._make_renderer()
+        return self._renderer.render(self._mirror, pinhole, pose, colour, depth)
+
+    def _set_sensors(self, bodies):
+        wanted = {}
+        for body in bodies:
+            for listed in body.get("sensors", ()):
+                wanted[body["name"], str(sorted(listed.items()))] = body["name"], listed
+        for key in [key for key in self._sensors if key not in wanted]:
+            self._sensors.pop(key).close()
+        for key, (model, listed) in wanted.items():
+            if key not in self._sensors:
+                try:
+                    self._sensors[key] = self._driver(SensorEntry(model, listed))
+                except (SensorError, ImportError, AttributeError) as error:
+                    rospy.logerr("no pictures: %s" % error)
+
+    def _driver(self, entry):
+        try:
+            module, name = self._drivers[entry.filename].split(":")
+        except KeyError:
+            raise SensorError("%s: plugin '%s' is not known here; known plugins: %s"
+                              % (entry, entry.filename, ", ".join(sorted(self._drivers)))) from None
+        return getattr(importlib.import_module(module), name)(entry)
+
+
+def _find_snapshot(stop):
+    """The reader of the simulator on this master, as soon as there is one; None when ``stop()``."""
+    while not stop():
+        try:
+            folder = rospy.get_param("/gazebo/snapshot", None)
+            if folder is not None:
+                reader = SnapshotReader(folder)
+                if reader.is_alive:
+                    return reader
+        except (SnapshotError, OSError):
+            pass  # left by an earlier simulator, or no master for the moment
+        time.sleep(_SEEK_S)
+    return None
+
+
+def make_renderer():
+    """What this machine can draw with, and says so."""
+    try:
+        renderer = GlRenderer()
+    except RenderingError as error:
+        from sensor_renderer.tiny_renderer import TinyRenderer
+
+        rospy.logwarn("%s; pictures come from PyBullet's TinyRenderer, about ten times slower. Install libegl1 and "
+                      "libgl1-mesa-dri." % error)
+        renderer = TinyRenderer()
+    rospy.loginfo("cameras are drawn by %s" % renderer.name)
+    return renderer
+
+
+def main():
+    """Draw until a signal or a shutdown request; returns the exit code."""
+    # Physics comes first: pictures take what the processors have left.
+    os.nice(19)
+    ending = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ending.set())
+    rospy.init_node("sensor_renderer", disable_rostime=True, disable_signals=True)
+    path = os.path.join(rospkg.RosPack().get_path("sensor_renderer"), "config", "camera_drivers.yaml")
+    with open(path, encoding="utf-8") as file:
+        drivers = yaml.safe_load(file)
+    node = SensorRenderer(make_renderer, drivers)
+    node.run(lambda: ending.is_set() or rospy.is_shutdown())
+    node.close()
+    rospy.signal_shutdown("the renderer ends")
+    sys.stdout.flush()
+    # A subscriber that does not read would keep the threads of its connection, and so the process.
+    os._exit(0)

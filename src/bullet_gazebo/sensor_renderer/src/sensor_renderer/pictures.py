@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What happens to a picture between the lens and the wire, and points from depth. ROS-free."""
+import numpy as np
+
+# Numbers of the noise that is made once and shifted for each picture.
+_NOISE_LENGTH = 1 << 20
+_BYTES = {"rgb8": 3, "bgr8": 3, "mono8": 1, "bgra8": 4}
+
+
+class Noise:
+    """Normal noise on every value of a picture."""
+
+    def __init__(self, deviation, seed=0):
+        """``deviation``: standard deviation, 1.0 being full brightness."""
+        self._random = np.random.default_rng(seed)
+        self._values = np.round(self._random.normal(0.0, 255.0 * deviation, _NOISE_LENGTH)).astype(np.int16)
+
+    def add(self, picture):
+        """The picture (uint8) with noise."""
+        start = int(self._random.integers(_NOISE_LENGTH))
+        noise = np.resize(np.roll(self._values, start)[:picture.size], picture.size).reshape(picture.shape)
+        return np.clip(picture + noise, 0, 255).astype(np.uint8)
+
+
+def encoded(picture, encoding):
+    """The bytes of a picture (height, width, 3) of red, green, blue in ROS's ``encoding``, and the bytes of a row."""
+    if encoding == "bgr8":
+        picture = picture[:, :, ::-1]
+    elif encoding == "bgra8":
+        opaque = np.full((*picture.shape[:2], 1), 255, dtype=np.uint8)
+        picture = np.concatenate([picture[:, :, ::-1], opaque], axis=2)
+    elif encoding == "mono8":
+        # ITU-R BT.601's weights, in 256ths.
+        picture = ((picture @ np.array([77, 150, 29], dtype=np.uint32)) >> 8).astype(np.uint8)
+    return np.ascontiguousarray(picture).tobytes(), picture.shape[1] * _BYTES[encoding]
+
+
+def within(depth, nearest, furthest):
+    """``depth`` (height, width) with NaN in place of what is nearer or further than that [m]."""
+    with np.errstate(invalid="ignore"):
+        return np.where((depth >= nearest) & (depth <= furthest), depth, np.float32(np.nan))
+
+
+def millimetres(depth):
+    """``depth`` [m] as uint16 [mm]; 0 where there is none, or where it is too far to say."""
+    with np.errstate(invalid="ignore"):
+        rounded = np.round(depth * 1000.0)
+        return np.where(rounded < 65536.0, rounded, 0.0).astype(np.uint16)
+
+
+class Cloud:
+    """Coloured points of one camera: rows of x y z [m, optical frame] and the colour, packed as PCL reads it."""
+
+    POINT_BYTES = 16
+
+    def __init__(self, pinhole):
+        columns = (np.arange(pinhole.width, dtype=np.float32) - pinhole.cx) / pinhole.fx
+        rows = (np.arange(pinhole.height, dtype=np.float32) - pinhole.cy) / pinhole.fy
+        self._columns, self._rows = columns.astype(np.float32)[None, :], rows.astype(np.float32)[:, None]
+
+    def points(self, depth, picture):
+        """float32 (height, width, 4) of ``depth`` (height, width) and ``picture`` (height, width, 3) in red, green,
+        blue; NaN where depth is."""
+        found = np.empty((*depth.shape, 4), dtype=np.float32)
+        np.multiply(depth, self._columns, out=found[:, :, 0])
+        np.multiply(depth, self._rows, out=found[:, :, 1])
+        found[:, :, 2] = depth
+        colour = found.view(np.uint8).reshape(*depth.shape, 16)
+        colour[:, :, 12:15] = picture[:, :, ::-1]
+        colour[:, :, 15] = 0
+        return found

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What an SDF ``<sensor>`` element says of a camera, and what its ``<plugin>`` says of topics. ROS-free."""
+from typing import NamedTuple
+
+import numpy as np
+from lxml import etree
+
+from sensor_renderer.errors import SensorError
+from sensor_renderer.pinhole import OPTICAL, Pinhole
+from urdf_model.transforms import pose_matrix
+
+# SDF's defaults.
+_WIDTH, _HEIGHT, _FIELD_RAD = 320, 240, 1.047
+_NEAR_M, _FAR_M = 0.1, 100.0
+_FORMATS = {"R8G8B8": "rgb8", "B8G8R8": "bgr8", "L8": "mono8", "RGB_INT8": "rgb8", "BGR_INT8": "bgr8",
+            "L_INT8": "mono8"}
+
+
+class CameraElement(NamedTuple):
+    """One camera of a ``<sensor>``.
+
+    ``offset`` (4, 4): its optical frame in the frame of the link; ``encoding`` of its images as ROS names it;
+    ``noise`` [of 1.0 for full brightness] is the standard deviation of each pixel.
+    """
+
+    name: str
+    pinhole: Pinhole
+    offset: np.ndarray
+    encoding: str
+    noise: float
+
+
+class SensorEntry:
+    """A ``<sensor>`` with its ``<plugin>``, as the simulator lists it in its scene."""
+
+    def __init__(self, model, listed):
+        """``listed``: ``link`` (a body of the model), ``offset`` (16 numbers, link frame in the body's), ``member``
+        (the link it was written for), ``xml`` (the element), ``plugin`` (which of its plugins), ``namespace``.
+
+        Raises :class:`SensorError`.
+        """
+        self.model = model
+        self.link = listed["link"]
+        self.member = listed["member"]
+        self.offset = np.array(listed["offset"], dtype=float).reshape(4, 4)
+        self.namespace = listed["namespace"]
+        self.element = etree.fromstring(listed["xml"])
+        self.plugin = self.element.findall("plugin")[listed["plugin"]]
+        self.filename = self.plugin.get("filename", "").rsplit("/", 1)[-1]
+        self.name = self.element.get("name") or self.plugin.get("name") or "camera"
+        rate = self.number(self.plugin, "updateRate", 0.0) or self.number(self.element, "update_rate", 0.0)
+        #: Pictures a second of simulation time; 0: as many as there are states.
+        self.rate = max(rate, 0.0)
+
+    def __str__(self):
+        return "sensor '%s' of model '%s'" % (self.name, self.model)
+
+    def text(self, tag, default):
+        """Stripped text of the plugin's child ``tag``, or ``default`` where it is missing or empty."""
+        return (self.plugin.findtext(tag) or "").strip() or default
+
+    def number(self, element, path, default):
+        """A number in a child; raises :class:`SensorError`."""
+        text = (element.findtext(path) or "").strip()
+        try:
+            value = float(text) if text else default
+        except ValueError:
+            value = float("nan")
+        if not np.isfinite(value):
+            raise SensorError("%s: <%s> is '%s', expected a number" % (self, path, text))
+        return value
+
+    def cameras(self):
+        """The list of :class:`CameraElement`; raises :class:`SensorError` for none and for impossible ones."""
+        found = self.element.findall("camera")
+        if not found:
+            raise SensorError("%s has no <camera> element; expected one, with <horizontal_fov>, <image> and <clip>"
+                              % self)
+        return [self._camera(camera, number) for number, camera in enumerate(found)]
+
+    def _camera(self, camera, number):
+        try:
+            pinhole = Pinhole.from_field_of_view(
+                round(self.number(camera, "image/width", _WIDTH)), round(self.number(camera, "image/height", _HEIGHT)),
+                self.number(camera, "horizontal_fov", _FIELD_RAD), self.number(camera, "clip/near", _NEAR_M),
+                self.number(camera, "clip/far", _FAR_M))
+        except SensorError as error:
+            raise SensorError("%s: %s" % (self, str(error).split(": ", 1)[-1])) from error
+        written = (camera.findtext("image/format") or "R8G8B8").strip().upper()
+        if written not in _FORMATS:
+            raise SensorError("%s: image format '%s' is not known; expected one of %s"
+                              % (self, written, ", ".join(_FORMATS)))
+        offset = self.offset @ self._pose(self.element) @ self._pose(camera) @ OPTICAL
+        return CameraElement(camera.get("name") or "camera%d" % number, pinhole, offset, _FORMATS[written],
+                             max(self.number(camera, "noise/stddev", 0.0), 0.0))
+
+    def _pose(self, element):
+        words = (element.findtext("pose") or "").split()
+        if not words:
+            return np.eye(4)
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = []
+        if len(values) != 6 or not np.isfinite(values).all():
+            raise SensorError("%s: <pose> is '%s', expected six numbers" % (self, " ".join(words)))
+        return pose_matrix(values[:3], values[3:])
