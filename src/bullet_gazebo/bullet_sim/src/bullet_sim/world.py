@@ -224,6 +224,11 @@ class World:
             )
         return found
 
+    def touching(self, model):
+        """Return the contacts of ``model`` where everything is now, as :meth:`contacts` does; no time passes."""
+        pybullet.performCollisionDetection(physicsClientId=self._client)
+        return self.contacts(model)
+
     def ray_test_batch(self, starts, ends):
         """Cast rays from ``starts`` (k, 3) to ``ends`` (k, 3) [m, world]; return the fractions (k,) at which they hit.
 
@@ -234,13 +239,15 @@ class World:
         return np.array([hit[2] if hit[0] >= 0 else 1.0 for hit in hits])
 
     def first_hits(self, starts, ends):
-        """Cast rays as ``ray_test_batch`` does; return [(name of the model that is hit first or None, fraction)].
+        """Cast rays as ``ray_test_batch`` does; return for each what it meets first: ``(model's name, link's merged
+        name)``, or None.
 
         A ray that starts inside a convex shape passes out of it unhindered.
         """
-        names = {model.body: model.name for model in self.models.values()}
+        models = {model.body: model for model in self.models.values()}
         hits = pybullet.rayTestBatch(list(starts), list(ends), physicsClientId=self._client)
-        return [(names.get(hit[0]), hit[2]) for hit in hits]
+        found = ((models.get(hit[0]), hit[1]) for hit in hits)
+        return [None if model is None else (model.name, model.link_name(link)) for model, link in found]
 
     def close(self):
         """Give the physics client back. The world is of no use afterwards."""

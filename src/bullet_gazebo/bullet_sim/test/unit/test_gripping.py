@@ -94,5 +94,4 @@ def test_too_weak_a_grip_lets_go(world, vice):
 def test_rays_say_whom_they_meet(world):
     world.spawn(parse_urdf(BOX), "box", Pose((0, 0, 1)), static=True)
     hits = world.first_hits([(0, 0, 2), (1, 0, 2), (0, 0, 1.0)], [(0, 0, 1), (1, 0, 1), (0, 0, 2)])
-    assert hits[0] == ("box", pytest.approx(0.98, abs=1e-6))
-    assert hits[1] == hits[2] == (None, 1.0)
+    assert hits == [("box", "box"), None, None]

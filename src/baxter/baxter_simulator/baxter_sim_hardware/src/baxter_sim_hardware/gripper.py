@@ -1,169 +1,221 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The electric gripper: commands in, set-point of its fingers out; what it feels follows from the fingers alone."""
 import json
-import math
-from dataclasses import dataclass
+from enum import Enum
 
 from .errors import CommandRefused
+from .gripper_commands import Gripper, is_number
 
-PARAMETERS = {"velocity": 50.0, "moving_force": 40.0, "holding_force": 30.0, "dead_zone": 5.0}  # [%] at the start
 FULL_SPEED = 0.1  # [m/s] of a finger at velocity 100 %
 REACH = 0.1  # share of the travel by which the set-point may lead fingers that something stops
-STILL = 0.05  # [travels/s] below which the fingers stand
+STILL = 0.05  # [travels/s] below which the fingers stand, and half of the commanded speed where that is less
 PUSHING = 0.5  # share of the allowed force from which fingers that stand are stopped by something
+LOOSE = 0.25  # share of the allowed force below which what was held is gone
+SETTLE_S = 0.04  # for so long it must be so
+GIVE_UP_S = 0.5  # after which fingers that stand short of their target, with nothing between them, are left there
+END_STOP = 0.02  # share of the travel within which a calibration must find the ends
 OPEN, CLOSED = 1.0, 0.0
 
 
-@dataclass(frozen=True)
-class Feeling:
-    """What the fingers tell: position and force in percent, and the flags of the state message."""
+class Phase(Enum):
+    """What the fingers are doing."""
 
-    position: float
-    force: float
-    moving: bool
-    gripping: bool
-    missed: bool
+    RESTING = "resting"
+    MOVING = "moving"
+    HOLDING = "holding"
 
 
-class ElectricGripper:
+class ElectricGripper(Gripper):
     """Positions are shares of the fingers' travel, 0 closed to 1 open, where no percents are named.
 
     travel: of one finger [m]; position: where the fingers are now; dt: length of a tick [s].
+    Attributes: calibrated, error, missed: flags of the state message.
     """
 
+    PARAMETERS = {"velocity": (50.0, 100.0), "moving_force": (40.0, 100.0), "holding_force": (30.0, 100.0),
+                  "dead_zone": (5.0, 100.0)}  # [%]
+    COMMANDS = {
+        "no_op": ("no_op", False),
+        "set": ("configure", False),
+        "configure": ("configure", False),
+        "reset": ("_reset_error", False),
+        "reboot": ("_reboot", False),
+        "calibrate": ("_calibrate", True),
+        "clear_calibration": ("_clear_calibration", False),
+        "go": ("_go", True),
+        "grip": ("_grip", True),
+        "prepare_to_grip": ("_open", True),
+        "release": ("_open", True),
+        "stop": ("_stop", False),
+    }
+    ONCE = ("calibrate", "reboot")
+
     def __init__(self, travel, position, dt=0.002):
-        self._step = FULL_SPEED / travel * dt
-        self._dt = dt
+        self._travel, self._dt = travel, dt
+        self._position = position
+        super().__init__()
         self.reset(position)
 
     def reset(self, position):
         """As at the start: calibrated, as the vendor's simulator is, and holding `position`."""
-        self.parameters = dict(PARAMETERS)
-        self.calibrated = True
-        self.command, self.sender, self.sequence = "", "", 0
-        self.stop(position)
+        self.forget()
+        self.calibrated, self.error = True, False
+        self._stand_at(position)
 
     def stop(self, position):
-        """Hold `position`."""
-        self._setpoint = self._target = position
-        self._plan = []  # where a calibration still has to go
-        self._calibrating = False
-        self._attempt = False  # closing, to hold something
-        self.is_resting = False
+        """Move no further than `position`, where the fingers are; what is held stays held.
 
-    def take(self, command, args, sender, sequence, position, enabled):
-        """One command message; position: of the fingers now; enabled: whether the robot is.
-
-        args: JSON object or empty. Raises CommandRefused for an unknown command, for senseless arguments, and for
-        motion while the robot is disabled or the gripper not calibrated. The echo of sender and sequence that
-        acknowledges a command comes with every known one. A calibration or reboot that is sent again, as the SDK does
-        until it sees the effect, is the same one.
+        A calibration that was under way is not one.
         """
-        if command not in _HANDLERS:
-            raise CommandRefused("unknown gripper command '%s'; choices are %s" % (command, ", ".join(_HANDLERS)))
-        handler, moves = _HANDLERS[command]
-        repeated = sender and (command, sender, sequence) == (self.command, self.sender, self.sequence)
-        self.command, self.sender, self.sequence = command, sender, sequence
-        if repeated and command in ("calibrate", "reboot"):
-            return
-        values = _parse(args)
-        if moves and not enabled:
-            raise CommandRefused("the robot is disabled")
-        handler(self, values, position)
+        if self._phase is Phase.HOLDING:
+            self._stays = True
+        else:
+            self._stand_at(position)
 
-    def update(self, position, feeling):
-        """One tick, for fingers that do not rest. Returns (set-point, force [%] that may be used).
+    @property
+    def flags(self):
+        return {"calibrated": self.calibrated, "ready": self.ready, "moving": self.moving, "gripping": self.gripping,
+                "missed": self.missed, "error": self.error}
 
-        feeling: the present Feeling.
+    @property
+    def ready(self):
+        """Whether it takes commands to move: not while it calibrates, nor with an error."""
+        return not self._calibrating and not self.error
+
+    @property
+    def moving(self):
+        """Whether the fingers are on their way."""
+        return self._phase is Phase.MOVING
+
+    @property
+    def gripping(self):
+        """Whether something keeps the fingers, pressing on it, from where they were told to go."""
+        return self._phase is Phase.HOLDING
+
+    def update(self, position, speed, squeeze):
+        """One tick. Returns (set-point, force [% of the joints'] that may be used), or None: the last one still holds.
+
+        position, speed [travels/s]: of the fingers; squeeze: function that returns the force on them [%].
         """
-        step = self._step * self.parameters["velocity"] / 100.0
+        self._position = position
+        stands = abs(speed) < min(STILL, 0.5 * self._speed) or self._speed == 0.0
+        if self._phase is Phase.RESTING:
+            if abs(position - self._rest) <= max(self._dead, END_STOP):
+                return None
+            self._phase = Phase.MOVING
+        if self._phase is Phase.MOVING:
+            self._still_s = self._still_s + self._dt if stands else 0.0
+            if self._still_s >= SETTLE_S:
+                self._arrive(squeeze())
+        elif squeeze() >= LOOSE * self._allowed:
+            self._loose_s = 0.0
+        else:
+            self._loose_s += self._dt
+            if self._loose_s >= SETTLE_S and self._stays:
+                self._stand_at(position)
+            elif self._loose_s >= SETTLE_S:
+                self._move_to(self._target)
+        step = 0.0 if self._stays else self._speed * self._dt
         setpoint = self._setpoint + min(max(self._target - self._setpoint, -step), step)
         self._setpoint = min(max(setpoint, position - REACH), position + REACH)
-        if not feeling.moving:
-            if self._plan:
-                self._target = self._plan.pop(0)
-            elif self._calibrating:
-                self.calibrated, self._calibrating = True, False
-            elif not feeling.gripping and self._setpoint == self._target:
-                self.is_resting = True
-        return self._setpoint, self.parameters["holding_force" if feeling.gripping else "moving_force"]
+        return self._setpoint, self.parameters["holding_force" if self.gripping else "moving_force"]
 
-    def feel(self, position, speed, force):
-        """The Feeling of fingers at `position` with `speed` [travels/s], pressing with `force` [% of the joint's]."""
-        dead = self.parameters["dead_zone"] / 100.0
-        gap = position - self._target
-        allowed = min(self.parameters["holding_force"], self.parameters["moving_force"])
-        stands = abs(speed) < STILL
-        stopped = stands and abs(gap) > dead and force >= PUSHING * allowed
-        arrived = stands and abs(gap) <= dead
-        return Feeling(100.0 * min(max(position, 0.0), 1.0), min(force, 100.0), not (stopped or arrived),
-                       stopped and gap > 0.0, arrived and self._attempt)
+    @property
+    def _speed(self):
+        """[travels/s] that is commanded."""
+        return FULL_SPEED / self._travel * self.parameters["velocity"] / 100.0
+
+    @property
+    def _dead(self):
+        return self.parameters["dead_zone"] / 100.0
+
+    @property
+    def _allowed(self):
+        """Force [%] that the fingers certainly reach on what they hold."""
+        return min(self.parameters["holding_force"], self.parameters["moving_force"])
+
+    def _stand_at(self, position):
+        self._plan = []  # where a calibration still has to go
+        self._calibrating = False
+        self.missed = self._attempt = False
+        self._setpoint = position
+        self._move_to(position)
+
+    def _move_to(self, target):
+        self._target = target
+        self._stays = False  # whether to stay here when what is held is gone
+        self._phase = Phase.MOVING
+        self._still_s = self._loose_s = 0.0
+
+    def _arrive(self, squeeze):
+        """The fingers stand: find out why, and what comes next."""
+        is_there = abs(self._position - self._target) <= max(self._dead, END_STOP) and self._setpoint == self._target
+        if squeeze >= max(PUSHING * self._allowed, 1.0):
+            if self._calibrating:
+                self._fail()
+            else:
+                self._phase, self._loose_s = Phase.HOLDING, 0.0
+        elif is_there and self._plan and self._at_end:
+            self._move_to(self._plan.pop(0))
+        elif is_there and (not self._calibrating or self._at_end):
+            self.calibrated = self.calibrated or self._calibrating
+            self._calibrating = False
+            self.missed = self._attempt
+            self._come_to_rest()
+        elif self._still_s >= GIVE_UP_S:
+            if self._calibrating:
+                self._fail()
+            else:
+                self._come_to_rest()
+
+    @property
+    def _at_end(self):
+        return abs(self._position - self._target) <= END_STOP
+
+    def _come_to_rest(self):
+        self._phase, self._rest = Phase.RESTING, self._position
+
+    def _fail(self):
+        """A calibration that did not find the ends of the travel."""
+        self._stand_at(self._position)
+        self.error = True
 
     def _go_to(self, target):
         if not self.calibrated:
             raise CommandRefused("the gripper is not calibrated: calibrate it first")
-        self._plan = []
-        self._target = target
-        self._attempt = 100.0 * target <= self.parameters["dead_zone"]
-        self.is_resting = False
+        self.missed = False
+        self._attempt = target <= self._dead
+        self._move_to(target)
 
-    def _go(self, values, position):
+    def _go(self, values):
         percent = values.get("position")
-        if not _is_number(percent):
+        if not is_number(percent):
             raise CommandRefused('go needs {"position": 0 to 100}, not %s' % json.dumps(values))
         self._go_to(min(max(percent, 0.0), 100.0) / 100.0)
 
-    def _configure(self, values, position):
-        for name, value in values.items():
-            if name not in PARAMETERS or not (_is_number(value) and 0.0 <= value <= 100.0):
-                raise CommandRefused("configure: %s is %r; parameters are %s, each from 0 to 100" % (
-                    name, value, ", ".join(PARAMETERS)))
-        self.parameters.update(values)
+    def _grip(self, values):
+        self._go_to(CLOSED)
 
-    def _calibrate(self, values, position):
-        self.stop(position)
+    def _open(self, values):
+        self._go_to(OPEN)
+
+    def _stop(self, values):
+        self.stop(self._position)
+
+    def _reset_error(self, values):
+        self.error = False
+
+    def _calibrate(self, values):
+        self._clear_calibration(values)
+        self.error = False
+        self._calibrating, self._plan = True, [OPEN]
+        self._move_to(CLOSED)
+
+    def _clear_calibration(self, values):
+        self._stop(values)
         self.calibrated = False
-        self._target, self._plan, self._calibrating = CLOSED, [OPEN], True
 
-    def _clear_calibration(self, values, position):
-        self.stop(position)
-        self.calibrated = False
-
-    def _reboot(self, values, position):
-        self._clear_calibration(values, position)
-        self.parameters = dict(PARAMETERS)
-
-
-def _parse(args):
-    try:
-        values = json.loads(args) if args.strip() else {}
-    except ValueError as error:
-        raise CommandRefused("args are %r; they must be a JSON object (%s)" % (args, error)) from None
-    if not isinstance(values, dict):
-        raise CommandRefused("args are %r; they must be a JSON object" % args)
-    return values
-
-
-def _is_number(value):
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _nothing(gripper, values, position):
-    pass
-
-
-# {command: (function(gripper, values, position), whether it moves the fingers)}
-_HANDLERS = {
-    "no_op": (_nothing, False),
-    "set": (ElectricGripper._configure, False),
-    "configure": (ElectricGripper._configure, False),
-    "reset": (_nothing, False),  # there is no fault to clear
-    "reboot": (ElectricGripper._reboot, False),
-    "calibrate": (ElectricGripper._calibrate, True),
-    "clear_calibration": (ElectricGripper._clear_calibration, False),
-    "go": (ElectricGripper._go, True),
-    "grip": (lambda gripper, values, position: gripper._go_to(CLOSED), True),
-    "prepare_to_grip": (lambda gripper, values, position: gripper._go_to(OPEN), True),
-    "release": (lambda gripper, values, position: gripper._go_to(OPEN), True),
-    "stop": (lambda gripper, values, position: gripper.stop(position), False),
-}
+    def _reboot(self, values):
+        self._clear_calibration(values)
+        self.error = False
+        self.parameters = {name: start for name, (start, _) in self.PARAMETERS.items()}

@@ -67,9 +67,11 @@ TOPICS = (
     Topic("head_state", "head/head_state", "baxter_core_msgs/HeadState", STATE_RATE_HZ,
           "pan [rad], turning, nodding, panning enabled"),
     Topic("gripper_state", "end_effector/{limb}_gripper/state", "baxter_core_msgs/EndEffectorState", STATE_RATE_HZ,
-          "position and force [%], moving, gripping, missed; sender and sequence of the last command"),
+          "position and force [%], moving, gripping, missed; sender and sequence of the last command; `state` of a "
+          "suction gripper is a JSON object: `vacuum sensor` (0 to 255), `vacuum`, `blowing`, `sucking`"),
     Topic("gripper_properties", "end_effector/{limb}_gripper/properties", "baxter_core_msgs/EndEffectorProperties",
-          STATE_RATE_HZ, "`ui_type` 2 electric, or 0 where the arm carries no gripper"),
+          STATE_RATE_HZ, "`ui_type` 1 suction, 2 electric, 0 where the arm carries no gripper; else what "
+          "`set_properties` said"),
     Topic("started", "sim/started", "std_msgs/Empty", LATCHED,
           "the robot stands, publishes and listens"),
     Topic("joint_command", "limb/{limb}/joint_command", "baxter_core_msgs/JointCommand", None,
@@ -83,6 +85,11 @@ TOPICS = (
     Topic("gripper_command", "end_effector/{limb}_gripper/command", "baxter_core_msgs/EndEffectorCommand", None,
           "configure, calibrate, clear_calibration, reset, reboot, go, stop, release, grip, prepare_to_grip, "
           "set, no_op; arguments as a JSON object"),
+    Topic("gripper_set_properties", "end_effector/{limb}_gripper/rsdk/set_properties",
+          "baxter_core_msgs/EndEffectorProperties", None,
+          "what a tool is that only the client knows, on an arm without a gripper"),
+    Topic("gripper_set_state", "end_effector/{limb}_gripper/rsdk/set_state", "baxter_core_msgs/EndEffectorState", None,
+          "the state of such a tool, which the robot then publishes"),
     Topic("command_head_pan", "head/command_head_pan", "baxter_core_msgs/HeadPanCommand", None,
           "target [rad]; speed ratio of 8.4 rad/s, where 0 means full speed; enable request"),
     Topic("command_head_nod", "head/command_head_nod", "std_msgs/Bool", None, "true begins a nod of 1 s"),

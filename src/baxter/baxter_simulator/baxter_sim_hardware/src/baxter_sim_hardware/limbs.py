@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the URDF says about Baxter: which joints make an arm, where its tip is, how far its fingers open."""
+"""What the URDF says about Baxter: which joints make an arm, where its tip is, what it carries there."""
+from urdf_model import Cylinder
+
 from .arms import LimbModel
 from .errors import ModelMismatch
 from .joint_command import JOINT_SUFFIXES
@@ -36,3 +38,23 @@ def finger_openings(robot):
             lower, upper = joint.limit.lower, joint.limit.upper
             openings[joint.name] = upper if abs(upper) > abs(lower) else lower
     return openings
+
+
+def openings_of(robot, side):
+    """`finger_openings` of one arm; empty where it carries no electric gripper."""
+    return {name: opening for name, opening in finger_openings(robot).items()
+            if name.startswith("%s_gripper_" % side[0])}
+
+
+def cup_of(robot, side):
+    """(frame at the rim, radius [m]) of the cup that one arm carries, or None.
+
+    Raises ModelMismatch for a cup that is not made of a cylinder.
+    """
+    link = robot.links.get("%s_gripper_cup" % side)
+    if link is None:
+        return None
+    radii = [shape.geometry.radius for shape in link.collisions if isinstance(shape.geometry, Cylinder)]
+    if not radii:
+        raise ModelMismatch("link '%s' has no cylinder among its collision shapes; a suction cup is one" % link.name)
+    return tip_of(side), max(radii)

@@ -58,7 +58,7 @@ class BaxterPlugin(ModelPlugin):
             limbs, limits, model.read_joints()[0][arm], dt=self._dt,
             profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"))
         self._head = HeadTopics(model, self._baxter.state, self._dt)
-        self._grippers = GripperTopics(model, finger_openings(robot), self._baxter.state, self._dt)
+        self._grippers = GripperTopics(context.world, model, self._baxter.state, self._dt)
         if self._switch("enable", False):
             self._apply(Event.ENABLE)
         self._alphabetical = np.argsort(model.joint_names)

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What every kind of gripper does with a command message: check it, echo it, hand it on."""
+import json
+import math
+
+from .errors import CommandRefused
+from .robot import ENABLE_HINT
+
+
+class Gripper:
+    """One kind of gripper, as its commands and parameters see it. Kinds derive from it and fill the two tables.
+
+    Attributes: command, sender, sequence: of the last command that was understood, which is how it is acknowledged;
+    parameters: {name: value}; flags: {flag of the state message: whether it is set}, details: the JSON text in it.
+    """
+
+    flags = {}
+    details = ""
+
+    PARAMETERS = {}  # {name: (value at the start, largest one)}; the smallest is 0
+    COMMANDS = {}  # {command: (name of the method that takes the arguments as a dict, whether it needs power)}
+    ONCE = ()  # commands that count once, however often the same message comes
+
+    def __init__(self):
+        self.forget()
+
+    def forget(self):
+        """As at the start: no command, parameters at their defaults."""
+        self.command, self.sender, self.sequence = "", "", 0
+        self.parameters = {name: start for name, (start, _) in self.PARAMETERS.items()}
+
+    def take(self, command, args, sender, sequence, enabled):
+        """One command message.
+
+        args: JSON object or empty. sender, sequence: a client's own mark; with the same mark, commands of ONCE are one
+        command that is sent again, as the SDK does until it sees the effect. Raises CommandRefused for an unknown
+        command, for senseless arguments, and for what needs power while the robot is not enabled.
+        """
+        if command not in self.COMMANDS:
+            raise CommandRefused("unknown gripper command '%s'; choices are %s" % (command, ", ".join(self.COMMANDS)))
+        method, needs_power = self.COMMANDS[command]
+        is_repeated = sender and (command, sender, sequence) == (self.command, self.sender, self.sequence)
+        self.command, self.sender, self.sequence = command, sender, sequence
+        if is_repeated and command in self.ONCE:
+            return
+        values = _parse(args)
+        if needs_power and not enabled:
+            raise CommandRefused(ENABLE_HINT)
+        getattr(self, method)(values)
+
+    def no_op(self, values):
+        """Nothing; it is acknowledged all the same."""
+
+    def configure(self, values):
+        """Change parameters, all of `values` or, if one is senseless, none. Raises CommandRefused."""
+        for name, value in values.items():
+            if name not in self.PARAMETERS or not (is_number(value) and 0.0 <= value <= self.PARAMETERS[name][1]):
+                raise CommandRefused("%s: %s is %r; parameters are %s" % (self.command, name, value, ", ".join(
+                    "%s (0 to %g)" % (known, upper) for known, (_, upper) in self.PARAMETERS.items()) or "none"))
+        self.parameters.update(values)
+
+
+class CustomGripper(Gripper):
+    """A tool that the robot knows nothing about, or none at all: without parameters, and no command has an effect."""
+
+    COMMANDS = {"no_op": ("no_op", False), "set": ("configure", False), "configure": ("configure", False)}
+
+
+def is_number(value):
+    """Whether a value from JSON is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _parse(args):
+    try:
+        values = json.loads(args) if args.strip() else {}
+    except ValueError as error:
+        raise CommandRefused("args are %r; they must be a JSON object (%s)" % (args, error)) from None
+    if not isinstance(values, dict):
+        raise CommandRefused("args are %r; they must be a JSON object" % args)
+    return values

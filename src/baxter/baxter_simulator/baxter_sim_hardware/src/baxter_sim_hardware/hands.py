@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Grippers in the physics world: each brings a gripper's core together with the bodies that it moves and touches."""
+import numpy as np
+
+from .gripper import ElectricGripper
+from .gripper_commands import CustomGripper
+from .limbs import cup_of, openings_of, tip_of
+from .suction import SuctionGripper
+
+RIM_RAYS = 8  # that look for a surface around the rim of the cup, and one in its middle
+RIM_SHARE = 0.8  # of the cup's radius, at which they do
+INSIDE_M, LIP_M = 0.002, 0.003  # they begin so far inside the cup; its lip bridges a gap of so much
+
+
+class FingersHand:
+    """The electric gripper of one side: two finger joints that move as one, as on a common pinion.
+
+    model: of bullet_sim; openings: {finger joint: where it is open [m]}; dt: length of a tick [s].
+    Attribute `gripper`: its core.
+    """
+
+    def __init__(self, model, side, openings, dt):
+        self._model = model
+        self._index = model.index(openings)
+        self._openings = np.array(list(openings.values()))
+        self._max_effort = model.max_effort[self._index]
+        self._links = [model.robot.joints[name].child for name in openings]
+        self._tip = tip_of(side)
+        for first, second in zip(self._index, self._index[1:], strict=False):
+            model.couple(first, second, self._openings[1] / self._openings[0])
+        for link in self._links:
+            model.grip_firmly(link)
+        self.gripper = ElectricGripper(float(np.abs(self._openings).max()), self._position(), dt)
+
+    def readings(self, positions):
+        """(opening, force) [%] for the state message; positions: of all joints of the model."""
+        return 100.0 * min(max(self._share(positions), 0.0), 1.0), min(self._squeeze(), 100.0)
+
+    def _squeeze(self):
+        """Force on the fingers along their way, the mean of both [% of the joints' largest one]."""
+        along = self._model.link_pose(self._tip).matrix()[:3, 1]
+        forces = [abs(float(self._model.contact_force(link) @ along)) for link in self._links]
+        return 100.0 * sum(forces) / float(self._max_effort.sum())
+
+    def update(self, joints):
+        """One tick; joints: (position, velocity, effort) of the whole model."""
+        drive = self.gripper.update(self._share(joints[0]), self._share(joints[1]), self._squeeze)
+        if drive is not None:
+            setpoint, force = drive
+            self._model.drive_position(self._index, setpoint * self._openings, force / 100.0 * self._max_effort)
+
+    def stop(self):
+        """The robot was disabled."""
+        self.gripper.stop(self._position())
+
+    def reset(self):
+        """The world went back to its start, or the joints were put elsewhere."""
+        self.gripper.reset(self._position())
+
+    def _position(self):
+        return self._share(self._model.read_joints()[0])
+
+    def _share(self, values):
+        return float((values[self._index] / self._openings).mean())
+
+
+class CupHand:
+    """The suction gripper of one side: a cup that the pressure in it presses against what lies on it.
+
+    world, model: of bullet_sim; cup: (frame at the rim, radius [m]). The frame's z axis points out of the cup.
+    Attribute `gripper`: its core.
+    """
+
+    def __init__(self, world, model, cup, dt):
+        self._world, self._model = world, model
+        self._frame, radius = cup
+        self._area_m2 = np.pi * radius**2
+        angles = 2.0 * np.pi * np.arange(RIM_RAYS) / RIM_RAYS
+        ring = RIM_SHARE * radius * np.array([np.cos(angles), np.sin(angles), 0.0 * angles]).T
+        self._ring = np.vstack([ring, np.zeros(3)])
+        model.grip_firmly(self._frame)
+        self.gripper = SuctionGripper(dt)
+
+    def readings(self, positions):
+        """(opening, force) [%] for the state message: a cup has neither."""
+        return 0.0, 0.0
+
+    def _covering(self):
+        """(model, link) by name that covers the cup, its rim and its middle, within reach of the lip, or None."""
+        pose = self._model.link_pose(self._frame).matrix()
+        starts = (self._ring - (0.0, 0.0, INSIDE_M)) @ pose[:3, :3].T + pose[:3, 3]
+        ends = starts + (INSIDE_M + LIP_M) * pose[:3, 2]
+        met = set(self._world.first_hits(starts.tolist(), ends.tolist()))
+        # Now and then a ray does not get out of the cup's own shape.
+        met -= {met_here for met_here in met if met_here is not None and met_here[0] == self._model.name}
+        return met.pop() if len(met) == 1 else None
+
+    def update(self, joints):
+        """One tick."""
+        if self.gripper.idle:
+            return
+        covering = self._covering()
+        pressure = self.gripper.update(covering is not None)
+        if covering is None:
+            return
+        model, link = covering
+        pose = self._model.link_pose(self._frame)
+        force = pressure * self._area_m2 * pose.matrix()[:3, 2]
+        self._world.models[model].apply_wrench(link, force, position=pose.position)
+        self._model.apply_wrench(self._frame, -force, position=pose.position)
+
+    def stop(self):
+        """The robot was disabled."""
+        self.gripper.end_attempt()
+
+    def reset(self):
+        """The world went back to its start, or the joints were put elsewhere."""
+        self.gripper.reset()
+
+
+class NoHand:
+    """An arm without a gripper, or with a tool that moves nothing.
+
+    Attribute `gripper`: its core.
+    """
+
+    def __init__(self):
+        self.gripper = CustomGripper()
+
+    def readings(self, positions):
+        """(opening, force) [%] for the state message."""
+        return 0.0, 0.0
+
+    def update(self, joints):
+        """One tick."""
+
+    def stop(self):
+        """The robot was disabled."""
+
+    def reset(self):
+        """The world went back to its start, or the joints were put elsewhere."""
+        self.gripper.forget()
+
+
+def hand_of(world, model, side, dt):
+    """What the description puts on one arm, as one of the classes above."""
+    openings, cup = openings_of(model.robot, side), cup_of(model.robot, side)
+    if openings:
+        return FingersHand(model, side, openings, dt)
+    return CupHand(world, model, cup, dt) if cup else NoHand()
