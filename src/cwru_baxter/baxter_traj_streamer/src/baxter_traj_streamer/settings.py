@@ -10,7 +10,7 @@ _CHOICES = {"interpolation": ("fields", "linear", "cubic", "quintic", "time_opti
             "start": ("refuse", "blend", "jump"), "joints": ("any", "right_arm")}
 _SWITCHES = ("check_limits", "feedback", "preemption", "stop_when_client_leaves")
 _POSITIVE = ("min_segment_s", "rate_hz", "start_tolerance", "max_duration_s", "max_points", "stop_deceleration",
-             "goal_tolerance", "settle_time_s", "speed_scale_factor")
+             "goal_tolerance", "settle_time_s", "speed_scale_factor", "cartesian_speed")
 
 
 class SettingsError(ValueError):

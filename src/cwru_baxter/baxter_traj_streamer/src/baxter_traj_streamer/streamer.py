@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The library of the notes: poses of the arms, paths turned into trajectories, and both sent to the robot."""
 import functools
+import math
 
 import rospy
 from baxter_core_msgs.msg import JointCommand
@@ -11,7 +12,26 @@ from baxter_interface import startup
 from . import timing
 from .robot_link import RobotLink
 from .ros_settings import read_settings
-from .settings import SIDES, arm_joint_names
+from .settings import JOINTS, SIDES, arm_joint_names
+
+
+def stuff_trajectory(qvecs, side, settings):
+    """The JointTrajectory of one arm along the 7-vectors ``qvecs``; the first point is due at 0 s.
+
+    Raises ValueError for an empty path or vectors that are not seven finite numbers.
+    """
+    if not len(qvecs):
+        raise ValueError("the path has no poses; it needs at least one")
+    for index, qvec in enumerate(qvecs):
+        if len(qvec) != len(JOINTS) or not all(map(math.isfinite, qvec)):
+            raise ValueError("pose %d must be %d finite numbers, got %s" % (index, len(JOINTS), list(qvec)))
+    times = timing.arrival_times(qvecs, settings.planning_velocity(), settings.min_segment_s)
+    trajectory = JointTrajectory(joint_names=arm_joint_names(side))
+    trajectory.header.stamp = rospy.Time.now()
+    trajectory.points = [
+        JointTrajectoryPoint(positions=list(qvec), time_from_start=rospy.Duration.from_sec(time))
+        for qvec, time in zip(qvecs, times, strict=True)]
+    return trajectory
 
 
 class BaxterTrajStreamer:
@@ -44,19 +64,8 @@ class BaxterTrajStreamer:
         return timing.transition_time(dqvec, self.settings.planning_velocity())
 
     def stuff_trajectory(self, qvecs, side="right"):
-        """Turn a path, a list of 7-vectors, into a JointTrajectory of one arm; the first point is due at 0 s.
-
-        Raises ValueError for an empty path or vectors that are not seven finite numbers.
-        """
-        if not len(qvecs):
-            raise ValueError("the path has no poses; it needs at least one")
-        times = timing.arrival_times(qvecs, self.settings.planning_velocity(), self.settings.min_segment_s)
-        trajectory = JointTrajectory(joint_names=arm_joint_names(side))
-        trajectory.header.stamp = rospy.Time.now()
-        trajectory.points = [
-            JointTrajectoryPoint(positions=list(qvec), time_from_start=rospy.Duration.from_sec(time))
-            for qvec, time in zip(qvecs, times, strict=True)]
-        return trajectory
+        """Turn a path, a list of 7-vectors, into a JointTrajectory of one arm; see :func:`stuff_trajectory`."""
+        return stuff_trajectory(qvecs, side, self.settings)
 
     def cmd_pose(self, qvec, side):
         """Command one arm's joints once, in position mode, and return at once."""

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the commands that move arms have in common."""
+import sys
+
+import rospy
+
+import baxter_interface.startup
+
+from .move_service import REFUSALS
+from .traj_client import MoveFailed, TrajClient
+
+
+def add_wait_option(parser, default_s):
+    """``--wait SECONDS``; ``default_s`` None: until the move is over."""
+    parser.add_argument("--wait", type=float, default=default_s, metavar="SECONDS",
+                        help="how long to wait for the result; the arm moves on in any case (default: %s)"
+                        % ("until it is there" if default_s is None else "%g" % default_s))
+
+
+def run(name, plan, wait_s):
+    """Send the trajectory ``plan(client)`` and wait for it; exits with a line on stderr where that fails.
+
+    ``plan`` returns None where there is nothing to send.
+    """
+    try:
+        baxter_interface.startup.init_node(name, anonymous=True)
+        client = TrajClient()
+        client.wait_until_ready()
+        trajectory = plan(client)
+        if trajectory is None:
+            return
+        client.send(trajectory)
+        result = client.wait(wait_s)
+        if result is None:
+            rospy.logwarn("no result within %g s; the arm moves on", wait_s)
+        else:
+            rospy.loginfo("the arm is there (return_val %d)", result.return_val)
+    except MoveFailed as error:
+        sys.exit(str(error))
+    except REFUSALS as error:
+        sys.exit("%s: %s" % (name, error))
+    except (KeyboardInterrupt, rospy.ROSInterruptException):
+        pass

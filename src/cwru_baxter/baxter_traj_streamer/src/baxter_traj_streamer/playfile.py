@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joint-space playfiles (``.jsp``): per line the seven angles of an arm and an arrival time. Free of ROS."""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .errors import GoalRefused
+from .judging import judge
+from .settings import JOINTS, arm_joint_names
+from .timing import arrival_times
+
+_COLUMNS = len(JOINTS) + 1
+
+
+class PlayfileError(ValueError):
+    """A playfile that cannot be used; the text names file, line, what was found and what would be right."""
+
+
+class Playfile(NamedTuple):
+    """``positions`` (m, 7) [rad] and ``times`` (m,) [s], increasing, not below 0, of one arm; ``source``: its name;
+    ``lines``: where in the source each row stands."""
+
+    positions: np.ndarray
+    times: np.ndarray
+    source: str
+    lines: tuple
+
+    @classmethod
+    def read(cls, path):
+        """Read a file. Raises PlayfileError, OSError."""
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise PlayfileError("%s is no text: %s" % (path, error)) from error
+        return cls.parse(text, str(path))
+
+    @classmethod
+    def parse(cls, text, source="playfile"):
+        """Take the content of a file; empty lines and what follows a # are left aside. Raises PlayfileError."""
+        rows, lines = [], []
+        for number, line in enumerate(text.splitlines(), start=1):
+            fields = line.partition("#")[0].strip().rstrip(",")
+            if fields:
+                rows.append(_numbers(fields.split(","), source, number))
+                lines.append(number)
+                if rows[-1][-1] < 0.0 or (len(rows) > 1 and rows[-1][-1] <= rows[-2][-1]):
+                    raise PlayfileError("%s, line %d: the time %.9g s must be above %s" % (
+                        source, number, rows[-1][-1],
+                        "that of line %d, %.9g s" % (lines[-2], rows[-2][-1]) if len(rows) > 1 else "or at 0"))
+        if not rows:
+            raise PlayfileError("%s has no rows; each is %s, arrival time" % (source, ", ".join(JOINTS)))
+        table = np.array(rows)
+        return cls(table[:, :-1], table[:, -1], source, tuple(lines))
+
+    def text(self):
+        """The content of a file; the times are written to the ms, the angles to the microrad."""
+        return "".join("%s, %.3f\n" % (", ".join("%.6f" % angle for angle in row), time)
+                       for row, time in zip(self.positions, self.times, strict=True))
+
+    def retimed(self, velocity, min_segment_s):
+        """The same poses with the notes' arrival times for ``velocity`` (7,) [rad/s]."""
+        return self._replace(times=np.array(arrival_times(self.positions, velocity, min_segment_s)))
+
+
+def merged(playfiles):
+    """(joint names, times (m,), positions (m, k)) of {side: Playfile}, each begun at its first row at time 0.
+
+    A row for each time at which any of the files has one; between its own rows an arm goes straight, after them it
+    rests.
+    """
+    times = np.unique(np.concatenate([file.times - file.times[0] for file in playfiles.values()]))
+    names, columns = [], []
+    for side, file in playfiles.items():
+        names += arm_joint_names(side)
+        columns += [np.interp(times, file.times - file.times[0], column) for column in file.positions.T]
+    return names, times, np.array(columns).T
+
+
+def check(playfiles, limits, settings):
+    """Judge {side: Playfile} as the server would, its start left aside; arguments as for judging.judge.
+
+    Raises PlayfileError, which names the file and the line where there is one.
+    """
+    names, times, positions = merged(playfiles)
+    if len(times) == 1:
+        # A pose, no way: only the joints' limits count.
+        times = times + 1.0
+    try:
+        judge(names, [(time, row, (), ()) for time, row in zip(times, positions, strict=True)], limits, None, settings)
+    except GoalRefused as refusal:
+        where = ", ".join(file.source for file in playfiles.values())
+        if refusal.joint is not None and refusal.point is not None:
+            file = playfiles[refusal.joint.partition("_")[0]]
+            row = int(np.searchsorted(file.times - file.times[0], times[refusal.point]))
+            where = "%s, line %d" % (file.source, file.lines[min(row, len(file.lines) - 1)])
+        raise PlayfileError("%s: %s" % (where, refusal)) from refusal
+
+
+def _numbers(fields, source, line):
+    if len(fields) != _COLUMNS:
+        raise PlayfileError("%s, line %d has %d numbers, expected %d: %s, arrival time" % (
+            source, line, len(fields), _COLUMNS, ", ".join(JOINTS)))
+    row = []
+    for field, name in zip(fields, (*JOINTS, "arrival time"), strict=True):
+        try:
+            row.append(float(field))
+        except ValueError:
+            row.append(math.nan)
+        if not math.isfinite(row[-1]):
+            raise PlayfileError("%s, line %d: %s is %r, not a finite number" % (source, line, name, field.strip()))
+    return row

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Straight lines of an arm's tip that keep its orientation, on one branch of the inverse kinematics. Free of ROS."""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from baxter_sim_kinematics import NoSolution, solve
+
+from .optimal import time_optimal
+
+# Distance between two solutions [m]: usually, and at least, where the joints turn fast or the reach ends.
+_STEP_M, _SHORTEST_STEP_M = 0.005, 0.0005
+# Nearer than this to a solution the next one must be, else it is on another branch [rad].
+_SAME_BRANCH = 0.15
+# Residuals of a solution [m, rad]: the path is differentiated twice.
+_RESIDUAL = 1e-8
+# What the curvature of the path in joint space may take of the accelerations; the rest is for speeding up.
+_CURVATURE_SHARE = 0.5
+
+
+class LeavesReach(ValueError):
+    """A line that cannot be followed to its end: ``reached_m`` of ``length_m``; the text says why."""
+
+    def __init__(self, reached_m, length_m, why):
+        super().__init__("the line leaves the arm's reach after %.3f m of %.3f m: %s" % (reached_m, length_m, why))
+        self.reached_m, self.length_m = reached_m, length_m
+
+
+class StraightLine(NamedTuple):
+    """``distances`` (m,) [m] along the line and the ``positions`` (m, n) [rad] of the joints there."""
+
+    distances: np.ndarray
+    positions: np.ndarray
+
+    def timed(self, velocity, acceleration, speed):
+        """(times (m,) [s], positions (m, n), velocities (m, n)): points that cubics join to an even, smooth move.
+
+        The tip speeds up, goes on at ``speed`` [m/s], and slows down, all as fast as ``velocity`` [rad/s] and
+        ``acceleration`` [rad/s^2] (n,) allow along the whole line.
+        """
+        slope = np.gradient(self.positions, self.distances, axis=0, edge_order=min(2, len(self.distances) - 1))
+        bend = np.abs(np.gradient(slope, self.distances, axis=0)).max(axis=0)
+        steepest = np.abs(slope).max(axis=0)
+        with np.errstate(divide="ignore"):
+            fastest = min(speed, (velocity / steepest).min(),
+                          np.sqrt(_CURVATURE_SHARE * acceleration / bend).min())
+            push = ((1.0 - _CURVATURE_SHARE) * acceleration / steepest).min()
+        way = time_optimal([[0.0], [self.distances[-1]]], [fastest], [push])
+        grid = np.linspace(0.0, way.end_time, 20 * len(self.distances) + 1)
+        samples = np.array([way.sample(t)[:2, 0] for t in grid])
+        times = np.interp(self.distances, samples[:, 0], grid)
+        times[-1] = way.end_time
+        return times, self.positions, slope * np.array([[way.sample(t)[1, 0]] for t in times])
+
+
+def straight_line(chain, start, displacement):
+    """The :class:`StraightLine` of the tip of ``chain`` from the posture ``start`` (n,) [rad].
+
+    ``displacement`` (3,) [m] is in the base frame of the chain. Each solution is sought from the one before, and must
+    be near it. Raises LeavesReach, and ValueError for a displacement that is no line.
+    """
+    displacement = np.asarray(displacement, dtype=float)
+    length = float(np.linalg.norm(displacement)) if displacement.shape == (3,) else math.nan
+    if not math.isfinite(length) or length < _SHORTEST_STEP_M:
+        raise ValueError("the displacement must be three finite numbers, %g m or more; got %s" % (
+            _SHORTEST_STEP_M, displacement.tolist()))
+    path = [np.asarray(start, dtype=float)]
+    pose = chain.fk(path[0])
+    origin = pose[:3, 3].copy()
+    distances = [0.0]
+    usual = min(_STEP_M, length / 2.0)
+    step, beyond = usual, ""
+    while distances[-1] < length:
+        # No stub is left for the end.
+        left = length - distances[-1]
+        distance = length if left <= 1.5 * step else distances[-1] + step
+        pose[:3, 3] = origin + displacement * (distance / length)
+        found, why = _next(chain, pose, path[-1])
+        if not why:
+            distances.append(distance)
+            path.append(found)
+            step = min(2.0 * step, usual)
+            beyond = ""
+            continue
+        # Near the end of its reach an arm often turns fast before it cannot go on: the latter says more.
+        beyond = beyond or ("" if found is not None else why)
+        if step <= _SHORTEST_STEP_M:
+            raise LeavesReach(distances[-1], length, beyond or why)
+        step /= 2.0
+    return StraightLine(np.array(distances), np.array(path))
+
+
+def _next(chain, pose, before):
+    """(the solution for ``pose`` or None, why it is none on the branch of the one ``before`` or "")."""
+    try:
+        found = solve(chain, pose, before, _RESIDUAL, _RESIDUAL, candidates=1, max_starts=1).q
+    except NoSolution as error:
+        return None, str(error)
+    turn = np.abs(found - before)
+    joint = int(turn.argmax())
+    if turn[joint] <= _SAME_BRANCH:
+        return found, ""
+    return found, "%s would have to turn by %.3f rad at once, to another way of holding the arm; start in another " \
+        "posture" % (chain.joint_names[joint], turn[joint])
