@@ -203,8 +203,17 @@ class Model:
 
     def set_joint_positions(self, index, position):
         """Put joints ``index`` (k,) at ``position`` (k,), at rest, at once. Nothing in between is simulated."""
-        for joint, value in zip(index.tolist(), position.tolist(), strict=True):
-            pybullet.resetJointState(self.body, joint, value, 0.0, physicsClientId=self._client)
+        if len(index) != len(position):
+            raise BulletSimError("%d joints but %d positions" % (len(index), len(position)))
+        if len(index):
+            # In one call, since each works out anew where every link is.
+            pybullet.resetJointStatesMultiDof(
+                self.body,
+                index.tolist(),
+                position[:, None].tolist(),
+                np.zeros((len(index), 1)).tolist(),
+                physicsClientId=self._client,
+            )
         self._world.wake_all()
 
     def gravity_efforts(self, position=None):
