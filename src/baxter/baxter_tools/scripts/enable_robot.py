@@ -6,7 +6,8 @@ import sys
 
 import rospy
 
-from baxter_interface import CHECK_VERSION, RobotEnable, startup
+from baxter_interface import CHECK_VERSION, RobotEnable
+from baxter_interface.programs import run
 
 ACTIONS = {
     "state": lambda robot: print(robot.state()),
@@ -36,21 +37,15 @@ def parse_arguments(argv):
     return actions
 
 
+def carry_out(actions):
+    robot = RobotEnable(CHECK_VERSION)
+    for action in actions:
+        ACTIONS[action](robot)
+
+
 def main():
     actions = parse_arguments(rospy.myargv()[1:])
-    if not actions:
-        return 0
-    try:
-        startup.init_node("rsdk_robot_enable")
-        robot = RobotEnable(CHECK_VERSION)
-        for action in actions:
-            ACTIONS[action](robot)
-    except (OSError, ValueError, rospy.ROSException) as error:
-        print("enable_robot.py: %s" % (getattr(error, "strerror", None) or error), file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
-    return 0
+    return run("rsdk_robot_enable", lambda: carry_out(actions)) if actions else 0
 
 
 if __name__ == "__main__":

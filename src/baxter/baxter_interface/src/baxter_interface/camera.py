@@ -16,6 +16,10 @@ LIST_TIMEOUT_S = 10.0
 TURNED_CAMERA = "head_camera"
 
 
+class UnknownCamera(AttributeError, ValueError):
+    """A camera that the robot does not have, or that has no power."""
+
+
 def list_cameras(timeout_s=LIST_TIMEOUT_S):
     """List the names of the cameras that have power. Raises ServiceUnavailable (an OSError and a ROSException)."""
     startup.wait_for_start([])
@@ -27,8 +31,9 @@ class CameraController:
 
     Assigning to a property opens the camera again with the new setting. Settings that were not assigned are the
     camera's defaults: 320x200 at 20 pictures per second, everything else automatic or off.
-    Raises ServiceUnavailable (an OSError and a ROSException) if the robot has no cameras, AttributeError for a camera
-    that is not on the robot's list, rospy.ROSInitException before rospy.init_node; OSError if the camera refuses.
+    Raises ServiceUnavailable (an OSError and a ROSException) if the robot has no cameras, UnknownCamera (an
+    AttributeError and a ValueError) for a camera that is not on the robot's list, OSError if the camera refuses,
+    rospy.ROSInitException before rospy.init_node.
     """
 
     MODES = list(MODES)
@@ -38,7 +43,7 @@ class CameraController:
         self._id = name
         names = list_cameras()
         if name not in names:
-            raise AttributeError("there is no camera %r: those with power are %s. At most two of the three are on at a "
+            raise UnknownCamera("there is no camera %r: those with power are %s. At most two of the three are on at a "
                                  "time; closing one may power another"
                                  % (name, ", ".join(map(repr, names)) or "none"))
         for service in ("/cameras/open", "/cameras/close"):

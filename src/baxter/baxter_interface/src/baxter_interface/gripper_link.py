@@ -19,6 +19,10 @@ SEQUENCE_END = 2**31 - 1
 EFFECT_TIMEOUT_S = 0.5
 
 
+class NoGripper(OSError):
+    """The arm carries no gripper."""
+
+
 class GripperLink:
     """What the classes of gripper_types work on; waits for the gripper as startup.wait_for_part does."""
 
@@ -43,7 +47,7 @@ class GripperLink:
         except OSError as failure:
             self.unregister()
             if failure.errno == errno.ETIMEDOUT and self.properties is not None and self.kind is None:
-                raise OSError(errno.ETIMEDOUT, "there is no gripper on the %s arm: its properties say ui_type %d; "
+                raise NoGripper(errno.ETIMEDOUT, "there is no gripper on the %s arm: its properties say ui_type %d; "
                               "1 is suction, 2 electric, 3 custom" % (side, self.properties.ui_type)) from failure
             raise
         except BaseException:

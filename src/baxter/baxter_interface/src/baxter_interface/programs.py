@@ -83,6 +83,11 @@ class EnabledRobot:
             return
         self.switch.disable()
 
+    def is_enabled(self):
+        """Tell whether the robot is enabled now."""
+        state = self.switch.state()
+        return state.enabled and not state.stopped
+
     def beats(self, rate_hz):
         """Yield `rate_hz` times a second of ROS time until ROS shuts down, as long as the robot is enabled and there.
 
@@ -98,11 +103,11 @@ class EnabledRobot:
     def _check(self, now_s):
         if self.switch.silence_s() > LOST_AFTER_S and rospy.rostime.is_wallclock():
             raise RobotLost("lost the robot: it has reported nothing for %.0f s" % LOST_AFTER_S)
-        state = self.switch.state()
-        if state.enabled and not state.stopped:
+        if self.is_enabled():
             self._disabled_since_s = None
         elif self._disabled_since_s is None or now_s < self._disabled_since_s:
             self._disabled_since_s = now_s
         elif now_s - self._disabled_since_s >= DISABLED_GRACE_S:
+            what = "stopped" if self.switch.state().stopped else "disabled, or restarted"
             raise RobotLost("lost the robot: it was %s. Enable it, and start this program again (rosrun baxter_tools "
-                            "enable_robot.py -e)" % ("stopped" if state.stopped else "disabled, or restarted"))
+                            "enable_robot.py -e)" % what)

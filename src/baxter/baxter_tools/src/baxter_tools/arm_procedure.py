@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Programs that let the robot run a procedure on one arm: taring, calibrating."""
+import argparse
+
+import rospy
+
+from baxter_interface import CHECK_VERSION, Gripper, RobotEnable, RobustController
+from baxter_interface.gripper_link import NoGripper
+from baxter_interface.joint_checks import SIDES
+from baxter_interface.programs import ProgramFailed, run
+
+
+def run_arm_procedure(node_name, procedure, kind, data, timeout_s, description):
+    """Parse the options, run `procedure` on the arm, and return the exit status.
+
+    Parameters: `procedure` as the robot calls it; `kind` of its enable message and its `data`; `timeout_s`.
+    """
+    parser = argparse.ArgumentParser(
+        description=description, epilog="The arm must carry no gripper, and have room to move. Exit status: 0 done, "
+                                        "1 failed, 2 wrong options.")
+    parser.add_argument("-l", "--limb", required=True, choices=SIDES, help="the arm")
+    limb = parser.parse_args(rospy.myargv()[1:]).limb
+
+    def body():
+        robot = RobotEnable(CHECK_VERSION)
+        _require_bare_hand(limb, procedure)
+        controller = RobustController("/robustcontroller/%s/%s" % (limb, procedure), kind(True, "sdk", data),
+                                      kind(False, "sdk", data), timeout_s)
+        robot.enable()
+        try:
+            rospy.loginfo("%s of the %s arm: this may take up to %.0f min", procedure, limb, timeout_s / 60.0)
+            controller.run()
+        finally:
+            robot.disable()
+        rospy.loginfo("%s of the %s arm is complete", procedure, limb)
+
+    return run("%s_%s" % (node_name, limb), body)
+
+
+def _require_bare_hand(limb, procedure):
+    """Raise ProgramFailed if the arm carries a gripper: its weight would be taken for the arm's."""
+    try:
+        kind = Gripper(limb).type()
+    except NoGripper:
+        return
+    if kind != "custom":
+        raise ProgramFailed("the %s arm carries a gripper (%s): take it off before %s" % (limb, kind, procedure))

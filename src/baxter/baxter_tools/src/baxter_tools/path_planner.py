@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A collision-free way between two postures. Free of ROS.
+
+Two trees of postures grow from both ends towards random ones and towards each other until they meet (RRT-connect:
+Kuffner and LaValle, ICRA 2000); then corners are cut off. Straight ways, also by way of given postures, are tried
+first: nearly always one of them is free.
+"""
+import itertools
+
+import numpy as np
+
+# Distance between postures at which a way is looked at: the joint that moves most [rad].
+RESOLUTION_RAD = 0.02
+# Longest stretch that a tree grows at once, by the same measure [rad].
+STRETCH_RAD = 0.4
+TREE_LIMIT = 3000
+SHORT_CUTS = 60
+# How far around a start that touches something a free posture is looked for [rad], and how often.
+ESCAPE_RADII_RAD = (0.05, 0.1, 0.2, 0.4, 0.8)
+ESCAPE_TRIES = 60
+# What a way out of a touch may come nearer than the touch itself [m].
+ESCAPE_SLACK_M = 0.001
+
+
+class NoPath(Exception):
+    """No free way was found; the text says from where on."""
+
+
+class PathPlanner:
+    """Finds ways for postures (n,) [rad].
+
+    Parameters:
+        lower, upper: limits of the joints (n,).
+        clearance: function of a posture that returns the least distance between parts [m], negative where they overlap.
+        margin_m: least clearance of a way; where an end itself has less, its own.
+        rng: numpy random generator; the same one gives the same ways.
+    """
+
+    def __init__(self, lower, upper, clearance, margin_m, rng):
+        self._lower, self._upper = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+        self._clearance = clearance
+        self._margin_m = margin_m
+        self._rng = rng
+
+    def plan(self, start, goal, via=()):
+        """Return a way from `start` to `goal` as a list of postures, straight in between; `via`: postures to try first.
+
+        A start that touches something is left on the way that frees it. Raises NoPath.
+        """
+        start, goal = (np.asarray(end, dtype=float) for end in (start, goal))
+        at_goal_m = self._clearance(goal)
+        if at_goal_m <= 0.0:
+            raise NoPath("parts of the robot overlap by %.0f mm where it should go" % (-1000.0 * at_goal_m))
+        # The folded arm is nearer to its own body than one would choose to be on the way.
+        margin_m = min(self._margin_m, 0.9 * at_goal_m)
+        way = [start]
+        if self._clearance(start) < margin_m:
+            way.append(self._escape(start, margin_m))
+        for stops in itertools.chain([()], ([stop] for stop in via), [via] if len(via) > 1 else []):
+            legs = [way[-1], *stops, goal]
+            if all(self._is_free(a, b, margin_m) for a, b in itertools.pairwise(legs)):
+                return self._shorten([*way, *legs[1:]], margin_m)
+        return self._shorten([*way, *self._connect(way[-1], goal, margin_m)[1:]], margin_m)
+
+    def _is_free(self, a, b, margin_m):
+        count = max(1, int(np.ceil(np.abs(b - a).max() / RESOLUTION_RAD)))
+        # Far apart first: what is in the way is thick, and found sooner so.
+        steps = sorted(range(1, count + 1), key=_bits_reversed)
+        return all(self._clearance(a + (b - a) * (step / count)) >= margin_m for step in steps)
+
+    def _escape(self, start, margin_m):
+        touch_m = self._clearance(start)
+        for radius in ESCAPE_RADII_RAD:
+            for _ in range(ESCAPE_TRIES):
+                end = np.clip(start + self._rng.uniform(-radius, radius, len(start)), self._lower, self._upper)
+                if self._clearance(end) >= margin_m and self._is_free(start, end, touch_m - ESCAPE_SLACK_M):
+                    return end
+        raise NoPath("parts of the robot touch (clearance %.0f mm) and no way out was found" % (1000.0 * touch_m))
+
+    def _connect(self, start, goal, margin_m):
+        trees = [_Tree(start), _Tree(goal)]
+        for turn in range(TREE_LIMIT):
+            grown, other = trees[turn % 2], trees[1 - turn % 2]
+            node = self._grow(grown, self._rng.uniform(self._lower, self._upper), margin_m)
+            if node is None:
+                continue
+            target, meeting = grown.postures[node], None
+            while (meeting := self._grow(other, target, margin_m)) is not None:
+                if np.array_equal(other.postures[meeting], target):
+                    here, there = grown.branch(node), other.branch(meeting)
+                    return here[::-1] + there[1:] if grown is trees[0] else there[::-1] + here[1:]
+        raise NoPath("no free way was found in %d tries" % TREE_LIMIT)
+
+    def _grow(self, tree, target, margin_m):
+        """Grow `tree` by one stretch towards `target`; return the new node, None where something is in the way."""
+        nearest = tree.nearest(target)
+        from_here = tree.postures[nearest]
+        distance = np.abs(target - from_here).max()
+        end = target if distance <= STRETCH_RAD else from_here + (target - from_here) * (STRETCH_RAD / distance)
+        return tree.add(end, nearest) if self._is_free(from_here, end, margin_m) else None
+
+    def _shorten(self, way, margin_m):
+        """Leave out postures between which the straight way is free. The first stretch out of a touch stays."""
+        first = 1 if len(way) > 1 and self._clearance(way[0]) < margin_m else 0
+        for _ in range(SHORT_CUTS):
+            if len(way) - first < 3:
+                break
+            a = int(self._rng.integers(first, len(way) - 2))
+            b = int(self._rng.integers(a + 2, len(way)))
+            if self._is_free(way[a], way[b], margin_m):
+                way = way[:a + 1] + way[b:]
+        return way
+
+
+class _Tree:
+    def __init__(self, root):
+        self.postures = [root]
+        self._parents = [None]
+
+    def nearest(self, target):
+        return int(np.abs(np.array(self.postures) - target).max(axis=1).argmin())
+
+    def add(self, posture, parent):
+        self.postures.append(posture)
+        self._parents.append(parent)
+        return len(self.postures) - 1
+
+    def branch(self, node):
+        """Postures from `node` back to the root."""
+        way = []
+        while node is not None:
+            way.append(self.postures[node])
+            node = self._parents[node]
+        return way
+
+
+def _bits_reversed(number):
+    return int(format(number, "016b")[::-1], 2)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How near the arms are to each other and to the body, from the robot's description. Free of ROS messages and masters.
+
+The shapes and the pairs of parts that can meet are those that the simulator collides, on a physics world of our own.
+"""
+import numpy as np
+
+from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
+from bullet_sim import World
+from gazebo_ros.resources import ResourceFinder
+from urdf_model import parse_urdf
+
+
+class SelfClearance:
+    """Called with a posture (n,) [rad] of the joints `names`, returns the least distance between parts [m].
+
+    Negative where parts overlap; FAR where none is nearer than about 20 mm, beyond which nobody looks. Fingers count as
+    spread as far as they go.
+
+    Parameters: the text of the robot's URDF; `names` of the joints; `warn` takes a line of text.
+    Raises UrdfError and BulletSimError for a description that is none of Baxter.
+    Attributes: lower, upper: limits (n,) [rad].
+    """
+
+    FAR = 1.0
+
+    def __init__(self, urdf_xml, names, warn=lambda text: None):
+        robot = parse_urdf(urdf_xml, source="robot_description")
+        self._world = World(find_mesh=ResourceFinder(), warn=warn)
+        self._model = self._world.spawn(robot, "baxter", static=True, mesh_cuts=MESH_CUTS,
+                                        self_collision_pairs=self_collision_pairs(robot.links))
+        self._index = self._model.index(names)
+        self.lower, self.upper = self._model.lower[self._index], self._model.upper[self._index]
+        fingers = self._model.index([name for name in self._model.joint_names if name.endswith("finger_joint")])
+        lower, upper = self._model.lower[fingers], self._model.upper[fingers]
+        self._model.set_joint_positions(fingers, np.where(np.abs(lower) > np.abs(upper), lower, upper))
+
+    def __call__(self, posture):
+        self._model.set_joint_positions(self._index, posture)
+        self._world.detect_contacts()
+        return min((contact.distance for contact in self._world.contacts(self._model)), default=self.FAR)
+
+    def close(self):
+        """Give the physics world back."""
+        self._world.close()
