@@ -71,7 +71,8 @@ class JointTrajectoryActionServer:
         self._inbox = collections.deque()
         self._wake = threading.Condition()
         self._ending = False
-        self._clock = RosClock(gives_up=lambda: self._ending or self._watch.is_gone())
+        # A request is heard also while a simulation is paused.
+        self._clock = RosClock(gives_up=lambda: self._ending or self._inbox or self._watch.is_gone())
         self._ticker = Ticker(self._clock, rate)
         self._stopwatch = Stopwatch(self._clock.now())
         self._was_gone = False
