@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A :class:`CollisionChecker` on the shapes of a bullet_sim world. Imported by who needs it: PyBullet takes its
+time.
+"""
+import itertools
+from collections import Counter
+
+import numpy as np
+
+from baxter_sim_kinematics.collision import Touch
+from bullet_sim import World
+
+
+class BulletChecker:
+    """Asks a world of its own, or one that is given, whether a robot touches itself or what else stands there.
+
+    One thread at a time. Only contacts count that the asked joints can change: the other arm's hand on the table is its
+    own affair.
+    """
+
+    def __init__(self, world, model, self_collision_pairs=None, margin_m=0.0):
+        """``model``: the robot in ``world`` (bullet_sim); ``self_collision_pairs``: [(link, link)] that must not
+        touch, all that make sense where None. ``margin_m``: how deep a touch is let pass; shapes are often a little
+        too large.
+        """
+        self._world, self._model, self._margin_m = world, model, margin_m
+        pairs = plausible_pairs(world, model) if self_collision_pairs is None else self_collision_pairs
+        model.set_self_collision_pairs(pairs)
+        self._plans = {}
+
+    @classmethod
+    def of_robot(cls, robot, self_collision_pairs=None, margin_m=0.0, find_mesh=None, mesh_cuts=None):
+        """Return a checker with a world of its own, in which ``robot`` (urdf_model.Robot) stands fixed at the origin.
+
+        ``find_mesh``: as for ``bullet_sim.World``; ``mesh_cuts``: as for its ``spawn``.
+        """
+        world = World(**({} if find_mesh is None else {"find_mesh": find_mesh}))
+        options = {} if mesh_cuts is None else {"mesh_cuts": mesh_cuts}
+        model = world.spawn(robot, robot.name or "robot", static=True, **options)
+        return cls(world, model, self_collision_pairs, margin_m)
+
+    @property
+    def world(self):
+        """The bullet_sim.World; spawn into it what the robot is to keep clear of."""
+        return self._world
+
+    def known(self, joint_names, q):
+        """Return (names, values) of those joints that the robot has and whose value is a number."""
+        has = set(self._model.joint_names)
+        pairs = [pair for pair in zip(joint_names, q, strict=False) if pair[0] in has and np.isfinite(pair[1])]
+        return [name for name, _ in pairs], [value for _, value in pairs]
+
+    def set_posture(self, joint_names, q):
+        """Put other joints of the robot, such as the other arm's, where they are."""
+        self._model.set_joint_positions(self._model.index(joint_names), np.asarray(q, dtype=float))
+
+    def contact(self, joint_names, q):
+        """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None where it is clear."""
+        index, moved = self._plan(tuple(joint_names))
+        self._model.set_joint_positions(index, q)
+        worst = None
+        for found in self._world.touching(self._model):
+            if found.distance >= -self._margin_m or (worst is not None and found.distance >= -worst.depth_m):
+                continue
+            ours, others = self._named(found)
+            if ours[0] in moved or ours[-1] in moved:
+                worst = Touch(ours[0], others, len(ours) == 1, -found.distance)
+        return worst
+
+    def close(self):
+        """Give the world back."""
+        self._world.close()
+
+    def _plan(self, joint_names):
+        """Return (index of the joints, names of the links that they move); worked out once."""
+        if joint_names not in self._plans:
+            moved = set()
+            for joint in self._model.merged.joints.values():  # parents come before their children
+                if joint.name in joint_names or joint.parent in moved:
+                    moved.add(joint.child)
+            self._plans[joint_names] = (self._model.index(joint_names), moved)
+        return self._plans[joint_names]
+
+    def _named(self, found):
+        """Return (our links that take part, the other one's name)."""
+        if found.model_a == found.model_b:
+            return (found.link_a, found.link_b), found.link_b
+        if found.model_a == self._model.name:
+            return (found.link_a,), "%s/%s" % (found.model_b, found.link_b)
+        return (found.link_b,), "%s/%s" % (found.model_a, found.link_a)
+
+
+def plausible_pairs(world, model, samples=50):
+    """Return [(link, link)] of ``model`` that have no joint between them and do not overlap by their make.
+
+    That is taken to be so where they touch in more than half of ``samples`` random postures.
+    """
+    neighbours = {frozenset((joint.parent, joint.child)) for joint in model.merged.joints.values()}
+    pairs = [pair for pair in itertools.combinations(model.merged.links, 2) if frozenset(pair) not in neighbours]
+    model.set_self_collision_pairs(pairs)
+    low, high = np.clip(model.lower, -np.pi, np.pi), np.clip(model.upper, -np.pi, np.pi)
+    touches = Counter()
+    for q in np.random.default_rng(0).uniform(low, high, (samples, len(low))):
+        model.set_joint_positions(np.arange(len(low)), q)
+        touches.update({frozenset((found.link_a, found.link_b)) for found in world.touching(model)
+                        if found.model_a == found.model_b and found.distance < 0.0})
+    return [pair for pair in pairs if touches[frozenset(pair)] <= samples // 2]
