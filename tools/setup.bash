@@ -205,21 +205,22 @@ step_build() {
     note="$(find src -name CATKIN_IGNORE -prune -o -name package.xml -print | wc -l) packages"
 }
 
-# The lab prints this file; nothing at run time reads it.
+# The labs print and name these files; nothing at run time reads them.
 step_urdf() {
-    local folder=$DESCRIPTION/urdf key
-    if [[ ! -f $folder/baxter.urdf.xacro || ! -d src/compat/xacro ]]; then
+    local targets=("$DESCRIPTION/urdf/baxter.urdf" src/cwru_baxter/cwru_baxter_sim/cwru_baxter.urdf) target key
+    if [[ ! -f ${targets[0]}.xacro || ! -d src/compat/xacro ]]; then
         note="skipped: no baxter.urdf.xacro or compat/xacro in src/"
         return
     fi
     key=$(find src -name '*.xacro' -type f -print0 | sort -z | xargs -0 sha256sum | sha256sum)
-    if stamp_is "$key" && [[ -s $folder/baxter.urdf ]]; then
+    if stamp_is "$key" && [[ -s ${targets[0]} && -s ${targets[1]} ]]; then
         note="up to date"
         return
     fi
-    run bash -c 'source "$1/tools/environment.bash" && use_build &&
-        rosrun xacro xacro --inorder "$2/baxter.urdf.xacro" >"$2/baxter.urdf.part" &&
-        mv "$2/baxter.urdf.part" "$2/baxter.urdf"' expand "$LAB_ROOT" "$folder"
+    for target in "${targets[@]}"; do
+        run bash -c 'source "$1/tools/environment.bash" && use_build &&
+            rosrun xacro xacro --inorder "$2.xacro" >"$2.part" && mv "$2.part" "$2"' expand "$LAB_ROOT" "$target"
+    done
     stamp "$key"
 }
 

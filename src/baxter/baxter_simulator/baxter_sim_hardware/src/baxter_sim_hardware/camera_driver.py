@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Baxter's cameras as /sensor_renderer serves them: topics per camera, and the services that open and close."""
+import threading
+
+import rospy
+from baxter_core_msgs.srv import (
+    CloseCamera,
+    CloseCameraResponse,
+    ListCameras,
+    ListCamerasResponse,
+    OpenCamera,
+    OpenCameraResponse,
+)
+from std_srvs.srv import Empty, EmptyResponse
+
+from baxter_sim_hardware.cameras import FLIP, MIRROR, CameraRefused, Rack, Settings
+from sensor_renderer import convert
+from sensor_renderer.drivers import ColourTopics, Driver, Pace
+
+# Two of the robot's three cameras can have power (baxter_interface 1.1.0).
+_ROBOT_POWERS, _ALL = 2, 3
+# How the robot's cameras are after it has started: both hands' are open.
+_ROBOT_MODE = (640, 400, 25.0)
+_HEAD = "head_camera"
+# The head's camera hangs upside down; all clients ask for this.
+_UPRIGHT = {FLIP: 1, MIRROR: 1}
+
+
+class CameraServices:
+    """``list``, ``open``, ``close`` and ``reset`` of all cameras in one namespace."""
+
+    _by_namespace = {}
+
+    @classmethod
+    def of(cls, namespace):
+        """The services of this namespace, made when first asked for."""
+        if namespace not in cls._by_namespace:
+            cls._by_namespace[namespace] = cls(namespace)
+        return cls._by_namespace[namespace]
+
+    def __init__(self, namespace):
+        profile = rospy.get_param("/baxter_sim_hardware/profile", "sim")
+        #: Whether the cameras start as the physical robot's, or as the vendor's simulator had them.
+        self.as_robot = profile == "robot"
+        powered = rospy.get_param("/baxter_sim_hardware/powered_cameras", _ROBOT_POWERS if self.as_robot else _ALL)
+        self._rack = Rack(powered)
+        self._drivers = {}
+        self._namespace = namespace
+        self._lock = threading.Lock()
+        self._services = [rospy.Service("%s/%s" % (namespace, name), kind, handler) for name, kind, handler in (
+            ("list", ListCameras, self._list), ("open", OpenCamera, self._open), ("close", CloseCamera, self._close),
+            ("reset", Empty, self._reset))]
+
+    def add(self, driver):
+        """A camera has come."""
+        with self._lock:
+            self._drivers[driver.camera_name] = driver
+            self._rack.add(driver.camera_name, driver.first_settings)
+            driver.use(self._rack.open.get(driver.camera_name))
+
+    def remove(self, driver):
+        """A camera has gone; the last one takes the services along."""
+        with self._lock:
+            self._drivers.pop(driver.camera_name)
+            self._rack.remove(driver.camera_name)
+            driver.use(None)
+            if not self._drivers:
+                for service in self._services:
+                    service.shutdown("the cameras are gone")
+                self._by_namespace.pop(self._namespace)
+
+    def _list(self, _request):
+        with self._lock:
+            return ListCamerasResponse(self._rack.available())
+
+    def _open(self, request):
+        asked = request.settings
+        settings = Settings(asked.width, asked.height, asked.fps,
+                            {control.id: control.value for control in asked.controls})
+
+        def do():
+            self._drivers[request.name].use(self._rack.open_camera(request.name, settings))
+
+        return OpenCameraResponse(self._code(do))
+
+    def _close(self, request):
+        def do():
+            self._rack.close_camera(request.name)
+            self._drivers[request.name].use(None)
+
+        return CloseCameraResponse(self._code(do))
+
+    def _reset(self, _request):
+        with self._lock:
+            for name in list(self._rack.open):
+                self._rack.close_camera(name)
+            for name, driver in self._drivers.items():
+                self._rack.remove(name)
+                self._rack.add(name, driver.first_settings)
+                driver.use(self._rack.open.get(name))
+        return EmptyResponse()
+
+    def _code(self, do):
+        with self._lock:
+            try:
+                do()
+            except CameraRefused as error:
+                rospy.logerr("cameras: %s" % error)
+                return error.code
+        return 0
+
+
+class BaxterCamera(Driver):
+    """One of the robot's cameras, named as its sensor; ``<robotNamespace>`` is where the services are."""
+
+    def __init__(self, entry):
+        super().__init__(entry)
+        camera = entry.cameras()[0]
+        self.camera_name = entry.name
+        self._camera = camera
+        self._frame = entry.text("frameName", entry.member)
+        self._use = None
+        self._services = CameraServices.of(entry.namespace)
+        pinhole = camera.pinhole
+        controls = _UPRIGHT if self.camera_name == _HEAD else {}
+        if self._services.as_robot:
+            self._encoding = "bgra8"
+            self.first_settings = None if self.camera_name == _HEAD else Settings(*_ROBOT_MODE, controls)
+        else:
+            # As the vendor's simulator: the description's own size, until a client opens the camera in another mode.
+            self._encoding = camera.encoding
+            self.first_settings = Settings(pinhole.width, pinhole.height, entry.rate, controls)
+        self._services.add(self)
+
+    def use(self, settings):
+        """Be open with ``settings``, or closed with None."""
+        if settings is None:
+            old, self.topics, self._use = self.topics, [], None
+            for topic in old:
+                topic.close()
+            return
+        pinhole = self._camera.pinhole
+        if settings is not self.first_settings or self._services.as_robot:
+            pinhole = settings.pinhole(pinhole.fx, pinhole.near, pinhole.far)
+        topics = self._use[0] if self._use is not None else ColourTopics(
+            self.name("%s/image" % self.camera_name),
+            [self.name("%s/%s" % (self.camera_name, name)) for name in ("camera_info", "camera_info_std")])
+        self._use = topics, settings, pinhole, convert.camera_info(settings.turned(pinhole))
+        self._pace = Pace(settings.rate)
+        self.topics = topics.all
+
+    def publish(self, time_s, link_pose, draw):
+        use = self._use
+        if use is None:
+            return  # closed by a client since the node asked
+        topics, settings, pinhole, info = use
+        picture = None
+        if topics.want_picture:
+            picture, _ = draw(pinhole, link_pose @ self._camera.offset, True, False)
+            picture = settings.developed(picture)
+        topics.publish(time_s, self._frame, picture, self._encoding, info)
+
+    def close(self):
+        self._services.remove(self)

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Baxter's cameras: what may be asked of one, which may be open together, what its controls do to a picture.
+
+A camera is an array of 1280 x 800 sensors. Every mode shows all of it, scaled, unless a window is asked for: then the
+picture is that part of the array, pixel by pixel. Half resolution joins four sensors to one, which halves the array that
+a window is cut from. Without EGL, without ROS.
+"""
+import errno
+from typing import NamedTuple
+
+import numpy as np
+
+from baxter_sim_hardware.errors import HardwareError
+from sensor_renderer.pinhole import Pinhole
+
+ARRAY = (1280, 800)
+MODES = ((1280, 800), (960, 600), (640, 400), (480, 300), (384, 240), (320, 200))
+#: Fastest rate, and the rate that a request gets which names none [Hz].
+FASTEST_HZ, DEFAULT_HZ = 60.0, 25.0
+AUTO = -1
+EXPOSURE, GAIN, WHITE_R, WHITE_G, WHITE_B, WINDOW_X, WINDOW_Y, FLIP, MIRROR, HALF = range(100, 110)
+#: What a control is called and how far its values go; -1 is "automatic" besides.
+CONTROLS = {
+    EXPOSURE: ("exposure", 100), GAIN: ("gain", 79), WHITE_R: ("white balance red", 4095),
+    WHITE_G: ("white balance green", 4095), WHITE_B: ("white balance blue", 4095), WINDOW_X: ("window x", ARRAY[0]),
+    WINDOW_Y: ("window y", ARRAY[1]), FLIP: ("flip", 1), MIRROR: ("mirror", 1), HALF: ("half resolution", 1)}
+# Values that change nothing: the middle of the range, but for gain, where that is none. Full gain doubles.
+_NEUTRAL_EXPOSURE, _NEUTRAL_WHITE, _DOUBLING_GAIN = 50.0, 2048.0, 79.0
+
+
+class CameraRefused(HardwareError):
+    """A request that a camera cannot follow. ``code`` is the errno of the service's answer."""
+
+    def __init__(self, code, text):
+        super().__init__(text)
+        self.code = code
+
+
+class Settings(NamedTuple):
+    """How a camera is open: size [pixels], rate [Hz], and ``controls``, {id: value}, of which those left out are automatic.
+
+    """
+
+    width: int
+    height: int
+    rate: float
+    controls: dict
+
+    def checked(self):
+        """These settings with a rate; raises :class:`CameraRefused` for what no camera can do."""
+        if (self.width, self.height) not in MODES:
+            raise CameraRefused(errno.EINVAL, "%d x %d is no resolution of this camera; choose from %s"
+                                % (self.width, self.height, ", ".join("%d x %d" % mode for mode in MODES)))
+        rate = self.rate or DEFAULT_HZ
+        if not 0.0 < rate <= FASTEST_HZ:
+            raise CameraRefused(errno.EINVAL, "%g pictures a second are out of range; expected more than 0, at most %g"
+                                % (rate, FASTEST_HZ))
+        for number, value in self.controls.items():
+            if number not in CONTROLS:
+                raise CameraRefused(errno.EINVAL, "camera control %d is not known; known are %s" % (
+                    number, ", ".join("%d %s" % (key, name) for key, (name, _) in CONTROLS.items())))
+            name, most = CONTROLS[number]
+            if not AUTO <= value <= most:
+                raise CameraRefused(errno.EINVAL, "%s of %d is out of range; expected 0 to %d, or -1 for automatic"
+                                    % (name, value, most))
+        settings = self._replace(rate=rate)
+        x, y = settings.window or (0, 0)
+        width, height = settings.array if settings.window else ARRAY
+        if x + self.width > width or y + self.height > height:
+            raise CameraRefused(errno.EINVAL, "a window of %d x %d at %d, %d does not fit the array of %d x %d"
+                                % (self.width, self.height, x, y, width, height))
+        return settings
+
+    def control(self, number):
+        """A control's value, -1 for automatic."""
+        return self.controls.get(number, AUTO)
+
+    @property
+    def array(self):
+        """The array that a window is cut from [pixels]."""
+        return (ARRAY[0] // 2, ARRAY[1] // 2) if self.control(HALF) == 1 else ARRAY
+
+    @property
+    def window(self):
+        """Where in the array the picture begins (x, y), or None for all of the array."""
+        x, y = self.control(WINDOW_X), self.control(WINDOW_Y)
+        return None if x == AUTO and y == AUTO else (max(x, 0), max(y, 0))
+
+    def pinhole(self, focal, near, far):
+        """What the lens shows, before :meth:`turned`. ``focal``: focal length of the full array [pixels]."""
+        if self.window is None:
+            focal, start, size = focal * self.width / ARRAY[0], (0, 0), (self.width, self.height)
+        else:
+            focal, start, size = focal * self.array[0] / ARRAY[0], self.window, self.array
+        return Pinhole(self.width, self.height, focal, focal, (size[0] - 1) / 2.0 - start[0],
+                       (size[1] - 1) / 2.0 - start[1], near, far)
+
+    def turned(self, pinhole):
+        """The pinhole of the picture after flip and mirror, in the same frame: a mirrored axis has a negative focal
+        length, so that pixels still project along the right rays."""
+        if self.control(MIRROR) == 1:
+            pinhole = pinhole._replace(fx=-pinhole.fx, cx=pinhole.width - 1 - pinhole.cx)
+        if self.control(FLIP) == 1:
+            pinhole = pinhole._replace(fy=-pinhole.fy, cy=pinhole.height - 1 - pinhole.cy)
+        return pinhole
+
+    def developed(self, picture):
+        """The picture (height, width, 3), red, green, blue, as exposure, gain, white balance, flip and mirror leave it."""
+        exposure, gain = self.control(EXPOSURE), self.control(GAIN)
+        bright = (1.0 if exposure == AUTO else exposure / _NEUTRAL_EXPOSURE)
+        bright *= 1.0 if gain == AUTO else 1.0 + gain / _DOUBLING_GAIN
+        factors = [bright * (1.0 if white == AUTO else white / _NEUTRAL_WHITE)
+                   for white in (self.control(number) for number in (WHITE_R, WHITE_G, WHITE_B))]
+        if factors != [1.0, 1.0, 1.0]:
+            levels = np.clip(np.arange(256)[:, None] * factors, 0, 255).astype(np.uint8)
+            picture = np.stack([levels[:, k][picture[:, :, k]] for k in range(3)], axis=2)
+        rows = -1 if self.control(FLIP) == 1 else 1
+        columns = -1 if self.control(MIRROR) == 1 else 1
+        return picture[::rows, ::columns]
+
+
+class Rack:
+    """The robot's cameras, and which of them are open."""
+
+    def __init__(self, most_open):
+        """``most_open``: how many can have power at a time; the robot's wiring carries two of its three."""
+        self._most_open = most_open
+        self._names = []
+        self.open = {}
+
+    def add(self, name, settings):
+        """A camera that is there; open from the start with ``settings``, or closed for None."""
+        self._names.append(name)
+        if settings is not None and len(self.open) < self._most_open:
+            self.open[name] = settings
+
+    def remove(self, name):
+        """A camera that is gone."""
+        self._names.remove(name)
+        self.open.pop(name, None)
+
+    def available(self):
+        """Names of the cameras that are open or could be opened now."""
+        full = len(self.open) >= self._most_open
+        return [name for name in self._names if name in self.open or not full]
+
+    def open_camera(self, name, settings):
+        """Open or re-configure a camera; returns the :class:`Settings` as they hold. Raises :class:`CameraRefused`."""
+        self._known(name)
+        if name not in self.available():
+            raise CameraRefused(errno.ENODEV, "%s has no power: %s are open, and only %d cameras can be; close one"
+                                % (name, " and ".join(self.open), self._most_open))
+        self.open[name] = settings.checked()
+        return self.open[name]
+
+    def close_camera(self, name):
+        """Close a camera. Raises :class:`CameraRefused`."""
+        self._known(name)
+        if name not in self.open:
+            raise CameraRefused(errno.EALREADY, "%s is closed already; open: %s"
+                                % (name, ", ".join(self.open) or "none"))
+        del self.open[name]
+
+    def _known(self, name):
+        if name not in self._names:
+            raise CameraRefused(errno.ENODEV, "there is no camera '%s'; cameras: %s"
+                                % (name, ", ".join(self._names) or "none"))
