@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import rosgraph
 import rospy
 from bullet_sim_msgs.srv import AdvanceTicks, AdvanceTicksResponse
 from gazebo_msgs.msg import ModelState, ODEPhysics
@@ -47,6 +48,12 @@ def root_element(xml):
     """Name of the root element of an XML text, or "" where there is none."""
     found = _ROOT_ELEMENT.search(_NOT_CONTENT.sub("", xml))
     return found.group(1) if found else ""
+
+
+def _parameters():
+    """The whole tree of the parameter server, of the master itself: rospy answers for "/" from a cache which, once the
+    node has logged a line, holds next to nothing."""
+    return rosgraph.Master(rospy.get_name()).getParam("/")
 
 
 class GazeboServices:
@@ -102,7 +109,7 @@ class GazeboServices:
             is_sdf = root_element(request.model_xml) in ("sdf", "gazebo")
             prepare = self._spawner.prepare_sdf if is_sdf else self._spawner.prepare
             prepared = prepare(request.model_name, request.model_xml, request.robot_namespace,
-                               lambda: rospy.get_param("/"))
+                               _parameters)
             self._simulation.board.call(self._spawn_prepared, prepared, request)
         except (SpawnRefused, LoopEnded) as error:
             return SpawnModelResponse(False, "SpawnModel: Failure - %s" % error)

@@ -5,6 +5,7 @@ import threading
 from concurrent.futures import CancelledError
 from concurrent.futures import TimeoutError as FutureTimeout
 
+import rosgraph
 import rospy
 from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
 from controller_manager_msgs.srv import (
@@ -173,7 +174,8 @@ class ControllerManagerServices:
 
 
 def _parameters(namespace):
+    # Of the master itself: rospy answers for "/" from a cache that holds next to nothing, once the node has logged.
     try:
-        return rospy.get_param(namespace or "/")
-    except KeyError:
+        return rosgraph.Master(rospy.get_name()).getParam(namespace or "/")
+    except rosgraph.MasterError:
         return {}

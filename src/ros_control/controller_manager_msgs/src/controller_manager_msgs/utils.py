@@ -96,7 +96,13 @@ def filter_by_resources(ctrl_list, resources, hardware_interface=None, match_any
 
 def get_rosparam_controller_names(namespace="/"):
     """Names on the parameter server below ``namespace`` that have a ``type``, as controllers do."""
-    tree = rospy.get_param(namespace, {})
+    try:
+        # Of the master itself: rospy answers for "/" from a cache that may hold next to nothing.
+        tree = rosgraph.Master(rospy.get_name()).getParam(rospy.resolve_name(namespace))
+    except rosgraph.MasterError:
+        return []
+    if not isinstance(tree, dict):
+        return []
     return [name for name, value in tree.items() if isinstance(value, dict) and isinstance(value.get("type"), str)]
 
 
