@@ -8,7 +8,9 @@ import unittest
 import actionlib
 import rospy
 import rostest
+from baxter_core_msgs.msg import AssemblyState
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal, FollowJointTrajectoryResult
+from controller_manager_msgs.srv import ListControllers
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
@@ -22,8 +24,33 @@ GOALS = {
 NEUTRAL = {"s0": 0.0, "s1": -0.55, "e0": 0.0, "e1": 0.75, "w0": 0.0, "w1": 1.26, "w2": 0.0}
 
 
+def wait_for(condition, what, deadline_s=60.0):
+    """Poll until ``condition()`` is true; an error that says what was awaited otherwise."""
+    end = time.monotonic() + deadline_s
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError(f"waited {deadline_s:g} s in vain for {what}")
+        rospy.rostime.wallsleep(0.05)
+
+
+def running(name):
+    """Whether the arm's trajectory controller runs; its action is there as soon as it is loaded."""
+    service = f"/{name}/probot_anno/controller_manager/list_controllers"
+    rospy.wait_for_service(service, 60.0)
+    listing = rospy.ServiceProxy(service, ListControllers)().controller
+    return any(entry.name == "arm_joint_controller" and entry.state == "running" for entry in listing)
+
+
+def enabled():
+    """Whether Baxter is."""
+    return rospy.wait_for_message("/robot/state", AssemblyState, timeout=60.0).enabled
+
+
 class ThreeRobots(unittest.TestCase):
     def test_all_arrive_where_they_were_sent(self):
+        for name in GOALS:
+            wait_for(lambda name=name: running(name), f"the controller of {name} to run")
+        wait_for(enabled, "Baxter to be enabled")
         clients = {}
         for name in GOALS:
             action = f"/{name}/probot_anno/arm_joint_controller/follow_joint_trajectory"

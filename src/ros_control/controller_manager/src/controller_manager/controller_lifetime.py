@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that live as long as the process that spawned them."""
 import os
+import queue
+import signal
+import threading
 import time
 
 import rosgraph
@@ -19,12 +22,56 @@ from std_msgs.msg import Bool
 # Between two looks at something that is not there yet [wall s].
 _POLL_S = 0.1
 _FAILED_LOAD_PAUSE_S = 1.0
-# How long a paused simulation may keep an ending process from ending.
+# How long a paused simulation may keep an ending process from ending, in one request and in all [wall s].
 _TAKE_DOWN_S = 2.0
+_END_S = 5.0
 
 
 class NotThere(Exception):
     """What was waited for did not come; the text says what it was and how to get it."""
+
+
+def run_until_ended(node_name, work, clean_up):
+    """Be a node that runs ``work()`` in a thread until a signal or a shutdown request comes, then ``clean_up()``.
+
+    ``work`` returns None to go on until the end. Returns the exit code, 1 where it raised. rospy would clean up inside
+    the signal's handler, which interrupts the main thread anywhere, also where it holds a lock that cleaning up needs.
+    """
+    try:
+        rospy.init_node(node_name, anonymous=True, disable_signals=True)
+    except KeyboardInterrupt:
+        return 0
+    events, over = queue.SimpleQueue(), threading.Event()
+
+    def run():
+        code = 1
+        try:
+            code = work()
+        except rospy.ROSInterruptException:
+            code = 0
+        except (NotThere, rospy.ROSException, rospy.ServiceException) as error:
+            rospy.logerr("%s: %s", node_name, error)
+        finally:
+            if code is not None:
+                events.put(code)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: events.put(0))
+
+    def asked_to_shut_down():
+        events.put(0)
+        over.wait(_END_S)
+
+    rospy.on_shutdown(asked_to_shut_down)
+    threading.Thread(target=run, daemon=True).start()
+    code = events.get()
+    cleaning = threading.Thread(target=clean_up, daemon=True)
+    cleaning.start()
+    # In a paused simulation nobody answers; what is not taken down by now stays.
+    cleaning.join(_END_S)
+    over.set()
+    rospy.signal_shutdown("done")
+    return code
 
 
 class ControllerLifetime:
@@ -37,6 +84,7 @@ class ControllerLifetime:
         self._deadline = time.monotonic() + timeout_s if timeout_s > 0.0 else None
         self._timeout_s = timeout_s
         self._loaded = []
+        self._ending = False
         self._load = self._proxy("load_controller", LoadController)
         self._switch = self._proxy("switch_controller", SwitchController)
         self._list = self._proxy("list_controllers", ListControllers)
@@ -93,16 +141,18 @@ class ControllerLifetime:
     def bring_up(self, names, start=True):
         """Load each of ``names``; start those that could be loaded, all or none."""
         for name in names:
-            if rospy.is_shutdown():
+            if self._ending or rospy.is_shutdown():
                 return
+            # Before the answer: who ends while it is on its way takes the controller down too.
+            self._loaded.append(name)
             if self._asked(self._load, name):
-                self._loaded.append(name)
                 rospy.loginfo("loaded controller '%s'", name)
             else:
+                self._loaded.remove(name)
                 time.sleep(_FAILED_LOAD_PAUSE_S)
                 rospy.logerr("controller '%s' could not be loaded: see the log of the node that holds the controller "
                              "manager (/gazebo) for the reason", name)
-        if not start or not self._loaded:
+        if not start or not self._loaded or self._ending:
             return
         if self._asked(self._switch, self._loaded, [], SwitchControllerRequest.STRICT, False, 0.0):
             rospy.loginfo("started controllers: %s", ", ".join(self._loaded))
@@ -111,10 +161,11 @@ class ControllerLifetime:
                          "manager (/gazebo) for the reason", ", ".join(self._loaded))
 
     def take_down(self):
-        """Stop what was brought up and unload it, last one first. What is gone already does not matter."""
-        if not self._loaded:
+        """Any thread: stop what was brought up and unload it, last one first. What is gone already does not matter."""
+        self._ending = True
+        names = list(self._loaded)
+        if not names:
             return
-        names, self._loaded = self._loaded, []
         try:
             states = {controller.name: controller.state for controller in self._list().controller}
             running = [name for name in names if states.get(name) == "running"]

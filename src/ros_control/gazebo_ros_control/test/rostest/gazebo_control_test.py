@@ -6,6 +6,7 @@ import os
 import random
 import signal
 import subprocess
+import tempfile
 import threading
 import time
 import unittest
@@ -331,6 +332,17 @@ class GazeboControl(unittest.TestCase):
         self.joints("/two").at(shoulder=0.0, elbow=-0.6)
         self.assertEqual(list(two.states()), ["joint_state_controller", "elbow"])
 
+    def test_a_robot_in_the_root_namespace_has_its_parameters_after_the_first_line_of_log_too(self):
+        self.assertFalse(self.one.load("absent"))
+        self.said("cannot load controller 'absent'")
+        self.spawn("root", self.urdf.replace("/one<", "/<"))
+        root = Manager("")
+        self.start("joint_state_controller", "elbow", manager=root)
+        self.send("/elbow/command", Float64(1.0))
+        self.joints("").at(elbow=0.2, shoulder=0.0)
+        self.assertIn("elbow", utils.get_rosparam_controller_names("/"))
+        self.assertEqual(utils.get_rosparam_controller_names("/nowhere"), [])
+
     def test_emergency_stop_and_release(self):
         joints = self.joints()
         self.start("joint_state_controller", "both")
@@ -401,6 +413,32 @@ class GazeboControl(unittest.TestCase):
             self.assertTrue(self.one.switch((), ["shoulder", "elbow"]))
             self.assertTrue(self.one.unload("elbow"))
         self.assertEqual(self.one.states(), {})
+
+    def test_the_spawner_ends_while_physics_is_paused(self):
+        with self.process("spawner", "both"):
+            wait_for(lambda: self.one.states() == {"both": "running"}, "the spawner's controller")
+            self.pause_physics()
+
+    def test_the_spawner_loads_a_file_and_what_stands_in_it(self):
+        with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
+            file.write("from_file: {type: position_controllers/JointPositionController, joint: elbow}\n"
+                       "also: {type: position_controllers/JointPositionController, joint: shoulder}\n")
+            file.flush()
+            with self.process("spawner", file.name):
+                wait_for(lambda: self.one.states() == {"from_file": "running", "also": "running"},
+                         "the controllers of the file")
+        self.assertEqual(rospy.get_param("/one/also/joint"), "shoulder")
+        self.assertEqual(self.one.states(), {})
+
+    def test_the_spawner_says_what_is_wrong_with_a_file(self):
+        for content, words in (("just: [a, list", "cannot be read as YAML"), ("text", "expected a mapping")):
+            with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
+                file.write(content)
+                file.flush()
+                code, output = self.tool("spawner", file.name)
+            self.assertEqual(code, 1)
+            line, = [line for line in output.splitlines() if file.name in line]
+            self.assertIn(words, line)
 
     def test_the_spawner_takes_a_namespace_and_stopped(self):
         with self.process("spawner", "--namespace", "/one", "--stopped", "both", namespace="/"):
