@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where an arm gets to: a volume in cells, and in each the share of orientations that the tip can have there."""
+import json
+import math
+import multiprocessing
+import os
+import signal
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from baxter_sim_kinematics.batch import solve_batch
+from baxter_sim_kinematics.errors import KinematicsError
+
+# Cells that are computed, saved and counted together: about a second's work.
+_CHUNK = 32
+
+
+class ReachError(KinematicsError):
+    """A map that cannot be made, or not be gone on with."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a map depends on. lower, upper: corners (3,) of the volume [m, base frame]; cell_m: edge of a cell;
+    orientations: how many are tried in each; tool: (3,) the direction of the tip's z axis [base frame] if only turns
+    about that count, else None; starts: of each search; chain: whatever tells one arm from another."""
+
+    lower: tuple
+    upper: tuple
+    cell_m: float
+    orientations: int
+    tool: tuple | None
+    starts: int
+    chain: str
+
+    def __post_init__(self):
+        if not all(math.isfinite(v) for v in (*self.lower, *self.upper)) or not np.less(self.lower, self.upper).all():
+            raise ReachError("the volume must have each lower bound below its upper one, got %s to %s"
+                             % (self.lower, self.upper))
+        if not (self.cell_m > 0.0 and self.orientations >= 1 and self.starts >= 1):
+            raise ReachError("cell, orientations and starts must be positive, got %g m, %d and %d"
+                             % (self.cell_m, self.orientations, self.starts))
+        if self.tool is not None and np.linalg.norm(self.tool) < 1e-9:
+            raise ReachError("the tool must point somewhere, e.g. 0 0 -1 for down, got %s" % (self.tool,))
+
+    @property
+    def shape(self):
+        """How many cells there are along x, y, z."""
+        return tuple(max(1, int(round((high - low) / self.cell_m)))
+                     for low, high in zip(self.lower, self.upper, strict=True))
+
+    def centres(self):
+        """Return the cells' centres (cells, 3) [m], x slowest."""
+        axes = [low + self.cell_m * (0.5 + np.arange(count)) for low, count in zip(self.lower, self.shape, strict=True)]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+    def rotations(self):
+        """Return the orientations (orientations, 3, 3) tried in every cell: the same for the same settings."""
+        if self.tool is None:
+            # Normalised normal deviates are spread evenly over the rotations.
+            return np.array([_from_quaternion(q) for q in np.random.default_rng(0).normal(size=(self.orientations, 4))])
+        z = np.array(self.tool) / np.linalg.norm(self.tool)
+        x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+        x /= np.linalg.norm(x)
+        turns = 2.0 * math.pi * np.arange(self.orientations) / self.orientations
+        return np.array([np.column_stack((math.cos(t) * x + math.sin(t) * np.cross(z, x),
+                                          math.cos(t) * np.cross(z, x) - math.sin(t) * x, z)) for t in turns])
+
+
+def compute(chain, settings, folder, processes, progress=lambda done, total: None):
+    """Compute a map and return (share (x, y, z) in 0 to 1, mean manipulability (x, y, z), NaN where nothing is
+    reached).
+
+    Each finished part is kept in ``folder``; parts that are there already are not computed again. ``progress`` is
+    called with the number of cells done and of all. Raises ReachError where ``folder`` holds parts of another map.
+    """
+    parts = _Parts(Path(folder), settings)
+    centres = settings.centres()
+    todo = [first for first in range(0, len(centres), _CHUNK) if not parts.path(first).exists()]
+    done = len(centres) - sum(min(_CHUNK, len(centres) - first) for first in todo)
+    progress(done, len(centres))
+    if todo:
+        context = multiprocessing.get_context("fork")
+        with context.Pool(min(processes, len(todo)), _begin, (chain, settings, parts)) as pool:
+            for first in pool.imap_unordered(_work, todo):
+                done += min(_CHUNK, len(centres) - first)
+                progress(done, len(centres))
+    loaded = [np.load(parts.path(first)) for first in range(0, len(centres), _CHUNK)]
+    return tuple(np.concatenate([part[name] for part in loaded]).reshape(settings.shape)
+                 for name in ("share", "manipulability"))
+
+
+def cell_values(chain, settings, centres):
+    """Return share and mean manipulability (k,) of the cells at ``centres`` (k, 3).
+
+    Manipulability is Yoshikawa's sqrt(det(J J^T)), the mean over the orientations that are reached.
+    """
+    rotations = settings.rotations()
+    share, manipulability = np.zeros(len(centres)), np.full(len(centres), math.nan)
+    for k, centre in enumerate(centres):
+        # Where the outstretched arm does not get to there is nothing to search.
+        if math.dist(centre, chain.shoulder) > chain.tip_reach_m:
+            continue
+        targets = np.tile(np.eye(4), (len(rotations), 1, 1))
+        targets[:, :3, :3], targets[:, :3, 3] = rotations, centre
+        found = solve_batch(chain, targets, chain.mid_range, candidates=1, max_starts=settings.starts, threads=1,
+                            tolerance_m=1e-5, tolerance_rad=1e-5)
+        share[k] = found.solved.mean()
+        if found.solved.any():
+            manipulability[k] = np.mean([yoshikawa(chain.jacobian(q)) for q in found.q[found.solved]])
+    return share, manipulability
+
+
+def yoshikawa(jacobian):
+    """Return the manipulability of a Jacobian (6, n)."""
+    return math.sqrt(max(np.linalg.det(jacobian @ jacobian.T), 0.0))
+
+
+class _Parts:
+    """The files of a map that is being computed."""
+
+    def __init__(self, folder, settings):
+        self._folder = folder / "parts"
+        self._folder.mkdir(parents=True, exist_ok=True)
+        wanted = json.loads(json.dumps(asdict(settings)))
+        note = self._folder / "settings.json"
+        if note.exists():
+            found = json.loads(note.read_text())
+            other = sorted(key for key in wanted if found.get(key) != wanted[key])
+            if other:
+                raise ReachError("'%s' holds parts of a map with another %s (%s there); choose another folder or "
+                                 "delete it" % (self._folder, other[0], found.get(other[0])))
+        else:
+            note.write_text(json.dumps(wanted, indent=1) + "\n")
+
+    def path(self, first):
+        return self._folder / ("%07d.npz" % first)
+
+    def save(self, first, share, manipulability):
+        # Under another name until it is whole: what is there counts as done.
+        unfinished = self._folder / (".%07d.%d.npz" % (first, os.getpid()))
+        np.savez(unfinished, share=share, manipulability=manipulability)
+        unfinished.rename(self.path(first))
+
+
+_task = None  # of a worker process: (chain, settings, parts)
+
+
+def _begin(*task):
+    global _task
+    _task = task
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends the workers
+
+
+def _work(first):
+    chain, settings, parts = _task
+    parts.save(first, *cell_values(chain, settings, settings.centres()[first:first + _CHUNK]))
+    return first
+
+
+def _from_quaternion(q):
+    w, x, y, z = q / np.linalg.norm(q)
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
