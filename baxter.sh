@@ -19,6 +19,7 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
   HOST [COMMAND…]       a robot, by host name or IP address. ROS_IP is found from the route to it;
                         ROS_IP or ROS_HOSTNAME, if you have set one, wins.
   setup                 install and build what is missing; runs by itself the first time anything is used
+  setup --with FILE     also fetch the packages of a rosinstall file, and prefer them to ours: rosinstall/README.md
   test [NAMES] [--long] lint, unit tests and rostests. NAMES: packages, test files, or pytest arguments such as -k
   doctor [HOST]         look for what is wrong with master, network, clock, build, Python and robot, and say the fix
   help                  this text

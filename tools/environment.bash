@@ -84,7 +84,7 @@ use_robot() {
 fingerprint() {
     {
         echo "$LAB_ROOT"
-        cd "$LAB_ROOT" && find requirements*.txt tools/*.txt tools/setup.bash src \
+        cd "$LAB_ROOT" && find requirements*.txt tools/*.txt tools/setup.bash src $([[ -d src_overlay ]] && echo src_overlay) \
             \( -name meshes -o -name __pycache__ -o -name .git \) -prune -o \
             -type f \( -name package.xml -o -name CMakeLists.txt -o -name setup.py -o -name '*.msg' -o -name '*.srv' \
                 -o -name '*.action' -o -name '*.cfg' -o -name '*.xacro' -o -path '*/env-hooks/*' \

@@ -10,6 +10,9 @@ LAB_ROOT=$(cd -P "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 source "$LAB_ROOT/tools/environment.bash"
 # shellcheck source=stand_ins.bash
 source "$LAB_ROOT/tools/stand_ins.bash"
+# shellcheck source=overlay.bash
+source "$LAB_ROOT/tools/overlay.bash"
+CALLED_FROM=$PWD
 cd "$LAB_ROOT" || exit 1
 
 STATE=$LAB_ROOT/.baxter
@@ -18,7 +21,7 @@ VENV=$LAB_ROOT/.venv
 NOETIC=/opt/ros/noetic/setup.bash
 DESCRIPTION=$LAB_ROOT/src/baxter/baxter_common/baxter_description
 GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
-STEPS=(apt venv pip meshes build urdf kernels)
+STEPS=(apt venv pip meshes overlay build urdf kernels)
 # Python packages with compiled inner loops: `python3 -m NAME` fills their cache.
 COMPILED=(baxter_sim_kinematics)
 declare -A TITLES=(
@@ -26,6 +29,7 @@ declare -A TITLES=(
     [venv]="virtual environment"
     [pip]="Python packages"
     [meshes]="Baxter's meshes"
+    [overlay]="other people's packages"
     [build]="catkin_make"
     [urdf]="baxter.urdf"
     [kernels]="compiled inner loops"
@@ -185,10 +189,32 @@ step_meshes() {
     stamp "$key"
 }
 
+# With --with FILE: fetch. In any case: check what lies in src_overlay, and let it win over packages of ours.
+step_overlay() {
+    local file hidden
+    for file in ${overlay_files[@]+"${overlay_files[@]}"}; do
+        [[ -f $file ]] || refuse "there is no file $file; rosinstall/ has those that come with the workspace"
+        run import_overlay "$LAB_ROOT" "$file"
+    done
+    leave_out_stand_ins "$LAB_ROOT" "${NOETIC%/*}/share" /usr/share
+    if [[ -d src_overlay ]]; then
+        run /usr/bin/python3 tools/check_overlay.py src_overlay
+    else
+        rm -f src/overlay
+    fi
+    hidden=$(leave_out_overlaid "$LAB_ROOT" 2>>"$step_log") || refuse "$(tail -n 1 "$step_log")"
+    note="none"
+    if [[ -n $hidden ]]; then note="instead of ours: ${hidden//$'\n'/ }"; fi
+    # What a package of the same name has left in the build would still be found.
+    if ! stamp_is "$hidden"; then
+        [[ -f $STATE/overlay.stamp || -n $hidden ]] && run rm -rf build devel
+        stamp "$hidden"
+    fi
+}
+
 step_build() {
     local key
-    leave_out_stand_ins "$LAB_ROOT" "${NOETIC%/*}/share" /usr/share
-    key="$LAB_ROOT $(cd src && find . -name meshes -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
+    key="$LAB_ROOT $(cd src && find -L . \( -name meshes -o -name .git \) -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
         -o -name setup.py -o -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name '*.cfg' \
         -o -name CATKIN_IGNORE -o -path '*/env-hooks/*' \) -print0 | sort -z | xargs -0 sha256sum | sha256sum)"
     if stamp_is "$key" && [[ -f devel/setup.bash && -f build/CMakeCache.txt ]]; then
@@ -243,6 +269,24 @@ case $LAB_ROOT in
         ;;
 esac
 
+usage="Usage: ./baxter.sh setup [--with FILE.rosinstall]… [STEP…], where a STEP is one of: ${STEPS[*]}"
+overlay_files=() chosen=()
+while [[ $# -gt 0 ]]; do
+    case $1 in
+        --with=*) overlay_files+=("$(cd "$CALLED_FROM" && realpath -m "${1#--with=}")") ;;
+        --with)
+            [[ $# -gt 1 ]] || { echo "--with needs a file. $usage" >&2; exit 2; }
+            overlay_files+=("$(cd "$CALLED_FROM" && realpath -m "$2")")
+            shift
+            ;;
+        *)
+            [[ " ${STEPS[*]} " == *" $1 "* ]] || { echo "unknown argument '$1'. $usage" >&2; exit 2; }
+            chosen+=("$1")
+            ;;
+    esac
+    shift
+done
+
 mkdir -p "$LOGS"
 # One set-up at a time: a launch and a node started together on a fresh clone must not both build.
 exec 9>"$STATE/lock"
@@ -266,6 +310,7 @@ started=$SECONDS
 rm -f "$STATE/done" "$STATE/failed"
 echo "Setting up $LAB_ROOT"
 for index in "${!STEPS[@]}"; do
+    [[ ${#chosen[@]} -eq 0 || " ${chosen[*]} " == *" ${STEPS[index]} "* ]] || continue
     step_name=${STEPS[index]} step_log=$LOGS/${STEPS[index]}.log note="" step_started=$SECONDS
     printf '%s\n' "# ${TITLES[$step_name]}, $(date)" >"$step_log"
     printf '[%d/%d] %s …\n' $((index + 1)) ${#STEPS[@]} "${TITLES[$step_name]}"
@@ -273,5 +318,6 @@ for index in "${!STEPS[@]}"; do
     printf '[%d/%d] %s: %s (%d s)\n' $((index + 1)) ${#STEPS[@]} "${TITLES[$step_name]}" "${note:-done}" \
         $((SECONDS - step_started))
 done
-fingerprint >"$STATE/done"
+# Some steps alone do not make a set-up.
+if [[ ${#chosen[@]} -eq 0 ]]; then fingerprint >"$STATE/done"; fi
 echo "Set-up finished in $((SECONDS - started)) s."

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Refuse Python 2 among other people's packages, with file and line, before it is built.
+
+    python3 tools/check_overlay.py FOLDER
+"""
+
+import ast
+import sys
+import warnings
+from pathlib import Path
+
+SHOWN = 10
+
+
+def is_python(path: Path) -> bool:
+    """By its suffix, or by a first line that starts a Python interpreter."""
+    if path.suffix == ".py":
+        return True
+    if path.suffix:
+        return False
+    with path.open("rb") as file:
+        first = file.readline(200)
+    return first.startswith(b"#!") and b"python" in first
+
+
+def findings(folder: Path):
+    """(path, line, what) of each file that Python 3 cannot read."""
+    for path in sorted(folder.rglob("*")):
+        if ".git" in path.parts or not path.is_file() or not is_python(path):
+            continue
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                ast.parse(path.read_bytes(), str(path))
+        except (SyntaxError, ValueError) as error:
+            yield path, getattr(error, "lineno", None) or 1, getattr(error, "msg", None) or str(error)
+
+
+def main(argv):
+    folder = Path(argv[0])
+    found = list(findings(folder))
+    for path, line, what in found[:SHOWN]:
+        print(f"{path}:{line}: {what}", file=sys.stderr)
+    if not found:
+        return 0
+    print(
+        f"{len(found)} files in {folder} are not Python 3, and this system has no other. Take a branch or fork of that "
+        f"package that is, or convert it (2to3 does most), or remove its folder.",
+        file=sys.stderr,
+    )
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

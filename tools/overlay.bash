@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Other people's packages beside ours, in src_overlay/: fetched from rosinstall files, checked, and preferred where a
+# package of theirs bears the name of one of ours. Sourced by set-up.
+
+OVERLAY_MARK="made by set-up: src_overlay has this package"
+
+# import_overlay ROOT FILE: fetch what a .rosinstall or .repos file lists; what is there already is brought up to date.
+import_overlay() {
+    local root=$1 file=$2
+    mkdir -p "$root/src_overlay" && vcs import --input "$file" "$root/src_overlay" &&
+        ln -sfn ../src_overlay "$root/src/overlay"
+}
+
+# name_of PACKAGE.XML
+name_of() { sed -n 's/.*<name>[[:space:]]*\([^<[:space:]]*\).*/\1/p' "$1" | head -n 1; }
+
+# manifests FOLDER: the package.xml files below it, without what is left out of the build
+manifests() { find "$1" \( -name .git -o -name meshes -o -name __pycache__ \) -prune -o -name package.xml -print; }
+
+# leave_out_overlaid ROOT: hide every package of ours that the overlay has, and show again what it has no more.
+# Prints the names of the hidden ones. Fails where the overlay has one name twice.
+leave_out_overlaid() {
+    local root=$1 manifest name
+    local -A theirs=()
+    if [[ -d $root/src_overlay ]]; then
+        while read -r manifest; do
+            name=$(name_of "$manifest")
+            [[ ! -f ${manifest%/*}/CATKIN_IGNORE ]] || continue
+            if [[ -n ${theirs[$name]:-} ]]; then
+                echo "src_overlay has the package $name twice: ${theirs[$name]} and ${manifest%/*}; remove one" >&2
+                return 1
+            fi
+            theirs[$name]=${manifest%/*}
+        done < <(manifests "$root/src_overlay")
+    fi
+    while read -r manifest; do
+        name=$(name_of "$manifest")
+        if [[ -n ${theirs[$name]:-} ]]; then
+            echo "$OVERLAY_MARK" >"${manifest%/*}/CATKIN_IGNORE"
+            echo "$name"
+        elif [[ $(cat "${manifest%/*}/CATKIN_IGNORE" 2>/dev/null) == "$OVERLAY_MARK" ]]; then
+            rm "${manifest%/*}/CATKIN_IGNORE"
+        fi
+    done < <(manifests "$root/src")
+}
