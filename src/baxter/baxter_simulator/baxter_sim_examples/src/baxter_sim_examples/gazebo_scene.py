@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scene in a running simulator: table and block come and go, and where the block is."""
+import math
+from pathlib import Path
+
+import rospkg
+import rospy
+from gazebo_msgs.srv import GetModelState, GetWorldProperties, SpawnModel
+from geometry_msgs.msg import Point, Pose, Quaternion
+
+from gazebo_ros.gazebo_interface import GazeboInterfaceError, call, delete_model_client
+
+from .scene import BASE_HEIGHT_M, TABLE_XY_M, block_urdf
+
+GAZEBO = "/gazebo"
+TABLE, BLOCK = "cafe_table", "block"
+
+
+class GazeboScene:
+    """Table and block for one Trial, in the world as long as a `with` lasts. Raises GazeboInterfaceError."""
+
+    def __init__(self, trial):
+        self._trial = trial
+
+    def __enter__(self):
+        self._remove()
+        table = Path(rospkg.RosPack().get_path("gazebo_ros")) / "models" / TABLE / "model.sdf"
+        self._spawn("sdf", TABLE, table.read_text(), Pose(Point(*TABLE_XY_M, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0)))
+        self._spawn("urdf", BLOCK, block_urdf(self._trial.mass_kg, self._trial.friction), _pose(self._trial.source))
+        return self
+
+    def __exit__(self, *_):
+        try:
+            self._remove()
+        except GazeboInterfaceError as error:
+            rospy.logwarn("table and block stay in the world: %s", error)
+
+    def distance(self, spot):
+        """Distance [m] of the block's middle from a Spot."""
+        state = call(GAZEBO + "/get_model_state", GetModelState, BLOCK, "world")
+        here, there = state.pose.position, _pose(spot).position
+        return math.dist((here.x, here.y, here.z), (there.x, there.y, there.z))
+
+    def _spawn(self, kind, name, xml, pose):
+        answer = call("%s/spawn_%s_model" % (GAZEBO, kind), SpawnModel, name, xml, "/", pose, "world")
+        if not answer.success:
+            raise GazeboInterfaceError("model '%s' cannot be spawned: %s" % (name, answer.status_message))
+
+    def _remove(self):
+        there = call(GAZEBO + "/get_world_properties", GetWorldProperties).model_names
+        for name in (BLOCK, TABLE):
+            if name in there:
+                delete_model_client(name, GAZEBO)
+
+
+def _pose(spot):
+    """A Spot as a pose in the physics world, whose floor is at z = 0."""
+    return Pose(Point(spot.x, spot.y, spot.z + BASE_HEIGHT_M),
+                Quaternion(0.0, 0.0, math.sin(spot.yaw / 2.0), math.cos(spot.yaw / 2.0)))

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Take a block from one spot of a table and put it on another: the order of things, for any arm. Free of ROS.
+
+An arm is an object with `name`, `ik(position, orientation, seed)` -> angles by joint name (raises what it likes),
+`move_to(angles)`, `open()`, `close()`, which return when it is done, and `holds()`. Positions [m] are those of the
+frame between the finger tips, in `base`; orientations are quaternions x, y, z, w.
+"""
+import math
+from dataclasses import dataclass
+
+# Where the left arm begins [rad]; the vendor's demo begins there too. The right arm's is the mirror image.
+START_ANGLES = {"s0": -0.08000397926829805, "s1": -0.9999781166910306, "e0": -1.189968899785275,
+                "e1": 1.9400238130755056, "w0": 0.6699952259595108, "w1": 1.030009435085784,
+                "w2": -0.4999997247485215}
+MIRRORED = ("s0", "e0", "w0", "w2")
+
+HOVER_M = 0.15  # above a spot: free to move sideways
+NEAR_M = 0.05  # above a spot: from here on straight down and slowly, from here up straight
+_QUARTER = math.pi / 2.0
+
+
+class BlockLost(Exception):
+    """There is nothing between the fingers where the block should be; the text says when that was seen."""
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Where a block's middle is, or shall be: x, y, z [m] in `base`, turned by yaw [rad] about z."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float = 0.0
+
+
+def start_angles(limb):
+    """Angles by joint name [rad] in which an arm, "left" or "right", begins."""
+    sign = {name: -1.0 if limb == "right" and name in MIRRORED else 1.0 for name in START_ANGLES}
+    return {"%s_%s" % (limb, name): sign[name] * angle for name, angle in START_ANGLES.items()}
+
+
+def tool_down(yaw):
+    """Quaternion (x, y, z, w) of a tool that looks straight down, its fingers along y turned by `yaw` [rad]."""
+    return math.cos(yaw / 2.0), math.sin(yaw / 2.0), 0.0, 0.0
+
+
+def grip_yaw(yaw):
+    """The turn in -45 to 45 degrees [rad] in which fingers meet two faces of a square block turned by `yaw`."""
+    return yaw - _QUARTER * round(yaw / _QUARTER)
+
+
+def pick_and_place(arm, source, target):
+    """Carry the block from `source` to `target` (Spot). Raises BlockLost, and whatever the arm raises.
+
+    The fingers stay turned to the block as they were when they took it, so that it arrives turned by the difference of
+    the two spots' yaw, up to quarter turns.
+    """
+    arm.open()
+    pose = arm.move_to(start_angles(arm.name))
+    for height in (HOVER_M, NEAR_M, 0.0):
+        pose = _go(arm, source, height, pose)
+    arm.close()
+    _require_block(arm, "after the fingers closed")
+    for height in (NEAR_M, HOVER_M):
+        pose = _go(arm, source, height, pose)
+    _require_block(arm, "after it was lifted")
+    for height in (HOVER_M, NEAR_M, 0.0):
+        pose = _go(arm, target, height, pose)
+    _require_block(arm, "on the way")
+    arm.open()
+    for height in (NEAR_M, HOVER_M):
+        pose = _go(arm, target, height, pose)
+
+
+def _go(arm, spot, height, seed):
+    """Move to `height` [m] above a spot, staying near the angles `seed`; return the new angles."""
+    angles = arm.ik((spot.x, spot.y, spot.z + height), tool_down(grip_yaw(spot.yaw)), seed)
+    return arm.move_to(angles)
+
+
+def _require_block(arm, when):
+    if not arm.holds():
+        raise BlockLost("nothing is between the fingers %s" % when)
