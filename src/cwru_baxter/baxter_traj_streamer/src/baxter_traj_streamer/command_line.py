@@ -29,8 +29,7 @@ def run(name, plan, wait_s):
         trajectory = plan(client)
         if trajectory is None:
             return
-        client.send(trajectory)
-        result = client.wait(wait_s)
+        result = client.move(trajectory, wait_s)
         if result is None:
             rospy.logwarn("no result within %g s; the arm moves on", wait_s)
         else:

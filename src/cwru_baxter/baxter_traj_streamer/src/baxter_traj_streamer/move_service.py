@@ -6,13 +6,10 @@ import rospy
 
 import baxter_interface.startup
 
-from .playfile import PlayfileError
-from .settings import SettingsError
-from .straight_line import LeavesReach
 from .traj_client import MoveFailed, TrajClient
 
-# What a request may ask for that cannot be; anything else is a fault of ours.
-REFUSALS = (PlayfileError, SettingsError, LeavesReach, MoveFailed, ValueError, OSError)
+# What a request may ask for that cannot be (PlayfileError, SettingsError, LeavesReach are ValueErrors).
+REFUSALS = (MoveFailed, ValueError, OSError)
 
 
 def run(name, service, service_type, move_type, plan):
@@ -31,8 +28,7 @@ def run(name, service, service_type, move_type, plan):
         if not busy.acquire(blocking=False):
             return answer_type(success=False, message="another move is under way; trajActionServer/cancel stops it")
         try:
-            client.send(plan(move, request))
-            client.wait()
+            client.move(plan(move, request))
         except REFUSALS as error:
             rospy.logwarn("%s: %s", service, error)
             return answer_type(success=False, message=str(error))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baxter_sim_kinematics import NoSolution, solve
+from baxter_sim_kinematics import NoSolution, Reason, solve
 
 from .optimal import time_optimal
 
@@ -15,6 +15,8 @@ _STEP_M, _SHORTEST_STEP_M = 0.005, 0.0005
 _SAME_BRANCH = 0.15
 # Residuals of a solution [m, rad]: the path is differentiated twice.
 _RESIDUAL = 1e-8
+# A joint this near to a limit [rad] cannot go on.
+_STUCK = 1e-3
 # What the curvature of the path in joint space may take of the accelerations; the rest is for speeding up.
 _CURVATURE_SHARE = 0.5
 
@@ -70,7 +72,9 @@ def straight_line(chain, start, displacement):
     origin = pose[:3, 3].copy()
     distances = [0.0]
     usual = min(_STEP_M, length / 2.0)
-    step, beyond = usual, ""
+    # Why there was no solution at all, and where.
+    beyond, beyond_m = "", length
+    step = usual
     while distances[-1] < length:
         # No stub is left for the end.
         left = length - distances[-1]
@@ -81,12 +85,12 @@ def straight_line(chain, start, displacement):
             distances.append(distance)
             path.append(found)
             step = min(2.0 * step, usual)
-            beyond = ""
             continue
-        # Near the end of its reach an arm often turns fast before it cannot go on: the latter says more.
-        beyond = beyond or ("" if found is not None else why)
+        if found is None:
+            beyond, beyond_m = why, distance
         if step <= _SHORTEST_STEP_M:
-            raise LeavesReach(distances[-1], length, beyond or why)
+            # Near the end of its reach an arm turns fast before it cannot go on: the latter says more.
+            raise LeavesReach(distances[-1], length, beyond if beyond_m - distances[-1] <= usual else why)
         step /= 2.0
     return StraightLine(np.array(distances), np.array(path))
 
@@ -96,7 +100,12 @@ def _next(chain, pose, before):
     try:
         found = solve(chain, pose, before, _RESIDUAL, _RESIDUAL, candidates=1, max_starts=1).q
     except NoSolution as error:
-        return None, str(error)
+        if error.reason is not Reason.NOT_CONVERGED:
+            return None, str(error)
+        stuck = [name for name, angle, low, high in zip(chain.joint_names, error.best, chain.lower, chain.upper,
+                                                        strict=True) if not low + _STUCK < angle < high - _STUCK]
+        return None, "this way of holding the arm ends here%s; start in another posture" % (
+            ", with %s at its limit" % ", ".join(stuck) if stuck else "")
     turn = np.abs(found - before)
     joint = int(turn.argmax())
     if turn[joint] <= _SAME_BRANCH:

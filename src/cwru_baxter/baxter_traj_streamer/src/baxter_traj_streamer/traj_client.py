@@ -13,6 +13,8 @@ from .streamer import BaxterTrajStreamer
 
 # How often it is said again what is waited for [s].
 REMINDER_S = 5.0
+# How often is looked whether a goal is over [s, wall].
+_POLL_S = 0.01
 
 
 class MoveFailed(Exception):
@@ -23,6 +25,43 @@ class MoveFailed(Exception):
         self.status = status
 
 
+class SentGoal:
+    """A goal on its way. Looked at rather than waited on for events: an answer may be quicker than its question."""
+
+    def __init__(self, client, trajectory, traj_id, feedback):
+        self._client = client
+        self._handle = client.send_goal(trajGoal(trajectory=trajectory, traj_id=traj_id),
+                                        feedback_cb=lambda _, message: feedback(message.fdbk))
+
+    def cancel(self):
+        """Ask the server to stop it."""
+        self._handle.cancel()
+
+    def is_active(self):
+        """Whether it is being followed."""
+        return self._handle.get_comm_state() == actionlib.CommState.ACTIVE
+
+    def is_over(self):
+        """Whether it has ended, one way or another."""
+        return self._handle.get_comm_state() in (actionlib.CommState.DONE, actionlib.CommState.LOST)
+
+    def wait(self, timeout_s=None):
+        """Wait for the end, at most ``timeout_s`` [s, wall]; returns whether it has come. Raises MoveFailed when the
+        server is gone."""
+        end = time.monotonic() + (float("inf") if timeout_s is None else timeout_s)
+        while not self.is_over():
+            if time.monotonic() >= end or rospy.is_shutdown():
+                return False
+            if not self._client.pub_goal.get_num_connections():
+                raise MoveFailed(GoalStatus.LOST, "%s is gone" % ACTION_NAME)
+            time.sleep(_POLL_S)
+        return True
+
+    def outcome(self):
+        """(status as in actionlib_msgs/GoalStatus, text, result message) of a goal that is over."""
+        return self._handle.get_terminal_state(), self._handle.get_goal_status_text(), self._handle.get_result()
+
+
 class TrajClient:
     """A robot's arms and the server that moves them; ``streamer`` is the library for paths.
 
@@ -31,7 +70,7 @@ class TrajClient:
 
     def __init__(self):
         self.streamer = BaxterTrajStreamer()
-        self._action = actionlib.SimpleActionClient(ACTION_NAME, trajAction)
+        self._action = actionlib.ActionClient(ACTION_NAME, trajAction)
 
     def wait_until_ready(self):
         """Wait for the server and for the robot to be enabled, whatever was started first, and say what for."""
@@ -41,23 +80,25 @@ class TrajClient:
             rospy.logwarn_throttle(REMINDER_S, "waiting: %s" % why)
             time.sleep(0.1)
 
-    def send(self, trajectory, traj_id=1):
-        """Send a JointTrajectory. The arms move on when this program ends; see the setting stop_when_client_leaves."""
-        self._action.send_goal(trajGoal(trajectory=trajectory, traj_id=traj_id))
+    def send(self, trajectory, traj_id=1, feedback=lambda percent: None):
+        """Send a JointTrajectory: a :class:`SentGoal`; ``feedback`` is called with the percent done.
 
-    def cancel(self):
-        """Stop the goal that was sent."""
-        self._action.cancel_goal()
+        The arms move on when this program ends; see the setting stop_when_client_leaves.
+        """
+        return SentGoal(self._action, trajectory, traj_id, feedback)
 
-    def wait(self, timeout_s=None):
-        """Wait [s, None: as long as it takes]; the result, or None if the time is over. Raises MoveFailed."""
-        timeout = rospy.Duration(timeout_s) if timeout_s is not None else rospy.Duration()
-        if not self._action.wait_for_result(timeout):
+    def move(self, trajectory, timeout_s=None):
+        """Send a JointTrajectory and wait [s, wall; None: until the end]: the result, or None after ``timeout_s``.
+
+        Raises MoveFailed.
+        """
+        goal = self.send(trajectory)
+        if not goal.wait(timeout_s):
             return None
-        status = self._action.get_state()
+        status, text, result = goal.outcome()
         if status != GoalStatus.SUCCEEDED:
-            raise MoveFailed(status, self._action.get_goal_status_text())
-        return self._action.get_result()
+            raise MoveFailed(status, text)
+        return result
 
     def here(self, joint_names):
         """The measured angles [rad] of these joints. Raises KeyError for one that the robot does not report."""

@@ -35,7 +35,7 @@ class AsInNotesTest(FakeRobotTest):
         moves = self.way(0.2, 1.0)
         self.client.send(ARM, moves)
         wait_until(lambda: len(self.commands) > 10, "the arm to be commanded")
-        self.client.action.cancel_goal()
+        self.client.goal.cancel()
         newer = Client()
         newer.send(ARM, [(0.0, moves[1][1]), (0.5, moves[0][1])])
         self.assertEqual(self.client.end()[0], GoalStatus.SUCCEEDED)
@@ -65,7 +65,7 @@ class AsInNotesTest(FakeRobotTest):
         wait_until(lambda: self.commands and self.commands[-1][1].mode == 1, "the stream to end")
         self.assertLess(self.angles(ARM)[3] - here[3], 0.35)
         stream = np.array([value for _, value in self.raw_stream("right_e1")])
-        self.assertLess(abs(stream[-1] - stream[-2]), 1e-3)
+        self.assertLess(abs(stream[-1] - stream[-2]), 0.01)
 
 
 if __name__ == "__main__":

@@ -7,12 +7,13 @@ import actionlib
 import numpy as np
 import rospy
 from baxter_core_msgs.msg import JointCommand
-from baxter_traj_streamer.msg import trajAction, trajGoal
+from baxter_traj_streamer.msg import trajAction
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from baxter_traj_streamer.settings import SIDES
 from baxter_traj_streamer.streamer import BaxterTrajStreamer
+from baxter_traj_streamer.traj_client import SentGoal
 
 DEADLINE_S = 30.0
 
@@ -28,24 +29,25 @@ class Client:
     """One goal, with all that is told about it."""
 
     def __init__(self):
-        self.action = actionlib.SimpleActionClient("trajActionServer", trajAction)
-        assert self.action.wait_for_server(rospy.Duration(DEADLINE_S)), "no trajActionServer"
+        self._action = actionlib.ActionClient("trajActionServer", trajAction)
+        assert self._action.wait_for_server(rospy.Duration(DEADLINE_S)), "no trajActionServer"
         self.feedback = []
+        self.goal = None
 
     def send(self, names, points, traj_id=0):
         trajectory = JointTrajectory(joint_names=names)
         trajectory.points = [JointTrajectoryPoint(positions=positions, time_from_start=rospy.Duration.from_sec(time_s))
                              for time_s, positions in points]
-        self.action.send_goal(trajGoal(trajectory=trajectory, traj_id=traj_id),
-                              feedback_cb=lambda message: self.feedback.append(message.fdbk))
+        self.feedback.clear()
+        self.goal = SentGoal(self._action, trajectory, traj_id, self.feedback.append)
 
     def wait_until_moving(self):
         wait_until(lambda: any(percent >= 20 for percent in self.feedback), "the goal to be a fifth done")
 
     def end(self):
         """State, text, result."""
-        assert self.action.wait_for_result(rospy.Duration(DEADLINE_S)), "the goal did not end"
-        return self.action.get_state(), self.action.get_goal_status_text(), self.action.get_result()
+        assert self.goal.wait(DEADLINE_S), "the goal did not end"
+        return self.goal.outcome()
 
 
 class FakeRobotTest(unittest.TestCase):

@@ -16,6 +16,9 @@ from baxter_traj_streamer.motion import Motion
 from baxter_traj_streamer.settings import JOINTS, SIDES, Settings, SettingsError, arm_joint_names
 from baxter_traj_streamer.timing import arrival_times, transition_time
 
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
+from spoilt_goals import WORDS, spoilt_goal  # noqa: E402
+
 DEFAULTS = yaml.safe_load((pathlib.Path(__file__).parents[2] / "config" / "streamer.yaml").read_text(encoding="utf-8"))
 SETTINGS = Settings(DEFAULTS)
 LIMITS = {name: JointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
@@ -159,33 +162,13 @@ def test_verdict_names_point_joint_value_and_limit():
 
 def test_five_hundred_random_spoilt_goals_are_refused_each_for_its_reason():
     source = random.Random(5)
-
-    def spoil(kind, points, names):
-        index, joint = source.randrange(2, len(points)), source.randrange(len(names))
-        time_s, positions, _, _ = points[index]
-        if kind == "number":
-            positions[joint] = source.choice([math.nan, math.inf, -math.inf])
-        elif kind == "time":
-            points[index] = point(points[index - 1][0] - source.choice([0.0, 0.1]), *positions)
-        elif kind == "size":
-            positions.pop()
-        elif kind == "limit":
-            positions[joint] = source.choice([-1, 1]) * source.uniform(2.01, 9.0)
-        elif kind == "velocity":
-            positions[joint] = points[index - 1][1][joint] + source.choice([-1.8, 1.8])
-        elif kind == "start":
-            points[0][1][joint] = source.choice([-1, 1]) * source.uniform(0.11, 0.5)
-        elif kind == "joints":
-            names[joint] = source.choice(["right_s9", "head_pan", "", names[joint - 1]])
-
     for number in range(500):
-        kind = ("number", "time", "size", "limit", "velocity", "start", "joints")[number % 7]
-        names = source.sample(KNOWN_JOINTS, source.randrange(2, 15))
-        points = [point(float(i), *(source.uniform(-0.1, 0.1) for _ in names)) for i in range(source.randrange(3, 6))]
-        points[0][1][:] = [0.0] * len(names)
-        plan_for(points, names)
-        spoil(kind, points, names)
-        assert refusal(points, names).reason == kind
+        kind, names, rows, good = spoilt_goal(source, number, LIMITS, AT_ZERO)
+        if kind != "joints":
+            plan_for([point(time_s, *positions) for time_s, positions in good], names)
+        found = refusal([point(time_s, *positions) for time_s, positions in rows], names)
+        assert found.reason == kind
+        assert WORDS[kind] in str(found)
 
 
 def test_a_joint_beyond_its_limit_may_come_back_but_go_no_farther():

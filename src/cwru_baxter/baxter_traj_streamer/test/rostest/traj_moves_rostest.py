@@ -1,0 +1,154 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Poses, playfiles and straight lines, each as command and as node."""
+import pathlib
+import subprocess
+import tempfile
+
+import numpy as np
+import rospy
+from baxter_traj_streamer.srv import CartMove, MoveToPose, PlayFile
+from geometry_msgs.msg import Vector3
+from traj_rostest_kit import DEADLINE_S, FakeRobotTest
+
+import urdf_model
+from baxter_sim_kinematics import Chain
+from baxter_traj_streamer.playfile import Playfile
+from baxter_traj_streamer.settings import SIDES, arm_joint_names
+
+# A posture with room around it, for the right arm; the left one's is its mirror image [rad].
+ROOMY = [0.08, -1.0, 1.19, 1.94, -0.67, 1.03, 0.5]
+
+
+def run(*command):
+    done = subprocess.run(["rosrun", "baxter_traj_streamer", *map(str, command)], capture_output=True, text=True,
+                          timeout=2 * DEADLINE_S, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+class TrajMovesTest(FakeRobotTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        robot = urdf_model.parse_urdf(rospy.get_param("robot_description"), source="robot_description")
+        cls.chains = {side: Chain.from_robot(robot, "base", "%s_gripper" % side) for side in SIDES}
+        cls.services = {}
+        for name, kind in (("move_to_pose", MoveToPose), ("play_file", PlayFile), ("cart_move", CartMove)):
+            rospy.wait_for_service(name, timeout=DEADLINE_S)
+            cls.services[name] = rospy.ServiceProxy(name, kind)
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+
+    def call(self, service, **request):
+        return self.services[service](**request)
+
+    def roomy(self, side):
+        mirror = self.streamer.settings.mirror
+        return [angle * (1 if side == "right" else mirror[joint])
+                for joint, angle in zip(("s0", "s1", "e0", "e1", "w0", "w1", "w2"), ROOMY, strict=True)]
+
+    def go_where_there_is_room(self, side):
+        answer = self.call("move_to_pose", side=side, angles=self.roomy(side), time_optimal=True)
+        self.assertTrue(answer.success, answer.message)
+        np.testing.assert_allclose(self.angles(arm_joint_names(side)), self.roomy(side), atol=0.01)
+
+    def tip(self, side):
+        return self.chains[side].fk(self.angles(arm_joint_names(side)))
+
+    def playfile(self, side, by=0.2):
+        """A file that bends an elbow there and back."""
+        here = self.angles(arm_joint_names(side))
+        rows = np.array([here, here + np.eye(7)[3] * by, here])
+        path = self.folder / ("%s.jsp" % side)
+        path.write_text(Playfile(rows, np.array([0.2, 0.8, 1.4]), "", ()).text(), encoding="utf-8")
+        return path, here
+
+    def test_named_pose_by_node_and_command(self):
+        for side in SIDES:
+            self.go_where_there_is_room(side)
+        code, text = run("traj_action_client_pre_pose", "left", "--time-optimal", "--wait", "30")
+        self.assertEqual(code, 0, text)
+        self.assertIn("the arm is there", text)
+        answer = self.call("move_to_pose", side="right", pose="pre_pose", time_optimal=True)
+        self.assertTrue(answer.success, answer.message)
+        for side in SIDES:
+            np.testing.assert_allclose(
+                self.angles(arm_joint_names(side)), self.streamer.settings.pose("pre_pose", side), atol=0.01)
+        for request, word in (({"side": "up", "pose": "pre_pose"}, "right and left"),
+                              ({"side": "left", "pose": "post_pose"}, "pre_pose"),
+                              ({"side": "left", "angles": [1.0]}, "7 finite numbers")):
+            answer = self.call("move_to_pose", **request)
+            self.assertFalse(answer.success)
+            self.assertIn(word, answer.message)
+
+    def test_playfiles_by_node_and_command(self):
+        for side in SIDES:
+            self.go_where_there_is_room(side)
+        (right, _), (left, _) = self.playfile("right"), self.playfile("left")
+        answer = self.call("play_file", right=str(right), left=str(left))
+        self.assertTrue(answer.success, answer.message)
+        for side in SIDES:
+            way = [value for _, value in self.raw_stream("%s_e1" % side)]
+            self.assertAlmostEqual(max(way), self.roomy(side)[3] + 0.2, delta=0.01)
+            self.assertAlmostEqual(way[-1], self.roomy(side)[3], delta=0.01)
+        self.commands.clear()
+        code, text = run("baxter_playfile_jointspace", right, left, "--check")
+        self.assertEqual(code, 0, text)
+        self.assertIn("3 rows, 1.200 s for the right arm; can be played", text)
+        self.assertEqual(self.commands, [])
+        code, text = run("baxter_playfile_jointspace", "-", left, "--time-optimal")
+        self.assertEqual(code, 0, text)
+        self.assertAlmostEqual(max(value for _, value in self.raw_stream("left_e1")), self.roomy("left")[3] + 0.2,
+                               delta=0.01)
+        self.assertEqual(self.raw_stream("right_e1"), [])
+
+    def test_bad_playfiles_move_nothing(self):
+        far, _ = self.playfile("right", by=9.0)
+        code, text = run("traj_action_client_pre_pose", "right", "--file", far)
+        self.assertEqual(code, 1)
+        self.assertIn("right.jsp, line 2", text)
+        answer = self.call("play_file", left=str(self.folder / "none.jsp"))
+        self.assertFalse(answer.success)
+        self.assertIn("none.jsp", answer.message)
+        self.assertFalse(self.call("play_file").success)
+        self.assertEqual(self.commands, [])
+
+    def test_recorded_move_can_be_played(self):
+        self.go_where_there_is_room("right")
+        path = self.folder / "recorded.jsp"
+        code, text = run("baxter_record_trajectory", path, "right", "--seconds", "0.6", "--rate", "10")
+        self.assertEqual(code, 0, text)
+        file = Playfile.read(path)
+        self.assertEqual(file.times.tolist(), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+        np.testing.assert_allclose(file.positions, [self.roomy("right")] * 6, atol=0.01)
+        answer = self.call("play_file", right=str(path))
+        self.assertTrue(answer.success, answer.message)
+
+    def test_straight_line_by_node_and_command(self):
+        for side in SIDES:
+            self.go_where_there_is_room(side)
+            before = self.tip(side)
+            answer = self.call("cart_move", side=side, displacement=Vector3(0.06, 0.0, -0.04), speed=0.2)
+            self.assertTrue(answer.success, answer.message)
+            np.testing.assert_allclose(self.tip(side)[:3, 3] - before[:3, 3], [0.06, 0.0, -0.04], atol=0.003)
+            np.testing.assert_allclose(self.tip(side)[:3, :3], before[:3, :3], atol=0.01)
+        there = self.tip("left")
+        code, text = run("cart_move", "left", "-0.06", "0", "0.04", "--speed", "0.2")
+        self.assertEqual(code, 0, text)
+        np.testing.assert_allclose(self.tip("left")[:3, 3] - there[:3, 3], [-0.06, 0.0, 0.04], atol=0.003)
+        self.commands.clear()
+        code, text = run("cart_move", "left", 2, 0, 0)
+        self.assertEqual(code, 1)
+        self.assertIn("leaves the arm's reach after 0.3", text)
+        answer = self.call("cart_move", side="left", displacement=Vector3(0.1, 0.0, 0.0), speed=-1.0)
+        self.assertFalse(answer.success)
+        self.assertIn("speed", answer.message)
+        self.assertEqual(self.commands, [])
+
+
+if __name__ == "__main__":
+    import rostest
+
+    rospy.init_node("traj_moves_rostest")
+    rostest.rosrun("baxter_traj_streamer", "traj_moves", TrajMovesTest)
