@@ -143,10 +143,16 @@ def test_gripper_argument_wins_over_the_switch(expand):
     assert "l_gripper_l_finger" in expand(left_electric_gripper="false", left_gripper="electric").links
 
 
-def test_brain_comes_with_the_simulator_only(expand):
-    plugins = [plugin for element in expand().gazebo for plugin in element.iter("plugin")]
-    assert [plugin.get("filename") for plugin in plugins] == ["libbaxter_gazebo_ros_control.so"]
-    assert plugins[0].findtext("robotNamespace") == "/robot"
+def test_brain_and_sensors_come_with_the_simulator_only(expand):
+    brains = [plugin for element in expand().gazebo for plugin in element.findall("plugin")]
+    assert [plugin.get("filename") for plugin in brains] == ["libbaxter_gazebo_ros_control.so"]
+    assert brains[0].findtext("robotNamespace") == "/robot"
+    sensors = [sensor for element in expand(kinect="true").gazebo for sensor in element.findall("sensor")]
+    assert {sensor.get("name"): sensor.find("plugin").get("filename") for sensor in sensors} == {
+        "left_hand_camera": "libbaxter_camera.so", "right_hand_camera": "libbaxter_camera.so",
+        "head_camera": "libbaxter_camera.so", "left_hand_range": "libgazebo_ros_laser.so",
+        "right_hand_range": "libgazebo_ros_laser.so", "openni_camera_camera": "libgazebo_ros_openni_kinect.so"}
+    assert all(sensor.getparent().get("reference") in expand(kinect="true").links for sensor in sensors)
     assert not [plugin for element in expand(gazebo="false").gazebo for plugin in element.iter("plugin")]
 
 

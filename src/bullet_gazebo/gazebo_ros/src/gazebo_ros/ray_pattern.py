@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a ``<ray>`` element says of a laser or range finder, and a scan taken a few rays at a time. ROS-free."""
+import math
+
+import numpy as np
+
+#: Rays that one tick casts at most [some 5 us each]: a scan of more is swept over several ticks, as a scanner's is.
+RAYS_PER_TICK = 32
+_MOST_RAYS = 100000
+
+
+class RayPatternError(Exception):
+    """A ``<ray>`` that cannot be used; the text says what was found and what would be right."""
+
+
+class RayPattern:
+    """Directions and ranges of a ray sensor; its x looks ahead, z is up.
+
+    Attributes: ``directions`` (rows * columns, 3), row by row from the lowest; ``angle_min``, ``angle_max``,
+    ``increment`` [rad] of a row; ``range_min``, ``range_max`` [m]; ``noise`` [m], a standard deviation; ``field``
+    [rad], the wider of both angles.
+    """
+
+    def __init__(self, ray, what):
+        """``ray``: the element; ``what`` names the sensor in messages. Raises :class:`RayPatternError`."""
+        if ray is None:
+            raise RayPatternError("%s has no <ray> element; expected one, with <scan> and <range>" % what)
+        self._ray, self._what = ray, what
+        self.columns, self.angle_min, self.angle_max = self._span("scan/horizontal", 640)
+        self.rows, low, high = self._span("scan/vertical", 1)
+        if self.rows * self.columns > _MOST_RAYS:
+            raise RayPatternError("%s casts %d rays; expected at most %d"
+                                  % (what, self.rows * self.columns, _MOST_RAYS))
+        self.range_min, self.range_max = self._number("range/min", 0.0), self._number("range/max", 10.0)
+        if not 0.0 <= self.range_min < self.range_max:
+            raise RayPatternError("%s reaches from %g to %g m; expected 0 <= min < max"
+                                  % (what, self.range_min, self.range_max))
+        self.noise = max(self._number("noise/stddev", 0.0), 0.0)
+        self.increment = (self.angle_max - self.angle_min) / (self.columns - 1) if self.columns > 1 else 0.0
+        self.field = max(self.angle_max - self.angle_min, high - low)
+        yaw, pitch = np.meshgrid(_angles(self.columns, self.angle_min, self.angle_max), _angles(self.rows, low, high))
+        self.directions = np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)],
+                                   axis=-1).reshape(-1, 3)
+
+    def _span(self, path, default_samples):
+        samples = round(self._number(path + "/samples", default_samples) * self._number(path + "/resolution", 1.0))
+        low, high = self._number(path + "/min_angle", 0.0), self._number(path + "/max_angle", 0.0)
+        if samples < 1 or not -math.pi - 1e-6 <= low <= high <= math.pi + 1e-6:
+            raise RayPatternError("%s: %s has %d samples from %g to %g rad; expected at least one, angles in order and "
+                                  "from -pi to pi" % (self._what, path, samples, low, high))
+        return samples, low, high
+
+    def _number(self, path, default):
+        text = (self._ray.findtext(path) or "").strip()
+        try:
+            value = float(text) if text else float(default)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise RayPatternError("%s: <%s> is '%s', expected a number" % (self._what, path, text))
+        return value
+
+
+class Sweep:
+    """One scan in the making."""
+
+    def __init__(self, pattern, cast, random):
+        """``cast(starts, ends)`` -> fractions (k,) at which rays from (k, 3) to (k, 3) hit, 1.0 for never; ``random``:
+        ``numpy.random.Generator`` for noise."""
+        self._pattern = pattern
+        self._cast = cast
+        self._random = random
+        self._ranges = np.empty(len(pattern.directions))
+        self._done = 0
+
+    def go_on(self, pose):
+        """Cast the next rays from a sensor at ``pose`` (4, 4). Returns the ranges (n,) [m] of a scan that is now
+        complete, infinite where a ray met nothing, else None."""
+        pattern = self._pattern
+        end = min(self._done + RAYS_PER_TICK, len(self._ranges))
+        directions = pattern.directions[self._done:end] @ pose[:3, :3].T
+        starts = pose[:3, 3] + directions * pattern.range_min
+        fractions = self._cast(starts, pose[:3, 3] + directions * pattern.range_max)
+        ranges = pattern.range_min + fractions * (pattern.range_max - pattern.range_min)
+        if pattern.noise:
+            ranges = np.clip(ranges + self._random.normal(0.0, pattern.noise, len(ranges)), pattern.range_min,
+                             pattern.range_max)
+        ranges[fractions >= 1.0] = math.inf
+        self._ranges[self._done:end] = ranges
+        self._done = end
+        if end < len(self._ranges):
+            return None
+        self._done = 0
+        return self._ranges.copy()
+
+
+def _angles(count, low, high):
+    return np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2.0])

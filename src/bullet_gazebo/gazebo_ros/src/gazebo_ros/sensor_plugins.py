@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gazebo's sensor plugins that measure without pictures: laser, range finder, IMU, bumper, pose, joint states."""
+import math
+
+import numpy as np
+import rospy
+from gazebo_msgs.msg import ContactsState, ContactState
+from geometry_msgs.msg import Vector3, Wrench
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu, JointState, LaserScan, Range
+
+from bullet_sim import Pose
+from gazebo_ros.convert import msg_from_pose, msg_from_twist
+from gazebo_ros.model_plugin import ModelPlugin, PluginError
+from gazebo_ros.ray_pattern import RayPattern, RayPatternError, Sweep
+from gazebo_ros.urdf_extras import sensor_of, unscoped
+from urdf_model.transforms import pose_matrix
+
+_TOLERANCE_S = 1e-6
+
+
+class PacedSensor(ModelPlugin):
+    """Base class: one topic, some times a second, while somebody listens. Names come from the plugin's elements."""
+
+    message_class = None
+    topic_tag, default_topic = "topicName", None
+
+    def __init__(self, context):
+        super().__init__(context)
+        self.sensor, self.link = sensor_of(context.element)
+        self.what = "sensor plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
+        own = self.number("updateRate", 0.0)
+        rate = own if own > 0.0 or self.sensor is None else self.number_in(self.sensor, "update_rate", 0.0)
+        self._period_s = 1.0 / rate if rate > 0.0 else 0.0
+        self._next_s = -math.inf
+        topic = context.element_text(self.topic_tag, self.default_topic)
+        if topic is None:
+            raise PluginError("%s names no topic; expected <%s>" % (self.what, self.topic_tag))
+        self.publisher = context.publisher(topic, self.message_class)
+
+    def number(self, tag, default):
+        """A number of the plugin's element; raises ``PluginError``."""
+        return self.number_in(self.context.element, tag, default)
+
+    def number_in(self, element, tag, default):
+        """A number of an element's child."""
+        return self.numbers(element, tag, (default,))[0]
+
+    def numbers(self, element, tag, defaults):
+        """As many numbers as ``defaults`` has; raises ``PluginError``."""
+        text = (element.findtext(tag) or "").strip()
+        try:
+            values = tuple(float(word) for word in text.split()) or tuple(defaults)
+        except ValueError:
+            values = ()
+        if len(values) != len(defaults) or not np.isfinite(values).all():
+            raise PluginError("%s: <%s> is '%s', expected %d number%s"
+                              % (self.what, tag, text, len(defaults), "" if len(defaults) == 1 else "s"))
+        return values
+
+    def sensor_pose(self):
+        """The pose (4, 4) of the ``<sensor>`` in its link."""
+        values = self.numbers(self.sensor, "pose", (0.0,) * 6)
+        return pose_matrix(values[:3], values[3:])
+
+    def link_named(self, tag):
+        """The link that the plugin's element ``tag`` names; raises ``PluginError``."""
+        name = self.context.element_text(tag)
+        found = None if name is None else unscoped(self.context.model.name, name)
+        if found not in self.context.model.merged.frames:
+            raise PluginError("%s: <%s> is '%s', expected one of the links %s"
+                              % (self.what, tag, name or "", ", ".join(self.context.model.merged.frames)))
+        return found
+
+    def is_due(self, time_s):
+        """Whether the next measurement is wanted; reckons that it is taken."""
+        if not self.publisher.has_listeners or time_s < self._next_s - _TOLERANCE_S:
+            return False
+        following = self._next_s + self._period_s
+        self._next_s = following if following > time_s else time_s + self._period_s
+        return True
+
+    def stamped(self, message, time_s, frame):
+        """``message`` with its header filled."""
+        message.header.stamp = rospy.Time(*divmod(round(time_s * 1e9), 10**9))
+        message.header.frame_id = frame
+        return message
+
+    def reset(self):
+        self._next_s = -math.inf
+
+
+class _RaySensor(PacedSensor):
+    """A sensor of rays, cast into the collision shapes."""
+
+    def __init__(self, context):
+        super().__init__(context)
+        if self.sensor is None:
+            raise PluginError('%s stands outside of a <sensor>; expected <gazebo reference="LINK"><sensor><plugin>'
+                              % self.what)
+        element = self.sensor.find("ray")
+        try:
+            self.pattern = RayPattern(element if element is not None else self.sensor.find("lidar"), self.what)
+        except RayPatternError as error:
+            raise PluginError(str(error)) from error
+        self.frame = context.element_text("frameName", self.link)
+        self._offset = self.sensor_pose()
+        self._start_sweep()
+        self._sweeping = False
+
+    def publish(self, time_s):
+        if not self._sweeping:
+            if not self.is_due(time_s):
+                return
+            self._sweeping = True
+            self._began_s = time_s
+        ranges = self._sweep.go_on(self.context.model.link_pose(self.link).matrix() @ self._offset)
+        if ranges is not None:
+            self._sweeping = False
+            self.publisher.publish(self.stamped(self.message(ranges), self._began_s, self.frame))
+
+    def message(self, ranges):
+        """The message that says ``ranges`` (n,) [m]."""
+        raise NotImplementedError
+
+    def reset(self):
+        super().reset()
+        self._start_sweep()
+        self._sweeping = False
+
+    def _start_sweep(self):
+        world = self.context.world
+        self._sweep = Sweep(self.pattern, world.ray_test_batch, world.random)
+
+
+class Laser(_RaySensor):
+    """``libgazebo_ros_laser.so``. Of several rows the middle one is published."""
+
+    message_class = LaserScan
+
+    def message(self, ranges):
+        pattern = self.pattern
+        row = ranges.reshape(pattern.rows, pattern.columns)[pattern.rows // 2]
+        return LaserScan(angle_min=pattern.angle_min, angle_max=pattern.angle_max, angle_increment=pattern.increment,
+                         scan_time=self._period_s, range_min=pattern.range_min, range_max=pattern.range_max,
+                         ranges=row.tolist())
+
+
+class RangeFinder(_RaySensor):
+    """``libgazebo_ros_range.so``: the nearest of all rays, the largest range when none meets anything."""
+
+    message_class = Range
+
+    def __init__(self, context):
+        super().__init__(context)
+        self._field = self.number("fov", self.pattern.field)
+        said = context.element_text("radiation", "infrared").lower()
+        self._radiation = Range.ULTRASOUND if said == "ultrasound" else Range.INFRARED
+        self._noise = self.number("gaussianNoise", 0.0)
+
+    def message(self, ranges):
+        nearest = min(float(ranges.min()), self.pattern.range_max)
+        if self._noise and nearest < self.pattern.range_max:
+            nearest += self.context.world.random.normal(0.0, self._noise)
+        return Range(radiation_type=self._radiation, field_of_view=self._field, min_range=self.pattern.range_min,
+                     max_range=self.pattern.range_max, range=nearest)
+
+
+class ImuSensor(PacedSensor):
+    """``libgazebo_ros_imu.so`` and ``libgazebo_ros_imu_sensor.so``: orientation in the world, rates and accelerations
+    in the link's axes. The acceleration is what a device feels: at rest, gravity upwards."""
+
+    message_class = Imu
+    default_topic = "imu"
+
+    def __init__(self, context):
+        super().__init__(context)
+        self._body = self.link if self.link is not None else self.link_named("bodyName")
+        self._frame = context.element_text("frameName", self._body)
+        self._noise = self.number("gaussianNoise", 0.0)
+        self._last = None
+
+    def publish(self, time_s):
+        if not self.publisher.has_listeners:
+            self._last = None
+            return
+        linear, angular = self.context.model.link_twist(self._body)
+        linear = np.asarray(linear)
+        last, self._last = self._last, (time_s, linear)
+        if last is None or time_s <= last[0] or not self.is_due(time_s):
+            return
+        pose = self.context.model.link_pose(self._body)
+        axes = pose.matrix()[:3, :3]
+        felt = axes.T @ ((linear - last[1]) / (time_s - last[0]) - np.asarray(self.context.world.gravity))
+        turning = axes.T @ np.asarray(angular)
+        if self._noise:
+            random = self.context.world.random
+            felt, turning = felt + random.normal(0.0, self._noise, 3), turning + random.normal(0.0, self._noise, 3)
+        message = Imu(angular_velocity=Vector3(*turning), linear_acceleration=Vector3(*felt))
+        message.orientation = msg_from_pose(pose).orientation
+        for covariance in (message.orientation_covariance, message.angular_velocity_covariance,
+                           message.linear_acceleration_covariance):
+            covariance[0] = covariance[4] = covariance[8] = self._noise ** 2
+        self.publisher.publish(self.stamped(message, time_s, self._frame))
+
+    def reset(self):
+        super().reset()
+        self._last = None
+
+
+class PoseSensor(PacedSensor):
+    """``libgazebo_ros_p3d.so``: where a link is and how fast, in the world's axes or another link's."""
+
+    message_class = Odometry
+
+    def __init__(self, context):
+        super().__init__(context)
+        self._body = self.link_named("bodyName")
+        frame = context.element_text("frameName", "world")
+        self._reference = None if frame.strip("/") in ("world", "map", "") else self.link_named("frameName")
+        self._frame = frame
+        self._offset = np.array(self.numbers(context.element, "xyzOffset", (0.0,) * 3))
+        turn = "rpyOffset" if context.element.find("rpyOffset") is not None else "rpyOffsets"
+        self._turn = pose_matrix((0.0, 0.0, 0.0), self.numbers(context.element, turn, (0.0,) * 3))
+        self._noise = self.number("gaussianNoise", 0.0)
+
+    def publish(self, time_s):
+        if not self.is_due(time_s):
+            return
+        model = self.context.model
+        pose = model.link_pose(self._body).matrix()
+        linear, angular = (np.asarray(part) for part in model.link_twist(self._body))
+        if self._reference is not None:
+            origin = model.link_pose(self._reference).matrix()
+            its_linear, its_angular = (np.asarray(part) for part in model.link_twist(self._reference))
+            away = pose[:3, 3] - origin[:3, 3]
+            linear = origin[:3, :3].T @ (linear - its_linear - np.cross(its_angular, away))
+            angular = origin[:3, :3].T @ (angular - its_angular)
+            pose = np.linalg.inv(origin) @ pose
+        pose = pose @ self._turn
+        pose[:3, 3] += self._offset
+        if self._noise:
+            random = self.context.world.random
+            linear, angular = linear + random.normal(0.0, self._noise, 3), angular + random.normal(0.0, self._noise, 3)
+        message = Odometry(child_frame_id=self._body)
+        message.pose.pose = msg_from_pose(Pose.from_matrix(pose))
+        message.twist.twist = msg_from_twist(linear, angular)
+        for covariance in (message.pose.covariance, message.twist.covariance):
+            covariance[::7] = [self._noise ** 2] * 6
+        self.publisher.publish(self.stamped(message, time_s, self._frame))
+
+
+class Bumper(PacedSensor):
+    """``libgazebo_ros_bumper.so``: what touches the link of its ``<sensor>``, and how hard."""
+
+    message_class = ContactsState
+    topic_tag, default_topic = "bumperTopicName", "bumper_states"
+
+    def __init__(self, context):
+        super().__init__(context)
+        if self.link is None:
+            raise PluginError('%s stands outside of a <sensor>; expected <gazebo reference="LINK"><sensor><plugin>'
+                              % self.what)
+        self._body = context.model.merged.frames[self.link].link
+        self._frame = context.element_text("frameName", "world")
+
+    def publish(self, time_s):
+        if not self.is_due(time_s):
+            return
+        model, touching = self.context.model, {}
+        for contact in self.context.world.contacts(model):
+            sides = ((contact.model_a, contact.link_a), (contact.model_b, contact.link_b))
+            if (model.name, self._body) not in sides:
+                continue
+            # The normal points from b to a: turned, where the link is b.
+            mine, other, sign = (*sides, 1.0) if sides[0] == (model.name, self._body) else (*sides[::-1], -1.0)
+            touching.setdefault((mine, other), []).append((contact, sign))
+        states = [_contact_state(mine, other, points) for (mine, other), points in touching.items()]
+        self.publisher.publish(self.stamped(ContactsState(states=states), time_s, self._frame))
+
+
+def _contact_state(mine, other, points):
+    state = ContactState(collision1_name="%s::%s" % mine, collision2_name="%s::%s" % other)
+    state.info = "%d contact points" % len(points)
+    total = np.zeros(3)
+    for contact, sign in points:
+        normal = sign * np.asarray(contact.normal)
+        force = contact.force * normal
+        total += force
+        state.wrenches.append(Wrench(force=Vector3(*force)))
+        state.contact_positions.append(Vector3(*contact.position))
+        state.contact_normals.append(Vector3(*normal))
+        state.depths.append(max(-contact.distance, 0.0))
+    state.total_wrench.force = Vector3(*total)
+    return state
+
+
+class JointStatePublisher(PacedSensor):
+    """``libgazebo_ros_joint_state_publisher.so``: positions, velocities and efforts of the joints in ``jointName``,
+    names with commas between them; all movable joints where it is left out."""
+
+    message_class = JointState
+    default_topic = "joint_states"
+
+    def __init__(self, context):
+        super().__init__(context)
+        model = context.model
+        text = context.element_text("jointName", "")
+        names = text.replace(",", " ").split() or list(model.joint_names)
+        unknown = [name for name in names if name not in model.joint_names]
+        if unknown:
+            raise PluginError("%s: <jointName> has %s, expected some of %s"
+                              % (self.what, ", ".join(unknown), ", ".join(model.joint_names) or "no joint at all"))
+        self._names = names
+        self._index = model.index(names)
+
+    def publish(self, time_s):
+        if self.is_due(time_s):
+            position, velocity, effort = (values[self._index].tolist() for values in self.context.model.read_joints())
+            self.publisher.publish(self.stamped(JointState(name=self._names, position=position, velocity=velocity,
+                                                           effort=effort), time_s, ""))

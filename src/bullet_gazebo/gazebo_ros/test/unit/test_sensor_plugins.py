@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sensors in a small physics world: what they say is known."""
+import math
+
+import numpy as np
+import pytest
+from gazebo_msgs.msg import ContactsState
+from lxml import etree
+
+from bullet_sim import Pose, World
+from gazebo_ros import sensor_plugins
+from gazebo_ros.model_plugin import PluginContext, PluginError
+from gazebo_ros.plugin_table import PluginTable
+from gazebo_ros.ray_pattern import RAYS_PER_TICK, RayPattern, RayPatternError
+from gazebo_ros.urdf_extras import ExtrasError, plugins
+from gazebo_ros.urdf_extras import sensor_plugins as found_in
+from urdf_model import parse_urdf
+
+BOX = """<robot name="box"><link name="link"><inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01"
+ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+%s</robot>"""
+ARM = """<robot name="arm"><link name="world"/><link name="boom"><inertial><mass value="1"/><inertia ixx="0.01"
+iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="turn" type="continuous">
+<parent link="world"/><child link="boom"/><axis xyz="0 0 1"/></joint>%s</robot>"""
+RAY = """<gazebo reference="link"><sensor type="ray" name="s">%s<update_rate>50</update_rate><ray><scan><horizontal>
+<samples>%d</samples><min_angle>-0.5</min_angle><max_angle>0.5</max_angle></horizontal></scan>
+<range><min>0.15</min><max>5</max></range></ray><plugin name="p" filename="%s"><topicName>scan</topicName></plugin>
+</sensor></gazebo>"""
+
+
+class Publisher:
+    def __init__(self):
+        self.has_listeners = True
+        self.sent = []
+
+    def publish(self, message):
+        self.sent.append(message)
+
+
+class Ros:
+    def __init__(self):
+        self.publishers = {}
+
+    def publisher(self, topic, msg_class, latch=False):
+        self.publishers[topic] = Publisher()
+        self.publishers[topic].msg_class = msg_class
+        return self.publishers[topic]
+
+
+class Lab:
+    """A world with a floor, one model and its plugin."""
+
+    def __init__(self, urdf, plugin_class, pose=None, static=True):
+        self.world = World()
+        self.world.add_ground_plane()
+        robot = parse_urdf(urdf, "test")
+        self.model = self.world.spawn(robot, "it", pose, static=static)
+        element = (plugins(robot) + found_in(robot))[0]
+        self.ros = Ros()
+        context = PluginContext(self.world, self.model, robot, element, "/ns", urdf, None, self.ros, {})
+        try:
+            self.plugin = plugin_class(context)
+        except PluginError:
+            self.world.close()
+            raise
+
+    @property
+    def publisher(self):
+        (publisher,) = self.ros.publishers.values()
+        return publisher
+
+    def run(self, seconds):
+        for _ in range(round(seconds / 0.002)):
+            self.plugin.update(self.world.time_s, 0.002)
+            self.world.step()
+            self.plugin.publish(self.world.time_s)
+        return self.publisher.sent
+
+
+@pytest.fixture
+def lab():
+    made = []
+
+    def make(*arguments, **options):
+        made.append(Lab(*arguments, **options))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.world.close()
+
+
+def wall(world, x):
+    """A box whose near face is at x."""
+    world.spawn(parse_urdf(BOX % "", "wall"), "wall", Pose((x + 0.1, 0.0, 1.0)), static=True)
+
+
+def test_a_laser_sees_a_wall_and_nothing_beside_it(lab):
+    it = lab(BOX % (RAY % ("", 101, "libgazebo_ros_laser.so")), sensor_plugins.Laser, Pose((0, 0, 1)))
+    wall(it.world, 1.0)
+    scan = it.run(0.1)[0]
+    assert (scan.angle_min, scan.angle_max, len(scan.ranges)) == (-0.5, 0.5, 101)
+    assert scan.angle_increment == pytest.approx(0.01) and scan.header.frame_id == "link"
+    assert list(it.ros.publishers) == ["/ns/scan"]
+    assert scan.ranges[50] == pytest.approx(1.0, abs=1e-3)
+    assert scan.ranges[55] == pytest.approx(1.0 / math.cos(0.05), abs=1e-3)
+    assert math.isinf(scan.ranges[0])
+
+
+def test_a_turned_sensor_looks_elsewhere(lab):
+    it = lab(BOX % (RAY % ("<pose>0 0 0 0 1.5707963 0</pose>", 1, "libgazebo_ros_laser.so")), sensor_plugins.Laser,
+             Pose((0, 0, 1)))
+    assert it.run(0.1)[0].ranges[0] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_long_scan_is_swept_and_its_rate_holds(lab):
+    it = lab(BOX % (RAY % ("", 3 * RAYS_PER_TICK, "libgazebo_ros_laser.so")), sensor_plugins.Laser, Pose((0, 0, 1)))
+    sent = it.run(1.0)
+    assert 49 <= len(sent) <= 51
+    stamps = [message.header.stamp.to_sec() for message in sent]
+    assert np.diff(stamps) == pytest.approx(0.02)
+
+
+def test_nobody_listens_and_nothing_is_measured(lab):
+    it = lab(BOX % (RAY % ("", 10, "libgazebo_ros_laser.so")), sensor_plugins.Laser, Pose((0, 0, 1)))
+    it.world.ray_test_batch = None
+    it.publisher.has_listeners = False
+    assert it.run(0.1) == []
+
+
+def test_a_range_finder_says_the_nearest_or_its_furthest(lab):
+    it = lab(BOX % (RAY % ("", 5, "libgazebo_ros_range.so")), sensor_plugins.RangeFinder, Pose((0, 0, 1)))
+    assert it.run(0.05)[-1].range == 5.0
+    wall(it.world, 2.0)
+    last = it.run(0.05)[-1]
+    assert last.range == pytest.approx(2.0, abs=1e-3)
+    assert (last.min_range, last.max_range, last.field_of_view) == (0.15, 5.0, 1.0)
+
+
+def test_an_imu_at_rest_feels_gravity_and_in_free_fall_nothing(lab):
+    plugin = """<gazebo><plugin filename="libgazebo_ros_imu.so"><topicName>imu</topicName><bodyName>link</bodyName>
+<updateRate>100</updateRate></plugin></gazebo>"""
+    standing = lab(BOX % plugin, sensor_plugins.ImuSensor, Pose((0, 0, 1), (0, math.sin(0.5), 0, math.cos(0.5))))
+    felt = standing.run(0.1)[-1].linear_acceleration
+    # Pitched by 1 rad: x points down.
+    assert (felt.x, felt.y, felt.z) == pytest.approx((-9.81 * math.sin(1), 0, 9.81 * math.cos(1)), abs=1e-6)
+    falling = lab(BOX % plugin, sensor_plugins.ImuSensor, Pose((0, 0, 5)), static=False)
+    felt = falling.run(0.1)[-1].linear_acceleration
+    assert abs(felt.z) < 0.05
+
+
+def test_p3d_says_where_a_link_is(lab):
+    plugin = """<gazebo><plugin filename="libgazebo_ros_p3d.so"><topicName>truth</topicName><bodyName>link</bodyName>
+<xyzOffset>1 0 0</xyzOffset><updateRate>50</updateRate></plugin></gazebo>"""
+    it = lab(BOX % plugin, sensor_plugins.PoseSensor, Pose((1, 2, 5)), static=False)
+    last = it.run(0.1)[-1]
+    assert last.header.frame_id == "world" and last.child_frame_id == "link"
+    assert (last.pose.pose.position.x, last.pose.pose.position.y) == pytest.approx((2.0, 2.0))
+    assert last.twist.twist.linear.z == pytest.approx(-9.81 * last.header.stamp.to_sec(), abs=0.03)
+
+
+def test_a_bumper_feels_the_weight(lab):
+    plugin = """<gazebo reference="link"><sensor type="contact" name="b"><plugin filename="libgazebo_ros_bumper.so">
+<bumperTopicName>bump</bumperTopicName></plugin></sensor></gazebo>"""
+    it = lab(BOX % plugin, sensor_plugins.Bumper, Pose((0, 0, 0.3)), static=False)
+    assert it.run(0.02)[-1].states == []
+    (state,) = it.run(1.5)[-1].states
+    assert it.publisher.msg_class is ContactsState
+    assert state.collision1_name == "it::link" and state.collision2_name.startswith("ground_plane::")
+    assert state.total_wrench.force.z == pytest.approx(2 * 9.81, rel=0.05)
+    assert all(normal.z > 0.99 for normal in state.contact_normals)
+
+
+def test_joint_states(lab):
+    plugin = ('<gazebo><plugin filename="libgazebo_ros_joint_state_publisher.so"><jointName>%s</jointName></plugin>'
+              '</gazebo>')
+    it = lab(ARM % (plugin % "turn"), sensor_plugins.JointStatePublisher)
+    it.model.set_joint_positions(np.array([0]), np.array([0.7]))
+    last = it.run(0.01)[-1]
+    assert last.name == ["turn"] and last.position == pytest.approx([0.7])
+    with pytest.raises(PluginError, match="nose, expected some of turn"):
+        lab(ARM % (plugin % "nose"), sensor_plugins.JointStatePublisher)
+
+
+def test_after_a_reset_of_time_sensors_go_on(lab):
+    it = lab(BOX % (RAY % ("", 1, "libgazebo_ros_laser.so")), sensor_plugins.Laser, Pose((0, 0, 1)))
+    before = len(it.run(1.0))
+    it.world.reset_time()
+    it.plugin.reset()
+    assert len(it.run(0.1)) >= before + 5
+
+
+@pytest.mark.parametrize(("element", "text"), [
+    ("<range><min>2</min><max>1</max></range>", "from 2 to 1 m"), ("<range><min>x</min></range>", "'x'"),
+    ("<scan><horizontal><samples>0</samples></horizontal></scan>", "0 samples"),
+    ("<scan><horizontal><samples>1e9</samples></horizontal></scan>", "at most")])
+def test_impossible_rays_are_refused(element, text):
+    with pytest.raises(RayPatternError, match=text):
+        RayPattern(etree.fromstring("<ray>%s</ray>" % element), "it")
+
+
+def test_missing_elements_are_named(lab):
+    with pytest.raises(PluginError, match="names no topic; expected <topicName>"):
+        lab(BOX % '<gazebo><plugin filename="libgazebo_ros_p3d.so"/></gazebo>', sensor_plugins.PoseSensor)
+    with pytest.raises(PluginError, match="no <ray> element"):
+        lab(BOX % '<gazebo reference="link"><sensor name="s"><plugin filename="x"><topicName>a</topicName></plugin>'
+            '</sensor></gazebo>', sensor_plugins.Laser)
+    with pytest.raises(ExtrasError, match="on link 'nose'"):
+        found_in(parse_urdf(BOX % '<gazebo reference="nose"><sensor name="s"/></gazebo>', "test"))
+
+
+def test_all_file_names_lead_to_classes():
+    import os
+    path = os.path.join(os.path.dirname(__file__), "..", "..", "config", "model_plugins.yaml")
+    table = PluginTable.from_yaml(path)
+    for filename in table.known:
+        if filename.startswith("libgazebo_ros_") and filename != "libgazebo_ros_control.so":
+            assert table.find(filename) is not None
