@@ -1,0 +1,56 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The SDK's Gripper on an arm without one, and after a client has said what tool it carries."""
+
+import errno
+import unittest
+
+import rospy
+import rostest
+from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
+
+from baxter_dataflow import wait_for
+from baxter_interface import Gripper
+from baxter_interface.startup import init_node
+
+DEADLINE_S = 20.0  # [simulated s]
+TOPIC = "/robot/end_effector/%s_gripper/"
+
+
+def announce(side):
+    """Say that an arm carries a custom tool, until the robot repeats it."""
+    publisher = rospy.Publisher(TOPIC % side + "rsdk/set_properties", EndEffectorProperties, queue_size=1)
+    seen = []
+    subscriber = rospy.Subscriber(TOPIC % side + "properties", EndEffectorProperties, seen.append)
+    tool = EndEffectorProperties(id=131073, ui_type=EndEffectorProperties.PASSIVE_GRIPPER, product="pen")
+    wait_for(lambda: seen and seen[-1] == tool, DEADLINE_S, body=lambda: publisher.publish(tool))
+    subscriber.unregister()
+    publisher.unregister()
+
+
+class CustomTest(unittest.TestCase):
+    def test_arm_without_gripper_has_none(self):
+        with self.assertRaises(OSError) as caught:
+            Gripper("right")
+        self.assertEqual(caught.exception.errno, errno.ETIMEDOUT)
+        self.assertIn("no gripper on the right arm", caught.exception.strerror)
+
+    def test_custom_tool_is_what_the_client_says(self):
+        announce("left")
+        gripper = Gripper("left")
+        self.assertEqual((gripper.type(), gripper.hardware_id(), gripper.hardware_name()), ("custom", 131073, "pen"))
+        self.assertFalse(gripper.ready() or gripper.calibrated() or gripper.gripping())
+        self.assertIsNone(gripper.open())
+        state = EndEffectorState(id=131073, ready=1, gripping=1, position=30.0)
+        publisher = rospy.Publisher(TOPIC % "left" + "rsdk/set_state", EndEffectorState, queue_size=1)
+        wait_for(gripper.gripping, DEADLINE_S, body=lambda: publisher.publish(state))
+        self.assertEqual((gripper.ready(), gripper.position()), (True, 30.0))
+        self.assertIs(gripper.reset_custom_state(timeout=DEADLINE_S), True)
+        self.assertFalse(gripper.gripping())
+        self.assertIs(gripper.reset_custom_properties(timeout=DEADLINE_S), True)
+        self.assertEqual((gripper.type(), gripper.hardware_name()), ("custom", ""))
+
+
+if __name__ == "__main__":
+    init_node("custom_gripper_rostest")
+    rostest.rosrun("workspace_tests", "custom_gripper", "__main__")
