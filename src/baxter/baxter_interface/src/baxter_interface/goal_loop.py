@@ -2,7 +2,11 @@
 """One goal after the other for an action server whose work is a step, 20 times a second."""
 import threading
 import time
+import traceback
+from collections.abc import Callable
+from typing import NamedTuple
 
+import actionlib
 import rospy
 
 from baxter_dataflow.ros_clock import RosClock
@@ -14,81 +18,140 @@ RATE_HZ = 20.0
 # No goal ends sooner than this after it has come [s, wall]: actionlib's simple client loses track of a goal, and waits
 # for ever, when the end comes before its send_goal has returned.
 SHORTEST_GOAL_S = 0.05
+_LOOK_UP_S = 0.5
+
+
+class Work(NamedTuple):
+    """How one goal is carried out.
+
+    `step()` does what is to be done now and tells whether the goal is reached; `stop()` is called when it ends early
+    and the robot can still be commanded; `missed()` says how far it came; `make_result()` makes the result message;
+    `timeout_s` [s, ROS time], below 0 for none; `refusal` says why the goal is not begun, "" if it is.
+    """
+
+    step: Callable
+    stop: Callable
+    missed: Callable
+    make_result: Callable
+    timeout_s: float
+    refusal: str = ""
 
 
 class GoalLoop:
-    """Runs the goals of an actionlib.SimpleActionServer, and gives each exactly one end.
+    """Serves an action. Each goal ends exactly once; the newest goal preempts the one before.
 
-    Parameters: `server`; `robot`, a RobotEnable; `name`, for the log.
+    Parameters: `name` of the action and its class `action`; `robot`, a RobotEnable; `label`, for the log;
+    `begin(handle)`, called in the loop's thread, makes the Work for the goal of an actionlib handle.
+    (actionlib's own SimpleActionServer refuses every goal for a while after a simulation was restarted.)
     """
 
-    def __init__(self, server, robot, name):
-        self._server = server
+    def __init__(self, name, action, robot, label, begin):
         self._robot = robot
-        self._name = name
-        self._ending = False
-        self._begin_s = 0.0
-        self._idle = threading.Event()
-        self._idle.set()
+        self._label = label
+        self._begin = begin
+        self._lock = threading.Condition()
+        self._next = self._current = None
+        self._cancelled = self._ending = False
         self._presence = Presence(rospy.resolve_name("robot/state"), robot.silence_s)
-        self._clock = RosClock(gives_up=lambda: bool(self._trouble()) or self._server.is_preempt_requested())
+        self._clock = RosClock(gives_up=lambda: self._is_unwanted() or bool(self._trouble()))
+        self._thread = threading.Thread(target=self._run, name=label, daemon=True)
+        self._server = actionlib.ActionServer(name, action, self._on_goal, self._on_cancel, auto_start=False)
+        start(self._server)
+        self._thread.start()
 
-    def end(self, timeout_s=2.0):
+    def clean_shutdown(self, timeout_s=2.0):
         """End the goal, if there is one, and wait for that, `timeout_s` [s, wall] at most."""
-        self._ending = True
-        self._idle.wait(timeout_s)
+        with self._lock:
+            self._ending = True
+            self._lock.notify()
+        self._thread.join(timeout_s)
 
-    def run(self, step, timeout_s, make_result, refusal, stop, missed):
-        """Carry out one goal, in the server's execute callback.
+    # -- rospy's threads --------------------------------------------------------------------------------------------
 
-        Parameters: `step()` does what is to be done now and tells whether the goal is reached; `timeout_s` [s, ROS
-        time], below 0 for none; `make_result()` makes the result message; `refusal` says why the goal is not begun,
-        "" if it is; `stop()` is called when it ends early, with the robot enabled; `missed()` says how far it came.
-        """
-        self._idle.clear()
-        self._begin_s = time.monotonic()
-        try:
-            self._run(step, timeout_s, make_result, refusal, stop, missed)
-        finally:
-            self._idle.set()
+    def _on_goal(self, handle):
+        with self._lock:
+            if self._next is not None:
+                self._next.set_canceled(text="another goal came before this one was begun")
+            self._next = handle
+            self._lock.notify()
 
-    def _run(self, step, timeout_s, make_result, refusal, stop, missed):
-        why = refusal or self._trouble()
+    def _on_cancel(self, handle):
+        with self._lock:
+            if self._next is not None and self._next == handle:
+                self._next = None
+                handle.set_canceled(text="cancelled before it was begun")
+            elif self._current is not None and self._current == handle:
+                self._cancelled = True
+
+    # -- the loop's thread ------------------------------------------------------------------------------------------
+
+    def _run(self):
+        while not self._ending and not rospy.is_shutdown():
+            with self._lock:
+                self._lock.wait_for(lambda: self._next is not None or self._ending, _LOOK_UP_S)
+                if self._next is None:
+                    continue
+                self._current, self._next, self._cancelled = self._next, None, False
+            handle, begin_s = self._current, time.monotonic()
+            handle.set_accepted()
+            try:
+                end, result, text = self._carry_out(handle)
+            except Exception as error:
+                # A goal has an end, whatever happens.
+                rospy.logerr("%s: %s", self._label, traceback.format_exc())
+                end, result, text = handle.set_aborted, None, "the action server failed: %s" % error
+            time.sleep(max(0.0, begin_s + SHORTEST_GOAL_S - time.monotonic()))
+            with self._lock:
+                self._current = None
+            end(result, text)
+
+    def _carry_out(self, handle):
+        """Returns how the goal ends: the handle's method, the result, and a text."""
+        work = self._begin(handle)
+        why = work.refusal or self._trouble()
         watch, ticker = Stopwatch(self._clock.now()), Ticker(self._clock, RATE_HZ)
         while not why:
-            if self._server.is_preempt_requested():
-                stop()
-                self._server.set_preempted(make_result(), "preempted; %s" % missed())
-                return
-            if step():
-                self._wait_for_client()
-                self._server.set_succeeded(make_result())
-                return
+            if self._is_unwanted():
+                work.stop()
+                return handle.set_canceled, work.make_result(), "preempted; %s" % work.missed()
+            if work.step():
+                return handle.set_succeeded, work.make_result(), ""
             elapsed_s = watch.elapsed_s(self._clock.now())
-            if not is_unlimited(timeout_s) and elapsed_s >= timeout_s:
-                stop()
+            if not is_unlimited(work.timeout_s) and elapsed_s >= work.timeout_s:
+                work.stop()
                 why = "not reached after %.1f s" % elapsed_s
             else:
                 ticker.sleep()
                 why = self._trouble()
                 if self._ending:
-                    stop()
+                    work.stop()
             if why:
-                why = "%s; %s" % (why, missed())
-        rospy.logerr("%s: goal aborted: %s", self._name, why)
-        self._wait_for_client()
-        self._server.set_aborted(make_result(), why)
+                why = "%s; %s" % (why, work.missed())
+        rospy.logerr("%s: goal aborted: %s", self._label, why)
+        return handle.set_aborted, work.make_result(), why
 
-    def _wait_for_client(self):
-        time.sleep(max(0.0, self._begin_s + SHORTEST_GOAL_S - time.monotonic()))
+    def _is_unwanted(self):
+        return self._cancelled or self._next is not None
 
     def _trouble(self):
         """Why nothing can be moved now, "" if it can."""
-        state = self._robot.state()
         if self._ending or rospy.is_shutdown():
             return "the action server was shut down"
         if self._presence.is_gone():
             return "the robot was lost: nobody publishes its state any more"
+        state = self._robot.state()
         if state.stopped:
             return "the robot is stopped; reset and enable it: rosrun baxter_tools enable_robot.py -e"
         return "" if state.enabled else "the robot is not enabled: rosrun baxter_tools enable_robot.py -e"
+
+
+def start(server):
+    """Start an actionlib.ActionServer whose status goes on when simulated time goes back, as at a restart.
+
+    actionlib's own timer would end then, for good.
+    """
+    server.start()
+    if server.status_frequency > 0.0:
+        server.status_timer.shutdown()
+        server.status_timer = rospy.Timer(rospy.Duration(1.0 / server.status_frequency), server.publish_status_async,
+                                          reset=True)

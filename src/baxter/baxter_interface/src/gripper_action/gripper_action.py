@@ -3,13 +3,14 @@
 import errno
 import math
 
-import actionlib
 from control_msgs.msg import GripperCommandAction, GripperCommandFeedback, GripperCommandResult
 
 from baxter_interface import RobotEnable
-from baxter_interface.goal_loop import GoalLoop
+from baxter_interface.goal_loop import GoalLoop, Work
 from baxter_interface.gripper_types import OPEN, clip_percent
 
+# How many steps fingers that hold something are given to let go of it, before they count as stalled.
+STEPS_TO_BEGIN = 4
 # A cup sucks for this long where a goal has no time-out [s].
 LONG_SUCTION_S = 3600.0
 
@@ -29,20 +30,17 @@ class GripperActionServer:
     def __init__(self, gripper, reconfig_server):
         self._gripper = gripper
         self._config = reconfig_server
-        self._robot = RobotEnable()
         self._actions = {"electric": _Electric, "suction": _Suction}.get(gripper.type())
         if self._actions is None:
             raise OSError(errno.ENODEV, "%s is of type %s; this server moves electric and suction grippers"
                           % (gripper.name, gripper.type()))
         self._prepare()
-        self._server = actionlib.SimpleActionServer("robot/end_effector/%s/gripper_action" % gripper.name,
-                                                    GripperCommandAction, self._execute, auto_start=False)
-        self._loop = GoalLoop(self._server, self._robot, gripper.name)
-        self._server.start()
+        self._loop = GoalLoop("robot/end_effector/%s/gripper_action" % gripper.name, GripperCommandAction,
+                              RobotEnable(), gripper.name, self._begin)
 
     def clean_shutdown(self):
         """End the goal, if there is one."""
-        self._loop.end()
+        self._loop.clean_shutdown()
 
     def _prepare(self):
         if self._gripper.error():
@@ -55,8 +53,9 @@ class GripperActionServer:
                 raise OSError(errno.EIO, "%s could not be calibrated: is the robot enabled "
                               "(rosrun baxter_tools enable_robot.py -e)?" % self._gripper.name)
 
-    def _execute(self, goal):
-        position, effort = goal.command.position, goal.command.max_effort
+    def _begin(self, handle):
+        command = handle.get_goal().command
+        position, effort = command.position, command.max_effort
         settings = {name[len(self._gripper.name) + 1:]: value for name, value in self._config.config.items()
                     if name.startswith(self._gripper.name)}
         refusal = ""
@@ -67,17 +66,18 @@ class GripperActionServer:
 
         def step():
             result.position, result.effort, result.stalled, result.reached_goal = action.observe()
-            self._server.publish_feedback(GripperCommandFeedback(result.position, result.effort, result.stalled,
-                                                                 result.reached_goal))
+            handle.publish_feedback(GripperCommandFeedback(result.position, result.effort, result.stalled,
+                                                           result.reached_goal))
             if result.stalled or result.reached_goal:
                 return True
             action.push()
             return False
 
-        self._loop.run(
-            step, settings["timeout"], lambda: result, refusal, stop=lambda: self._gripper.stop(block=False),
+        return Work(
+            step, stop=lambda: self._gripper.stop(block=False),
             missed=lambda: "%s is at %.1f %%, its goal is %.1f %%" % (
-                self._gripper.name, self._gripper.position(), position))
+                self._gripper.name, self._gripper.position(), position),
+            make_result=lambda: result, timeout_s=settings["timeout"], refusal=refusal)
 
 
 def _effort(asked, default):
@@ -93,14 +93,18 @@ class _Electric:
         self._force = _effort(effort, settings["moving_force"])
         self._wanted = {"velocity": settings["velocity"], "moving_force": self._force,
                         "holding_force": settings["holding_force"], "dead_zone": self._dead_zone}
+        self._pushes = 0
 
     def observe(self):
         """(position [%], force [%], stalled, reached)."""
         position, force = self._gripper.position(), self._gripper.force()
-        return (position, force, force > self._force or self._gripper.gripping(),
-                abs(position - self._position) < self._dead_zone)
+        closes = self._position < position
+        held = force > self._force or (closes and self._gripper.gripping())
+        stalled = held and self._pushes >= STEPS_TO_BEGIN and not self._gripper.moving()
+        return position, force, stalled, abs(position - self._position) < self._dead_zone
 
     def push(self):
+        self._pushes += 1
         if {name: self._gripper.parameters().get(name) for name in self._wanted} != self._wanted:
             self._gripper.set_parameters(self._wanted)
         self._gripper.command_position(self._position, block=False)

@@ -2,12 +2,11 @@
 """The action server that turns the head: robot/head/head_action."""
 import math
 
-import actionlib
 import rospy
 from control_msgs.msg import SingleJointPositionAction, SingleJointPositionFeedback, SingleJointPositionResult
 
 from baxter_interface import Head, RobotEnable
-from baxter_interface.goal_loop import GoalLoop
+from baxter_interface.goal_loop import GoalLoop, Work
 from baxter_interface.joint_limits import read_joint_limits
 
 ACTION_NAME = "robot/head/head_action"
@@ -25,18 +24,15 @@ class HeadActionServer:
     def __init__(self, reconfig_server):
         self._config = reconfig_server
         self._head = Head()
-        self._robot = RobotEnable()
         self._limit = read_joint_limits(["head_pan"])["head_pan"]
-        self._server = actionlib.SimpleActionServer(ACTION_NAME, SingleJointPositionAction, self._execute,
-                                                    auto_start=False)
-        self._loop = GoalLoop(self._server, self._robot, "head")
-        self._server.start()
+        self._loop = GoalLoop(ACTION_NAME, SingleJointPositionAction, RobotEnable(), "head", self._begin)
 
     def clean_shutdown(self):
         """End the goal, if there is one."""
-        self._loop.end()
+        self._loop.clean_shutdown()
 
-    def _execute(self, goal):
+    def _begin(self, handle):
+        goal = handle.get_goal()
         tolerance, timeout_s = self._config.config["goal"], self._config.config["timeout"]
         last = [rospy.get_time(), self._head.pan()]
 
@@ -46,18 +42,18 @@ class HeadActionServer:
             last[:] = now_s, pan
             feedback = SingleJointPositionFeedback(position=pan, velocity=velocity, error=goal.position - pan)
             feedback.header.stamp = rospy.Time.from_sec(now_s)
-            self._server.publish_feedback(feedback)
+            handle.publish_feedback(feedback)
             if abs(goal.position - pan) < tolerance:
                 return True
             self._turn(goal.position, speed)
             return False
 
         speed = goal.max_velocity if 0.0 < goal.max_velocity <= 1.0 else 1.0
-        self._loop.run(
-            step, timeout_s, SingleJointPositionResult, self._refusal(goal),
-            stop=lambda: self._turn(self._head.pan(), 1.0),
+        return Work(
+            step, stop=lambda: self._turn(self._head.pan(), 1.0),
             missed=lambda: "the head is at %.4f rad, %.4f rad from its goal of %.4f rad (tolerance %g)" % (
-                self._head.pan(), goal.position - self._head.pan(), goal.position, tolerance))
+                self._head.pan(), goal.position - self._head.pan(), goal.position, tolerance),
+            make_result=SingleJointPositionResult, timeout_s=timeout_s, refusal=self._refusal(goal))
 
     def _refusal(self, goal):
         """Why a goal cannot be carried out, "" if it can."""

@@ -19,7 +19,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker
 from baxter_interface import Limb
-from baxter_interface.goal_loop import SHORTEST_GOAL_S
+from baxter_interface.goal_loop import SHORTEST_GOAL_S, start
 from baxter_interface.joint_limits import read_joint_limits
 from joint_trajectory import (
     AllPointsInPast,
@@ -88,7 +88,7 @@ class JointTrajectoryActionServer:
         self._server = actionlib.ActionServer(prefix + "follow_joint_trajectory", FollowJointTrajectoryAction,
                                               self._on_goal, self._on_cancel, auto_start=False)
         self._thread = threading.Thread(target=self._guarded, name="%s arm" % limb, daemon=True)
-        self._server.start()
+        start(self._server)
         self._thread.start()
 
     def robot_is_enabled(self):

@@ -4,6 +4,7 @@
 import os
 import signal
 import subprocess
+import threading
 import unittest
 
 import actionlib
@@ -27,6 +28,8 @@ NEUTRAL = [0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0]
 # The example trajectory of the robot's documentation, for the left arm, in less time.
 WAYPOINT = np.array([-0.11, -0.62, -1.15, 1.32, 0.80, 1.27, 2.39])
 MIRRORED = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+# Joint states are 10 to 30 ms old when they are compared with the trajectory, on a busy machine.
+MEAN_ERROR_RAD = {"position_w_id": 0.05, "position": 0.1, "velocity": 0.05}
 EXIT_TIMEOUT_S = 60.0
 
 
@@ -56,35 +59,35 @@ class ActionServersTest(unittest.TestCase):
         self.assertEqual((state, code), (GoalStatus.ABORTED, FollowJointTrajectoryResult.INVALID_GOAL))
         self.assertIn("s0 would have to move at", text)
 
-    def follow_with_both_arms(self, mode, allowed_rad):
-        end = self.serve("joint_trajectory_action_server.py", "--mode", mode)
-        clients = {side: TrajectoryClient(side) for side in SIDES}
+    def follow(self, modes):
+        """Move both arms at once; `modes`: mode by side."""
+        ends = [self.serve("joint_trajectory_action_server.py", "--mode", mode, "--limb", side)
+                for side, mode in modes.items()]
+        clients = {side: TrajectoryClient(side) for side in modes}
         for side, client in clients.items():
             self.limits_are_kept(client)
             waypoint = WAYPOINT if side == "left" else WAYPOINT * MIRRORED
             angles = Limb(side).joint_angles()
-            client.send([(0.0, [angles[name] for name in client.names]), (2.5, waypoint), (3.5, 0.75 * waypoint),
-                         (5.0, 1.25 * waypoint)])
+            client.send([(0.0, [angles[name] for name in client.names]), (2.0, waypoint), (2.8, 0.75 * waypoint),
+                         (4.0, 1.25 * waypoint)])
         for side, client in clients.items():
             self.assertEqual(client.end(), (GoalStatus.SUCCEEDED, 0, ""), side)
             errors = np.abs([message.error.positions for message in client.feedback]).max(axis=1)
-            times = np.array([message.header.stamp.to_sec() for message in client.feedback])
+            ticks_ms = 1e3 * np.diff([message.header.stamp.to_sec() for message in client.feedback])
             print("%s, %s arm: farthest off %.4f rad, in the mean %.4f rad, tick %.2f ms, its deviation %.2f ms" % (
-                mode, side, errors.max(), errors.mean(), 1e3 * np.diff(times).mean(), 1e3 * np.diff(times).std()))
-            self.assertLess(errors.mean(), allowed_rad, side)
-            client.send([(3.0, NEUTRAL)])
+                modes[side], side, errors.max(), errors.mean(), ticks_ms.mean(), ticks_ms.std()))
+            self.assertLess(errors.mean(), MEAN_ERROR_RAD[modes[side]], side)
+            client.send([(2.5, NEUTRAL)])
         for client in clients.values():
             self.assertEqual(client.end()[0], GoalStatus.SUCCEEDED)
-        end()
+        for end in ends:
+            end()
 
-    def test_trajectories_with_dynamics(self):
-        self.follow_with_both_arms("position_w_id", 0.02)
+    def test_trajectories_as_raw_positions_and_velocities(self):
+        self.follow({"left": "position_w_id", "right": "velocity"})
 
-    def test_trajectories_in_position_mode(self):
-        self.follow_with_both_arms("position", 0.1)
-
-    def test_trajectories_in_velocity_mode(self):
-        self.follow_with_both_arms("velocity", 0.1)
+    def test_trajectories_as_positions_and_raw_positions(self):
+        self.follow({"left": "position", "right": "position_w_id"})
 
     def test_grippers(self):
         end = self.serve("gripper_action_server.py")
@@ -122,10 +125,13 @@ class ActionServersTest(unittest.TestCase):
         state, text = go(3.0, 1.0)
         self.assertEqual(state, GoalStatus.ABORTED)
         self.assertEqual(text, "the head turns from -1.5708 to 1.5708 rad, not to 3.0000 rad")
-        client.send_goal(SingleJointPositionGoal(position=1.57, max_velocity=0.01))
+        begun = threading.Event()
+        client.send_goal(SingleJointPositionGoal(position=1.57, max_velocity=0.01),
+                         feedback_cb=lambda feedback: begun.set())
+        self.assertTrue(begun.wait(DEADLINE_S), "no feedback")
         client.cancel_goal()
         self.assertTrue(client.wait_for_result(rospy.Duration(DEADLINE_S)))
-        self.assertIn(client.get_state(), (GoalStatus.PREEMPTED, GoalStatus.RECALLED))
+        self.assertEqual(client.get_state(), GoalStatus.PREEMPTED)
         self.robot.disable()
         self.addCleanup(self.robot.enable)
         state, text = go(0.0, 1.0)

@@ -3,7 +3,7 @@
 import pytest
 
 from baxter_interface import parameter_tables
-from gripper_action.gripper_action import LONG_SUCTION_S, _Electric, _Suction
+from gripper_action.gripper_action import LONG_SUCTION_S, STEPS_TO_BEGIN, _Electric, _Suction
 
 SETTINGS = {parameter.name[len("left_gripper_"):]: parameter.default for parameter in parameter_tables.GRIPPER
             if parameter.name.startswith("left_gripper_")}
@@ -11,8 +11,8 @@ SETTINGS = {parameter.name[len("left_gripper_"):]: parameter.default for paramet
 
 class FakeGripper:
     def __init__(self, **readings):
-        self.readings = {"position": 0.0, "force": 0.0, "gripping": False, "sucking": False, "blowing": False,
-                         "vacuum_sensor": 0.0, **readings}
+        flags = ("gripping", "moving", "sucking", "blowing")
+        self.readings = {"position": 0.0, "force": 0.0, "vacuum_sensor": 0.0, **dict.fromkeys(flags, False), **readings}
         self.sent = []
         self.told = {}
 
@@ -55,11 +55,20 @@ def test_electric_is_configured_once_and_commanded_each_time():
     ({"position": 30.0, "force": 10.0}, False, False),
     ({"position": 52.0}, False, True),
     ({"position": 30.0, "force": 41.0}, True, False),
-    ({"position": 30.0, "gripping": True}, True, False),
+    ({"position": 70.0, "gripping": True}, True, False),
+    ({"position": 70.0, "gripping": True, "moving": True}, False, False),
+    ({"position": 30.0, "gripping": True}, False, False),  # It opens, and has not let go yet.
 ])
 def test_electric_ends_at_the_position_or_stalled(readings, stalled, reached):
     action = _Electric(FakeGripper(**readings), SETTINGS, 50.0, 0.0)
+    for _ in range(STEPS_TO_BEGIN):
+        action.push()
     assert action.observe()[2:] == (stalled, reached)
+
+
+def test_electric_that_holds_something_is_not_stalled_before_it_was_told_to_move():
+    action = _Electric(FakeGripper(position=70.0, force=90.0, gripping=True), SETTINGS, 50.0, 0.0)
+    assert action.observe()[2:] == (False, False)
 
 
 def test_suction_sucks_until_it_holds():
