@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that share a robot's joints: what they are, and who may run. ROS-free.
 
-Only ``services``, ``controller_manager_interface`` and ``controller_lifetime`` know ROS.
+Only ``pid_tuning``, ``services``, ``controller_manager_interface`` and ``controller_lifetime`` know ROS.
 """
 from .controller import Controller, ControllerContext
 from .controller_table import ControllerTable

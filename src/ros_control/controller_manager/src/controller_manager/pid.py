@@ -60,11 +60,34 @@ class Gains:
 class Pid:
     """One PID per joint. The output is p e + i-term + d de/dt.
 
+    ``last_error``, ``last_error_dot``, ``integral``: arrays (k,) of the last update.
     Without antiwindup the i-term i * (integral of e) is clamped to [i_min, i_max]; with it, the integral itself is.
     """
 
     def __init__(self, gains):
         """``gains``: :class:`Gains` of k joints."""
+        self.integral = np.zeros(len(gains.p))
+        self.last_error = np.zeros(len(gains.p))
+        self.last_error_dot = np.zeros(len(gains.p))
+        self._take(gains)
+
+    def change(self, k, p, i, d, i_min, i_max, antiwindup):
+        """Other gains for joint ``k`` from now on; its past stays. Raises :class:`ControllerError`."""
+        if i_min > i_max:
+            raise ControllerError("the lower end of the integral term, %g, is above its upper end, %g" % (i_min, i_max))
+        gains = Gains.joined([self.gains])
+        gains.p[k], gains.i[k], gains.d[k], gains.i_min[k], gains.i_max[k] = p, i, d, i_min, i_max
+        gains.antiwindup[k] = antiwindup
+        self._take(gains)
+
+    def terms(self, k):
+        """(proportional, integral, derivative) parts of the last output of joint ``k``, before it was set to 0 for
+        an error that is not finite."""
+        gains = self.gains
+        integral = min(max(gains.i[k] * self.integral[k], gains.i_min[k]), gains.i_max[k])
+        return gains.p[k] * self.last_error[k], integral, gains.d[k] * self.last_error_dot[k]
+
+    def _take(self, gains):
         self.gains = gains
         self._bounded = gains.antiwindup & (gains.i != 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -73,13 +96,12 @@ class Pid:
         self._low, self._high = np.minimum(*ends), np.maximum(*ends)
         self._low[~self._bounded], self._high[~self._bounded] = -np.inf, np.inf
         self._any_integral = bool(gains.i.any())
-        self.integral = np.zeros(len(gains.p))
-        self.last_error = np.zeros(len(gains.p))
 
     def reset(self, index=slice(None)):
         """Forget the past, of all joints or of those in ``index``. The error before the first update counts as 0."""
         self.integral[index] = 0.0
         self.last_error[index] = 0.0
+        self.last_error_dot[index] = 0.0
 
     def update(self, error, dt, error_dot=None):
         """Output (k,) for ``error`` (k,); ``error_dot`` (k,) is differentiated from the errors when not given.
@@ -106,7 +128,8 @@ class Pid:
             np.minimum(self.integral, self._high, out=self.integral)
             output += np.minimum(np.maximum(gains.i * self.integral, gains.i_min), gains.i_max)
         if every:
-            self.last_error = np.array(error)
+            self.last_error, self.last_error_dot = np.array(error), np.array(error_dot)
             return output
         self.last_error = np.where(finite, error, self.last_error)
+        self.last_error_dot = np.where(finite, error_dot, self.last_error_dot)
         return np.where(finite, output, 0.0)

@@ -64,6 +64,19 @@ def test_reset_forgets():
     assert run(controller, [1.0, 2.0]) == first
 
 
+def test_gains_change_in_flight_and_the_past_stays():
+    controller = Pid(Gains([1.0, 1.0], [1.0, 1.0], [0.0, 0.0], [-9, -9], [9, 9], [False, False]))
+    controller.update(np.array([1.0, 1.0]), 0.1)
+    before = controller.gains
+    controller.change(1, 2.0, 3.0, 4.0, -0.5, 0.5, False)
+    assert controller.update(np.array([1.0, 2.0]), 0.1) == pytest.approx([1.2, 4.0 + 0.5 + 40.0])
+    assert controller.terms(1) == pytest.approx((4.0, 0.5, 40.0))
+    assert before.p.tolist() == [1.0, 1.0], "nobody else's arrays are written"
+    with pytest.raises(ControllerError, match="lower end of the integral term, 2, is above its upper end, 1"):
+        controller.change(0, 1.0, 0.0, 0.0, 2.0, 1.0, False)
+    assert controller.gains.i_max.tolist() == [9.0, 0.5]
+
+
 def gains(**values):
     context, _ = fake_context("arm", {"pid": values})
     return Gains.from_params(context.entry, ["pid"])

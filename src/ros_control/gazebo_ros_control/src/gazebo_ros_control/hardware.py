@@ -99,6 +99,12 @@ class SimulatedHardware(RobotHardware):
         elif not stopped:
             self._frozen = None
 
+    @property
+    def pids(self):
+        """List of (:class:`controller_manager.pid.Pid`, its joints' names) of the joints that are driven by one."""
+        return [(group.pid, [self.joint_names[i] for i in group.index]) for group in self._groups
+                if isinstance(group, _PidGroup)]
+
     # -- inside -------------------------------------------------------------------------------------------------
 
     @staticmethod
@@ -180,11 +186,11 @@ class _EffortGroup(_Group):
 class _PidGroup(_Group):
     def __init__(self, hardware, interface, index, model_index, limiter, effort, gains):
         super().__init__(hardware, interface, index, model_index, limiter, effort)
-        self._pid = Pid(gains)
+        self.pid = Pid(gains)
 
     def reset(self):
         super().reset()
-        self._pid.reset()
+        self.pid.reset()
 
     def drive(self, command, position, velocity, dt):
         if self.interface == POSITION:
@@ -194,7 +200,7 @@ class _PidGroup(_Group):
                 error = np.where(around, np.remainder(error + math.pi, 2.0 * math.pi) - math.pi, error)
         else:
             error = command - velocity
-        effort = self._pid.update(error, dt)
+        effort = self.pid.update(error, dt)
         self._model.drive_effort(self._model_index, np.minimum(np.maximum(effort, -self._effort), self._effort))
 
 

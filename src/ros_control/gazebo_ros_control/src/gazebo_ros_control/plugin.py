@@ -10,6 +10,7 @@ from std_msgs.msg import Bool
 
 from controller_manager import ControlError, ControllerTable
 from controller_manager.manager import ControllerManager
+from controller_manager.pid_tuning import TunablePids
 from controller_manager.services import ControllerManagerServices
 from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros_control.hardware import SimulatedHardware
@@ -18,6 +19,10 @@ from urdf_model import UrdfError, parse_urdf
 DEFAULT_SIM_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
 #: Private parameter of /gazebo: a mapping of controller type to "module:Class" that adds to ros_controllers' table.
 MORE_TYPES = "~controller_types"
+
+
+#: Where the gains of joints that the simulator drives by a PID stand, below the robot's namespace.
+PID_GAINS = "gazebo_ros_control/pid_gains"
 
 
 class GazeboRosControl(ModelPlugin):
@@ -44,10 +49,12 @@ class GazeboRosControl(ModelPlugin):
                              % (context.model.name, sim_type, DEFAULT_SIM_TYPE))
         hardware = SimulatedHardware(
             context.model, robot, urdf_xml, context.param("joint_limits"),
-            context.param("gazebo_ros_control/pid_gains"), context.namespace, context.log)
+            context.param(PID_GAINS), context.namespace, context.log)
         if not hardware.joint_names:
             context.log.warn("model '%s': its description has no <transmission>, so no joint can be controlled"
                              % context.model.name)
+        for pid, joints in hardware.pids:
+            TunablePids(context, pid, ["%s/%s" % (PID_GAINS, joint) for joint in joints])
         self._manager = ControllerManager(hardware, context.log)
         self._last_update_s = None
         self._restart = False

@@ -6,6 +6,7 @@ import numpy as np
 from control_msgs.msg import GripperCommandAction, GripperCommandResult
 
 from controller_manager import EFFORT, POSITION, Controller, Gains, Pid
+from controller_manager.pid_tuning import TunablePids
 from ros_controllers.action_server import ActionServer
 
 
@@ -115,7 +116,9 @@ class EffortGripperActionController(GripperController):
 
     def __init__(self, name, hardware, context):
         super().__init__(name, hardware, context)
-        self._pid = Pid(Gains.from_params(context.entry, ["gains/" + self.joint]))
+        names = ["gains/" + self.joint]
+        self._pid = Pid(Gains.from_params(context.entry, names))
+        self._tuning = TunablePids.of_controller(context, self._pid, names)
 
     def starting(self, time_s):
         super().starting(time_s)
@@ -124,4 +127,5 @@ class EffortGripperActionController(GripperController):
     def _drive(self, dt):
         error = self._target - self.hardware.position[self.index]
         effort = self._pid.update(error, dt, -self.hardware.velocity[self.index])
+        self._tuning.publish(self._time_s, dt, effort)
         self.hardware.command[EFFORT][self.index] = np.clip(effort, -self._max_effort, self._max_effort)

@@ -17,6 +17,7 @@ from control_msgs.srv import QueryTrajectoryState, QueryTrajectoryStateResponse
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from controller_manager import EFFORT, POSITION, VELOCITY, Controller, ControllerError, Gains, Pid
+from controller_manager.pid_tuning import TunablePids
 from joint_trajectory import (
     Command,
     Follower,
@@ -288,10 +289,12 @@ class PositionJointTrajectoryController(JointTrajectoryController):
 
 class _PidTrajectoryController(JointTrajectoryController):
     """Command = ``velocity_ff/<joint>`` * desired velocity + PID(position error, velocity error), the PID of each joint
-    in ``gains/<joint>``."""
+    in ``gains/<joint>``, where it can be tuned at run time."""
 
     def _make_adapter(self):
-        self._pid = Pid(Gains.from_params(self.context.entry, ["gains/%s" % joint for joint in self._joints]))
+        names = ["gains/%s" % joint for joint in self._joints]
+        self._pid = Pid(Gains.from_params(self.context.entry, names))
+        self._tuning = TunablePids.of_controller(self.context, self._pid, names)
         self._velocity_ff = np.array([self.context.number("velocity_ff/%s" % joint, 0.0) for joint in self._joints])
 
     def _start_adapter(self):
@@ -300,8 +303,9 @@ class _PidTrajectoryController(JointTrajectoryController):
 
     def _write(self, dt):
         error = self._follower.error
-        self.hardware.command[self.interface][self._index] = (
-            self._velocity_ff * self._next[1] + self._pid.update(error[0], dt, error[1]))
+        output = self._pid.update(error[0], dt, error[1])
+        self._tuning.publish(self._time_s, dt, output)
+        self.hardware.command[self.interface][self._index] = self._velocity_ff * self._next[1] + output
 
 
 class VelocityJointTrajectoryController(_PidTrajectoryController):

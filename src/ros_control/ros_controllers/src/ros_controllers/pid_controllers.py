@@ -7,6 +7,7 @@ from control_msgs.msg import JointControllerState
 from std_msgs.msg import Float64, Float64MultiArray
 
 from controller_manager import EFFORT, VELOCITY, Controller, ControllerError, Gains, Pid
+from controller_manager.pid_tuning import TunablePids
 from ros_controllers.convert import stamp
 
 # A state message goes out with every tenth update.
@@ -17,6 +18,7 @@ class PidController(Controller):
     """Base of the classes below: k joints, each with a PID from the error to a command of ``interface``.
 
     The command topic carries one value per joint; what is not finite or of the wrong length is reported and left out.
+    The gains can be tuned at run time (:mod:`controller_manager.pid_tuning`).
     Subclasses say how an error is made of command and state, and what the command is at the start.
     """
 
@@ -27,6 +29,7 @@ class PidController(Controller):
         self.joints, gain_names = self._read_joints()
         self.index = self.claim(self.interface, self.joints)
         self.pid = Pid(Gains.from_params(context.entry, gain_names))
+        self._tuning = TunablePids.of_controller(context, self.pid, gain_names)
         self._read_limits()
         self._command = np.zeros(len(self.joints))
         self._inbox = context.mailbox("command", self.msg_class)
@@ -43,6 +46,7 @@ class PidController(Controller):
         error = self._error()
         output = self.pid.update(error, dt)
         self.hardware.command[self.interface][self.index] = output
+        self._tuning.publish(time_s, dt, output)
         self._after(time_s, dt, error, output)
 
     def _accept(self, message):

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Settings that can be changed at run time, over the topics and the service of dynamic_reconfigure.
+
+Nothing here waits and nothing starts a thread: requests are answered in the loop's thread, messages go out through
+publishers that do not block.
+"""
+import math
+from dataclasses import dataclass
+
+import rospy
+from dynamic_reconfigure.msg import (
+    BoolParameter,
+    Config,
+    ConfigDescription,
+    DoubleParameter,
+    Group,
+    GroupState,
+    IntParameter,
+    ParamDescription,
+)
+from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
+
+__all__ = ["Setting", "SettingsServer"]
+
+# Type of a value -> name of the type, its list in Config, its message.
+_KINDS = {bool: ("bool", "bools", BoolParameter), int: ("int", "ints", IntParameter),
+          float: ("double", "doubles", DoubleParameter)}
+# All settings stand in one group.
+_GROUP = "Default"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One number or switch: its ``value`` at the start decides which (bool, int or float).
+
+    ``low``, ``high``: the range of a number. ``meaning``: in words, with the unit.
+    """
+
+    name: str
+    value: bool | int | float
+    low: bool | int | float = False
+    high: bool | int | float = True
+    meaning: str = ""
+
+    @property
+    def kind(self):
+        return type(self.value)
+
+    def checked(self, value):
+        """``value`` within the range; raises ``ValueError`` where it is not finite."""
+        if not math.isfinite(value):
+            raise ValueError("%s is %s, expected a finite number" % (self.name, value))
+        return value if self.kind is bool else min(max(value, self.low), self.high)
+
+
+class SettingsServer:
+    """Serves the settings of one name. Every method belongs to the loop's thread."""
+
+    def __init__(self, topics, name, settings, apply):
+        """Open ``<name>/set_parameters``, ``<name>/parameter_descriptions`` and ``<name>/parameter_updates``.
+
+        ``topics`` makes them: ``publisher(topic, msg_class, latch)`` and ``service(name, srv_class, handler)``, such as
+        a ``PluginContext``. ``settings``: list of :class:`Setting`. ``apply(values)`` gets {name: value} of all of
+        them when a client changes some; ``ValueError`` refuses.
+        """
+        self._name = name
+        self._settings = {setting.name: setting for setting in settings}
+        self._apply = apply
+        self.values = {setting.name: setting.value for setting in settings}
+        self._updates = topics.publisher(name + "/parameter_updates", Config, latch=True)
+        topics.publisher(name + "/parameter_descriptions", ConfigDescription, latch=True).publish(self._description())
+        topics.service(name + "/set_parameters", Reconfigure, self._answer)
+        self._updates.publish(self._config(self.values))
+
+    def show(self, **values):
+        """Tell clients of values that have changed for another reason."""
+        if any(self.values[name] != value for name, value in values.items()):
+            self.values.update(values)
+            self._updates.publish(self._config(self.values))
+
+    # -- inside -------------------------------------------------------------------------------------------------
+
+    def _answer(self, request):
+        values = dict(self.values)
+        try:
+            for kind, (_, field, _) in _KINDS.items():
+                for entry in getattr(request.config, field):
+                    values[entry.name] = self._setting(entry.name, kind).checked(entry.value)
+            for entry in request.config.strs:
+                self._setting(entry.name, str)
+            self._apply(dict(values))
+        except ValueError as error:
+            raise rospy.ServiceException("%s: %s" % (self._name, error)) from error
+        self.show(**values)
+        return ReconfigureResponse(self._config(self.values))
+
+    def _setting(self, name, kind):
+        setting = self._settings.get(name)
+        if setting is None:
+            raise ValueError("there is no setting '%s'; settings: %s" % (name, ", ".join(self._settings)))
+        if setting.kind is not kind:
+            raise ValueError("%s is a %s, not a %s" % (name, _KINDS[setting.kind][0], _KINDS.get(kind, ("str",))[0]))
+        return setting
+
+    def _config(self, values):
+        config = Config(groups=[GroupState(_GROUP, True, 0, 0)])
+        for name, value in values.items():
+            _, field, message = _KINDS[self._settings[name].kind]
+            getattr(config, field).append(message(name, value))
+        return config
+
+    def _description(self):
+        settings = self._settings.values()
+        parameters = [ParamDescription(setting.name, _KINDS[setting.kind][0], 0, setting.meaning, "")
+                      for setting in settings]
+        return ConfigDescription([Group(_GROUP, "", parameters, 0, 0)], *(
+            self._config({setting.name: getattr(setting, what) for setting in settings})
+            for what in ("high", "low", "value")))
