@@ -9,6 +9,7 @@ from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.gripper import ElectricGripper
 from baxter_sim_hardware.gripper_commands import CustomGripper
 from baxter_sim_hardware.hands import NoHand, hand_of
+from baxter_sim_hardware.panel import VACUUM_SENSORS
 from baxter_sim_hardware.sides import SIDES
 from baxter_sim_hardware.suction import SuctionGripper
 
@@ -58,9 +59,12 @@ class GripperTopics:
         for hand in self._hands.values():
             hand.reset()
 
-    def vacuum_sensor(self, side):
-        """What the vacuum sensor of one arm counts, 0 to 255."""
-        return getattr(self._hands[side].gripper, "sensor", 0)
+    def attach_sensors(self, panel):
+        """Show the vacuum sensors, 0 to 255, among the panel's channels."""
+        for side, name in VACUUM_SENSORS.items():
+            gripper = self._hands[side].gripper
+            if isinstance(gripper, SuctionGripper):
+                panel.attach(name, lambda gripper=gripper: gripper.sensor)
 
     def _command(self, side, msg, time_s):
         gripper = self._hands[side].gripper

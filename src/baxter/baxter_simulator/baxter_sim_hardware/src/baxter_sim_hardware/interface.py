@@ -55,7 +55,8 @@ TOPICS = (
     Topic("digital_io_states", "digital_io_states", "baxter_core_msgs/DigitalIOStates", STATE_RATE_HZ,
           "all of them"),
     Topic("analog_io", "analog_io/{analog}/state", "baxter_core_msgs/AnalogIOState", STATE_RATE_HZ,
-          "one wheel (0 to 255, wraps), or the integer that `torso_fan`, `torso_lighting` were told"),
+          "one wheel (0 to 255, wraps), one vacuum sensor (0 to 255), or the integer that `torso_fan`, "
+          "`torso_lighting` were told"),
     Topic("analog_io_uint32", "analog_io/{analog}/value_uint32", "std_msgs/UInt32", STATE_RATE_HZ,
           "the same value"),
     Topic("analog_io_states", "analog_io_states", "baxter_core_msgs/AnalogIOStates", STATE_RATE_HZ,

@@ -2,8 +2,7 @@
 """Buttons, lights, wheels and the other single channels of the robot, and what writes to them.
 
 The names are the physical robot's. Documents leave open which of the torso's channels can be written; here what its
-name calls a sensor, an input or a switch is an input. Hand range and vacuum sensors belong to what they measure and
-are not listed here.
+name calls a sensor, an input or a switch is an input. Sensors belong to what they measure, which attaches them.
 """
 from .errors import CommandRefused
 from .sides import SIDES
@@ -29,7 +28,8 @@ DIGITAL = {
                      "limit_switch_3", "motor_fault_signal"), True),
 }
 WHEELS = tuple("%s_wheel" % navigator for navigator in NAVIGATORS)
-ANALOG = {**dict.fromkeys(WHEELS, True), "torso_fan": False, "torso_lighting": False}
+VACUUM_SENSORS = {side: "%s_vacuum_sensor_analog" % side for side in SIDES}
+ANALOG = {**dict.fromkeys((*WHEELS, *VACUUM_SENSORS.values()), True), "torso_fan": False, "torso_lighting": False}
 
 
 def navigator_name(navigator):
@@ -41,7 +41,16 @@ class Panel:
     """The present value of every channel: `digital` {name: bool}, `analog` {name: int}; all zero at the start."""
 
     def __init__(self):
+        self._sensors = {}
         self.reset()
+
+    def attach(self, name, read):
+        """Have an analog input show what `read()` returns, an integer from 0."""
+        self._sensors[name] = read
+
+    def read_analog(self, name):
+        """The present integer of an analog channel."""
+        return self._sensors[name]() if name in self._sensors else self.analog[name]
 
     def reset(self):
         """Everything released, dark and at zero."""

@@ -25,12 +25,13 @@ class PanelTopics:
     def __init__(self, context):
         self._panel = Panel()
         self.reset = self._panel.reset
+        self.attach = self._panel.attach
         self.makers = {
             "digital_io": lambda time_s, name, _: self._digital(name),
             "digital_io_states": lambda time_s, part, _: DigitalIOStates(
                 list(DIGITAL), [self._digital(name) for name in DIGITAL]),
             "analog_io": lambda time_s, name, _: self._analog(name, time_s),
-            "analog_io_uint32": lambda time_s, name, _: UInt32(self._panel.analog[name]),
+            "analog_io_uint32": lambda time_s, name, _: UInt32(self._panel.read_analog(name)),
             "analog_io_states": lambda time_s, part, _: AnalogIOStates(
                 list(ANALOG), [self._analog(name, time_s) for name in ANALOG]),
             "navigator": lambda time_s, navigator, _: self._navigator(navigator),
@@ -48,7 +49,7 @@ class PanelTopics:
         return DigitalIOState(int(self._panel.digital[name]), DIGITAL[name])
 
     def _analog(self, name, time_s):
-        return AnalogIOState(stamp(time_s), float(self._panel.analog[name]), ANALOG[name])
+        return AnalogIOState(stamp(time_s), float(self._panel.read_analog(name)), ANALOG[name])
 
     def _navigator(self, navigator):
         buttons, wheel, lights = self._panel.navigator(navigator)

@@ -41,6 +41,7 @@ class BaxterPlugin(ModelPlugin):
         except HardwareError as error:
             raise PluginError("cannot be Baxter's brain for model '%s': %s" % (context.model.name, error)) from error
         self._panel = PanelTopics(context)
+        self._grippers.attach_sensors(self._panel)
         self._open_topics(context)
 
     def _build(self, context):

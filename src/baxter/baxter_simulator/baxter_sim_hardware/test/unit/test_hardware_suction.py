@@ -126,6 +126,8 @@ def test_holds_what_covers_the_cup_and_nothing_else(lab, gap, aside, holds):
     assert (state(lab).gripping, details(lab)["vacuum"]) == (int(holds), holds)
     if holds:
         assert details(lab)["vacuum sensor"] > 250
+        analog = lab.last("analog_io/left_vacuum_sensor_analog/state")
+        assert (analog.value, analog.isInputOnly) == (pytest.approx(255.0, abs=2.0), True)
         assert distance(lab, box) == pytest.approx(0.0, abs=1e-3)
     else:
         assert distance(lab, box) > 0.1
