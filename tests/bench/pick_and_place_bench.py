@@ -100,9 +100,16 @@ def world_pose(spot):
     return Pose((spot.x, spot.y, spot.z + BASE_HEIGHT_M), turn)
 
 
-def run(lab_class, robot, table, seed):
+def load_scene():
+    """(robot, table) as urdf_model.Robot."""
+    file = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
+    table = ModelFolders(model_folders()).find("model://cafe_table")
+    return (parse_urdf(xacro.process_file(file).toxml(), source=file),
+            parse_sdf_model(table.read_text(), str(table)).robot)
+
+
+def run(lab_class, robot, table, trial):
     """One trial. Returns (simulated seconds, distance from the target [m]); raises Failure, BlockLost, NoSolution."""
-    trial = Trial.from_seed(seed)
     lab = lab_class(robot, pose="untucked", parameters={"enable": True}, meshes=True)
     try:
         for topic, outbox in lab.outboxes.items():
@@ -135,16 +142,13 @@ def main():
     parser.add_argument("--seeds", type=int, default=100, help="how many (default: %(default)s)")
     parser.add_argument("--first", type=int, default=0, help="the first one (default: %(default)s)")
     arguments = parser.parse_args()
-    file = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
-    robot = parse_urdf(xacro.process_file(file).toxml(), source=file)
-    table = ModelFolders(model_folders()).find("model://cafe_table")
-    table = parse_sdf_model(table.read_text(), str(table)).robot
+    robot, table = load_scene()
     lab_class = load_lab()
     succeeded, simulated, misses = 0, 0.0, []
     begin, begin_cpu = time.monotonic(), time.process_time()
     for seed in range(arguments.first, arguments.first + arguments.seeds):
         try:
-            seconds, miss = run(lab_class, robot, table, seed)
+            seconds, miss = run(lab_class, robot, table, Trial.from_seed(seed))
         except (Failure, BlockLost, NoSolution) as failure:
             print("seed %d failed: %s" % (seed, failure), flush=True)
             continue
