@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """What the controllers of 18 joints cost in a tick, beside the physics step of the same world.
 
@@ -6,7 +5,6 @@ A tick is what libgazebo_ros_control.so does in one: read the joints, update thr
 the joint states, enforce the limits, drive the joints. All figures of one run on one machine, so that ratios mean
 something.
 """
-import argparse
 import statistics
 import time
 from pathlib import Path
@@ -74,7 +72,7 @@ def median_us(times):
     return statistics.median(times) * 1e6
 
 
-def measure(table, interface, kind, gains, ticks):
+def measure_kind(table, interface, kind, gains, ticks):
     """Median times [us] of (read, update, limits and drives, physics step)."""
     xml, arms = description(interface)
     robot = parse_urdf(xml)
@@ -116,26 +114,10 @@ def measure(table, interface, kind, gains, ticks):
     return [median_us(times) for times in parts]
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--ticks", type=int, default=5000, help="ticks to time, each way (default %(default)s)")
-    arguments = parser.parse_args()
+def measure(report, quick, number):
     path = Path(rospkg.RosPack().get_path("ros_controllers"), "config", "controllers.yaml")
     table = ControllerTable(yaml.safe_load(path.read_text()))
-    print("%d controllers of %d joints, on the way, and joint states [us, median of %d ticks]"
-          % (GROUPS, PER_GROUP, arguments.ticks))
-    print("%-12s %8s %8s %8s %10s %14s" % ("interface", "read", "update", "write", "control", "PyBullet step"))
-    slow = []
     for label, (interface, kind, gains) in KINDS.items():
-        read, update, write, step = measure(table, interface, kind, gains, arguments.ticks)
-        total = read + update + write
-        print("%-12s %8.1f %8.1f %8.1f %10.1f %14.1f" % (label, read, update, write, total, step))
-        if total > LIMIT_MS * 1e3:
-            slow.append(label)
-    print("a control tick should take less than %.0f us: %s" % (LIMIT_MS * 1e3, "too slow: " + ", ".join(slow) if slow
-                                                               else "yes"))
-    return 1 if slow else 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+        read, update, write, step = measure_kind(table, interface, kind, gains, 2500 if quick else 5000)
+        report.add("%s: read, update, write" % label, read + update + write, "us", ("physics step", step),
+                   most=1e3 * LIMIT_MS)

@@ -1,29 +1,35 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics on random reachable poses: ours beside TRAC-IK, in one run on one machine, with ratios.
+"""Inverse kinematics on random reachable poses: ours beside TRAC-IK and KDL, to 1e-5 m and rad from mid-range.
 
-    ./baxter.sh sim tests/bench/ik_bench.py [--poses 10000] [--side left] [--urdf FILE]
-
-Every pose is the forward kinematics of a posture drawn evenly between the limits; both start at mid-range. A pose
-counts as solved when our forward kinematics confirms it to 2e-5 m and 2e-5 rad inside the limits. TRAC-IK is optional:
-`pip install pytracik` into the workspace's .venv; it gets its usual limit of 5 ms a pose.
+Every pose is the forward kinematics of a posture drawn evenly between the limits. A pose counts as solved when our
+forward kinematics confirms it to 2e-5 m and 2e-5 rad inside the limits. TRAC-IK gets its usual limit of 5 ms a pose,
+and KDL with restarts as much. Five rounds make 10,000 poses of each arm.
 """
-import argparse
-import sys
+import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
+import PyKDL
+from arms import arms, fill, kdl_chain
 
-from baxter_sim_kinematics import Chain, NoSolution, solve, warm_up
-from urdf_model import parse_urdf
+from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
+from baxter_sim_kinematics import NoSolution, solve, solve_batch, warm_up
+from baxter_sim_kinematics.bullet_checker import BulletChecker
+from gazebo_ros.resources import ResourceFinder
 from urdf_model.transforms import rotation_angle
 
-TOLERANCE = 1e-5  # m and rad, as TRAC-IK's own tables use; each of the six components
-CONFIRMED = 2e-5  # the length of three such components, and a little
+POSES = 2000
+KDL_POSES = 500  # of those: KDL takes milliseconds for each that it does not find
+TOLERANCE = 1e-5
+CONFIRMED = 2e-5
+# KDL weighs a radian as a hundredth of a metre, so this is 1e-5 of either.
+KDL_TOLERANCE = 0.01 * TOLERANCE
 LIMIT_SLACK = 1e-6  # rad; pytracik keeps limits in single precision
-TRAC_IK_LIMIT_S = 0.005
-MODEL = Path(__file__).resolve().parents[2] / "src/baxter/baxter_common/baxter_description/urdf/baxter.urdf"
+LIMIT_S = 0.005
+TRAC = "TRAC-IK"
+# As far as a hand moves between two commands at 50 Hz [rad].
+SERVO_STEP = 0.02
 
 
 def confirmed(chain, q, target):
@@ -34,69 +40,148 @@ def confirmed(chain, q, target):
             and rotation_angle(tip[:3, :3].T @ target[:3, :3]) <= CONFIRMED)
 
 
-def measure(name, chain, targets, answer):
-    """Time ``answer(target)`` -> q or None over all targets; print and return (share solved, mean time [ms])."""
+def timed(chain, targets, seeds, answer):
+    """Return (share solved [%], times [ms]) of ``answer(target, seed)`` -> q or None."""
     times, solved = [], 0
-    for target in targets:
+    for target, seed in zip(targets, seeds, strict=True):
         start = time.perf_counter()
-        q = answer(target)
-        times.append(time.perf_counter() - start)
+        q = answer(target, seed)
+        times.append(1e3 * (time.perf_counter() - start))
         solved += confirmed(chain, q, target)
-    milliseconds = 1e3 * np.array(times)
-    share, mean = solved / len(targets), milliseconds.mean()
-    print("%-24s %7.2f %% solved   mean %7.4f ms   median %7.4f   p99 %7.4f   max %8.4f"
-          % (name, 100.0 * share, mean, *np.percentile(milliseconds, (50, 99)), milliseconds.max()))
-    return share, mean
+    return 100.0 * solved / len(targets), np.array(times)
 
 
-def ours(chain, candidates):
-    seed = chain.mid_range
-
-    def answer(target):
+def ours(chain, candidates, checker=None):
+    def answer(target, seed):
         try:
-            return solve(chain, target, seed, candidates=candidates).q
+            return solve(chain, target, seed, TOLERANCE, TOLERANCE, candidates=candidates, checker=checker).q
         except NoSolution:
             return None
 
     return answer
 
 
-def trac_ik(chain, urdf):
+def trac_ik(arm):
     """Return a function like :func:`ours`, or None where pytracik is not installed."""
     try:
         from trac_ik import TracIK
     except ImportError:
         return None
-    solver = TracIK(base_link_name=chain.base, tip_link_name=chain.tip, urdf_path=str(urdf), timeout=TRAC_IK_LIMIT_S,
-                    epsilon=TOLERANCE)
-    seed = chain.mid_range
-    return lambda target: solver.ik(target[:3, 3], target[:3, :3], seed_jnt_values=seed)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "arm.urdf"
+        path.write_text(arm.urdf)
+        solver = TracIK(base_link_name=arm.chain.base, tip_link_name=arm.chain.tip, urdf_path=str(path),
+                        timeout=LIMIT_S, epsilon=TOLERANCE)
+    return lambda target, seed: solver.ik(target[:3, 3], target[:3, :3], seed_jnt_values=seed)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--poses", type=int, default=10000)
-    parser.add_argument("--side", choices=("left", "right"), default="left")
-    parser.add_argument("--urdf", type=Path, default=MODEL)
-    options = parser.parse_args()
-    if not options.urdf.exists():
-        sys.exit("%s is missing: run ./baxter.sh setup, or name another model with --urdf" % options.urdf)
-    chain = Chain.from_robot(parse_urdf(options.urdf.read_text(), source=str(options.urdf)), "base",
-                             options.side + "_gripper")
-    warm_up(chain)
+def kdl(arm, restarts):
+    """KDL's Levenberg-Marquardt, which knows no limits; with ``restarts`` from random postures until one is inside."""
+    model, chain = kdl_chain(arm), arm.chain
+    solver = PyKDL.ChainIkSolverPos_LMA(model, KDL_TOLERANCE, 500)
+    start, found = PyKDL.JntArray(len(chain)), PyKDL.JntArray(len(chain))
     rng = np.random.default_rng(0)
-    targets = [chain.fk(q) for q in rng.uniform(chain.lower, chain.upper, (options.poses, len(chain)))]
-    print("%d random reachable poses, %s arm, seed at mid-range" % (options.poses, options.side))
-    measure("ours, first arrival", chain, targets, ours(chain, 1))
-    share, mean = measure("ours", chain, targets, ours(chain, 2))
-    other = trac_ik(chain, options.urdf)
-    if other is None:
-        print("TRAC-IK is not installed; for the comparison: .venv/bin/pip install --no-deps pytracik==0.0.3")
-        return
-    other_share, other_mean = measure("TRAC-IK, 5 ms limit", chain, targets, other)
-    print("ours to TRAC-IK: time x %.3f, unsolved poses %d to %d"
-          % (mean / other_mean, round((1 - share) * options.poses), round((1 - other_share) * options.poses)))
+
+    def answer(target, seed, _alive=model):  # the solver refers to the chain without holding it
+        frame = PyKDL.Frame(PyKDL.Rotation(*target[:3, :3].ravel().tolist()), PyKDL.Vector(*target[:3, 3].tolist()))
+        deadline = time.perf_counter() + LIMIT_S
+        while True:
+            fill(start, seed.tolist())
+            status = solver.CartToJnt(start, frame, found)
+            q = np.array([found[i] for i in range(len(chain))])
+            middle = chain.mid_range
+            q -= 2.0 * np.pi * np.round((q - middle) / (2.0 * np.pi))
+            if status >= 0 and confirmed(chain, q, target):
+                return q
+            if not restarts or time.perf_counter() > deadline:
+                return None
+            seed = rng.uniform(chain.lower, chain.upper)
+
+    return answer
 
 
-if __name__ == "__main__":
-    main()
+def measure(report, quick, number):
+    count = POSES // 10 if quick else POSES
+    checked = arms()
+    for k, arm in enumerate(checked):
+        warm_up(arm.chain)
+        compare(report, arm, count, np.random.default_rng((number, k)))
+    batch(report, checked[0], count * 5, np.random.default_rng((number, 7)))
+    clear(report, checked[0], count // 4, np.random.default_rng((number, 8)))
+
+
+def compare(report, arm, count, rng):
+    chain = arm.chain
+    postures = rng.uniform(chain.lower, chain.upper, (count, len(chain)))
+    targets = [chain.fk(q) for q in postures]
+    middle = [chain.mid_range] * count
+    share, times = timed(chain, targets, middle, ours(chain, 1))
+    two_share, two_times = timed(chain, targets, middle, ours(chain, 2))
+    peers = {TRAC: (trac_ik(arm), count), "KDL LMA": (kdl(arm, False), min(count, KDL_POSES)),
+             "KDL, restarts": (kdl(arm, True), min(count, KDL_POSES))}
+    report.add("%s: solved" % arm.name, share, "%", least=99.99)
+    report.add("%s: p99" % arm.name, np.percentile(times, 99), "ms", most=1.0)
+    report.add("%s: nearer of two, solved" % arm.name, two_share, "%", least=99.99)
+    report.add("%s: nearer of two, p99" % arm.name, np.percentile(two_times, 99), "ms", most=1.0)
+    distributions = {"ours": times}
+    for name, (answer, poses) in peers.items():
+        if answer is None:
+            continue
+        other_share, other_times = timed(chain, targets[:poses], middle[:poses], answer)
+        distributions[name] = other_times
+        report.add("%s: unsolved, beside %s" % (arm.name, name), 100.0 - share, "%", (name, 100.0 - other_share))
+        report.add("%s: mean, beside %s" % (arm.name, name), times.mean(), "ms", (name, other_times.mean()),
+                   **({"ratio_most": 0.1} if name == TRAC else {}))
+        if name == TRAC:
+            report.add("%s: median" % arm.name, np.median(times), "ms", (name, np.median(other_times)))
+            report.add("%s: p99, beside %s" % (arm.name, name), np.percentile(times, 99), "ms",
+                       (name, np.percentile(other_times, 99)))
+            report.add("%s: nearer of two, mean" % arm.name, two_times.mean(), "ms", (name, other_times.mean()))
+    report.sample("time for a pose, %s" % arm.name, "ms", **distributions)
+    servo(report, arm, postures, rng)
+
+
+def servo(report, arm, postures, rng):
+    """Targets a small step away from the posture that each search starts at."""
+    chain = arm.chain
+    near = np.clip(postures + rng.normal(0.0, SERVO_STEP, postures.shape), chain.lower, chain.upper)
+    targets = [chain.fk(q) for q in near]
+    share, times = timed(chain, targets, postures, ours(chain, 1))
+    report.add("%s: servoing, solved" % arm.name, share, "%", least=99.99)
+    answer = trac_ik(arm)
+    if answer is not None:
+        _, other_times = timed(chain, targets, postures, answer)
+        report.add("%s: servoing, mean" % arm.name, times.mean(), "ms", (TRAC, other_times.mean()))
+    some = min(len(targets), KDL_POSES)
+    _, other_times = timed(chain, targets[:some], postures[:some], kdl(arm, False))
+    report.add("%s: servoing, mean, beside KDL LMA" % arm.name, times.mean(), "ms", ("KDL LMA", other_times.mean()))
+
+
+def batch(report, arm, count, rng):
+    chain = arm.chain
+    targets = np.array([chain.fk(q) for q in rng.uniform(chain.lower, chain.upper, (count, len(chain)))])
+    rates = {}
+    for threads in (1, None):
+        start = time.perf_counter()
+        found = solve_batch(chain, targets, chain.mid_range, TOLERANCE, TOLERANCE, candidates=1, threads=threads)
+        rates[threads] = count / (time.perf_counter() - start)
+        assert found.solved.mean() > 0.999
+    report.add("batch on all cores", rates[None], "poses/s", ("one core", rates[1]), least=10000)
+
+
+def clear(report, arm, count, rng):
+    """Poses that a clear posture reaches, with Baxter's own table of what must not touch."""
+    chain = arm.chain
+    checker = BulletChecker.of_robot(arm.robot, self_collision_pairs(arm.robot.links), find_mesh=ResourceFinder(),
+                                     mesh_cuts=MESH_CUTS)
+    targets = []
+    while len(targets) < count:
+        q = rng.uniform(chain.lower, chain.upper)
+        if checker.contact(chain.joint_names, q) is None:
+            targets.append(chain.fk(q))
+    middle = [chain.mid_range] * count
+    share, times = timed(chain, targets, middle, ours(chain, 2, checker))
+    _, plain = timed(chain, targets, middle, ours(chain, 2))
+    checker.close()
+    report.add("left arm: clear of itself, solved where a clear posture exists", share, "%", least=99.0)
+    report.add("left arm: clear of itself, mean", times.mean(), "ms", ("without looking", plain.mean()), most=5.0)

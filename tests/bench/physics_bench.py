@@ -1,11 +1,8 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compare bullet_sim with PyBullet's own ways of loading the same robot: load time, tick time, gravity torques.
+"""bullet_sim beside PyBullet's own ways of loading the same robot: load time, tick time, gravity torques.
 
-All in one run on one machine, so that the ratios mean something; absolute times do not carry over.
 """
 
-import argparse
 import math
 import statistics
 import sys
@@ -137,15 +134,13 @@ def pybullets_own(path, flags, poses, names, steps):
     return load_s, step_us, math.nan, np.array(torques)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--steps", type=int, default=2000, help="ticks to time, each way (default %(default)s)")
-    arguments = parser.parse_args()
+def compare(steps, seed):
+    """Return {way of loading: (load [s], step [us], whole tick [us], greatest error of a gravity torque [Nm])}."""
     path = vendor_urdf()
     robot = parse_urdf(path.read_text(), path.name)
     names = [f"{side}_{joint}" for side in ("left", "right") for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")]
     limits = [robot.joints[name].limit for name in names]
-    random = np.random.default_rng(0)
+    random = np.random.default_rng(seed)
     poses = [np.array([random.uniform(limit.lower, limit.upper) for limit in limits]) for _ in range(5)]
     reference = np.array([gravity_by_energy(robot, names, q) for q in poses])
 
@@ -153,19 +148,18 @@ def main():
         return uri.replace(MESH_PREFIX, str(path.parents[2]) + "/")
 
     rows = {
-        "bullet_sim": ours(robot, find_mesh, poses, names, arguments.steps),
-        "loadURDF": pybullets_own(path, 0, poses, names, arguments.steps),
-        "loadURDF, merged": pybullets_own(path, pybullet.URDF_MERGE_FIXED_LINKS, poses, names, arguments.steps),
+        "bullet_sim": ours(robot, find_mesh, poses, names, steps),
+        "loadURDF": pybullets_own(path, 0, poses, names, steps),
+        "loadURDF, merged": pybullets_own(path, pybullet.URDF_MERGE_FIXED_LINKS, poses, names, steps),
     }
-    first = rows["bullet_sim"]
-    print(f"{'':18s}{'load':>9s}{'ratio':>7s}{'step':>10s}{'ratio':>7s}{'whole tick':>12s}{'gravity error':>15s}")
-    for name, (load_s, step_us, tick_us, torques) in rows.items():
-        error = np.abs(torques - reference).max()
-        print(
-            f"{name:18s}{load_s:7.3f} s{load_s / first[0]:7.1f}{step_us:7.0f} us{step_us / first[1]:7.2f}"
-            f"{tick_us:9.0f} us{error:12.1e} Nm"
-        )
+    return {name: (*times, np.abs(torques - reference).max()) for name, (*times, torques) in rows.items()}
 
 
-if __name__ == "__main__":
-    main()
+def measure(report, quick, number):
+    found = compare(200 if quick else 2000, number)
+    load_s, step_us, tick_us, error = found.pop("bullet_sim")
+    for name, (other_load_s, other_step_us, _, other_error) in found.items():
+        report.add(f"load Baxter, beside {name}", load_s, "s", (name, other_load_s))
+        report.add(f"physics step, beside {name}", step_us, "us", (name, other_step_us))
+        report.add(f"error of gravity torques, beside {name}", error, "Nm", (name, other_error))
+    report.add("tick: read, gravity, drive, step", tick_us, "us", ("its step alone", step_us))

@@ -1,9 +1,5 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Baxter's brain costs: CPU microseconds a tick of update() and publish(), on the real physics, without a master.
-
-    python tests/bench/robot_bench.py
-"""
+"""What Baxter's brain costs: CPU time a tick of update() and publish(), on the real physics, without a master."""
 import importlib.util
 import time
 from pathlib import Path
@@ -35,13 +31,13 @@ def load_lab():
     return module.Lab
 
 
-def measure(lab, before, listeners):
-    """Mean (update, publish) in microseconds over TICKS ticks; `before(tick)` is not counted."""
+def tick_costs(lab, before, listeners, ticks):
+    """Mean (update, publish, physics step) in microseconds over ``ticks``; `before(tick)` is not counted."""
     for outbox in lab.outboxes.values():
         outbox.has_listeners = listeners
         outbox.publish = lambda message: None
-    update = publish = 0.0
-    for tick in range(TICKS):
+    update = publish = step = 0.0
+    for tick in range(ticks):
         before(tick)
         begin = time.thread_time()
         lab.plugin.update(lab.world.time_s, 0.002)
@@ -50,15 +46,15 @@ def measure(lab, before, listeners):
         stepped = time.thread_time()
         lab.plugin.publish(lab.world.time_s)
         update += middle - begin
+        step += stepped - middle
         publish += time.thread_time() - stepped
-    return 1e6 * update / TICKS, 1e6 * publish / TICKS
+    return tuple(1e6 * total / ticks for total in (update, publish, step))
 
 
-def main():
+def measure(report, quick, number):
     file = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
     robot = parse_urdf(xacro.process_file(file).toxml(), source=file)
     lab_class = load_lab()
-    print("%-46s %8s %8s" % ("both arms, 500 Hz, us a tick", "update", "publish"))
     for title, mode, listeners in CASES:
         lab = lab_class(robot, parameters={"enable": True})
         start = lab.position
@@ -69,9 +65,6 @@ def main():
                 swing = wave * np.sin(0.01 * tick)
                 lab.command(mode, start + swing if mode in (1, 4) else swing)
 
-        print("%-46s %8.1f %8.1f" % (title, *measure(lab, command, listeners)))
+        update, publish, step = tick_costs(lab, command, listeners, TICKS // 10 if quick else TICKS)
+        report.add("%s: update and publish" % title, update + publish, "us", ("physics step", step))
         lab.close()
-
-
-if __name__ == "__main__":
-    main()

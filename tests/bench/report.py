@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Figures of a bench: collected round by round, then put together as median, spread and ratio to a peer."""
+import json
+import statistics
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+# What a goal may be about: our figure, or its ratio to the peer's. "least" is a lower bound, "most" an upper one.
+GOALS = ("most", "least", "ratio_most", "ratio_least")
+
+
+@dataclass
+class Row:
+    """One figure. ours, peer: one number a round; peer is empty where there is nothing to compare with. goal: {one of
+    GOALS: bound}, or empty."""
+
+    suite: str
+    what: str
+    unit: str
+    ours: list = field(default_factory=list)
+    peer_name: str = ""
+    peer: list = field(default_factory=list)
+    goal: dict = field(default_factory=dict)
+
+    @property
+    def median(self):
+        return statistics.median(self.ours)
+
+    @property
+    def ratios(self):
+        """Ours to the peer's, round by round: what disturbs a round disturbs both."""
+        return [ours / peer for ours, peer in zip(self.ours, self.peer, strict=False) if peer]
+
+    @property
+    def ratio(self):
+        return statistics.median(self.ratios) if self.ratios else None
+
+    @property
+    def met(self):
+        """Whether the median keeps the goal; None without a goal, or without the peer that it needs."""
+        for kind, bound in self.goal.items():
+            value = self.ratio if kind.startswith("ratio") else self.median
+            if value is None:
+                return None
+            return value <= bound if kind.endswith("most") else value >= bound
+        return None
+
+
+class Report:
+    """What one round of one suite measures."""
+
+    def __init__(self):
+        self.rows, self.samples = [], {}
+
+    def add(self, what, ours, unit="", peer=None, **goal):
+        """Note a figure. ``peer``: (name, figure), measured in the same round. ``goal``: one of GOALS."""
+        if len(goal) > 1 or not set(goal) <= set(GOALS):
+            raise ValueError("a goal is one of %s, got %s" % (", ".join(GOALS), goal))
+        name, other = peer if peer is not None else ("", None)
+        self.rows.append({"what": what, "unit": unit, "ours": float(ours), "peer_name": name,
+                          "peer": None if other is None else float(other), "goal": goal})
+
+    def sample(self, title, unit, **values):
+        """Note a distribution for the picture ``title``: {name: sequence of numbers}."""
+        self.samples[title] = {"unit": unit,
+                               "values": {name: [float(v) for v in some] for name, some in values.items()}}
+
+    def save(self, path):
+        Path(path).write_text(json.dumps({"rows": self.rows, "samples": self.samples}))
+
+
+def put_together(suite, rounds):
+    """Return (rows, samples) of the saved rounds of one suite: list of what :meth:`Report.save` wrote."""
+    rows, samples = {}, {}
+    for found in rounds:
+        for entry in found["rows"]:
+            row = rows.setdefault(entry["what"], Row(suite, entry["what"], entry["unit"], goal=entry["goal"],
+                                                     peer_name=entry["peer_name"]))
+            row.ours.append(entry["ours"])
+            if entry["peer"] is not None:
+                row.peer.append(entry["peer"])
+        for title, entry in found["samples"].items():
+            kept = samples.setdefault(title, {"unit": entry["unit"], "values": {}})
+            for name, values in entry["values"].items():
+                kept["values"].setdefault(name, []).extend(values)
+    return list(rows.values()), samples
+
+
+def table(rows):
+    """Return the rows as lines of text, one figure each, its peer beside it."""
+    lines = ["%-62s %11s %21s  %-22s %11s %8s %15s  %s" % (
+        "", "median", "spread", "peer", "median", "ratio", "spread", "goal")]
+    suite = None
+    for row in rows:
+        if row.suite != suite:
+            suite = row.suite
+            lines.append(suite)
+        line = "  %-60s %11s %21s" % (row.what + (" [%s]" % row.unit if row.unit else ""), number(row.median),
+                                      spread(row.ours))
+        line += "  %-22s %11s %8s %15s" % (
+            row.peer_name, number(statistics.median(row.peer)) if row.peer else "",
+            number(row.ratio) if row.ratio is not None else "", spread(row.ratios) if row.ratios else "")
+        lines.append((line + "  " + goal_text(row)).rstrip())
+    return lines
+
+
+def markdown(rows):
+    """Return the rows as lines of a Markdown table, for docs/performance.md."""
+    lines = ["| figure | ours | spread | peer | peer's | ratio | spread | goal |", "|---|---|---|---|---|---|---|---|"]
+    suite = None
+    for row in rows:
+        if row.suite != suite:
+            suite = row.suite
+            lines.append("| **%s** | | | | | | | |" % suite)
+        lines.append("| %s | %s %s | %s | %s | %s | %s | %s | %s |" % (
+            row.what, number(row.median), row.unit, spread(row.ours), row.peer_name,
+            number(statistics.median(row.peer)) if row.peer else "", number(row.ratio) if row.ratio is not None else "",
+            spread(row.ratios) if row.ratios else "", goal_text(row)))
+    return lines
+
+
+def goal_text(row):
+    """The goal in words, with whether it is kept."""
+    for kind, bound in row.goal.items():
+        sign = "<=" if kind.endswith("most") else ">="
+        verdict = {None: "no peer", True: "yes", False: "NO"}[row.met]
+        return "%s%s %s: %s" % ("ratio " if kind.startswith("ratio") else "", sign, number(bound), verdict)
+    return ""
+
+
+def spread(values):
+    """Least and greatest of the rounds."""
+    return "%s to %s" % (number(min(values)), number(max(values))) if len(values) > 1 else ""
+
+
+def number(value):
+    """Four digits that matter, never in powers of ten where a table has to be read."""
+    if value is None:
+        return ""
+    if value == int(value) and abs(value) < 1e6:
+        return "%d" % value
+    if abs(value) >= 1000:
+        return "%.0f" % value
+    # 99.99 % and 100 % are worlds apart.
+    return "%.2f" % value if abs(value) >= 10 else "%.3f" % value if abs(value) >= 0.1 else "%.4g" % value
+
+
+def as_json(rows, samples, machine):
+    """Return what goes into the JSON file."""
+    return json.dumps({"machine": machine, "rows": [{**asdict(row), "median": row.median, "ratio": row.ratio,
+                                                     "met": row.met} for row in rows], "samples": samples}, indent=1)

@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Say where the stack stands: every figure beside its peer in the same run, median and spread over rounds.
+
+    ./baxter.sh bench [NAME...] [--rounds 5] [--quick]
+
+A NAME is a suite, see --list; all run without one. The table goes to the terminal; JSON, Markdown and pictures to
+.baxter/bench. Suites take turns, round by round, so that a busy minute of the machine hits all of them.
+"""
+import argparse
+import datetime
+import json
+import os
+import platform
+import signal
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+from pictures import distribution, ratios
+from report import Report, as_json, markdown, put_together, table
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+PEERS = ROOT / ".baxter/bench/python"
+# Name: (module with a function `measure(report, quick, number)`, what it is about). Each round has its own process.
+SUITES = {
+    "ik": ("ik_bench", "inverse kinematics beside TRAC-IK and KDL: solved, time; batches; clear of collisions"),
+    "fk": ("fk_bench", "forward kinematics and Jacobian beside PyKDL and PyBullet"),
+    "load": ("physics_bench", "loading and stepping Baxter beside PyBullet's own loaders"),
+    "control": ("control_tick_bench", "the controllers of 18 joints beside a physics step"),
+    "brain": ("robot_bench", "a tick of Baxter's brain beside the physics step of the same world"),
+    "physics": ("world_bench", "the whole stack flat out beside bare steps: alone, with objects, clients, in contact"),
+    "loop": ("loop_bench", "real time: CPU, joint_states jitter, latency, with 0, 5 and 20 subscribers"),
+    "services": ("service_bench", "IK service beside an empty service"),
+    "start": ("start_bench", "launch to /robot/sim/started; memory of each process"),
+    "labs": ("labs_bench", "1, 2 and 4 labs side by side: factor and memory of each"),
+}
+# Longest that a round of a suite may take before it counts as hung [s].
+LIMIT_S = 1200
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="suites to run (default: all)")
+    parser.add_argument("--rounds", type=int, default=5, help="how often everything is measured (default: 5)")
+    parser.add_argument("--quick", action="store_true", help="a tenth of the work, to see that it runs")
+    parser.add_argument("--list", action="store_true", help="list the suites")
+    parser.add_argument("--out", type=Path, default=ROOT / ".baxter/bench", help="folder for JSON and pictures")
+    parser.add_argument("--child", help=argparse.SUPPRESS)
+    parser.add_argument("--number", type=int, default=0, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    unknown = [name for name in options.names if name not in SUITES]
+    if unknown:
+        parser.error("no suite is called %s; there are %s" % (", ".join(unknown), ", ".join(SUITES)))
+    if options.rounds < 1:
+        parser.error("--rounds must be at least 1, got %d" % options.rounds)
+    if options.list:
+        for name, (_, about) in SUITES.items():
+            print("%-10s %s" % (name, about))
+        return 0
+    if options.child:
+        return child(options)
+    names = options.names or list(SUITES)
+    options.out.mkdir(parents=True, exist_ok=True)
+    install_peers()
+    machine = describe_machine(options)
+    print("%(cpu)s, %(cores)d cores, load %(load_before)s, commit %(commit)s" % machine)
+    rounds, broken = {name: [] for name in names}, []
+    for number in range(options.rounds):
+        for name in names:
+            print("round %d of %d: %s ..." % (number + 1, options.rounds, name), flush=True)
+            found = run_child(name, number, options)
+            if found is None:
+                broken.append(name)
+            else:
+                rounds[name].append(found)
+    machine["load_after"] = "%.2f %.2f %.2f" % os.getloadavg()
+    rows, samples = [], {}
+    for name in names:
+        more, distributions = put_together(name, rounds[name])
+        rows += more
+        samples.update({"%s: %s" % (name, title): entry for title, entry in distributions.items()})
+    write(rows, samples, machine, options.out)
+    print("\n".join(table(rows)))
+    missed = [row for row in rows if row.met is False]
+    print("%d figures, %d of %d goals kept; JSON and pictures in %s" % (
+        len(rows), sum(row.met is True for row in rows), sum(row.met is not None for row in rows), options.out))
+    if broken:
+        print("failed: %s; see the lines above" % ", ".join(sorted(set(broken))))
+    return 1 if missed or broken else 0
+
+
+def child(options):
+    """Measure one round of one suite in this process."""
+    sys.path.append(str(PEERS))
+    report = Report()
+    import_module(SUITES[options.child][0]).measure(report, options.quick, options.number)
+    report.save(options.out)
+    return 0
+
+
+def run_child(name, number, options):
+    """Return what one round of a suite found, or None when it failed; its output goes through."""
+    saved = options.out / ("round_%s.json" % name)
+    saved.unlink(missing_ok=True)
+    command = [sys.executable, str(HERE / "run.py"), "--child", name, "--number", str(number), "--out", str(saved)]
+    process = subprocess.Popen(command + ["--quick"] * options.quick, start_new_session=True)
+    try:
+        process.wait(LIMIT_S)
+    except subprocess.TimeoutExpired:
+        print("%s has not ended within %d s" % (name, LIMIT_S))
+    finally:
+        # A suite that was interrupted leaves a lab behind; the group is its own.
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGTERM)
+            process.wait()
+    if process.returncode or not saved.exists():
+        return None
+    found = json.loads(saved.read_text())
+    saved.unlink()
+    return found
+
+
+def install_peers():
+    """Put the packages of requirements.txt where only the bench finds them; without a network they are left out."""
+    wanted = (HERE / "requirements.txt").read_text()
+    stamp = PEERS / "installed.txt"
+    if stamp.exists() and stamp.read_text() == wanted:
+        return
+    done = subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--upgrade", "--target",
+                           str(PEERS), "-r", str(HERE / "requirements.txt")])
+    if done.returncode:
+        print("the peers could not be installed; the comparison with them is left out")
+        return
+    stamp.write_text(wanted)
+
+
+def describe_machine(options):
+    models = [line.split(":", 1)[1].strip() for line in Path("/proc/cpuinfo").read_text().splitlines()
+              if line.startswith("model name")]
+    commit = subprocess.run(["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
+    return {"cpu": models[0] if models else platform.machine(), "cores": len(os.sched_getaffinity(0)),
+            "kernel": platform.release(), "python": platform.python_version(),
+            "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC"),
+            "commit": commit.stdout.strip() or "unknown", "rounds": options.rounds, "quick": options.quick,
+            "load_before": "%.2f %.2f %.2f" % os.getloadavg()}
+
+
+def write(rows, samples, machine, folder):
+    (folder / "bench.json").write_text(as_json(rows, samples, machine) + "\n")
+    note = "%(cpu)s, %(cores)d cores, %(date)s, commit %(commit)s, %(rounds)d rounds, load before %(load_before)s, " \
+        "after %(load_after)s" % machine
+    (folder / "bench.md").write_text("\n".join([note, "", *markdown(rows)]) + "\n")
+    ratios(rows, folder / "ratios.png")
+    for title, entry in samples.items():
+        distribution(title, entry, folder / ("".join(c if c.isalnum() else "_" for c in title) + ".png"))
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)
