@@ -96,8 +96,8 @@ class FakeHardware(RobotHardware):
     """Joints that do what they are told, with faults to choose.
 
     A position command is reached after ``lag`` (0: in the same tick, towards 1: slower), never beyond ``clip`` [rad];
-    ``frozen`` joints stay. A velocity command moves the joint at that velocity, an effort command accelerates it with
-    1 kg m2 or 1 kg.
+    ``frozen`` joints stay, whatever effort acts. A velocity command moves the joint at that velocity, an effort command
+    accelerates it with 1 kg m2 or 1 kg.
     """
 
     def __init__(self, joint_interfaces, lag=0.0, clip=float("inf")):
@@ -110,10 +110,14 @@ class FakeHardware(RobotHardware):
         """Let ``dt`` seconds pass."""
         before = self.position.copy()
         for interface, joints in self.interface_joints.items():
-            if interface not in self.command or self.frozen:
+            if interface not in self.command:
                 continue
             index = [self.joint_names.index(joint) for joint in joints]
             command = self.command[interface][index]
+            if interface == EFFORT:
+                self.effort[index] = command
+            if self.frozen:
+                continue
             if interface == POSITION:
                 target = command.clip(-self.clip, self.clip)
                 self.position[index] += (target - self.position[index]) * (1.0 - self.lag)
@@ -121,5 +125,4 @@ class FakeHardware(RobotHardware):
                 self.position[index] += command * dt
             elif interface == EFFORT:
                 self.position[index] += (self.velocity[index] + command * dt) * dt
-                self.effort[index] = command
         self.velocity[:] = (self.position - before) / dt

@@ -3,7 +3,8 @@
 """A controller manager on joints without physics, at 500 Hz of wall time, with faults to choose.
 
 Below the namespace /robot: the services of the controller manager, and one std_srvs/SetBool for each fault: ``lag``
-(every tick covers only 2 % of the way), ``clip`` (nothing beyond 0.5 rad), ``freeze`` (no motion at all).
+(every tick covers only 2 % of the way), ``clip`` (nothing beyond 0.5 rad), ``freeze`` (no motion at all). The joints
+have a position interface, those in the parameter ``effort_joints`` an effort interface.
 """
 import math
 import os
@@ -14,7 +15,7 @@ import rospy
 import yaml
 from std_srvs.srv import SetBool, SetBoolResponse
 
-from controller_manager import POSITION, ControllerTable
+from controller_manager import EFFORT, POSITION, ControllerTable
 from controller_manager.manager import ControllerManager
 from controller_manager.services import ControllerManagerServices
 from controller_manager.testing import FakeHardware
@@ -56,7 +57,9 @@ def main():
     log = LoopLog({"info": rospy.loginfo, "warn": rospy.logwarn, "error": rospy.logerr})
     hub, board = PublisherHub(), RequestBoard()
     context = PluginContext(None, None, robot, None, "/robot", text, log, RosObjects(hub, board, log), {})
-    hardware = FakeHardware({joint.name: (POSITION,) for joint in robot.movable_joints()})
+    pushed = rospy.get_param("/robot/effort_joints", [])
+    hardware = FakeHardware({joint.name: (EFFORT if joint.name in pushed else POSITION,)
+                             for joint in robot.movable_joints()})
     manager = ControllerManager(hardware, log)
     offer_faults(context, hardware)
     table = controller_table()
