@@ -4,6 +4,8 @@
 A driver is made from a :class:`SensorEntry`. The node asks whether it is due and has it publish; both
 happen in the thread that draws. ``config/camera_drivers.yaml`` says which driver a file name means.
 """
+import threading
+
 import rospy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 
@@ -14,18 +16,31 @@ _SMALLEST_TIME_S = 1e-6
 
 
 class Topic:
-    """A publisher that knows whether somebody listens."""
+    """A publisher that knows whether somebody listens. A service's thread may close it at any time."""
 
-    def __init__(self, name, message_class, latch=False):
+    def __init__(self, name, message_class):
         # A queue of one: a subscriber that has stopped reading loses pictures and holds nobody up.
-        self._publisher = rospy.Publisher(name, message_class, queue_size=1, latch=latch)
-        self.publish = self._publisher.publish
-        self.close = self._publisher.unregister
+        self._publisher = rospy.Publisher(name, message_class, queue_size=1)
+        self._lock = threading.Lock()
 
     @property
     def has_listeners(self):
         """True while somebody is connected."""
-        return self._publisher.get_num_connections() > 0
+        with self._lock:
+            return self._publisher is not None and self._publisher.get_num_connections() > 0
+
+    def publish(self, message):
+        """Send a message, unless the topic has been closed."""
+        with self._lock:
+            if self._publisher is not None:
+                self._publisher.publish(message)
+
+    def close(self):
+        """Take the topic back."""
+        with self._lock:
+            publisher, self._publisher = self._publisher, None
+        if publisher is not None:
+            publisher.unregister()
 
 
 class Pace:

@@ -83,7 +83,7 @@ class SensorRenderer:
             pose = self._mirror.bodies[entry.model].link_matrix(entry.link)
             driver.take(time_s, pose, self._draw)
         except rospy.ROSException:
-            return  # the node is shutting down, or a client has just closed this camera
+            return  # the node is shutting down
         except Exception as error:  # noqa: BLE001  (one sensor that fails must not blind the others)
             rospy.logerr("%s failed and is left out from now on: %s: %s" % (entry, type(error).__name__, error))
             self._sensors = {key: other for key, other in self._sensors.items() if other is not driver}

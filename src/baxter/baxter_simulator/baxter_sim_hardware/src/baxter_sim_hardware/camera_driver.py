@@ -79,7 +79,8 @@ class CameraServices:
                             {control.id: control.value for control in asked.controls})
 
         def do():
-            self._drivers[request.name].use(self._rack.open_camera(request.name, settings))
+            held = self._rack.open_camera(request.name, settings)  # first of all refuses unknown names
+            self._drivers[request.name].use(held)
 
         return OpenCameraResponse(self._code(do))
 

@@ -2,8 +2,8 @@
 """Baxter's cameras: what may be asked of one, which may be open together, what its controls do to a picture.
 
 A camera is an array of 1280 x 800 sensors. Every mode shows all of it, scaled, unless a window is asked for: then the
-picture is that part of the array, pixel by pixel. Half resolution joins four sensors to one, which halves the array that
-a window is cut from. Without EGL, without ROS.
+picture is that part of the array, pixel by pixel. Half resolution joins four sensors to one, which halves the array
+that a window is cut from. Without ROS.
 """
 import errno
 from typing import NamedTuple
@@ -37,9 +37,7 @@ class CameraRefused(HardwareError):
 
 
 class Settings(NamedTuple):
-    """How a camera is open: size [pixels], rate [Hz], and ``controls``, {id: value}, of which those left out are automatic.
-
-    """
+    """How a camera is open: size [pixels], rate [Hz], and ``controls``, {id: value}; those left out are automatic."""
 
     width: int
     height: int
@@ -105,7 +103,7 @@ class Settings(NamedTuple):
         return pinhole
 
     def developed(self, picture):
-        """The picture (height, width, 3), red, green, blue, as exposure, gain, white balance, flip and mirror leave it."""
+        """The picture (height, width, 3) of red, green, blue after exposure, gain, white balance, flip and mirror."""
         exposure, gain = self.control(EXPOSURE), self.control(GAIN)
         bright = (1.0 if exposure == AUTO else exposure / _NEUTRAL_EXPOSURE)
         bright *= 1.0 if gain == AUTO else 1.0 + gain / _DOUBLING_GAIN

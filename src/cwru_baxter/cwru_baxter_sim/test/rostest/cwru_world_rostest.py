@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Case Western's world through its sensors: a cube of known size and place, cameras, lasers, a reset."""
+import errno
+import unittest
+
+import numpy as np
+import rospy
+import tf2_ros
+from baxter_core_msgs.msg import CameraControl, CameraSettings
+from baxter_core_msgs.srv import CloseCamera, ListCameras, OpenCamera
+from cv_bridge import CvBridge
+from gazebo_msgs.srv import DeleteModel, SpawnModel
+from geometry_msgs.msg import Point, Pose, Quaternion
+from seen import is_red, matrix_of, picture_of, points_of, wait_for
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, LaserScan, PointCloud2
+from std_srvs.srv import Empty
+
+SIDE_M, AT = 0.06, (0.72, 0.15, 0.775)  # on the table; physics world
+BASE_Z = 0.93  # of the robot's base in the physics world
+CUBE = """<sdf version="1.6"><model name="cube"><static>true</static><link name="l"><pose>0 0 0.03 0 0 0</pose>
+<collision name="c"><geometry><box><size>0.06 0.06 0.06</size></box></geometry></collision>
+<visual name="v"><geometry><box><size>0.06 0.06 0.06</size></box></geometry>
+<material><ambient>0.9 0.02 0.02 1</ambient><diffuse>0.9 0.02 0.02 1</diffuse></material></visual></link></model>
+</sdf>"""
+# The region of the Kinect's picture where the red frame of the robot's own screen is not.
+ROBOT_FREE_ROWS = 380
+KINECT = {"/kinect/%s" % name for name in (
+    "rgb/image_raw", "rgb/image_raw/compressed", "rgb/camera_info", "depth/image_raw", "depth/camera_info",
+    "depth/points")}
+
+
+def service(name, kind):
+    rospy.wait_for_service(name, 60.0)
+    return rospy.ServiceProxy(name, kind)
+
+
+def red_rows(image):
+    return is_red(picture_of(image))[:ROBOT_FREE_ROWS]
+
+
+class CwruWorldTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.buffer = tf2_ros.Buffer(rospy.Duration(100.0))
+        cls.listener = tf2_ros.TransformListener(cls.buffer)
+        wait_for("/robot/joint_states", JointState)
+
+    def put_cube(self):
+        place = Pose(Point(*AT), Quaternion(0, 0, 0, 1))
+        answer = service("/gazebo/spawn_sdf_model", SpawnModel)("cube", CUBE, "", place, "world")
+        self.assertTrue(answer.success, answer.status_message)
+        self.addCleanup(service("/gazebo/delete_model", DeleteModel), "cube")
+
+    def base_in(self, frame):
+        return matrix_of(self.buffer.lookup_transform(frame, "base", rospy.Time(), rospy.Duration(30.0)))
+
+    def corners(self):
+        """(8, 4) of the cube, in base."""
+        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 2)]) * SIDE_M / 2.0
+        return np.hstack([signs + AT - [0.0, 0.0, BASE_Z], np.ones((8, 1))])
+
+    def test_a_cube_is_where_it_projects_and_where_it_is(self):
+        self.put_cube()
+        image = wait_for("/kinect/rgb/image_raw", Image, lambda message: red_rows(message).sum() > 300)
+        self.assertEqual((image.width, image.height, image.encoding, image.header.frame_id),
+                         (640, 480, "rgb8", "kinect_pc_frame"))
+        info = wait_for("/kinect/rgb/camera_info", CameraInfo)
+        optical = (self.corners() @ self.base_in("kinect_pc_frame").T)[:, :3]
+        pixels = optical @ np.array(info.K).reshape(3, 3).T
+        pixels = pixels[:, :2] / pixels[:, 2:]
+        rows, columns = np.nonzero(red_rows(image))
+        seen = [columns.min(), columns.max(), rows.min(), rows.max()]
+        expected = [pixels[:, 0].min(), pixels[:, 0].max(), pixels[:, 1].min(), pixels[:, 1].max()]
+        self.assertLess(np.abs(np.array(seen) - expected).max(), 2.0, "%s is not %s" % (seen, expected))
+
+        cloud = wait_for("/kinect/depth/points", PointCloud2)
+        xyz, colours = points_of(cloud)
+        self.assertEqual(cloud.header.frame_id, "kinect_pc_frame")
+        red = is_red(colours)[:ROBOT_FREE_ROWS] & np.isfinite(xyz[:ROBOT_FREE_ROWS, :, 2])
+        points = np.hstack([xyz[:ROBOT_FREE_ROWS][red], np.ones((red.sum(), 1))])
+        points = points @ np.linalg.inv(self.base_in("kinect_pc_frame")).T
+        low, high = self.corners()[:, :3].min(axis=0), self.corners()[:, :3].max(axis=0)
+        self.assertTrue((points[:, :3] > low - 0.005).all() and (points[:, :3] < high + 0.005).all(),
+                        "points from %s to %s, the cube from %s to %s" % (
+                            points.min(axis=0), points.max(axis=0), low, high))
+        self.assertLess(abs(np.percentile(points[:, 2], 95) - high[2]), 0.005)
+        self.assertLess(abs(points[:, 1].max() - high[1]), 0.005)
+
+        # Depth is the same third coordinate; cv_bridge reads both.
+        depth_message = wait_for("/kinect/depth/image_raw", Image)
+        depth = CvBridge().imgmsg_to_cv2(depth_message, "32FC1")
+        both = np.isfinite(depth) & np.isfinite(xyz[:, :, 2])
+        self.assertGreater(both.mean(), 0.5)
+        self.assertLess(np.median(np.abs(depth[both] - xyz[:, :, 2][both])), 1e-4)
+        self.assertEqual(CvBridge().imgmsg_to_cv2(image, "bgr8").shape, (480, 640, 3))
+        compressed = wait_for("/kinect/rgb/image_raw/compressed", CompressedImage)
+        self.assertEqual(CvBridge().compressed_imgmsg_to_cv2(compressed).shape, (480, 640, 3))
+
+    def test_the_can_stands_on_the_table(self):
+        cloud = wait_for("/kinect/depth/points", PointCloud2)
+        xyz, _ = points_of(cloud)
+        points = xyz[np.isfinite(xyz[:, :, 2])]
+        points = np.hstack([points, np.ones((len(points), 1))]) @ np.linalg.inv(self.base_in("kinect_pc_frame")).T
+        near = points[np.hypot(points[:, 0] - 0.69112, points[:, 1]) < 0.06]
+        top = near[near[:, 2] > 0.775 + 0.15 - BASE_Z]
+        self.assertGreater(len(top), 100)
+        self.assertLess(abs(np.median(top[:, 2]) - (0.775 + 0.168 - BASE_Z)), 0.005)
+        table = near[near[:, 2] < 0.775 + 0.02 - BASE_Z]
+        self.assertGreater(len(table), 100)
+        self.assertLess(abs(np.median(table[:, 2]) - (0.775 - BASE_Z)), 0.005)
+
+    def test_what_is_deleted_is_no_longer_seen_and_a_reset_blinds_nobody(self):
+        self.put_cube()
+        wait_for("/kinect/rgb/image_raw", Image, lambda message: red_rows(message).sum() > 300)
+        service("/gazebo/delete_model", DeleteModel)("cube")
+        wait_for("/kinect/rgb/image_raw", Image, lambda message: not red_rows(message).any())
+        before = rospy.get_time()
+        service("/gazebo/reset_simulation", Empty)()
+        image = wait_for("/kinect/rgb/image_raw", Image, lambda message: message.header.stamp.to_sec() < before)
+        later = wait_for("/kinect/rgb/image_raw", Image,
+                         lambda message: message.header.stamp.to_sec() > image.header.stamp.to_sec() + 0.5)
+        self.assertGreater(picture_of(later).std(), 10.0)
+
+    def test_cameras_open_and_close_with_what_the_robot_has(self):
+        opening, closing = service("/cameras/open", OpenCamera), service("/cameras/close", CloseCamera)
+        cameras = service("/cameras/list", ListCameras)().cameras
+        self.assertEqual(set(cameras), {"head_camera", "left_hand_camera", "right_hand_camera"})
+        for camera in cameras:
+            topic = "/cameras/%s/image" % camera
+            first = wait_for(topic, Image)
+            self.assertEqual((first.width, first.height, first.header.frame_id), (800, 800, camera))
+            controls = [CameraControl(107, 1), CameraControl(108, 1)]
+            self.assertEqual(opening(camera, CameraSettings(320, 200, 20.0, controls)).err, 0)
+            small = wait_for(topic, Image, lambda message: message.width == 320)
+            self.assertEqual(small.height, 200)
+            info = wait_for("/cameras/%s/camera_info_std" % camera, CameraInfo, lambda message: message.width == 320)
+            self.assertLess(info.K[0], 0.0)  # turned by flip and mirror
+            self.assertEqual(opening(camera, CameraSettings(123, 456, 20.0, [])).err, errno.EINVAL)
+            self.assertEqual(closing(camera).err, 0)
+            self.assertNotIn(topic, {name for name, _ in rospy.get_published_topics()})
+            self.assertEqual(closing(camera).err, errno.EALREADY)
+        self.assertEqual(opening("nose_camera", CameraSettings(320, 200, 20.0, [])).err, errno.ENODEV)
+        service("/cameras/reset", Empty)()
+        for camera in cameras:
+            self.assertEqual(wait_for("/cameras/%s/image" % camera, Image).width, 800)
+
+    def test_lasers_and_the_names_of_topics(self):
+        for side in ("left", "right"):
+            scan = wait_for("/sim/laserscan/%s_hand_range/state" % side, LaserScan)
+            self.assertEqual((scan.header.frame_id, len(scan.ranges)), ("%s_hand_range" % side, 1))
+            self.assertAlmostEqual(scan.range_max, 0.4, 6)
+            self.assertTrue(np.isinf(scan.ranges[0]), "nothing is before the hands of outstretched arms")
+        self.assertEqual({name for name, _ in rospy.get_published_topics() if name.startswith("/kinect/")}, KINECT)
+
+    def test_the_robot_stands_as_the_notes_have_it(self):
+        states = wait_for("/robot/joint_states", JointState)
+        self.assertEqual(len(states.name), 15)
+        self.assertLess(max(map(abs, states.position)), 0.02)
+        place = matrix_of(self.buffer.lookup_transform("head", "kinect_link", rospy.Time(), rospy.Duration(30.0)))
+        self.assertLess(np.abs(place[:3, 3] - [0.14, 0.0, 0.264]).max(), 1e-6)
+
+
+if __name__ == "__main__":
+    import rostest
+    rospy.init_node("cwru_world_rostest")
+    rostest.rosrun("cwru_baxter_sim", "cwru_world", CwruWorldTest)

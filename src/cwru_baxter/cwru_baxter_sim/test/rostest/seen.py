@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Messages that show something: waiting for them, and arrays out of them."""
+import threading
+
+import numpy as np
+import rospy
+
+from urdf_model.transforms import matrix_from_quaternion, rigid
+
+
+def wait_for(topic, message_class, wanted=lambda message: True, timeout_s=60.0):
+    """The first message for which ``wanted(message)`` is true; ``AssertionError`` after ``timeout_s`` of wall time."""
+    found, done = [], threading.Event()
+
+    def take(message):
+        if not done.is_set() and wanted(message):
+            found.append(message)
+            done.set()
+
+    subscriber = rospy.Subscriber(topic, message_class, take, queue_size=1, buff_size=1 << 24)
+    try:
+        if not done.wait(timeout_s):
+            raise AssertionError("no message that fits on %s within %g s" % (topic, timeout_s))
+    finally:
+        subscriber.unregister()
+    return found[0]
+
+
+def picture_of(image):
+    """(height, width, 3) uint8 of an rgb8 message."""
+    return np.frombuffer(image.data, np.uint8).reshape(image.height, image.width, 3)
+
+
+def points_of(cloud):
+    """(height, width, 3) float32 x y z, and (height, width, 3) uint8 red green blue, of a PointCloud2."""
+    raw = np.frombuffer(cloud.data, np.uint8).reshape(cloud.height, cloud.width, cloud.point_step)
+    place = {field.name: field.offset for field in cloud.fields}
+    xyz = np.ascontiguousarray(raw[:, :, place["x"]:place["x"] + 12]).view(np.float32)
+    return xyz, raw[:, :, place["rgb"]:place["rgb"] + 3][:, :, ::-1]
+
+
+def is_red(colours):
+    """Where (..., 3) uint8 colours are those of a red thing, in light or shade."""
+    r, g, b = (colours[..., k].astype(int) for k in range(3))
+    return (r > 50) & (g < r // 3) & (b < r // 3)
+
+
+def matrix_of(transform):
+    """(4, 4) of a geometry_msgs/TransformStamped."""
+    q, t = transform.transform.rotation, transform.transform.translation
+    return rigid(matrix_from_quaternion((q.x, q.y, q.z, q.w)), (t.x, t.y, t.z))
