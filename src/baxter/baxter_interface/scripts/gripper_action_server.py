@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Serve robot/end_effector/<gripper>/gripper_action for one gripper or both."""
 import argparse
+import functools
 import sys
 
 import rospy
 from baxter_interface.cfg import GripperActionServerConfig
 from dynamic_reconfigure.server import Server
 
-from baxter_interface import CHECK_VERSION, Gripper, programs
+from baxter_interface import programs
 from baxter_interface.joint_checks import SIDES
 from baxter_interface.serving import serve
 from gripper_action.gripper_action import GripperActionServer
@@ -22,7 +23,7 @@ def main():
 
     def body():
         config = Server(GripperActionServerConfig, lambda config, level: config)
-        serve([lambda side=side: GripperActionServer(Gripper(side, CHECK_VERSION), config) for side in sides],
+        serve([functools.partial(GripperActionServer, side, config) for side in sides],
               "gripper action server, grippers: %s" % " ".join(sides))
 
     suffix = "" if arguments.gripper == "both" else "_" + arguments.gripper

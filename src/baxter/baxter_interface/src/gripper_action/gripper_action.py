@@ -5,7 +5,7 @@ import math
 
 from control_msgs.msg import GripperCommandAction, GripperCommandFeedback, GripperCommandResult
 
-from baxter_interface import RobotEnable
+from baxter_interface import CHECK_VERSION, Gripper, RobotEnable
 from baxter_interface.goal_loop import GoalLoop, Work
 from baxter_interface.gripper_types import OPEN, clip_percent
 
@@ -16,7 +16,7 @@ LONG_SUCTION_S = 3600.0
 
 
 class GripperActionServer:
-    """Moves a gripper (baxter_interface.Gripper, electric or suction) to the goal's `position`, 0 closed to 100 open.
+    """Moves the gripper of the "left" or "right" arm to the goal's `position`, 0 closed to 100 open.
 
     `max_effort` is the force of an electric gripper, or the vacuum threshold of a cup [%]: 0 for the parameter, -1 for
     100. A cup opens at 100 and sucks below. Parameters, from the mapping `reconfig_server.config` at each goal, for
@@ -24,19 +24,21 @@ class GripperActionServer:
     vacuum_threshold [%], blow_off [s].
     A goal ends once: succeeded (at the position, or stalled on something with the force asked for), aborted with a text
     that says why, or preempted; when it is not reached the gripper is stopped. The result is the last feedback.
-    Clears errors of the gripper and calibrates it. Raises OSError if that fails, or with another kind of gripper.
+    Waits for the gripper, and raises, as Gripper does; checks its version; clears its errors and calibrates it. Raises
+    OSError if that fails, or if the gripper is neither electric nor a suction cup.
     """
 
     def __init__(self, gripper, reconfig_server):
-        self._gripper = gripper
+        self._gripper = Gripper(gripper, CHECK_VERSION)
         self._config = reconfig_server
-        self._actions = {"electric": _Electric, "suction": _Suction}.get(gripper.type())
+        name, kind = self._gripper.name, self._gripper.type()
+        self._actions = {"electric": _Electric, "suction": _Suction}.get(kind)
         if self._actions is None:
             raise OSError(errno.ENODEV, "%s is of type %s; this server moves electric and suction grippers"
-                          % (gripper.name, gripper.type()))
+                          % (name, kind))
         self._prepare()
-        self._loop = GoalLoop("robot/end_effector/%s/gripper_action" % gripper.name, GripperCommandAction,
-                              RobotEnable(), gripper.name, self._begin)
+        self._loop = GoalLoop("robot/end_effector/%s/gripper_action" % name, GripperCommandAction, RobotEnable(), name,
+                              self._begin)
 
     def clean_shutdown(self):
         """End the goal, if there is one."""

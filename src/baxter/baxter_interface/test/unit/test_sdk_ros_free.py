@@ -11,7 +11,8 @@ ROS = ("rospy", "rosgraph", "baxter_core_msgs", "sensor_msgs", "std_msgs", "genp
 CORES = ("baxter_interface.joint_motion", "baxter_interface.joint_checks", "baxter_interface.version_check",
          "baxter_interface.patience", "baxter_interface.wheel", "baxter_interface.gripper_types",
          "baxter_interface.settings", "baxter_dataflow.waiting",
-         "baxter_dataflow.signals")
+         "baxter_dataflow.signals", "baxter_interface.parameter_tables", "baxter_control.pid",
+         "joint_trajectory_action.arm_motion", "joint_trajectory_action.bezier")
 
 
 @pytest.mark.parametrize("core", CORES)
