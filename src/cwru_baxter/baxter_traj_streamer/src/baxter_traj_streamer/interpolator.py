@@ -6,6 +6,8 @@ import numpy as np
 import rospy
 from baxter_core_msgs.msg import JointCommand
 
+from baxter_interface import goal_loop
+
 from .action_server import TrajServer
 from .errors import GoalRefused
 from .judging import judge
@@ -38,7 +40,7 @@ class Interpolator:
 
     def run(self):
         """Serve until the node is shut down."""
-        self._server.start()
+        goal_loop.start(self._server)
         while not rospy.is_shutdown():
             with self._lock:
                 # Woken by a goal; the time-out is for the shutdown.
