@@ -1,0 +1,78 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Play a recording of joint_recorder.py back, in position mode."""
+import sys
+
+from baxter_dataflow.ros_clock import RosClock
+from baxter_dataflow.waiting import Stopwatch
+from baxter_examples import recording
+from baxter_examples.arguments import add_file, new_parser, parse
+from baxter_examples.mounted_grippers import mounted_grippers
+from baxter_interface import Limb
+from baxter_interface.joint_checks import SIDES
+from baxter_interface.programs import EnabledRobot, expect, run
+
+RATE_HZ = 1000.0
+# A gripper is sent what changed by more than this [%].
+GRIPPER_STEP_PERCENT = 1.0
+
+
+class Player:
+    """Sets the arms and grippers that a recording has to its values."""
+
+    def __init__(self, record):
+        self._parts = []
+        grippers = mounted_grippers([side for side in SIDES if record.side(side)[1]], calibrate=True)
+        for side in SIDES:
+            joints, _ = record.side(side)
+            self._parts.append((Limb(side) if joints else None, joints, grippers.get(side), side + "_gripper"))
+        self._told = {}
+
+    def go_to(self, row):
+        """Move the arms to `row` gently."""
+        for limb, joints, _, _ in self._parts:
+            if limb:
+                expect(limb.move_to_joint_positions({name: row[name] for name in joints}),
+                       "the %s arm did not get to the recording's start" % limb.name)
+
+    def command(self, row):
+        for limb, joints, gripper, column in self._parts:
+            if limb:
+                limb.set_joint_positions({name: row[name] for name in joints})
+            if gripper and abs(self._told.get(column, float("inf")) - row[column]) > GRIPPER_STEP_PERCENT:
+                gripper.command_position(row[column])
+                self._told[column] = row[column]
+
+
+def play(path, loops):
+    record = recording.read(path)
+    with EnabledRobot() as robot:
+        player = Player(record)
+        done = 0
+        while loops < 1 or done < loops:
+            done += 1
+            print("moving to the start of %s" % path, flush=True)
+            player.go_to(record.rows[0])
+            print("playing, time %d%s" % (done, " of %d" % loops if loops >= 1 else ""), flush=True)
+            clock = RosClock()
+            watch = Stopwatch(clock.now())
+            begin_s = record.times_s[0]
+            for _ in robot.beats(RATE_HZ):
+                time_s = begin_s + watch.elapsed_s(clock.now())
+                player.command(record.at(time_s))
+                if time_s >= record.duration_s:
+                    break
+            else:
+                return
+
+
+def main():
+    parser = new_parser(__doc__)
+    add_file(parser, "the recording")
+    parser.add_argument("-l", "--loops", type=int, default=1, help="times; below 1 for ever (default: %(default)s)")
+    arguments = parse(parser)
+    return run("rsdk_joint_position_file_playback", lambda: play(arguments.file, arguments.loops))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Hold an arm by virtual springs: push it, and it comes back. Set them with rqt_reconfigure, or dynparam."""
+import sys
+
+import rospy
+from baxter_examples.cfg import JointSpringsExampleConfig
+from dynamic_reconfigure.server import Server
+from std_msgs.msg import Empty
+
+from baxter_examples.arguments import add_limb, new_parser, parse
+from baxter_examples.springs import spring_torques
+from baxter_interface import Limb
+from baxter_interface.joint_checks import JOINTS
+from baxter_interface.programs import EnabledRobot, expect, run
+
+RATE_HZ = 1000.0
+# The robot leaves torque mode when so many commands are missed.
+MISSED_COMMANDS = 20
+
+
+class Springs:
+    """One arm on springs; their stiffness and damping follow this node's dynamic parameters."""
+
+    def __init__(self, side):
+        self._limb = Limb(side)
+        self._gains = {}
+        # While somebody holds the cuff the robot ignores torques; here the arm is meant to be held.
+        self._cuff = rospy.Publisher("robot/limb/%s/suppress_cuff_interaction" % side, Empty, queue_size=1)
+        self._server = Server(JointSpringsExampleConfig, self._on_gains)
+
+    def hold(self, robot):
+        """Pull the arm to neutral while `robot` is there. Raises ProgramFailed, RobotLost."""
+        limb = self._limb
+        expect(limb.move_to_neutral(), "the %s arm did not get to neutral" % limb.name)
+        rest = limb.joint_angles()
+        limb.set_command_timeout(MISSED_COMMANDS / RATE_HZ)
+        print("the %s arm is on springs; Ctrl-C: quit" % limb.name, flush=True)
+        try:
+            for _ in robot.beats(RATE_HZ):
+                self._cuff.publish()
+                limb.set_joint_torques(spring_torques(rest, limb.joint_angles(), limb.joint_velocities(), *self._gains))
+        finally:
+            limb.exit_control_mode()
+
+    def _on_gains(self, config, _level):
+        self._gains = tuple(
+            {"%s_%s" % (self._limb.name, joint): config[joint + suffix] for joint in JOINTS}
+            for suffix in ("_spring_stiffness", "_damping_coefficient"))
+        return config
+
+
+def hold(side):
+    with EnabledRobot() as robot:
+        Springs(side).hold(robot)
+
+
+def main():
+    parser = new_parser(__doc__)
+    add_limb(parser)
+    side = parse(parser).limb
+    return run("rsdk_joint_torque_springs_%s" % side, lambda: hold(side))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,43 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Send an arm along a trajectory through its action server."""
+import sys
+
+from baxter_examples.arguments import add_limb, new_parser, parse
+from baxter_examples.trajectories import TrajectoryClient
+from baxter_interface import Limb
+from baxter_interface.joint_checks import JOINTS
+from baxter_interface.programs import EnabledRobot, run
+
+# From shoulder to wrist [rad], on the left arm; on the right one MIRRORED joints turn the other way.
+POSTURE = (-0.11, -0.62, -1.15, 1.32, 0.80, 1.27, 2.39)
+MIRRORED = ("s0", "e0", "w0", "w2")
+# Time [s] and what POSTURE is multiplied with.
+POINTS = ((7.0, 1.0), (9.0, 0.75), (12.0, 1.25))
+PATIENCE_S = 15.0
+
+
+def move(side):
+    client = TrajectoryClient(side)
+    with EnabledRobot():
+        limb = Limb(side)
+        posture = [-angle if side == "right" and joint in MIRRORED else angle
+                   for joint, angle in zip(JOINTS, POSTURE, strict=True)]
+        here = limb.joint_angles()
+        client.add(0.0, [here[name] for name in limb.joint_names()])
+        for time_s, factor in POINTS:
+            client.add(time_s, [factor * angle for angle in posture])
+        client.send()
+        client.wait(PATIENCE_S)
+        print("the %s arm has followed its trajectory" % side, flush=True)
+
+
+def main():
+    parser = new_parser(__doc__)
+    add_limb(parser)
+    side = parse(parser).limb
+    return run("rsdk_joint_trajectory_client_%s" % side, lambda: move(side))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,46 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tell the robot a piece of its description, such as that of a tool in its hand, until Ctrl-C."""
+import sys
+import xml.etree.ElementTree as ElementTree
+
+import rospy
+from baxter_core_msgs.msg import URDFConfiguration
+
+from baxter_dataflow.ros_clock import RosClock
+from baxter_dataflow.waiting import Ticker
+from baxter_examples.arguments import add_file, new_parser, parse
+from baxter_interface.programs import ProgramFailed, run
+
+RATE_HZ = 5.0
+
+
+def send(path, link, joint):
+    with open(path, encoding="utf-8") as stream:
+        text = stream.read()
+    try:
+        ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        raise ProgramFailed("%s is no XML: %s" % (path, error)) from error
+    publisher = rospy.Publisher("/robot/urdf", URDFConfiguration, queue_size=10)
+    # A new time means a new configuration to the robot: the same message is sent again and again.
+    message = URDFConfiguration(time=rospy.get_rostime(), link=link, joint=joint, urdf=text)
+    print("sending %s as %s to link %s, until Ctrl-C" % (path, joint, link), flush=True)
+    ticker = Ticker(RosClock(), RATE_HZ)
+    while not rospy.is_shutdown():
+        publisher.publish(message)
+        ticker.sleep()
+
+
+def main():
+    parser = new_parser(__doc__)
+    add_file(parser, "URDF fragment")
+    parser.add_argument("-l", "--link", default="left_hand", help="link that it is fixed to (default: %(default)s)")
+    parser.add_argument("-j", "--joint", default="left_gripper_base",
+                        help="joint that fixes it (default: %(default)s)")
+    arguments = parse(parser)
+    return run("rsdk_configure_urdf", lambda: send(arguments.file, arguments.link, arguments.joint), anonymous=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

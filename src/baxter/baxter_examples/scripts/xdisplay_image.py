@@ -1,0 +1,42 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Show a picture on the robot's screen (1024x600; smaller ones at its left upper corner)."""
+import pathlib
+import sys
+
+import cv2
+import cv_bridge
+import rospy
+from sensor_msgs.msg import Image
+
+from baxter_dataflow.ros_clock import RosClock
+from baxter_examples.arguments import add_file, new_parser, parse
+from baxter_interface import startup
+from baxter_interface.programs import ProgramFailed, run
+
+# A latched picture is gone with its publisher: what has just connected gets so long to fetch it [s].
+HAND_OVER_S = 1.0
+
+
+def show(path, delay_s):
+    picture = cv2.imread(str(path))
+    if picture is None:
+        raise ProgramFailed("%s: %s" % (path, "this is no picture that OpenCV reads" if path.is_file()
+                                        else "there is no such file"))
+    publisher = rospy.Publisher("/robot/xdisplay", Image, latch=True, queue_size=1)
+    RosClock().sleep(delay_s)
+    startup.wait_for_subscribers(publisher)
+    publisher.publish(cv_bridge.CvBridge().cv2_to_imgmsg(picture, encoding="bgr8"))
+    RosClock().sleep(HAND_OVER_S)
+
+
+def main():
+    parser = new_parser(__doc__)
+    add_file(parser, "the picture's file")
+    parser.add_argument("-d", "--delay", type=float, default=0.0, metavar="SECONDS", help="wait before (default: 0)")
+    arguments = parse(parser)
+    return run("rsdk_xdisplay_image", lambda: show(pathlib.Path(arguments.file), arguments.delay), anonymous=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Options that several examples have."""
+import argparse
+
+import rospy
+
+from baxter_external_devices.controls import CONTROLLERS
+from baxter_interface.joint_checks import SIDES
+
+
+def new_parser(description):
+    """Return an argparse parser with our `description` and the exit statuses."""
+    return argparse.ArgumentParser(description=description,
+                                   epilog="Exit status: 0 done, 1 failed, 2 wrong options, 130 after Ctrl-C.")
+
+
+def add_limb(parser, text="the arm"):
+    """Add -l/--limb, required."""
+    parser.add_argument("-l", "--limb", required=True, choices=SIDES, help=text)
+
+
+def add_joystick(parser):
+    """Add -j/--joystick, required."""
+    parser.add_argument("-j", "--joystick", required=True, choices=list(CONTROLLERS), help="the kind of joystick")
+
+
+def add_file(parser, text):
+    """Add -f/--file, required."""
+    parser.add_argument("-f", "--file", required=True, metavar="PATH", help=text)
+
+
+def add_component(parser, default):
+    """Add -c/--component; see component()."""
+    parser.add_argument("-c", "--component", default=default, help="channel's name (default: %(default)s); the "
+                                                                   "parameter ~component_id overrides it")
+
+
+def component(arguments):
+    """Return the channel that -c or the parameter ~component_id names; call it as an initialised node."""
+    return rospy.get_param("~component_id", arguments.component)
+
+
+def parse(parser):
+    """Parse the command line without ROS's remappings."""
+    return parser.parse_args(rospy.myargv()[1:])

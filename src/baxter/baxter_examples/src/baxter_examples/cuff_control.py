@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The buttons at an arm's cuff open and close its gripper; squeezing the cuff lights the arm's navigator."""
+import queue
+
+from baxter_interface import DigitalIO, Navigator
+
+from .mounted_grippers import mounted_grippers
+
+
+class CuffControl:
+    """One arm's cuff. Call work() regularly: it does what the buttons have asked for since.
+
+    Parameters: `lights`: whether the navigator follows the cuff; `say` takes a line of text; `gripper`, looked for on
+    the arm if it is not given.
+    """
+
+    def __init__(self, side, lights=True, say=lambda text: None, gripper=None):
+        self._side = side
+        self._say = say
+        # Callbacks only note: switching a light waits until it follows, which callbacks must not.
+        self._asked = queue.SimpleQueue()
+        self._gripper = gripper or mounted_grippers([side], calibrate=True).get(side)
+        self._navigator = Navigator(side) if lights else None
+        self._open, self._close, self._cuff = (DigitalIO("%s_%s" % (side, name)) for name in (
+            "lower_button", "upper_button", "lower_cuff"))
+        self._open.state_changed.connect(self._on_open)
+        self._close.state_changed.connect(self._on_close)
+        self._cuff.state_changed.connect(self._on_cuff)
+
+    def work(self):
+        """Do what was asked for. Raises OSError if a light does not follow."""
+        while not self._asked.empty():
+            self._asked.get()()
+
+    def _on_open(self, pressed):
+        if pressed:
+            self._command("open")
+
+    def _on_close(self, pressed):
+        if pressed:
+            self._command("close")
+
+    def _command(self, action):
+        self._say("%s gripper: %s" % (self._side, action))
+        if self._gripper:
+            self._asked.put(getattr(self._gripper, action))
+
+    def _on_cuff(self, squeezed):
+        self._say("%s cuff: %s" % (self._side, "squeezed" if squeezed else "let go"))
+        if self._navigator:
+            self._asked.put(lambda: self._light(squeezed))
+
+    def _light(self, on):
+        self._navigator.inner_led = self._navigator.outer_led = on

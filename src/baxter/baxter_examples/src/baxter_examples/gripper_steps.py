@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Change a gripper's parameters and position step by step."""
+
+
+class GripperSteps:
+    """A Gripper, with `change` and `move` besides its own methods."""
+
+    def __init__(self, gripper):
+        self._gripper = gripper
+
+    def __getattr__(self, name):
+        return getattr(self._gripper, name)
+
+    def change(self, parameter, step):
+        """Add `step` [%] to the parameter, kept within 0 to 100; a gripper without it says so."""
+        value = self._gripper.parameters().get(parameter, 0.0) + step
+        self._gripper.set_parameters({parameter: max(0.0, min(100.0, value))})
+
+    def move(self, step):
+        """Move by `step` [%] from where it is, kept within 0 to 100."""
+        self._gripper.command_position(max(0.0, min(100.0, self._gripper.position() + step)))

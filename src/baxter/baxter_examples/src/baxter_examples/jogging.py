@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Move single joints by small steps."""
+from baxter_interface import Limb
+from baxter_interface.joint_checks import SIDES
+
+STEP_RAD = 0.1
+
+
+class Jogging:
+    """Both arms, joint by joint."""
+
+    def __init__(self):
+        self._limbs = {side: Limb(side) for side in SIDES}
+        # Steps add up from what was commanded, since the arm is still on its way there: quick keys would be lost.
+        self._targets = {}
+
+    def step(self, side, joint, step_rad):
+        """Move the joint (short name, such as "s0") by `step_rad`."""
+        limb, name = self._limbs[side], "%s_%s" % (side, joint)
+        here = limb.joint_angle(name)
+        target = self._targets.get(name, here)
+        # Blocked, at its limit, or moved by others: begin where it is.
+        if abs(target - here) > 2.0 * abs(step_rad):
+            target = here
+        self._targets[name] = target + step_rad
+        limb.set_joint_positions({name: self._targets[name]})

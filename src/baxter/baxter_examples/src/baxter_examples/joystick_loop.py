@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Steer the robot with a joystick until Ctrl-C."""
+from .key_table import KeyTable
+
+RATE_HZ = 100.0
+# A stick that is held acts this often [Hz].
+STICK_RATE_HZ = 10.0
+HELP_BUTTONS = ("function1", "function2")
+
+
+class JoystickTable:
+    """What the controls of `joystick` do; `title` goes above their list."""
+
+    def __init__(self, title, joystick):
+        self._joystick = joystick
+        self._table = KeyTable(title)
+        self._buttons, self._sticks = [], []
+        self._turn = 0
+
+    def on_down(self, button, text, action, *arguments):
+        """Call `action(*arguments)` when the button goes down."""
+        self._table.add(button, text, action, *arguments)
+        self._buttons.append(button)
+
+    def while_held(self, stick, text, action, step):
+        """Call `action(step)`, or with -step, ten times a second while the stick is held to a side."""
+        # In the table for its help only.
+        self._table.add(stick, text, lambda: None)
+        self._sticks.append((stick, action, step))
+
+    def help(self):
+        """Return the list of controls as text."""
+        return self._table.help()
+
+    def work(self):
+        """Do what the controls ask for now; call it RATE_HZ times a second."""
+        for button in (*self._buttons, *HELP_BUTTONS):
+            if self._joystick.button_down(button):
+                self._table.press(button)
+        self._turn = (self._turn + 1) % round(RATE_HZ / STICK_RATE_HZ)
+        if self._turn == 0:
+            for stick, action, step in self._sticks:
+                value = self._joystick.stick_value(stick)
+                if value:
+                    action(step if value > 0.0 else -step)
+
+
+def joystick_loop(table, robot):
+    """Work on `table` (a JoystickTable) while `robot` (an EnabledRobot) is there. Raises RobotLost."""
+    print("%s\n  %s: this help\n  Ctrl-C: quit" % (table.help(), ", ".join(HELP_BUTTONS)), flush=True)
+    for _ in robot.beats(RATE_HZ):
+        table.work()

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keys (or joystick controls) with what they do, and the help that lists them. Free of ROS."""
+
+
+class KeyTable:
+    """Actions by key; `add` them, then `press` keys. Every other key, and `?`, shows the help."""
+
+    def __init__(self, title, show=print):
+        self._title = title
+        self._show = show
+        self._actions = {}
+
+    def add(self, key, text, action, *arguments):
+        """Let `key` call `action(*arguments)`; `text` says what it does. Raises ValueError for a key in use."""
+        if key in self._actions:
+            raise ValueError("the key %r is in use for: %s" % (key, self._actions[key][0]))
+        self._actions[key] = (text, action, arguments)
+
+    def press(self, key):
+        """Do what `key` is for, and say so."""
+        if key not in self._actions:
+            self._show(self.help())
+            return
+        text, action, arguments = self._actions[key]
+        self._show(text)
+        action(*arguments)
+
+    def help(self):
+        """Return the list of keys as text."""
+        width = max((len(key) for key in self._actions), default=1)
+        lines = ["  %s: %s" % (key.ljust(width), text) for key, (text, _, _) in self._actions.items()]
+        return "\n".join([self._title, *lines])

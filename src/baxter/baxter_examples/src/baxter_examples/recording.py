@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joint angles and gripper positions over time, in a CSV file. Free of ROS.
+
+The first line names the columns: time [s], then for each side its joints [rad] and its gripper [%].
+"""
+import bisect
+import csv
+import math
+
+from baxter_interface.joint_checks import SIDES, limb_joint_names
+
+COLUMNS = ["time", *(name for side in SIDES for name in (*limb_joint_names(side), side + "_gripper"))]
+
+
+class BadRecording(ValueError):
+    """A file that is no recording; the text says where and why."""
+
+
+class Recording:
+    """Rows of values over time.
+
+    Attributes: names: of the columns but time; times_s: rising; rows: dicts of name to value, one for each time.
+    """
+
+    def __init__(self, names, times_s, rows):
+        self.names, self.times_s, self.rows = names, times_s, rows
+
+    @property
+    def duration_s(self):
+        """The last row's time [s]."""
+        return self.times_s[-1]
+
+    def side(self, side):
+        """Split off one side: (names of its joints, whether it has a gripper)."""
+        joints = [name for name in self.names if name in limb_joint_names(side)]
+        return joints, side + "_gripper" in self.names
+
+    def at(self, time_s):
+        """Return the values at `time_s`, on straight lines between the rows, the end rows' beyond them."""
+        after = bisect.bisect_right(self.times_s, time_s)
+        if after == 0:
+            return dict(self.rows[0])
+        if after == len(self.times_s):
+            return dict(self.rows[-1])
+        begin_s, end_s = self.times_s[after - 1:after + 1]
+        share = (time_s - begin_s) / (end_s - begin_s)
+        before, behind = self.rows[after - 1:after + 1]
+        return {name: before[name] + share * (behind[name] - before[name]) for name in self.names}
+
+
+def write_row(stream, values):
+    """Write one row of the file: the column names, or numbers."""
+    csv.writer(stream, lineterminator="\n").writerow(
+        ["%.6f" % value if isinstance(value, float) else value for value in values])
+
+
+def read(path):
+    """Read a recording. Raises BadRecording, OSError."""
+    with open(path, newline="", encoding="utf-8") as stream:
+        lines = list(csv.reader(stream))
+    if not lines or lines[0][:1] != ["time"]:
+        raise BadRecording("%s: the first line must name the columns: time,left_s0,... as joint_recorder.py writes it"
+                           % path)
+    names = [name.strip() for name in lines[0][1:]]
+    unknown = [name for name in names if name not in COLUMNS]
+    if unknown or len(set(names)) < len(names) or not names:
+        raise BadRecording("%s: the columns are time and any of %s, each once; found %s"
+                           % (path, ", ".join(COLUMNS[1:]), ", ".join(unknown or names) or "none"))
+    times_s, rows = [], []
+    for number, line in enumerate(lines[1:], 2):
+        try:
+            time_s, *values = (float(value) for value in line)
+            row = dict(zip(names, values, strict=True))
+        except ValueError:
+            raise BadRecording("%s, line %d: expected %d numbers, got %r"
+                               % (path, number, len(names) + 1, ",".join(line))) from None
+        if not all(map(math.isfinite, (time_s, *values))):
+            raise BadRecording("%s, line %d: every number must be finite" % (path, number))
+        if times_s and time_s <= times_s[-1]:
+            raise BadRecording("%s, line %d: time %g does not come after %g" % (path, number, time_s, times_s[-1]))
+        times_s.append(time_s)
+        rows.append(row)
+    if not rows:
+        raise BadRecording("%s: there are no rows below the first line" % path)
+    return Recording(names, times_s, rows)

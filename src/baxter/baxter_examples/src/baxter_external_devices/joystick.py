@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joysticks on the topic /joy (sensor_msgs/Joy)."""
+import threading
+
+import rospy
+from sensor_msgs.msg import Joy
+
+from .controls import CONTROLLERS, ButtonEvents, StickEvents
+
+
+class Joystick:
+    """A joystick by what happens on it; see its subclasses for the controllers that we know.
+
+    Parameters: a stick's value is `scale` * reading + `offset`, or 0 while its reading is within `deadband`.
+    Names of buttons: btnLeft, btnUp, btnDown, btnRight, dPadUp, dPadDown, dPadLeft, dPadRight, leftBumper, rightBumper,
+    leftTrigger, rightTrigger, function1, function2. Of sticks: leftStickHorz, leftStickVert, rightStickHorz,
+    rightStickVert; left and up are positive. Other names raise KeyError.
+    """
+
+    CONTROLLER = None
+
+    def __init__(self, scale=1.0, offset=0.0, deadband=0.1):
+        if self.CONTROLLER is None:
+            raise TypeError("a Joystick is one of XboxController, LogitechController and PS3Controller")
+        self._lock = threading.Lock()
+        self._buttons = {name: ButtonEvents() for name in self.CONTROLLER.buttons}
+        self._sticks = {name: StickEvents(scale, offset, deadband) for name in self.CONTROLLER.sticks}
+        self._subscriber = rospy.Subscriber("/joy", Joy, self._on_joy, queue_size=10)
+
+    def button_down(self, name):
+        """Tell whether the button has gone down since last asked."""
+        with self._lock:
+            return self._buttons[name].take_down()
+
+    def button_up(self, name):
+        """Tell whether the button has gone up since last asked."""
+        with self._lock:
+            return self._buttons[name].take_up()
+
+    def stick_value(self, name):
+        """Return the stick's value."""
+        with self._lock:
+            return self._sticks[name].value
+
+    def stick_changed(self, name):
+        """Tell whether the stick has moved since last asked."""
+        return self._move(name) != 0.0
+
+    def stick_inc(self, name):
+        """Tell whether the stick's value is greater than when last asked."""
+        return self._move(name) > 0.0
+
+    def stick_dec(self, name):
+        """Tell whether the stick's value is less than when last asked."""
+        return self._move(name) < 0.0
+
+    def _move(self, name):
+        with self._lock:
+            return self._sticks[name].take_move()
+
+    def _on_joy(self, message):
+        with self._lock:
+            try:
+                for controls, events in ((self.CONTROLLER.buttons, self._buttons),
+                                         (self.CONTROLLER.sticks, self._sticks)):
+                    for name, control in controls.items():
+                        events[name].update(control.read(message.axes, message.buttons))
+            except IndexError:
+                rospy.logwarn_throttle(5.0, "/joy has %d axes and %d buttons, which does not fit %s: is another "
+                                            "controller plugged in?"
+                                            % (len(message.axes), len(message.buttons), type(self).__name__))
+
+
+class XboxController(Joystick):
+    """A controller for the Xbox, as Linux's xpad driver numbers it."""
+
+    CONTROLLER = CONTROLLERS["xbox"]
+
+    def __init__(self, scale=1.0, offset=0.0, deadband=0.5):
+        super().__init__(scale, offset, deadband)
+
+
+class LogitechController(Joystick):
+    """A Logitech gamepad in its mode D."""
+
+    CONTROLLER = CONTROLLERS["logitech"]
+
+    def __init__(self, scale=1.0, offset=0.0, deadband=0.5):
+        super().__init__(scale, offset, deadband)
+
+
+class PS3Controller(Joystick):
+    """A controller for the PlayStation 3."""
+
+    CONTROLLER = CONTROLLERS["ps3"]
+
+    def __init__(self, scale=1.0, offset=0.0, deadband=0.5):
+        super().__init__(scale, offset, deadband)
+
+
+JOYSTICKS = {"xbox": XboxController, "logitech": LogitechController, "ps3": PS3Controller}
