@@ -14,7 +14,7 @@ class PoseMove:
         self._client = client
 
     def trajectory(self, side, pose, time_optimal=False):
-        """``pose``: a name from config/streamer.yaml or seven angles [rad]. Raises SettingsError, ValueError."""
+        """``pose``: a name or seven angles [rad]. Raises SettingsError, ValueError."""
         streamer = self._client.streamer
         path = [streamer.get_qvec(side), streamer.settings.pose(pose, side) if isinstance(pose, str) else pose]
         trajectory = streamer.stuff_trajectory(path, side)

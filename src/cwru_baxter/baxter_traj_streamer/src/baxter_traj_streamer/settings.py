@@ -2,6 +2,9 @@
 """Joint names and settings, from config/streamer.yaml, which explains each. Free of ROS."""
 import math
 
+from baxter_sim_hardware.errors import PoseError
+from baxter_sim_hardware.poses import Poses
+
 SIDES = ("right", "left")
 # From torso to tool flange, the order of all 7-vectors here.
 JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
@@ -27,10 +30,11 @@ def arm_joint_names(side):
 class Settings:
     """The checked content of streamer.yaml as attributes of the same names.
 
-    defaults: that content; overrides: dict with some of the same keys. Raises SettingsError.
+    defaults: that content; overrides: dict with some of the same keys; robot_poses: the content of
+    baxter_sim_hardware/config/poses.yaml. Raises SettingsError.
     """
 
-    def __init__(self, defaults, overrides=None):
+    def __init__(self, defaults, overrides=None, *, robot_poses):
         overrides = overrides or {}
         if unknown := sorted(set(overrides) - set(defaults)):
             raise SettingsError("unknown setting %s; there are %s" % (", ".join(unknown), ", ".join(sorted(defaults))))
@@ -53,17 +57,23 @@ class Settings:
             for joint, value in values.items():
                 _require_positive("%s of %s" % (table, joint), value)
 
+        try:
+            self._named_poses = Poses({**robot_poses, "poses": {**robot_poses["poses"], **self.poses}})
+        except PoseError as error:
+            raise SettingsError(str(error)) from error
+
     def planning_velocity(self):
         """Velocities of the seven joints that arrival times are computed with [rad/s], scale factor included."""
         return [self.max_velocity[joint] * self.speed_scale_factor for joint in JOINTS]
 
     def pose(self, name, side):
         """The seven angles [rad] of a named pose. Raises SettingsError for an unknown pose or side."""
-        arm_joint_names(side)
-        if name not in self.poses:
-            raise SettingsError("unknown pose %r; choices are %s" % (name, ", ".join(self.poses)))
-        (given, angles), = self.poses[name].items()
-        return [angles[joint] * (1 if side == given else self.mirror[joint]) for joint in JOINTS]
+        names = arm_joint_names(side)
+        try:
+            angles = self._named_poses.angles(name, side)
+        except PoseError as error:
+            raise SettingsError(str(error)) from error
+        return [angles[joint] for joint in names]
 
 
 def _require_positive(name, value):

@@ -16,9 +16,6 @@ from baxter_sim_kinematics import Chain
 from baxter_traj_streamer.playfile import Playfile
 from baxter_traj_streamer.settings import SIDES, arm_joint_names
 
-# A posture with room around it, for the right arm; the left one's is its mirror image [rad].
-ROOMY = [0.08, -1.0, 1.19, 1.94, -0.67, 1.03, 0.5]
-
 
 def run(*command):
     done = subprocess.run(["rosrun", "baxter_traj_streamer", *map(str, command)], capture_output=True, text=True,
@@ -44,12 +41,10 @@ class TrajMovesTest(FakeRobotTest):
         return self.services[service](**request)
 
     def roomy(self, side):
-        mirror = self.streamer.settings.mirror
-        return [angle * (1 if side == "right" else mirror[joint])
-                for joint, angle in zip(("s0", "s1", "e0", "e1", "w0", "w1", "w2"), ROOMY, strict=True)]
+        return self.streamer.settings.pose("untucked", side)
 
     def go_where_there_is_room(self, side):
-        answer = self.call("move_to_pose", side=side, angles=self.roomy(side), time_optimal=True)
+        answer = self.call("move_to_pose", side=side, pose="untucked", time_optimal=True)
         self.assertTrue(answer.success, answer.message)
         np.testing.assert_allclose(self.angles(arm_joint_names(side)), self.roomy(side), atol=0.01)
 
@@ -70,7 +65,8 @@ class TrajMovesTest(FakeRobotTest):
         code, text = run("traj_action_client_pre_pose", "left", "--time-optimal", "--wait", "30")
         self.assertEqual(code, 0, text)
         self.assertIn("the arm is there", text)
-        answer = self.call("move_to_pose", side="right", pose="pre_pose", time_optimal=True)
+        answer = self.call("move_to_pose", side="right", time_optimal=True,
+                           angles=self.streamer.settings.pose("pre_pose", "right"))
         self.assertTrue(answer.success, answer.message)
         for side in SIDES:
             np.testing.assert_allclose(

@@ -14,7 +14,7 @@ import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Empty
+from std_msgs.msg import Bool, Empty, Float64
 
 from baxter_traj_streamer.judging import KNOWN_JOINTS
 from baxter_traj_streamer.ros_settings import read_limits
@@ -112,6 +112,19 @@ class TrajInTheWorldTest(unittest.TestCase):
             self.wait_until(lambda: not robot.why_not_ready(), "the robot to be enabled")
             # Neither the stop nor being enabled again made the arm jump.
             self.assertLess(abs(client.here(joint)[0] - at), COASTING)
+
+    def test_4_speed_ratio_does_not_throttle_a_goal(self):
+        client = self.ready_client()
+        ratio = rospy.Publisher("/robot/limb/left/set_speed_ratio", Float64, queue_size=1)
+        self.wait_until(ratio.get_num_connections, "the robot to listen")
+        ratio.publish(0.05)
+        begin = client.here(["left_e1"])[0]
+        # At 0.05 of 1.5 rad/s this would take 11 s, and 4 s are granted.
+        goal = client.send(joint_trajectory(["left_e1"], [2.0], [[begin - 0.8]]))
+        self.assertTrue(goal.wait(DEADLINE_S))
+        status, text, _ = goal.outcome()
+        self.assertEqual(status, GoalStatus.SUCCEEDED, text)
+        self.assertAlmostEqual(client.here(["left_e1"])[0], begin - 0.8, delta=TOLERANCE)
 
     def ready_client(self):
         self.start("baxter_traj_streamer", "traj_interpolator_as")

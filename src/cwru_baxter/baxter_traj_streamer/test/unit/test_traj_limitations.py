@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The limitations that the notes list: each lifted, and each switched back by config/as_in_notes.yaml."""
 import pathlib
+import sys
 
 import numpy as np
 import pytest
-import yaml
 
 from baxter_traj_streamer.errors import GoalRefused
 from baxter_traj_streamer.judging import KNOWN_JOINTS, RIGHT_ARM, JointLimit, judge
-from baxter_traj_streamer.settings import Settings
 
-CONFIG = pathlib.Path(__file__).parents[2] / "config"
-DEFAULTS, AS_IN_NOTES = (yaml.safe_load((CONFIG / name).read_text(encoding="utf-8"))
-                         for name in ("streamer.yaml", "as_in_notes.yaml"))
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
+from streamer_settings import AS_IN_NOTES, DEFAULTS, make_settings  # noqa: E402
+
 LIMITS = {name: JointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
 AT_ZERO = dict.fromkeys(KNOWN_JOINTS, 0.0)
 ARM = [0.0] * 7
@@ -20,7 +19,7 @@ ARM = [0.0] * 7
 
 def plan_for(points, names=("right_s0", "left_w2"), **settings):
     rows = [(*point, *[[]] * (4 - len(point))) for point in points]
-    return judge(names, rows, LIMITS, AT_ZERO, Settings(DEFAULTS, settings))
+    return judge(names, rows, LIMITS, AT_ZERO, make_settings(**settings))
 
 
 def reason(points, *arguments, **settings):
@@ -35,7 +34,7 @@ def moved(index, value):
 
 def test_all_switches_of_the_notes_are_settings_and_differ_from_ours():
     assert all(DEFAULTS[name] != value for name, value in AS_IN_NOTES.items())
-    Settings(DEFAULTS, AS_IN_NOTES)
+    make_settings(**AS_IN_NOTES)
 
 
 # -- interpolation ----------------------------------------------------------------------------------------------------

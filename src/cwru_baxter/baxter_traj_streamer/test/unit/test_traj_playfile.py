@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Playfiles: reading, checking, timing, joining, writing."""
 import pathlib
+import sys
 
 import numpy as np
 import pytest
-import yaml
 
 from baxter_traj_streamer.judging import KNOWN_JOINTS, JointLimit
 from baxter_traj_streamer.playfile import Playfile, PlayfileError, check, merged
-from baxter_traj_streamer.settings import SIDES, Settings, arm_joint_names
+from baxter_traj_streamer.settings import SIDES, arm_joint_names
 
-SETTINGS = Settings(yaml.safe_load(
-    (pathlib.Path(__file__).parents[2] / "config" / "streamer.yaml").read_text(encoding="utf-8")))
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
+from streamer_settings import make_settings  # noqa: E402
+
+SETTINGS = make_settings()
 LIMITS = {name: JointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
 THREE_ROWS = """# wave
 0.1, 0, 0, 0, 0, 0, 0, 0.2

@@ -8,19 +8,18 @@ import sys
 
 import numpy as np
 import pytest
-import yaml
 
 from baxter_traj_streamer.errors import GoalRefused
 from baxter_traj_streamer.judging import KNOWN_JOINTS, JointLimit, judge
 from baxter_traj_streamer.motion import Motion
-from baxter_traj_streamer.settings import JOINTS, SIDES, Settings, SettingsError, arm_joint_names
+from baxter_traj_streamer.settings import JOINTS, SIDES, SettingsError, arm_joint_names
 from baxter_traj_streamer.timing import arrival_times, transition_time
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
 from spoilt_goals import WORDS, spoilt_goal  # noqa: E402
+from streamer_settings import make_settings  # noqa: E402
 
-DEFAULTS = yaml.safe_load((pathlib.Path(__file__).parents[2] / "config" / "streamer.yaml").read_text(encoding="utf-8"))
-SETTINGS = Settings(DEFAULTS)
+SETTINGS = make_settings()
 LIMITS = {name: JointLimit(-2.0, 2.0, 1.5) for name in KNOWN_JOINTS}
 AT_ZERO = dict.fromkeys(KNOWN_JOINTS, 0.0)
 RIGHT = arm_joint_names("right")
@@ -31,7 +30,7 @@ def point(time_s, *positions, velocities=(), accelerations=()):
 
 
 def plan_for(points, names=("right_s0", "left_w2"), measured=AT_ZERO, **settings):
-    return judge(names, points, LIMITS, measured, Settings(DEFAULTS, settings))
+    return judge(names, points, LIMITS, measured, make_settings(**settings))
 
 
 def refusal(*arguments, **options):
@@ -43,7 +42,7 @@ def refusal(*arguments, **options):
 def test_core_loads_without_ros():
     ros = ("rospy", "actionlib", "sensor_msgs", "trajectory_msgs", "baxter_core_msgs", "std_msgs", "actionlib_msgs")
     code = ("import sys; sys.modules.update(dict.fromkeys(%r)); "
-            "import baxter_traj_streamer.judging, baxter_traj_streamer.motion, baxter_traj_streamer.timing" % (ros,))
+            "from baxter_traj_streamer import curve, judging, motion, optimal, playfile, straight_line" % (ros,))
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
@@ -64,10 +63,17 @@ def test_left_pre_pose_mirrors_the_right_one():
 @pytest.mark.parametrize("overrides", [
     {"speed_scale_factor": 0.0}, {"speed_scale_factor": 1.5}, {"rate": 100.0}, {"interpolation": "smooth"},
     {"start": "hop"}, {"joints": "left_arm"}, {"feedback": 1}, {"max_acceleration": {"s0": 1.0}},
+    {"poses": {"half": {"left": {"s0": 1.0}}}},
     {"max_velocity": {"s0": 1.0}}, {"max_velocity": dict.fromkeys(JOINTS, math.nan)}, {"rate_hz": "fast"}])
 def test_unusable_settings_are_refused(overrides):
     with pytest.raises(SettingsError):
-        Settings(DEFAULTS, overrides)
+        make_settings(**overrides)
+
+
+def test_poses_of_the_robot_are_known_too():
+    for side in SIDES:
+        assert SETTINGS.pose("neutral", side) == [0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0]
+    assert SETTINGS.pose("untucked", "right")[:2] == [0.08, -1.0]
 
 
 def test_unknown_pose_and_side_are_refused():

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Settings as the nodes read them, without ROS."""
+import pathlib
+
+import yaml
+
+from baxter_traj_streamer.settings import Settings
+
+_PACKAGE = pathlib.Path(__file__).resolve().parents[1]
+
+
+def read(path):
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+DEFAULTS, AS_IN_NOTES = (read(_PACKAGE / "config" / name) for name in ("streamer.yaml", "as_in_notes.yaml"))
+ROBOT_POSES = read(_PACKAGE.parents[1] / "baxter/baxter_simulator/baxter_sim_hardware/config/poses.yaml")
+
+
+def make_settings(**overrides):
+    return Settings(DEFAULTS, overrides, robot_poses=ROBOT_POSES)
