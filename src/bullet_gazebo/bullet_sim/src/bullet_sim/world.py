@@ -210,9 +210,9 @@ class World:
         """Find the contacts where everything stands now, without a step; ``contacts`` then returns them."""
         pybullet.performCollisionDetection(physicsClientId=self._client)
 
-    def contacts(self, model=None):
-        """Return the contacts of the last step as a list of Contact; all, or those that involve one Model."""
-        body = {} if model is None else {"bodyA": model.body}
+    def contacts(self, model=None, other=None):
+        """Return the contacts of the last step as a list of Contact; all, or those of one Model, or between two."""
+        body = {key: value.body for key, value in (("bodyA", model), ("bodyB", other)) if value is not None}
         names = {other.body: other for other in self.models.values()}
         found = []
         for point in pybullet.getContactPoints(physicsClientId=self._client, **body) or ():

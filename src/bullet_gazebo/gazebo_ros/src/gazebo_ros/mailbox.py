@@ -53,6 +53,8 @@ class Queue:
 
     def drain(self):
         """Loop thread: all unread messages, oldest first."""
+        if not self._messages:
+            return []  # a robot looks into a hundred queues each tick, and nearly all are empty
         messages = []
         while self._messages:
             messages.append(self._messages.popleft())

@@ -49,6 +49,9 @@ SMOOTHING_S = 0.02  # see setpoint.MovingAverage
 # have; a larger one would only make them overshoot. In free motion the joints stay within a tenth of it.
 REACH_RAD = 1e-3
 AT_LIMIT = 0.999  # fraction of the velocity limit from which torque mode watches the limit
+# An arm that touches the robot itself pushes with this share of its effort limits in position and velocity mode.
+YIELD_FACTOR = 0.3
+FEED_FORWARD_S = 0.05  # for so long a feed-forward velocity belongs to the raw commands that come in
 SINK_DAMPING = 150.0  # [Nm s/rad] an unpowered arm with `disabled:=sink` gives way to gravity against this
 SINK_FRICTION = 1.0  # [Nm] what still damps a joint whose gravity torque vanishes
 
@@ -89,6 +92,7 @@ class _Limb:
         self.mode = Mode.POSITION  # of the last command
         self.speed_ratio = 1.0
         self.timeout_s = COMMAND_TIMEOUT_S
+        self.floats = False
 
 
 class Arms:
@@ -118,12 +122,18 @@ class Arms:
         self._braking = np.zeros(count, dtype=bool)
         self._brakes = False
         self._brake_ticks = 0  # left, of BRAKES_S
+        self._yielding = np.zeros(count, dtype=bool)
+        self._balanced = np.ones(count)  # 1 where torque mode adds the torque that balances gravity, 0 where not
+        self._feed_forward = np.zeros(count)  # [rad/s]
+        self._feed_forward_stamp = np.full(count, -np.inf)
         self._smoothing = MovingAverage(max(1, round(SMOOTHING_S / dt)), position)
         self.reset(position)
 
     def reset(self, position):
         """Forget every command and hold `position`, (n,) [rad]: after a reset of the world, or a teleport."""
         everything = np.ones(len(self._mode), dtype=bool)
+        for limb in self._limbs.values():
+            limb.floats = False
         self._reference = np.array(position, dtype=float)
         self._rate = np.zeros(len(position))
         self._output = self._reference.copy()
@@ -189,6 +199,8 @@ class Arms:
         """
         limb = self._limbs[side]
         command = limb.parser.parse(mode, names, values)
+        if limb.floats:
+            raise CommandRefused("the arm floats, because its cuff is squeezed; release it first")
         named = np.zeros(len(self._mode), dtype=bool)
         named[command.index] = True
         if limb.mode is not command.mode:
@@ -213,6 +225,51 @@ class Arms:
         self._refresh_speed()
         return command
 
+    def set_yielding(self, side, yields):
+        """Whether a limb, in position and velocity mode, pushes with no more than YIELD_FACTOR of its effort limits."""
+        self._yielding[self._limbs[side].index] = yields
+
+    def set_gravity_compensation(self, side, on):
+        """Whether a limb's torque mode adds the torque that balances gravity."""
+        self._balanced[self._limbs[side].index] = float(on)
+
+    def set_floating(self, side, floats, position, velocity):
+        """Have a limb float without resistance, or hold where it is then; (n,) measured. It takes no commands while."""
+        limb = self._limbs[side]
+        if floats == limb.floats:
+            return
+        joints = np.zeros(len(self._mode), dtype=bool)
+        joints[limb.index] = True
+        limb.floats = floats
+        limb.mode = Mode.TORQUE if floats else Mode.POSITION
+        if floats:
+            self._set_mode(joints, Mode.TORQUE)
+            self._refresh_speed()
+        else:
+            self._hold(joints, position, velocity)
+
+    def feed_forward(self, side, velocities, time_s):
+        """Take the velocities (7,) [rad/s] at which raw set-points move that come in about now.
+
+        A stream of set-points is then followed without the lag of one command. Raises CommandRefused for what is not
+        one finite number for each joint.
+        """
+        index = self._limbs[side].index
+        if len(velocities) != len(index) or not np.isfinite(velocities).all():
+            raise CommandRefused("inverse dynamics command has velocities %s; it must have %d finite numbers [rad/s]"
+                                 % (list(velocities), len(index)))
+        limit = self.limits.velocity[index]
+        self._feed_forward[index] = np.clip(velocities, -limit, limit)
+        self._feed_forward_stamp[index] = time_s
+
+    def stop_limb(self, side, position, velocity):
+        """Stop one limb's joints and hold them where they come to rest; (n,) measured."""
+        limb = self._limbs[side]
+        joints = np.zeros(len(self._mode), dtype=bool)
+        joints[limb.index] = True
+        limb.mode = Mode.POSITION
+        self._hold(joints, position, velocity)
+
     def stop(self, position, velocity, brakes):
         """Stop every joint and hold it where it comes to rest; (n,) measured.
 
@@ -222,6 +279,7 @@ class Arms:
         self._brake_ticks = round(BRAKES_S / self._dt) if brakes else 0
         for limb in self._limbs.values():
             limb.mode = Mode.POSITION
+            limb.floats = False
         self._hold(np.ones(len(self._mode), dtype=bool), position, velocity)
 
     # -- one tick
@@ -241,6 +299,9 @@ class Arms:
         bound = (BRAKES_EFFORT_FACTOR if self._brake_ticks else 1.0) * self.limits.effort + np.abs(gravity)
         if self._brake_ticks:
             self._brake_ticks -= 1
+        elif self._yielding.any():
+            gentle = self._yielding & (self._mode != _RAW_POSITION)
+            bound = np.where(gentle, YIELD_FACTOR * self.limits.effort + np.abs(gravity), bound)
         in_torque = self._mode == _TORQUE
         if self._is_settled or not in_torque.any():
             return Drives(self._all, self._output, self._output_rate, bound, self._none, self._none, self._none)
@@ -248,7 +309,7 @@ class Arms:
         motor = np.flatnonzero(in_torque)
         servo = np.flatnonzero(~in_torque)
         return Drives(servo, self._output[servo], self._output_rate[servo], bound[servo],
-                      motor, *self._torque_drive(motor, velocity[motor], gravity[motor]))
+                      motor, *self._torque_drive(motor, velocity[motor], (self._balanced * gravity)[motor]))
 
     def sink(self, position, velocity, gravity):
         """Drives for a tick without power: each joint gives way to gravity like a light body in a thick medium.
@@ -265,7 +326,7 @@ class Arms:
     # -- inside
 
     def _torque_drive(self, joints, velocity, gravity):
-        """Command plus gravity as a motor that cannot run away: (velocity [rad/s], effort [Nm]), both (k,).
+        """Command plus what balances gravity, as a motor's (velocity [rad/s], effort [Nm]), both (k,); it never races.
 
         A velocity motor with a far target and a bounded effort exerts exactly that effort, and none beyond the target:
         the velocity limit comes for free and holds within the tick, also for a wrist that 15 Nm would bring to 15 rad/s
@@ -286,8 +347,12 @@ class Arms:
         goes_on = (self._mode[index] == Mode.RAW_POSITION) & (gap <= STREAM_GAP_S)
         self._target[index] = np.where(goes_on, self._target[index], command.values)
         limit = self.limits.velocity[index]
-        self._stream_rate[index] = np.clip((command.values - self._target[index]) / gap, -limit, limit)
-        self._stream_goal[index] = command.values
+        # With a feed-forward velocity the goal is where the next command will be, without the one that has just come.
+        is_fresh = goes_on & (time_s - self._feed_forward_stamp[index] <= FEED_FORWARD_S)
+        ahead = np.where(is_fresh, self._feed_forward[index] * np.minimum(gap, STREAM_GAP_S), 0.0)
+        goal = np.clip(command.values + ahead, self.limits.lower[index], self.limits.upper[index])
+        self._stream_rate[index] = np.clip((goal - self._target[index]) / gap, -limit, limit)
+        self._stream_goal[index] = goal
         self._stream_stamp[index] = time_s
 
     def _move_stream(self, raw):

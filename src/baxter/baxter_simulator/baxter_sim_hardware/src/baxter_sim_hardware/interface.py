@@ -1,41 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's ROS interface as one table: what the plugin opens, what the documentation lists, what tests expect."""
-from dataclasses import dataclass
+from .collision import COLLISION_TOPICS
+from .procedures import MAINTENANCE_TOPICS
+from .screen import SCREEN_TOPICS
+from .sensors import SENSOR_TOPICS
+from .status import STATUS_TOPICS
+from .topic_row import JOINT_STATE_RATE, LATCHED, PARTS, STATE_RATE_HZ, Topic
 
-from .panel import ANALOG, DIGITAL, NAVIGATORS
-from .sides import SIDES
-
-STATE_RATE_HZ = 100.0  # the physical robot's state topics
 JOINT_STATE_RATE_HZ = 50.0  # what the vendor's simulator publishes and the lab sheets print
-LATCHED = "latched"  # in place of a rate: once, and again for who comes later
-JOINT_STATE_RATE = "joint_state_rate"  # in place of a rate: the parameter of that name
-PARTS = {"limb": SIDES, "digital": tuple(DIGITAL), "analog": tuple(ANALOG), "navigator": NAVIGATORS}
-
-
-@dataclass(frozen=True)
-class Topic:
-    """One row. key: what the plugin calls it; name: below the robot's namespace, with one of PARTS in braces where
-    there is a topic for each.
-
-    rate: Hz, or LATCHED, or JOINT_STATE_RATE; None for topics that the robot listens to.
-    """
-
-    key: str
-    name: str
-    type: str
-    rate: object
-    meaning: str
-
-    @property
-    def is_published(self):
-        return self.rate is not None
-
-    def names(self):
-        """[(part or None, topic name)], one for each limb, component ... where the topic exists for each."""
-        for kind, parts in PARTS.items():
-            if "{%s}" % kind in self.name:
-                return [(part, self.name.format(**{kind: part})) for part in parts]
-        return [(None, self.name)]
 
 
 TOPICS = (
@@ -55,7 +27,7 @@ TOPICS = (
     Topic("digital_io_states", "digital_io_states", "baxter_core_msgs/DigitalIOStates", STATE_RATE_HZ,
           "all of them"),
     Topic("analog_io", "analog_io/{analog}/state", "baxter_core_msgs/AnalogIOState", STATE_RATE_HZ,
-          "one wheel (0 to 255, wraps), one vacuum sensor (0 to 255), or the integer that `torso_fan`, "
+          "one wheel (0 to 255, wraps), hand range [mm], vacuum sensor (0 to 255), or the integer that `torso_fan`, "
           "`torso_lighting` were told"),
     Topic("analog_io_uint32", "analog_io/{analog}/value_uint32", "std_msgs/UInt32", STATE_RATE_HZ,
           "the same value"),
@@ -101,6 +73,11 @@ TOPICS = (
     Topic("set_super_enable", "set_super_enable", "std_msgs/Bool", None, "true enables, false disables"),
     Topic("set_super_stop", "set_super_stop", "std_msgs/Empty", None, "software stop"),
     Topic("set_super_reset", "set_super_reset", "std_msgs/Empty", None, "clears a stop; leaves the robot disabled"),
+    *COLLISION_TOPICS,
+    *SENSOR_TOPICS,
+    *STATUS_TOPICS,
+    *SCREEN_TOPICS,
+    *MAINTENANCE_TOPICS,
 )
 
 
@@ -114,7 +91,8 @@ def markdown_table(namespace="/robot"):
             rate = "%g Hz" % topic.rate
         else:
             rate = topic.rate or "–"
-        lines.append("| `%s/%s` | %s | %s | %s | %s |" % (
-            namespace, topic.name.format(**{kind: "<%s>" % kind for kind in PARTS}), topic.type,
+        name = topic.name.format(**{kind: "<%s>" % kind for kind in PARTS})
+        lines.append("| `%s` | %s | %s | %s | %s |" % (
+            name if name.startswith("/") else "%s/%s" % (namespace, name), topic.type,
             "robot publishes" if topic.is_published else "robot listens", rate, topic.meaning))
     return "\n".join(lines) + "\n"

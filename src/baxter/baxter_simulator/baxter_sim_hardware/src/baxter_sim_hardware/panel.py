@@ -29,7 +29,9 @@ DIGITAL = {
 }
 WHEELS = tuple("%s_wheel" % navigator for navigator in NAVIGATORS)
 VACUUM_SENSORS = {side: "%s_vacuum_sensor_analog" % side for side in SIDES}
-ANALOG = {**dict.fromkeys((*WHEELS, *VACUUM_SENSORS.values()), True), "torso_fan": False, "torso_lighting": False}
+RANGE_SENSORS = {side: "%s_hand_range" % side for side in SIDES}
+ANALOG = {**dict.fromkeys((*WHEELS, *VACUUM_SENSORS.values(), *RANGE_SENSORS.values()), True),
+          "torso_fan": False, "torso_lighting": False}
 
 
 def navigator_name(navigator):

@@ -45,6 +45,10 @@ class PanelTopics:
         }
         context.service(PRESS_SERVICE, Press, self._press)
 
+    def cuff_squeezed(self, side):
+        """Whether somebody squeezes the cuff of one hand."""
+        return self._panel.digital["%s_lower_cuff" % side]
+
     def _digital(self, name):
         return DigitalIOState(int(self._panel.digital[name]), DIGITAL[name])
 

@@ -7,16 +7,21 @@ import roslib.message
 from std_msgs.msg import Empty
 
 from baxter_sim_hardware import convert, endpoint, interface
+from baxter_sim_hardware.collision_topics import CollisionTopics
 from baxter_sim_hardware.errors import CommandRefused, HardwareError
 from baxter_sim_hardware.gripper_topics import GripperTopics
 from baxter_sim_hardware.head_topics import HeadTopics
 from baxter_sim_hardware.joint_command import JointLimits
 from baxter_sim_hardware.limbs import BASE_FRAME, finger_openings, limbs_of, tip_of
 from baxter_sim_hardware.panel_topics import PanelTopics
+from baxter_sim_hardware.procedure_topics import ProcedureTopics
 from baxter_sim_hardware.robot import Baxter
 from baxter_sim_hardware.robot_state import Event
 from baxter_sim_hardware.schedule import Schedule
+from baxter_sim_hardware.screen_topics import ScreenTopics
 from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
+from baxter_sim_hardware.sensor_topics import SensorTopics
+from baxter_sim_hardware.status_topics import StatusTopics
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
@@ -40,8 +45,6 @@ class BaxterPlugin(ModelPlugin):
             self._build(context)
         except HardwareError as error:
             raise PluginError("cannot be Baxter's brain for model '%s': %s" % (context.model.name, error)) from error
-        self._panel = PanelTopics(context)
-        self._grippers.attach_sensors(self._panel)
         self._open_topics(context)
 
     def _build(self, context):
@@ -60,6 +63,16 @@ class BaxterPlugin(ModelPlugin):
             profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"))
         self._head = HeadTopics(model, self._baxter.state, self._dt)
         self._grippers = GripperTopics(context.world, model, self._baxter.state, self._dt)
+        self._panel = PanelTopics(context)
+        senses = SensorTopics(context.world, model, robot, self._limb_index, self._dt)
+        for part in (self._grippers, senses):
+            part.attach_sensors(self._panel)
+        self._collision = CollisionTopics(
+            context.world, model, self._baxter.arms, self._feel, self._panel.cuff_squeezed)
+        self._procedures = ProcedureTopics(self._baxter.state)
+        self._parts = (
+            self._panel, self._head, self._grippers, self._collision, self._procedures, senses, ScreenTopics(),
+            StatusTopics(self._baxter, self._chains, self._read_arms, robot.links, context.urdf_xml, context.log))
         if self._switch("enable", False):
             self._apply(Event.ENABLE)
         self._alphabetical = np.argsort(model.joint_names)
@@ -89,9 +102,9 @@ class BaxterPlugin(ModelPlugin):
 
     def _open_topics(self, context):
         """Open every row of the interface table; `sim/started` last, so that who hears it finds all the others."""
-        parts = (self._panel, self._head, self._grippers)
-        makers = {key: make for part in parts for key, make in part.makers.items()}
-        takers = {key: take for part in parts for key, take in part.takers.items()}
+        makers = {key: make for part in self._parts for key, make in part.makers.items()}
+        takers = {key: take for part in self._parts for key, take in part.takers.items()}
+        latched = {key: begin for part in self._parts for key, begin in getattr(part, "latched", {}).items()}
         groups = {}  # rate -> (schedule, [(function that makes a message, part, publisher)])
         self._takers = []  # (key, part, queue, function that takes a message)
         self._inputs = {}  # key -> [(side, queue)]
@@ -103,8 +116,10 @@ class BaxterPlugin(ModelPlugin):
         for row in interface.TOPICS:
             message = roslib.message.get_message_class(row.type)
             for side, name in row.names():
-                if row.rate == interface.LATCHED:
+                if row.key == "started":
                     started = name, message
+                elif row.rate == interface.LATCHED:
+                    latched[row.key](context.publisher(name, message, latch=True))
                 elif row.is_published:
                     hz = rate if row.rate == interface.JOINT_STATE_RATE else row.rate
                     make = makers.get(row.key) or getattr(self, "_" + row.key)
@@ -126,6 +141,7 @@ class BaxterPlugin(ModelPlugin):
         position, velocity = self._before[0][self._arm_index], self._before[1][self._arm_index]
         self._take_messages(time_s, position, velocity)
         arm = self._arm_index
+        self._collision.update(time_s, self._baxter.state.enabled, position, velocity)
         gravity = self._model.gravity_efforts(self._before[0])[arm]
         drives = self._baxter.update(time_s, position, velocity, gravity)
         if len(drives.servo):
@@ -138,17 +154,32 @@ class BaxterPlugin(ModelPlugin):
 
     def publish(self, time_s):
         snapshot = None
+        self._procedures.update(time_s, lambda side: self._feel(side, self._snapshot())[0])
         for schedule, topics in self._outputs:
             if not schedule.due(time_s):
                 continue
             for make, part, publisher in topics:
                 if publisher.has_listeners:
                     if snapshot is None:
-                        snapshot = _Snapshot(self._model, self._before, self._dt)
+                        snapshot = self._snapshot()
                     publisher.publish(make(time_s, part, snapshot))
         if not self._has_started:
             self._started.publish(Empty())
             self._has_started = True
+
+    def _snapshot(self):
+        return _Snapshot(self._model, self._before, self._arm_index, self._dt)
+
+    def _read_arms(self):
+        """(position, velocity) of the arms' joints, (n,) each."""
+        return tuple(values[self._arm_index] for values in self._model.read_joints()[:2])
+
+    def _feel(self, side, snapshot):
+        """(torques (7,), wrench (6,)) that the surroundings exert on one arm's joints and on its tip."""
+        index = self._limb_index[side]
+        jacobian = self._chains[side].jacobian(snapshot.position[index])
+        return (snapshot.own_effort[index] - snapshot.effort[index],
+                endpoint.contact_wrench(jacobian, snapshot.effort[index], snapshot.own_effort[index]))
 
     def joints_set(self):
         self._baxter.arms.reset(self._model.read_joints()[0][self._arm_index])
@@ -157,7 +188,9 @@ class BaxterPlugin(ModelPlugin):
 
     def reset(self):
         self.joints_set()
-        self._panel.reset()
+        for part in self._parts:
+            if part not in (self._head, self._grippers) and hasattr(part, "reset"):
+                part.reset()
         self._last_warning.clear()
 
     # -- in
@@ -196,7 +229,7 @@ class BaxterPlugin(ModelPlugin):
 
     def _apply(self, event, time_s=0.0, position=None, velocity=None):
         if position is None:
-            position, velocity = (values[self._arm_index] for values in self._model.read_joints()[:2])
+            position, velocity = self._read_arms()
         before = self._baxter.state.state
         refusal = self._baxter.apply(event, position, velocity)
         if refusal:
@@ -260,10 +293,11 @@ class BaxterPlugin(ModelPlugin):
 class _Snapshot:
     """The model's joints after a step; what is costly is computed once, and only if a message asks for it."""
 
-    def __init__(self, model, before, dt):
-        """before: `model.read_joints()` as it was when that step began."""
+    def __init__(self, model, before, arm_index, dt):
+        """before: `model.read_joints()` as it was when that step began; arm_index: of the arms' joints."""
         self.position, self.velocity, self.effort = model.read_joints()
-        self._model, self._before, self._dt = model, before, dt
+        self.before, self.arm_index = before, arm_index
+        self._model, self._dt = model, dt
         self._gravity = self._own_effort = None
 
     @property
@@ -278,7 +312,7 @@ class _Snapshot:
         """(n,) what the robot's own weight, motion and joint damping took in the last step [Nm, N]; the rest of the
         effort went into what the robot touches."""
         if self._own_effort is None:
-            position, velocity, _ = self._before
+            position, velocity, _ = self.before
             acceleration = (self.velocity - velocity) / self._dt
             self._own_effort = self._model.inverse_dynamics(position, velocity, acceleration)
             self._own_effort += self._model.damping * velocity

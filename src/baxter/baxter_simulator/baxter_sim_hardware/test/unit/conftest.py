@@ -28,15 +28,17 @@ class _Inbox:
         self.messages = []
 
     def drain(self):
+        if not self.messages:
+            return ()
         messages, self.messages = self.messages, []
         return messages
 
 
 class _Outbox:
-    has_listeners = True
-
-    def __init__(self, lab):
+    def __init__(self, lab, topic):
         self._lab = lab
+        # Of all but the pictures, which would fill the memory; tests of the screen listen themselves.
+        self.has_listeners = topic != "sim/screen"
         self.messages = []  # (time_s, message)
 
     def publish(self, message):
@@ -81,7 +83,7 @@ class Lab:
         return self.parameters.get(name, default)
 
     def publisher(self, topic, msg_class, latch=False):
-        return self.outboxes.setdefault(topic, _Outbox(self))
+        return self.outboxes.setdefault(topic, _Outbox(self, topic))
 
     def queue(self, topic, msg_class, depth):
         return self.inboxes.setdefault(topic, _Inbox())

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The head's screen: pictures of any usual encoding, put into its upper left corner."""
+import numpy as np
+
+from .errors import CommandRefused
+from .topic_row import Topic
+
+WIDTH, HEIGHT = 1024, 600
+SCREEN_RATE_HZ = 10.0
+# Channels of a pixel, and which of them are red, green and blue; cv_bridge's 8UC3 and 8UC1 say nothing of colours, and
+# clients mean blue first.
+ENCODINGS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "8UC3": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)),
+             "bgra8": (4, (2, 1, 0)), "8UC4": (4, (2, 1, 0)), "mono8": (1, (0, 0, 0)), "8UC1": (1, (0, 0, 0))}
+
+SCREEN_TOPICS = (
+    Topic("xdisplay", "xdisplay", "sensor_msgs/Image", None,
+          "a picture of up to 1024 x 600 for the head's screen, from its upper left corner: rgb8, bgr8, rgba8, bgra8, "
+          "mono8, 8UC1, 8UC3, 8UC4; it stays until the next one"),
+    Topic("screen", "sim/screen", "sensor_msgs/Image", SCREEN_RATE_HZ, "what the screen shows, 1024 x 600, rgb8"),
+)
+
+
+class Screen:
+    """`pixels`: (600, 1024, 3) uint8, red first: what is shown; `pictures`: how many have been shown."""
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        """A dark screen."""
+        self.pixels = np.zeros((HEIGHT, WIDTH, 3), dtype=np.uint8)
+        self.pictures = 0
+
+    def show(self, width, height, encoding, step, data):
+        """Show a picture, dark around it; `step`: bytes a row. Raises CommandRefused, and shows nothing new then."""
+        if encoding not in ENCODINGS:
+            raise CommandRefused("picture has encoding '%s'; choices are %s" % (encoding, ", ".join(ENCODINGS)))
+        channels, colours = ENCODINGS[encoding]
+        if not (0 < width <= WIDTH and 0 < height <= HEIGHT):
+            raise CommandRefused("picture has %d x %d pixels; the screen has %d x %d" % (width, height, WIDTH, HEIGHT))
+        if step < width * channels or len(data) < step * height:
+            raise CommandRefused("picture has %d bytes, %d a row; %d x %d pixels of %s need %d a row" % (
+                len(data), step, width, height, encoding, width * channels))
+        rows = np.frombuffer(data, dtype=np.uint8, count=step * height).reshape(height, step)
+        picture = rows[:, :width * channels].reshape(height, width, channels)
+        self.pixels = np.zeros_like(self.pixels)
+        self.pixels[:height, :width] = picture[:, :, colours]
+        self.pictures += 1

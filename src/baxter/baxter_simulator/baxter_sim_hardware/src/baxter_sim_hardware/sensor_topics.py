@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The robot's own senses as ROS messages. Rays are cast only for a topic that somebody listens to."""
+import math
+
+import numpy as np
+from geometry_msgs.msg import Point32, Vector3
+from sensor_msgs.msg import ChannelFloat32, Imu, LaserScan, PointCloud, Range
+from std_msgs.msg import Float32, Header, UInt16
+
+from baxter_sim_hardware import sensors
+from baxter_sim_hardware.convert import stamp
+from baxter_sim_hardware.limbs import BASE_FRAME
+from baxter_sim_hardware.panel import RANGE_SENSORS
+from baxter_sim_hardware.sides import SIDES
+from baxter_sim_kinematics import Chain
+
+SONAR_FRAME = "sonar_ring"
+_UNKNOWN = [-1.0] + [0.0] * 8  # the covariance of what an Imu does not measure
+
+
+def accelerometer_frame(side):
+    return "%s_hand_accelerometer" % side
+
+
+class SensorTopics:
+    """makers and takers: as in PanelTopics. world, model: of bullet_sim; robot: urdf_model.Robot; limb_index:
+    {side: (7,) indices of its joints in the model's}; dt: length of a tick [s].
+
+    A robot whose description lacks a sensor's frame reports that it sees nothing and feels nothing there.
+    """
+
+    def __init__(self, world, model, robot, limb_index, dt):
+        self._world, self._model, self._limb_index, self._dt = world, model, limb_index, dt
+        self._links = set(robot.links)
+        self._chains = {side: Chain.from_robot(robot, base=BASE_FRAME, tip=accelerometer_frame(side))
+                        for side in SIDES if accelerometer_frame(side) in robot.links}
+        self._directions = sensors.sonar_directions()
+        self._ring = sensors.SonarRing()
+        self.reset = self._ring.reset
+        self.makers = {
+            "hand_range": self._range,
+            "hand_range_scan": self._scan,
+            "accelerometer": self._accelerometer,
+            "sonar": self._sonar,
+            "sonars_enabled": lambda time_s, part, _: UInt16(self._ring.enabled),
+            "sonar_lights": self._lights,
+            "sonar_green_level": lambda time_s, part, _: Float32(self._ring.levels["green"]),
+            "sonar_red_level": lambda time_s, part, _: Float32(self._ring.levels["red"]),
+        }
+        self.takers = {
+            "set_sonars_enabled": lambda part, msg, time_s: self._ring.enable(msg.data),
+            "set_lights": lambda part, msg, time_s: self._ring.set_lights(msg.data, time_s),
+            "set_green_level": lambda part, msg, time_s: self._ring.set_level("green", msg.data),
+            "set_red_level": lambda part, msg, time_s: self._ring.set_level("red", msg.data),
+        }
+
+    # -- hands
+
+    def attach_sensors(self, panel):
+        """Show the hands' ranges [mm] among the panel's channels."""
+        for side, name in RANGE_SENSORS.items():
+            panel.attach(name, lambda side=side: round(1000.0 * sensors.range_from_hit(self._hit(side))))
+
+    def _hit(self, side):
+        """How far [m] the nearest surface before one hand's range sensor is, or None."""
+        if RANGE_SENSORS[side] not in self._links:
+            return None
+        matrix = self._model.link_pose(RANGE_SENSORS[side]).matrix()
+        start = matrix[:3, 3]
+        fraction = self._world.ray_test_batch([start], [start + sensors.RANGE_MAX_M * matrix[:3, 0]])[0]
+        return None if fraction >= 1.0 else float(fraction) * sensors.RANGE_MAX_M
+
+    def _range(self, time_s, side, snapshot):
+        return Range(Header(stamp=stamp(time_s), frame_id=RANGE_SENSORS[side]), Range.INFRARED, sensors.RANGE_FIELD_RAD,
+                     sensors.RANGE_MIN_M, sensors.RANGE_MAX_M, sensors.range_from_hit(self._hit(side)))
+
+    def _scan(self, time_s, side, snapshot):
+        hit = self._hit(side)
+        return LaserScan(Header(stamp=stamp(time_s), frame_id=RANGE_SENSORS[side]), 0.0, 0.0, 0.0, 0.0, 0.0,
+                         sensors.RANGE_MIN_M, sensors.RANGE_MAX_M, [math.inf if hit is None else hit], [])
+
+    def _accelerometer(self, time_s, side, snapshot):
+        force = np.zeros(3)
+        if side in self._chains:
+            chain, index = self._chains[side], self._limb_index[side]
+            velocities = []
+            for position, velocity in (snapshot.before[:2], (snapshot.position, snapshot.velocity)):
+                pose, jacobian = chain.fk_and_jacobian(position[index])
+                velocities.append(jacobian[:3] @ velocity[index])
+            to_base = self._model.link_pose(BASE_FRAME).matrix()[:3, :3].T
+            force = sensors.specific_force(*velocities, to_base @ np.array(self._world.gravity), pose[:3, :3], self._dt)
+        return Imu(header=Header(stamp=stamp(time_s), frame_id=accelerometer_frame(side)),
+                   orientation_covariance=_UNKNOWN, angular_velocity_covariance=_UNKNOWN,
+                   linear_acceleration=Vector3(*force.tolist()))
+
+    # -- head
+
+    def _distances(self):
+        """(12,) [m] to what each sonar hears; inf where nothing."""
+        if SONAR_FRAME not in self._links:
+            return np.full(sensors.SONAR_COUNT, np.inf)
+        matrix = self._model.link_pose(SONAR_FRAME).matrix()
+        rays = (self._directions @ matrix[:3, :3].T).reshape(-1, 3)
+        near = matrix[:3, 3] + sensors.SONAR_MIN_M * rays
+        span = sensors.SONAR_MAX_M - sensors.SONAR_MIN_M
+        fractions = self._world.ray_test_batch(near, near + span * rays).reshape(self._directions.shape[:2]).min(axis=1)
+        return np.where(fractions < 1.0, sensors.SONAR_MIN_M + span * fractions, np.inf)
+
+    def _sonar(self, time_s, part, snapshot):
+        echoes = self._ring.echoes(self._distances())
+        # The beam's axis lies in the plane of the ring.
+        ahead = self._directions.sum(axis=1)
+        ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+        points = [Point32(*(distance * ahead[sensor]).tolist()) for sensor, distance in echoes]
+        channels = [ChannelFloat32("SensorId", [float(sensor) for sensor, _ in echoes]),
+                    ChannelFloat32("Distance", [float(distance) for _, distance in echoes])]
+        return PointCloud(Header(stamp=stamp(time_s), frame_id=SONAR_FRAME), points, channels)
+
+    def _lights(self, time_s, part, snapshot):
+        mask = self._ring.overridden(time_s)
+        if mask is None:
+            mask = sum(1 << sensor for sensor, _ in self._ring.echoes(self._distances()))
+        return UInt16(mask)

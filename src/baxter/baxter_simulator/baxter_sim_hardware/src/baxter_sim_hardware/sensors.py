@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The robot's own senses: infrared range at the hands, the ring of sonars at the head, accelerometers in the hands."""
+import math
+
+import numpy as np
+
+from .errors import CommandRefused
+from .topic_row import STATE_RATE_HZ, Topic
+
+# Infrared range of a hand: one ray along x of its frame [m, rad]; the physical robot's figures.
+RANGE_MIN_M, RANGE_MAX_M, RANGE_FIELD_RAD = 0.004, 0.4, 0.0872664600611
+RANGE_NOTHING_M = 65.535  # what it reports where it sees nothing
+
+# The ring: transducers at equal angles, the first straight ahead. Each one hears what the nearest of its rays hits,
+# half a beam's width above and below the horizon; the beam's width and how far it hears are estimates, as the physical
+# robot's are not public. So the floor, 1.7 m below, is out of its hearing.
+SONAR_COUNT = 12
+SONAR_MIN_M, SONAR_MAX_M = 0.05, 10.0
+SONAR_ELEVATIONS_RAD = (math.radians(-7.5), math.radians(7.5))
+SONAR_RATE_HZ = 10.0
+ALL_SONARS = (1 << SONAR_COUNT) - 1
+LIGHTS_OVERRIDE = 0x8000  # of set_lights: the low bits are the lights; without, each one shows that its sonar hears
+LIGHTS_S = 0.2  # [simulated s] one set_lights counts for so long; clients repeat it at about 100 Hz
+MAX_LEVEL = 100.0
+
+SENSOR_TOPICS = (
+    Topic("hand_range", "range/{limb}_hand_range/state", "sensor_msgs/Range", STATE_RATE_HZ,
+          "infrared, 0.004 to 0.4 m along x of `<limb>_hand_range`; 65.535 m where it sees nothing"),
+    Topic("hand_range_scan", "/sim/laserscan/{limb}_hand_range/state", "sensor_msgs/LaserScan", STATE_RATE_HZ,
+          "the same as a scan of one ray, as the vendor's simulator has it; `inf` where it sees nothing"),
+    Topic("accelerometer", "accelerometer/{limb}_accelerometer/state", "sensor_msgs/Imu", STATE_RATE_HZ,
+          "acceleration less gravity in `<limb>_hand_accelerometer` [m/s^2]: 9.81 upwards at rest; no rates, no "
+          "orientation"),
+    Topic("sonar", "sonar/head_sonar/state", "sensor_msgs/PointCloud", SONAR_RATE_HZ,
+          "a point in `sonar_ring` for each of the 12 sonars that is switched on and hears something within 10 m; "
+          "channels SensorId, Distance [m]"),
+    Topic("sonars_enabled", "sonar/head_sonar/sonars_enabled", "std_msgs/UInt16", SONAR_RATE_HZ,
+          "a bit for each sonar; 4095, all on, at the start"),
+    Topic("sonar_lights", "sonar/head_sonar/lights/state", "std_msgs/UInt16", SONAR_RATE_HZ,
+          "a bit for each light: those that `set_lights` asks for, else those whose sonar hears something"),
+    Topic("sonar_green_level", "sonar/head_sonar/lights/green_level", "std_msgs/Float32", SONAR_RATE_HZ, "0 to 100"),
+    Topic("sonar_red_level", "sonar/head_sonar/lights/red_level", "std_msgs/Float32", SONAR_RATE_HZ, "0 to 100"),
+    Topic("set_sonars_enabled", "sonar/head_sonar/set_sonars_enabled", "std_msgs/UInt16", None,
+          "a bit for each sonar, 0 to 4095"),
+    Topic("set_lights", "sonar/head_sonar/lights/set_lights", "std_msgs/UInt16", None,
+          "for 0.2 s: bit 15 and a bit for each light to be lit"),
+    Topic("set_green_level", "sonar/head_sonar/lights/set_green_level", "std_msgs/Float32", None, "0 to 100"),
+    Topic("set_red_level", "sonar/head_sonar/lights/set_red_level", "std_msgs/Float32", None, "0 to 100"),
+)
+
+
+def range_from_hit(distance):
+    """What a hand's sensor reports [m] for a ray that hit after `distance` [m], or met nothing (None)."""
+    return RANGE_NOTHING_M if distance is None else max(distance, RANGE_MIN_M)
+
+
+def sonar_directions():
+    """(12, 2, 3) unit vectors in the ring's frame: for each transducer its two rays."""
+    angles = 2.0 * math.pi * np.arange(SONAR_COUNT) / SONAR_COUNT
+    return np.array([[(math.cos(angle) * math.cos(up), math.sin(angle) * math.cos(up), math.sin(up))
+                      for up in SONAR_ELEVATIONS_RAD] for angle in angles])
+
+
+class SonarRing:
+    """Which sonars and lights are on."""
+
+    def __init__(self):
+        self.reset()
+
+    def reset(self):
+        self.enabled = ALL_SONARS
+        self.levels = {"green": 0.0, "red": 0.0}
+        self._lights, self._lights_until = 0, 0.0
+
+    def enable(self, mask):
+        """Raises CommandRefused for bits that belong to no sonar."""
+        if mask & ~ALL_SONARS:
+            raise CommandRefused("sonars %d are to be enabled; it must be from 0 to %d" % (mask, ALL_SONARS))
+        self.enabled = mask
+
+    def set_lights(self, mask, time_s):
+        """Light what `mask` says for LIGHTS_S if it has LIGHTS_OVERRIDE; else show again what the sonars hear."""
+        self._lights = mask
+        self._lights_until = time_s + LIGHTS_S if mask & LIGHTS_OVERRIDE else 0.0
+
+    def overridden(self, time_s):
+        """The mask that clients ask for at time_s [s], or None."""
+        return self._lights if time_s < self._lights_until else None
+
+    def set_level(self, colour, level):
+        """Raises CommandRefused for what is not from 0 to 100."""
+        if not 0.0 <= level <= MAX_LEVEL:
+            raise CommandRefused("%s level is %g; it must be from 0 to %g" % (colour, level, MAX_LEVEL))
+        self.levels[colour] = level
+
+    def echoes(self, distances):
+        """[(sensor, distance [m])] of the sonars that are on, from (12,) distances, inf where nothing was hit."""
+        return [(sensor, distance) for sensor, distance in enumerate(distances)
+                if self.enabled >> sensor & 1 and SONAR_MIN_M <= distance <= SONAR_MAX_M]
+
+
+def specific_force(before, after, gravity, rotation, dt):
+    """(3,) [m/s^2] what an accelerometer feels, in its own axes.
+
+    before, after: (3,) velocity [m/s] of its frame in base around a tick of dt [s]; gravity: (3,) in base [m/s^2];
+    rotation: (3, 3) from its axes to base.
+    """
+    return rotation.T @ ((after - before) / dt - gravity)

@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Range, sonars, accelerometers on the real physics; the screen; maintenance; what the robot says of itself."""
+import numpy as np
+import pytest
+from baxter_core_msgs.msg import URDFConfiguration
+from baxter_maintenance_msgs.msg import CalibrateArmEnable, TareEnable
+from genpy import Time
+from sensor_msgs.msg import Image
+from std_msgs.msg import Empty, Float32, String, UInt16
+
+from baxter_sim_hardware import sensors
+from bullet_sim import Pose
+from urdf_model import parse_urdf
+
+SIDES = ("left", "right")
+WALL = """<robot name="wall"><link name="wall"><collision><geometry><box size="0.02 0.6 0.6"/></geometry></collision>
+</link></robot>"""
+
+
+def wall_before(lab, link, distance, name="wall"):
+    """A wall across the x axis of a link's frame, its near side so far [m] away."""
+    matrix = lab.model.link_pose(link).matrix()
+    centre = matrix.copy()
+    centre[:3, 3] += (distance + 0.01) * matrix[:3, 0]
+    lab.world.spawn(parse_urdf(WALL), name, Pose.from_matrix(centre), static=True)
+
+
+# -- range
+
+@pytest.mark.parametrize("side", SIDES)
+def test_hand_range_measures_what_is_before_it(lab, side):
+    name = "%s_hand_range" % side
+
+    def read():
+        lab.run(0.02)
+        scan = lab.last("/sim/laserscan/%s/state" % name)
+        return (lab.last("range/%s/state" % name).range, lab.last("analog_io/%s/state" % name).value,
+                lab.last("analog_io/%s/value_uint32" % name).data, scan.ranges[0])
+
+    assert read() == (65.535, 65535.0, 65535, np.inf)
+    wall_before(lab, name, 0.5)
+    assert read() == (65.535, 65535.0, 65535, np.inf)
+    lab.world.delete("wall")
+    wall_before(lab, name, 0.25)
+    metres, millimetres, whole, scanned = read()
+    assert (metres, millimetres, whole, scanned) == pytest.approx((0.25, 250.0, 250, 0.25), abs=1.0, rel=5e-3)
+    assert metres == pytest.approx(0.25, abs=2e-3)
+    message = lab.last("range/%s/state" % name)
+    assert message.header.frame_id == name and message.radiation_type == message.INFRARED
+    assert (message.min_range, message.max_range) == (0.004, 0.4)
+    assert lab.last("analog_io/%s/state" % name).isInputOnly
+
+
+@pytest.mark.parametrize("hit, reported", [(None, 65.535), (0.0, 0.004), (0.1, 0.1), (0.4, 0.4)])
+def test_range_from_hit(hit, reported):
+    assert sensors.range_from_hit(hit) == reported
+
+
+# -- sonar
+
+def heard(lab):
+    """{sensor: distance} of the last cloud, after a look at its points."""
+    lab.run(0.2)
+    cloud = lab.last("sonar/head_sonar/state")
+    assert cloud.header.frame_id == "sonar_ring"
+    assert [channel.name for channel in cloud.channels] == ["SensorId", "Distance"]
+    ids, distances = (channel.values for channel in cloud.channels)
+    for point, sensor, distance in zip(cloud.points, ids, distances, strict=True):
+        assert np.linalg.norm((point.x, point.y, point.z)) == pytest.approx(distance, abs=1e-3)
+        assert np.arctan2(point.y, point.x) % (2 * np.pi) == pytest.approx(sensor * np.pi / 6, abs=1e-3)
+    return dict(zip(map(int, ids), distances, strict=True))
+
+
+def test_sonars_hear_a_wall_and_can_be_switched_off(make_lab):
+    lab = make_lab(pose="start")
+    nothing = heard(lab)
+    assert 0 not in nothing
+    wall_before(lab, "sonar_ring", 2.0)
+    assert heard(lab)[0] == pytest.approx(2.0, abs=0.05)
+    assert lab.last("sonar/head_sonar/sonars_enabled").data == 4095
+    assert lab.last("sonar/head_sonar/lights/state").data & 1
+    lab.send("sonar/head_sonar/set_sonars_enabled", UInt16(4094))
+    assert 0 not in heard(lab)
+    assert lab.last("sonar/head_sonar/sonars_enabled").data == 4094
+    lab.send("sonar/head_sonar/set_sonars_enabled", UInt16(4096))
+    lab.run(0.1)
+    assert "must be from 0 to 4095" in lab.log.lines[-1]
+
+
+def test_lights_and_levels(make_lab):
+    lab = make_lab(pose="start")
+    lab.send("sonar/head_sonar/lights/set_lights", UInt16(0x8FFF))
+    lab.send("sonar/head_sonar/lights/set_green_level", Float32(40.0))
+    lab.send("sonar/head_sonar/lights/set_red_level", Float32(400.0))
+    lab.run(0.15)
+    assert lab.last("sonar/head_sonar/lights/state").data == 0x8FFF
+    assert lab.last("sonar/head_sonar/lights/green_level").data == 40.0
+    assert lab.last("sonar/head_sonar/lights/red_level").data == 0.0
+    assert any("red level is 400" in line for line in lab.log.lines)
+    lab.run(0.3)
+    assert not lab.last("sonar/head_sonar/lights/state").data & 0x8000
+
+
+# -- accelerometers
+
+@pytest.mark.parametrize("side", SIDES)
+def test_accelerometer_feels_gravity_and_motion(lab, side):
+    topic = "accelerometer/%s_accelerometer/state" % side
+    lab.run(0.1)
+
+    def force():
+        vector = lab.last(topic).linear_acceleration
+        return lab.model.link_pose("%s_hand_accelerometer" % side).matrix()[:3, :3] @ (vector.x, vector.y, vector.z)
+
+    np.testing.assert_allclose(force(), (0.0, 0.0, 9.81), atol=0.05)
+    message = lab.last(topic)
+    assert message.header.frame_id == "%s_hand_accelerometer" % side
+    assert message.orientation_covariance[0] == message.angular_velocity_covariance[0] == -1.0
+    # Begin to turn at the shoulder: the hand accelerates sideways by 10 rad/s^2 times its distance from the axis.
+    lab.command(2, [1.0], names=["%s_s0" % side])
+    felt, moved, before = [], [], lab.model.link_twist("%s_hand_accelerometer" % side)[0]
+    for _ in range(10):
+        lab.run(0.01)
+        felt.append(force() - (0.0, 0.0, 9.81))
+        after = lab.model.link_twist("%s_hand_accelerometer" % side)[0]
+        moved.append((after - before) / 0.01)
+        before = after
+    np.testing.assert_allclose(np.mean(felt, axis=0), np.mean(moved, axis=0), atol=1.5)
+    assert np.linalg.norm(np.mean(moved, axis=0)) > 3.0
+
+
+# -- screen
+
+def picture(width, height, encoding, value, step=None):
+    channels = {"mono8": 1, "bgra8": 4}.get(encoding, 3)
+    return Image(width=width, height=height, encoding=encoding, step=step or width * channels,
+                 data=bytes([*value]) * (width * height))
+
+
+def shown(lab):
+    lab.outboxes["sim/screen"].has_listeners = True
+    lab.run(0.2)
+    message = lab.last("sim/screen")
+    assert (message.width, message.height, message.encoding) == (1024, 600, "rgb8")
+    return np.frombuffer(message.data, dtype=np.uint8).reshape(600, 1024, 3)
+
+
+@pytest.mark.parametrize("encoding, value, colour", [
+    ("bgr8", (1, 2, 3), (3, 2, 1)), ("8UC3", (1, 2, 3), (3, 2, 1)), ("rgb8", (1, 2, 3), (1, 2, 3)),
+    ("bgra8", (1, 2, 3, 255), (3, 2, 1)), ("mono8", (7,), (7, 7, 7))])
+def test_a_picture_is_shown_from_the_upper_left_corner_and_stays(make_lab, encoding, value, colour):
+    lab = make_lab()
+    assert not shown(lab).any()
+    lab.send("xdisplay", picture(100, 50, encoding, value))
+    lab.run(1.0)
+    pixels = shown(lab)
+    assert (pixels[:50, :100] == colour).all() and not pixels[50:].any() and not pixels[:, 100:].any()
+
+
+@pytest.mark.parametrize("message, reason", [
+    (picture(1025, 10, "bgr8", (1, 2, 3)), "1025 x 10 pixels; the screen has 1024 x 600"),
+    (picture(0, 10, "bgr8", (1, 2, 3)), "0 x 10 pixels"),
+    (picture(10, 10, "16UC1", (1, 2, 3)), "encoding '16UC1'; choices are"),
+    (picture(10, 10, "bgr8", (1,)), "100 bytes, 30 a row"),
+    (picture(10, 10, "bgr8", (1, 2, 3), step=5), "5 a row")])
+def test_a_senseless_picture_is_refused(make_lab, message, reason):
+    lab = make_lab()
+    lab.send("xdisplay", message)
+    assert not shown(lab).any()
+    assert reason in lab.log.lines[-1]
+
+
+# -- maintenance
+
+def ask(lab, name, side, wanted):
+    kind = {"Tare": TareEnable, "CalibrateArm": CalibrateArmEnable}[name]
+    lab.send("/robustcontroller/%s/%s/enable" % (side, name), kind(isEnabled=wanted, uid="sdk"))
+
+
+def status(lab, name, side):
+    return lab.last("/robustcontroller/%s/%s/status" % (side, name))
+
+
+def keep_asking(name, side):
+    def ask_twice_a_second(lab):
+        if lab.world.tick % 250 == 0:
+            ask(lab, name, side, True)
+
+    return ask_twice_a_second
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("name", ["Tare", "CalibrateArm"])
+def test_a_procedure_runs_its_dialogue(lab, name, side):
+    lab.run(0.2)
+    assert not status(lab, name, side).isEnabled
+    lab.run(1.0, before=keep_asking(name, side))
+    assert status(lab, name, side).isEnabled and status(lab, name, side).complete == 0
+    assert status(lab, name, side).controlUid == "sdk"
+    lab.run(5.0, before=keep_asking(name, side))
+    assert status(lab, name, side).isEnabled and status(lab, name, side).complete == 2
+    ask(lab, name, side, False)
+    lab.run(0.2)
+    assert not status(lab, name, side).isEnabled
+    others = [(n, s) for n in ("Tare", "CalibrateArm") for s in SIDES if (n, s) != (name, side)]
+    assert not any(status(lab, *other).isEnabled for other in others)
+
+
+def test_a_procedure_whose_client_goes_away_times_out(lab):
+    ask(lab, "Tare", "left", True)
+    lab.run(1.0)
+    assert status(lab, "Tare", "left").isEnabled
+    lab.run(1.0)
+    assert not status(lab, "Tare", "left").isEnabled and status(lab, "Tare", "left").timedOut
+
+
+def test_a_procedure_fails_on_a_disabled_robot(make_lab):
+    lab = make_lab()
+    lab.run(0.5, before=keep_asking("CalibrateArm", "right"))
+    assert status(lab, "CalibrateArm", "right").complete == 1
+    assert status(lab, "CalibrateArm", "right").errorCodes == ["the robot is disabled"]
+
+
+def test_a_tare_fails_when_something_leans_on_the_arm(lab):
+    go_on = keep_asking("Tare", "left")
+
+    def lean(lab):
+        go_on(lab)
+        lab.model.apply_wrench("left_gripper", (0.0, 0.0, -10.0),
+                               position=lab.model.link_pose("left_gripper").position)
+
+    lab.run(6.0, before=lean)
+    assert status(lab, "Tare", "left").complete == 1
+    assert "feels" in status(lab, "Tare", "left").errorCodes[0]
+
+
+def test_updater_has_nothing_to_update_from(make_lab):
+    lab = make_lab()
+    lab.run(1.1)
+    assert lab.last("/usb/update_sources").sources == []
+    assert lab.last("/updater/status").status == 0
+    lab.send("/updater/start", String("abc"))
+    lab.run(1.1)
+    assert lab.last("/updater/status").status == 1 and "no update 'abc'" in lab.last("/updater/status").long_description
+    assert lab.last("/update/status").data == 1
+    lab.send("/updater/stop", Empty())
+    lab.run(1.1)
+    assert lab.last("/updater/status").status == 0
+
+
+# -- what the robot says of itself
+
+def test_diagnostics_follow_the_robots_state(lab):
+    lab.run(1.1)
+    names = [each.name for each in lab.last("/diagnostics").status]
+    assert names == ["state", "left arm", "right arm"]
+    assert lab.last("/diagnostics_toplevel_state").level == 0
+    lab.stop()
+    lab.run(1.1)
+    assert [each.level for each in lab.last("/diagnostics").status] == [2, 0, 0]
+    assert lab.last("/diagnostics_toplevel_state").level == 2
+    aggregate = lab.last("/diagnostics_agg").status
+    assert aggregate[0].name == "/Baxter" and aggregate[0].level == 2
+    assert [each.name for each in aggregate[1:]] == ["/Baxter/" + name for name in names]
+
+
+def test_set_points_are_published(lab):
+    lab.command(1, lab.position + 0.2)
+    lab.run(0.1)
+    set_points, measured = lab.last("ref_joint_states"), lab.last("joint_states")
+    arms = [name for name in measured.name if name.startswith(SIDES)]
+    assert set_points.name == arms
+    wanted = dict(zip(measured.name, measured.position, strict=True))
+    np.testing.assert_allclose(set_points.position, [wanted[name] for name in arms], atol=0.03)
+    assert np.abs(set_points.velocity).min() > 0.1
+    for side in SIDES:
+        here, there = (lab.last("limb/%s/%s" % (side, name)) for name in ("endpoint_state", "commanded_endpoint_state"))
+        assert there.header.frame_id == "base"
+        assert there.pose.position.x == pytest.approx(here.pose.position.x, abs=0.02)
+        assert there.twist.linear.z == pytest.approx(here.twist.linear.z, abs=0.05)
+
+
+FRAGMENT = '<robot name="tool"><link name="tool"/></robot>'
+
+
+def test_a_urdf_fragment_is_passed_on_once(make_lab):
+    lab = make_lab()
+    sent = [message for _, message in lab.outboxes["urdf"].messages]
+    assert len(sent) == 1 and sent[0].link == ""
+    fragment = URDFConfiguration(Time(3), "left_hand", "left_gripper_base", FRAGMENT)
+    for _ in range(5):
+        lab.send("urdf", fragment)
+        lab.run(0.01)
+    assert [message for _, message in lab.outboxes["urdf"].messages][1:] == [fragment]
+
+
+@pytest.mark.parametrize("link, joint, xml, reason", [
+    ("nose", "j", FRAGMENT, "link 'nose'"), ("left_hand", "", FRAGMENT, "names no joint"),
+    ("left_hand", "j", "<robot", "is no XML"), ("left_hand", "j", "<model/>", "is <model>; it must be a <robot>")])
+def test_a_senseless_urdf_fragment_is_refused(make_lab, link, joint, xml, reason):
+    lab = make_lab()
+    lab.send("urdf", URDFConfiguration(Time(3), link, joint, xml))
+    lab.run(0.01)
+    assert reason in lab.log.lines[-1] and len(lab.outboxes["urdf"].messages) == 1
