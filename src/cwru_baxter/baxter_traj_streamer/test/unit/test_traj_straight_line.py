@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Straight lines: straight, not turned, within limits, on one branch; and where they end."""
+import dataclasses
 import math
 import pathlib
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 import urdf_model
-from baxter_sim_kinematics import Chain
+from baxter_sim_kinematics import Chain, solve
 from baxter_traj_streamer.curve import interpolate
 from baxter_traj_streamer.straight_line import LeavesReach, straight_line
 
@@ -66,6 +67,22 @@ def test_line_that_leaves_reach_says_where_and_why(arm, displacement, reached_m,
     assert words in str(caught.value)
     # Up to there it can be followed.
     straight_line(chain, start, np.array(displacement) * (0.98 * caught.value.reached_m / caught.value.length_m))
+
+
+def test_solutions_on_another_branch_are_the_end_of_the_line(arm, monkeypatch):
+    chain, start = arm
+    pose = chain.fk(start)
+
+    def solve_with_a_jump(chain, target, *arguments, **options):
+        found = solve(chain, target, *arguments, **options)
+        if target[2, 3] - pose[2, 3] < -0.0501:
+            found = dataclasses.replace(found, q=found.q + 0.5 * np.eye(7)[4])
+        return found
+
+    monkeypatch.setattr("baxter_traj_streamer.straight_line.solve", solve_with_a_jump)
+    with pytest.raises(LeavesReach, match="w0 would have to turn by .* another way of holding the arm") as caught:
+        straight_line(chain, start, (0.0, 0.0, -0.1))
+    assert caught.value.reached_m == pytest.approx(0.05, abs=0.001)
 
 
 @pytest.mark.parametrize("displacement", [(0.0, 0.0, 0.0), (math.nan, 0.0, 0.0), (1e-5, 0.0, 0.0), (0.1, 0.2)])
