@@ -39,6 +39,7 @@ from gazebo_ros.mailbox import LoopEnded
 from gazebo_ros.simulation import AdvanceRefused
 from gazebo_ros.spawning import SpawnRefused
 from gazebo_ros.urdf_extras import unscoped
+from loop_reconfigure import Setting, SettingsServer
 
 _ROOT_ELEMENT = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 _NOT_CONTENT = re.compile(r"<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
@@ -71,6 +72,7 @@ class GazeboServices:
         LightServices(lights, ros)
         #: For the loop, before each physics step.
         self.push = self._bodies.push
+        self._settings = self._open_settings(ros)
         self._state_requests = {}
         self._model_state_commands = ros.queue("/gazebo/set_model_state", ModelState, depth=10)
         for name, srv_class, handler in (
@@ -251,23 +253,55 @@ class GazeboServices:
             status_message="GetPhysicsProperties: got properties")
 
     def _set_physics_properties(self, request):
-        simulation = self._simulation
         gravity = request.gravity
         try:
-            if abs(request.time_step - simulation.step_s) > 1e-9:
-                raise ValueError("time_step %g s cannot be set while the world runs; it is %g s (the world file's "
-                                 "max_step_size decides)" % (request.time_step, simulation.step_s))
-            if not request.max_update_rate >= 0.0:
-                raise ValueError("max_update_rate is %g Hz, expected 0 (as fast as possible) or a positive number"
-                                 % request.max_update_rate)
-            iterations = request.ode_config.sor_pgs_iters or self._world.solver_iterations
-            if iterations != self._world.solver_iterations:
-                self._world.set_solver_iterations(iterations)
-            self._world.set_gravity((gravity.x, gravity.y, gravity.z))
+            self._set_physics(request.time_step, request.max_update_rate, (gravity.x, gravity.y, gravity.z),
+                              request.ode_config.sor_pgs_iters or self._world.solver_iterations)
         except (BulletSimError, ValueError) as error:
             return SetPhysicsPropertiesResponse(False, "SetPhysicsProperties: %s" % error)
-        factor = request.max_update_rate * simulation.step_s
-        if abs(factor - simulation.real_time_factor) > 1e-9:
-            simulation.real_time_factor = factor
+        self._settings.show(**self._physics())
         return SetPhysicsPropertiesResponse(True, "SetPhysicsProperties: gravity, update rate and solver "
                                                   "iterations set; the rest of ode_config has no counterpart here")
+
+    def _set_physics(self, time_step, max_update_rate, gravity, iterations):
+        """Raises ``ValueError`` or ``BulletSimError``."""
+        simulation = self._simulation
+        if abs(time_step - simulation.step_s) > 1e-9:
+            raise ValueError("time_step %g s cannot be set while the world runs; it is %g s (the world file's "
+                             "max_step_size decides)" % (time_step, simulation.step_s))
+        if not max_update_rate >= 0.0:
+            raise ValueError("max_update_rate is %g Hz, expected 0 (as fast as possible) or a positive number"
+                             % max_update_rate)
+        if iterations != self._world.solver_iterations:
+            self._world.set_solver_iterations(iterations)
+        self._world.set_gravity(gravity)
+        factor = max_update_rate * simulation.step_s
+        if abs(factor - simulation.real_time_factor) > 1e-9:
+            simulation.real_time_factor = factor
+
+    # -- the same for dynamic_reconfigure -------------------------------------------------------------------------
+
+    def _physics(self):
+        simulation = self._simulation
+        return {"time_step": simulation.step_s, "max_update_rate": simulation.real_time_factor / simulation.step_s,
+                **dict(zip(("gravity_x", "gravity_y", "gravity_z"), map(float, self._world.gravity), strict=True)),
+                "sor_pgs_iters": self._world.solver_iterations}
+
+    def _open_settings(self, ros):
+        now = self._physics()
+        step_s = now["time_step"]
+
+        def apply(values):
+            try:
+                self._set_physics(values["time_step"], values["max_update_rate"],
+                                  [values["gravity_" + axis] for axis in "xyz"], values["sor_pgs_iters"])
+            except BulletSimError as error:
+                raise ValueError(str(error)) from error
+
+        return SettingsServer(ros, "/gazebo", [
+            Setting("time_step", step_s, step_s, step_s, "length of a step [s]; the world file decides"),
+            Setting("max_update_rate", now["max_update_rate"], 0.0, 1e5, "steps per second [Hz]; 0: as many as can be"),
+            *(Setting("gravity_" + axis, now["gravity_" + axis], -100.0, 100.0, "along %s [m/s^2]" % axis)
+              for axis in "xyz"),
+            Setting("sor_pgs_iters", now["sor_pgs_iters"], 1, 1000, "iterations of the constraint solver"),
+        ], apply)

@@ -7,6 +7,7 @@ import threading
 import time
 import unittest
 
+import dynamic_reconfigure.client
 import rospy
 import rostest
 from bullet_sim_msgs.srv import AdvanceTicks
@@ -313,6 +314,25 @@ class GazeboServices(unittest.TestCase):
             self.refused(self.set_physics_properties(0.001, 500.0, gravity, before.ode_config), "0.001", "0.002")
         finally:
             self.set_physics_properties(0.002, 500.0, before.gravity, before.ode_config)
+
+    def test_dynamic_reconfigure_sets_the_same_physics(self):
+        heard = []
+        client = dynamic_reconfigure.client.Client("/gazebo", timeout=DEADLINE_S, config_callback=heard.append)
+        names = [row["name"] for row in client.get_parameter_descriptions(timeout=DEADLINE_S)]
+        self.assertEqual(names, ["time_step", "max_update_rate", "gravity_x", "gravity_y", "gravity_z",
+                                 "sor_pgs_iters"])
+        before = self.get_physics_properties()
+        try:
+            answer = client.update_configuration({"gravity_z": -1.62, "sor_pgs_iters": 33, "time_step": 1.0})
+            self.assertEqual((answer["gravity_z"], answer["sor_pgs_iters"], answer["time_step"]), (-1.62, 33, 0.002))
+            now = self.get_physics_properties()
+            self.assertEqual((now.gravity.z, now.ode_config.sor_pgs_iters), (-1.62, 33))
+            with self.assertRaises(dynamic_reconfigure.DynamicReconfigureCallbackException):
+                client.update_configuration({"gravity_z": float("nan")})
+        finally:
+            self.set_physics_properties(0.002, 500.0, before.gravity, before.ode_config)
+        wait_for(lambda: heard and heard[-1]["gravity_z"] == before.gravity.z, "the change by the service to be told")
+        client.close()
 
 
 if __name__ == "__main__":

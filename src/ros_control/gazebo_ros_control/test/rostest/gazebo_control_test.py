@@ -11,8 +11,10 @@ import threading
 import time
 import unittest
 
+import dynamic_reconfigure.client
 import rospy
 import rostest
+from control_msgs.msg import PidState
 from controller_manager_msgs.srv import (
     ListControllers,
     ListControllerTypes,
@@ -383,6 +385,29 @@ class GazeboControl(unittest.TestCase):
         count = joints.count
         wait_for(lambda: joints.count > count + 10, "joint states")
         joints.at(shoulder=0.3, elbow=-0.3)
+
+    def test_gains_are_tuned_while_controllers_run(self):
+        # The elbow has an effort interface here, the shoulder is kept by the simulator's own PID.
+        # The parameter would speak for the other robots.
+        urdf = self.urdf.replace("<eStopTopic>", "<robotParam>/none</robotParam><eStopTopic>")
+        head, tail = urdf.rsplit("PositionJointInterface", 1)
+        self.spawn("three", head + "EffortJointInterface" + tail)
+        three = Manager("/three")
+        joints = self.joints("/three")
+        self.start("joint_state_controller", "tuned", manager=three)
+        states = []
+        subscriber = rospy.Subscriber("/three/tuned/pid/state", PidState, states.append)
+        self._cleanups_of_test.callback(subscriber.unregister)
+        wait_for(lambda: states and abs(states[-1].error) > 0.1, "the elbow to hang, with so small a gain")
+        elbow = dynamic_reconfigure.client.Client("/three/tuned/pid", timeout=DEADLINE_S)
+        self._cleanups_of_test.callback(elbow.close)
+        self.assertEqual(elbow.get_configuration(timeout=DEADLINE_S)["p"], 1.0)
+        self.assertEqual(elbow.update_configuration({"p": 2000.0, "d": 40.0})["p"], 2000.0)
+        joints.at(elbow=0.0, tolerance=0.01)
+        self.assertTrue(all(state.timestep.to_nsec() == 2_000_000 for state in states))
+        shoulder = dynamic_reconfigure.client.Client("/three/gazebo_ros_control/pid_gains/shoulder", timeout=DEADLINE_S)
+        self._cleanups_of_test.callback(shoulder.close)
+        self.assertEqual(shoulder.get_configuration(timeout=DEADLINE_S)["p"], 900.0)
 
     def test_controller_managers_are_found(self):
         self.spawn("two")
