@@ -35,6 +35,7 @@ SUITES = {
     "loop": ("loop_bench", "real time: CPU, joint_states jitter, latency, with 0, 5 and 20 subscribers"),
     "services": ("service_bench", "IK service beside an empty service"),
     "start": ("start_bench", "launch to /robot/sim/started; memory of each process"),
+    "cameras": ("camera_bench", "pictures beside PyBullet's own; cameras and clouds a second, and what they cost physics"),
     "labs": ("labs_bench", "1, 2 and 4 labs side by side: factor and memory of each"),
 }
 # Longest that a round of a suite may take before it counts as hung [s].

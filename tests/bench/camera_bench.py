@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Cameras: one picture beside PyBullet's own rendering of the vendor's meshes, and a lab that delivers many."""
+import re
+import socket
+import statistics
+import time
+
+import numpy as np
+import pybullet
+import rospkg
+from labs import Lab
+from sensor_msgs.msg import Image, PointCloud2
+
+import xacro
+from gazebo_ros.drawing import DrawingCache
+from gazebo_ros.resources import ResourceFinder
+from sensor_renderer.gl_renderer import GlRenderer
+from sensor_renderer.mirror import Mirror
+from sensor_renderer.pinhole import OPTICAL, Pinhole
+from urdf_model import merge_fixed, parse_urdf
+from urdf_model.transforms import inverse, pose_matrix
+
+SECONDS, PICTURES, NAIVE_PICTURES = 10.0, 40, 4
+SIZE = (640, 400)
+FIELD_RAD = 1.2
+CAMERAS = ("head_camera", "left_hand_camera", "right_hand_camera")
+# Where pictures are taken from: the whole robot seen from the front left; its own hand's camera, looking at the floor.
+OUTSIDE = pose_matrix((2.6, 1.2, 1.6), (0.0, 0.25, np.pi + 0.45)) @ OPTICAL
+CWRU = ("cwru_baxter_sim", "baxter_world.launch")
+
+
+def measure(report, quick, number):
+    pictures(report, 4 if quick else PICTURES, 1 if quick else NAIVE_PICTURES)
+    streams(report, 2.0 if quick else SECONDS)
+
+
+def pictures(report, count, naive_count):
+    """One renderer beside the other, in this process, the robot moving between pictures."""
+    file = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
+    xml = xacro.process_file(file).toxml()
+    merged = merge_fixed(parse_urdf(xml, source=file))
+    joints = [joint.name for joint in merged.joints.values()]
+    finder = ResourceFinder()
+    mirror = Mirror(DrawingCache(), finder, print)
+    mirror.set_scene([{"name": "floor", "urdf": None, "joints": []}, {"name": "robot", "urdf": xml, "joints": joints}])
+    renderer, pinhole = GlRenderer(), Pinhole.from_field_of_view(*SIZE, FIELD_RAD, 0.06, 100.0)
+    naive = Naive(xml, finder)
+    for title, place in (("outside", None), ("left hand", "left_hand_camera")):
+        def pose(place=place):
+            if place is None:
+                return OUTSIDE
+            frame = merged.frames[place]
+            return mirror.bodies["robot"].link_matrix(frame.link) @ frame.offset
+
+        ours = []
+        for step in range(-2, count):
+            angle = 0.3 + 0.01 * step
+            mirror.set_state(np.concatenate([[0, 0, 0, 0, 0, 0, 1], [0, 0, 0.93, 0, 0, 0, 1],
+                                             np.full(len(joints), angle)]))
+            begin = time.perf_counter()
+            renderer.render(mirror, pinhole, pose())
+            if step >= 0:  # the first ones hand the meshes over
+                ours.append(1e3 * (time.perf_counter() - begin))
+        theirs = [naive.picture(joints, 0.3 + 0.01 * step, pinhole, pose()) for step in range(naive_count)]
+        report.add("picture of %d x %d, %s" % (*SIZE, title), statistics.median(ours), "ms",
+                   ("vendor meshes, TinyRenderer", statistics.median(theirs)), ratio_most=0.1)
+    renderer.close()
+    naive.close()
+
+
+class Naive:
+    """The way without a renderer of one's own: the physics client draws the description as it stands."""
+
+    def __init__(self, xml, finder):
+        self._client = pybullet.connect(pybullet.DIRECT)
+        path = "/tmp/camera_bench_%d.urdf" % time.time_ns()
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(re.sub(r"package://[^\"']+", lambda found: finder(found.group()) or "", xml))
+        self._robot = pybullet.loadURDF(path, [0, 0, 0.93], useFixedBase=True, physicsClientId=self._client)
+        self._index = {pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[1].decode(): k
+                       for k in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client))}
+
+    def picture(self, joints, angle, pinhole, pose):
+        """Draw one; returns what it took [ms]."""
+        for name in joints:
+            pybullet.resetJointState(self._robot, self._index[name], angle, physicsClientId=self._client)
+        turn = np.diag([1.0, -1.0, -1.0, 1.0])
+        clip = pinhole.clip_matrix()
+        clip[1] *= -1.0
+        begin = time.perf_counter()
+        pybullet.getCameraImage(
+            pinhole.width, pinhole.height, (turn @ inverse(pose)).T.ravel().tolist(), (clip @ turn).T.ravel().tolist(),
+            renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client)
+        return 1e3 * (time.perf_counter() - begin)
+
+    def close(self):
+        pybullet.disconnect(physicsClientId=self._client)
+
+
+def streams(report, seconds):
+    """Case Western's world with both arms moving: the real-time factor without pictures, then with them."""
+    with Lab(CWRU, gui="false", enable="true") as lab:
+        lab.part("swing")
+        for camera in CAMERAS:
+            settings = "{name: %s, settings: {width: %d, height: %d, fps: 60}}" % (camera, *SIZE)
+            lab.start("rosservice", "call", "/cameras/open", settings).wait(30)
+        blind = lab.factor(seconds)
+        topics = [("/cameras/%s/image" % camera, Image) for camera in CAMERAS]
+        for title, watched, goal in (("one camera", topics[1:2], 30.0),
+                                     ("three cameras and the Kinect's points",
+                                      [*topics, ("/kinect/depth/points", PointCloud2)], 8.0)):
+            counts, factor = count_messages(lab, watched, seconds)
+            report.add("%s: pictures a second of each" % title, min(counts) / seconds, "Hz", least=goal)
+            report.add("%s: real-time factor" % title, factor, "", ("nobody looks", blind), least=0.95)
+
+
+def count_messages(lab, watched, seconds):
+    """How many messages come on each of [(topic, class)] in ``seconds``, and the real-time factor meanwhile."""
+    counters = [Counter(lab.sink(topic, message_class)) for topic, message_class in watched]
+    for counter in counters:
+        counter.wait(1)
+    before, simulated, wall = [counter.messages for counter in counters], lab.now(), time.monotonic()
+    while time.monotonic() < wall + seconds:
+        for counter in counters:
+            counter.drain()
+        time.sleep(0.001)
+    factor = (lab.now() - simulated) / (time.monotonic() - wall)
+    counts = [counter.messages - start for counter, start in zip(counters, before, strict=True)]
+    for counter in counters:
+        counter.close()
+    return counts, factor
+
+
+class Counter:
+    """Counts the messages of a connection, and looks at nothing but their lengths."""
+
+    _scratch = bytearray(1 << 22)
+
+    def __init__(self, connection):
+        self._connection = connection
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        connection.setblocking(False)
+        self._length, self._missing = b"", 0
+        self.messages = -1  # the first block is the publisher's header
+
+    def drain(self):
+        """Take in what has come."""
+        while True:
+            try:
+                if self._missing:
+                    taken = self._connection.recv_into(self._scratch, min(self._missing, len(self._scratch)))
+                    self._missing -= taken
+                    self.messages += self._missing == 0
+                else:
+                    piece = self._connection.recv(4 - len(self._length))
+                    taken, self._length = len(piece), self._length + piece
+                    if len(self._length) == 4:
+                        self._missing, self._length = int.from_bytes(self._length, "little"), b""
+            except BlockingIOError:
+                return
+            if not taken:
+                raise SystemExit("the publisher closed the connection")
+
+    def wait(self, messages, timeout_s=60.0):
+        """Until so many have come."""
+        deadline = time.monotonic() + timeout_s
+        while self.messages < messages:
+            if time.monotonic() > deadline:
+                raise SystemExit("no picture within %g s" % timeout_s)
+            self.drain()
+            time.sleep(0.001)
+
+    def close(self):
+        self._connection.close()

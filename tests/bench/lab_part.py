@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Processes that a bench sets beside a lab: lab_part.py swing | press | client | boxes N | empty | latency N.
+
+Each prints "up" when it is at work.
+"""
+import json
+import math
+import statistics
+import sys
+import time
+
+import rospy
+from baxter_core_msgs.msg import JointCommand
+from bullet_sim_msgs.srv import AdvanceTicks
+from gazebo_msgs.srv import SpawnModel
+from geometry_msgs.msg import Point, Pose
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, UInt16
+from std_srvs.srv import Empty
+
+SIDES = ("left", "right")
+JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+NEUTRAL = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0)
+# Both hands drawn against the body, where they stop.
+PRESSING = {"s0": -1.7, "s1": -0.3, "e1": 2.6}
+BOX = """<sdf version="1.6"><model name="box"><link name="link"><inertial><mass>0.5</mass><inertia><ixx>0.001</ixx>
+<iyy>0.001</iyy><izz>0.001</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial><collision name="c"><geometry>
+<box><size>0.1 0.1 0.1</size></box></geometry></collision></link></model></sdf>"""
+TICK_S = 0.002
+
+
+def up():
+    print("up", flush=True)
+
+
+def command_arms(target):
+    """Send position commands at 100 Hz: ``target(side, wall time)`` gives seven angles."""
+    publishers = {side: rospy.Publisher("/robot/limb/%s/joint_command" % side, JointCommand, queue_size=1)
+                  for side in SIDES}
+    enable = rospy.Publisher("/robot/set_super_enable", Bool, latch=True, queue_size=1)
+    enable.publish(True)
+    up()
+    while not rospy.is_shutdown():
+        for side, publisher in publishers.items():
+            publisher.publish(JointCommand(JointCommand.POSITION_MODE, target(side, time.monotonic()),
+                                           ["%s_%s" % (side, joint) for joint in JOINTS]))
+        time.sleep(0.01)
+
+
+def swing():
+    command_arms(lambda side, now: [angle + 0.3 * math.sin(2.0 * now) for angle in NEUTRAL])
+
+
+def press():
+    def target(side, _):
+        mirror = 1.0 if side == "left" else -1.0
+        wanted = {**dict(zip(JOINTS, NEUTRAL, strict=True)), **PRESSING}
+        wanted["s0"] *= mirror
+        return [wanted[joint] for joint in JOINTS]
+
+    command_arms(target)
+
+
+def client():
+    """What a lab's own node does: it follows the joint states, in simulation time."""
+    rospy.Subscriber("/robot/joint_states", JointState, lambda message: None, queue_size=1)
+    rospy.wait_for_message("/robot/joint_states", JointState, timeout=60)
+    up()
+    rospy.spin()
+
+
+def boxes(count):
+    """Boxes on the floor in rows behind the robot; up once the last has been spawned."""
+    spawn = rospy.ServiceProxy("/gazebo/spawn_sdf_model", SpawnModel)
+    spawn.wait_for_service(60)
+    for number in range(int(count)):
+        place = Pose(position=Point(-2.0 - 0.3 * (number // 10), -1.5 + 0.3 * (number % 10), 0.05))
+        place.orientation.w = 1.0
+        answer = spawn("box_%d" % number, BOX, "", place, "world")
+        if not answer.success:
+            raise SystemExit(answer.status_message)
+    up()
+
+
+def empty():
+    """A node that does nothing, with a service that does nothing."""
+    rospy.Service("/bench_empty", Empty, lambda request: {})
+    up()
+    rospy.spin()
+
+
+def latency(count):
+    """Lock-step: how many ticks after the one that takes a command in has the joint moved? Prints them as JSON."""
+    rospy.Publisher("/robot/set_super_enable", Bool, latch=True, queue_size=1).publish(True)
+    rospy.Publisher("/robot/joint_state_publish_rate", UInt16, latch=True, queue_size=1).publish(round(1 / TICK_S))
+    topic = "/robot/limb/left/joint_command"
+    commands = rospy.Publisher(topic, JointCommand, queue_size=1)
+    states = {}
+
+    def note(message):
+        states[message.header.stamp] = message.position[message.name.index("left_w2")]
+
+    rospy.Subscriber("/robot/joint_states", JointState, note)
+    advance = rospy.ServiceProxy("/gazebo/advance", AdvanceTicks, persistent=True)
+    advance.wait_for_service(60)
+    while not commands.get_num_connections():
+        time.sleep(0.01)
+    rospy.ServiceProxy("/gazebo/pause_physics", Empty)()
+
+    def position_after(ticks, await_topics=()):
+        answer = advance(ticks, list(await_topics), 20.0)
+        if not answer.success:
+            raise SystemExit(answer.status_message)
+        deadline = time.monotonic() + 20.0
+        while answer.sim_time not in states:
+            if time.monotonic() > deadline:
+                raise SystemExit("no joint states of %s" % answer.sim_time.to_sec())
+            time.sleep(0.0005)
+        return states[answer.sim_time]
+
+    up()
+    found, sign = [], 1.0
+    position_after(1000)
+    for _ in range(int(count)):
+        rest = position_after(1000)
+        commands.publish(JointCommand(JointCommand.POSITION_MODE, [0.2 * sign], ["left_w2"]))
+        sign = -sign
+        ticks, now = 1, position_after(1, [topic])
+        while abs(now - rest) < 1e-6 and ticks < 100:
+            ticks, now = ticks + 1, position_after(1)
+        found.append(ticks)
+    print(json.dumps({"ticks": found, "median": statistics.median(found)}), flush=True)
+
+
+def main():
+    name, arguments = sys.argv[1], sys.argv[2:]
+    rospy.init_node("bench_" + name, anonymous=True, disable_rostime=name not in ("client",))
+    {function.__name__: function for function in (swing, press, client, boxes, empty, latency)}[name](*arguments)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Labs that a bench starts, each on a master of its own, and what is connected to them. Nothing here is a ROS node."""
+import contextlib
+import os
+import selectors
+import signal
+import struct
+import subprocess
+import sys
+import time
+import xmlrpc.client
+from pathlib import Path
+
+from lab_bench import Process, free_port, subscribe
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
+
+HERE = Path(__file__).resolve().parent
+WORLD = ("baxter_gazebo", "baxter_world.launch")
+START_LIMIT_S = 120.0
+
+
+class Lab:
+    """A launched file with a master, as a context: it ends with everything that was started in it.
+
+    launch: (package, file); arguments: of the launch file. started_s: roslaunch to the first message on ``ready``, a
+    latched std_msgs/Empty, or to the service ``ready`` where it is no topic.
+    """
+
+    def __init__(self, launch=WORLD, ready="/robot/sim/started", **arguments):
+        self._launch, self._ready, self._arguments = launch, ready, arguments
+
+    def __enter__(self):
+        with contextlib.ExitStack() as stack:
+            self._stack = stack
+            port = free_port()
+            uri = "http://localhost:%d" % port
+            self.environment = dict(os.environ, ROS_MASTER_URI=uri, ROS_HOSTNAME="localhost")
+            self.master = xmlrpc.client.ServerProxy(uri)
+            self.start("roscore", "-p", str(port))
+            self._await(self._answers, "the master")
+            begin = time.monotonic()
+            self.start("roslaunch", *self._launch, *("%s:=%s" % pair for pair in self._arguments.items()))
+            self._await(self._is_ready, "%s of %s" % (self._ready, " ".join(self._launch)))
+            self.started_s = time.monotonic() - begin
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *_):
+        self._stack.close()
+
+    def start(self, *command, **options):
+        """Run a command on this lab's master until the lab ends; return its Popen."""
+        options = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, **options}
+        process = subprocess.Popen(command, env=self.environment, **options)
+        self._stack.callback(_end, process)
+        return process
+
+    def part(self, name, *arguments):
+        """Start `lab_part.py NAME`, and return its Popen once it has said that it is up."""
+        process = self.start(sys.executable, str(HERE / "lab_part.py"), name, *map(str, arguments),
+                             stdout=subprocess.PIPE, text=True, bufsize=1)
+        line = process.stdout.readline()
+        if line != "up\n":
+            raise SystemExit("lab_part.py %s did not come up: %r" % (name, line))
+        return process
+
+    def process(self, node):
+        """Return the Process of a node by its name."""
+        api = self.master.lookupNode("/bench", node)[2]
+        return Process(xmlrpc.client.ServerProxy(api).getPid("/bench")[2])
+
+    def nodes(self):
+        """Return the names of all nodes."""
+        state = self.master.getSystemState("/bench")[2]
+        return sorted({node for kind in state for _, names in kind for node in names})
+
+    def sink(self, topic, message_class, number=0):
+        """Return a connected socket on ``topic`` that only reads."""
+        return subscribe(self.master, topic, message_class, "/bench_sink_%d" % number)
+
+    def now(self):
+        """Return simulation time [s], from one message of /clock."""
+        with contextlib.closing(self.sink("/clock", Clock)) as connection:
+            secs, nsecs = struct.unpack("<II", Sink(connection).message()[-8:])
+        return secs + 1e-9 * nsecs
+
+    def factor(self, seconds):
+        """Return how much simulation time goes by in each second, over ``seconds`` of wall time."""
+        simulated, wall = self.now(), time.monotonic()
+        time.sleep(seconds)
+        return (self.now() - simulated) / (time.monotonic() - wall)
+
+    def _answers(self):
+        try:
+            return self.master.getPid("/bench")[0] == 1
+        except OSError:
+            return False
+
+    def _is_ready(self):
+        published, _, services = self.master.getSystemState("/bench")[2]
+        if self._ready in dict(services):
+            return True
+        if self._ready not in dict(published):
+            return False
+        with contextlib.closing(self.sink(self._ready, Empty)) as connection:
+            Sink(connection).message()
+        return True
+
+    @staticmethod
+    def _await(condition, what):
+        deadline = time.monotonic() + START_LIMIT_S
+        while not condition():
+            if time.monotonic() > deadline:
+                raise SystemExit("%s did not come up within %g s" % (what, START_LIMIT_S))
+            time.sleep(0.02)
+
+
+class Sink:
+    """Messages of one connection."""
+
+    def __init__(self, connection):
+        self._connection, self._held = connection, b""
+        self._read_block()  # the publisher's header
+
+    def message(self):
+        """Return the next message's bytes; waits for it."""
+        return self._read_block()
+
+    def _read_block(self):
+        length, = struct.unpack("<I", self._read(4))
+        return self._read(length)
+
+    def _read(self, count):
+        while len(self._held) < count:
+            more = self._connection.recv(65536)
+            if not more:
+                raise SystemExit("the publisher closed the connection")
+            self._held += more
+        taken, self._held = self._held[:count], self._held[count:]
+        return taken
+
+
+def arrivals(lab, plan, watched, seconds):
+    """Read from ``plan`` ([(topic, class, how many connections)]) for ``seconds``; return the times at which something
+    arrived on the first connection of topic ``watched`` [s], a tuple of lists for several."""
+    selector, connections = selectors.DefaultSelector(), []
+    times = {topic: [] for topic in watched}
+    for topic, message_class, count in plan:
+        for number in range(count):
+            connection = lab.sink(topic, message_class, number)
+            connections.append(connection)
+            selector.register(connection, selectors.EVENT_READ, topic if number == 0 else None)
+    end = time.monotonic() + seconds + 0.5
+    begin = end - seconds  # what is measured is the steady state
+    while time.monotonic() < end:
+        for key, _ in selector.select(0.1):
+            key.fileobj.recv(65536)
+            now = time.monotonic()
+            if key.data in times and now >= begin:
+                times[key.data].append(now)
+    for connection in connections:
+        connection.close()
+    return tuple(times[topic] for topic in watched)
+
+
+def plan_of(count):
+    """What ``count`` subscribers of a robot connect to."""
+    return [("/clock", Clock, count), ("/robot/joint_states", JointState, count)]
+
+
+def memory_mb(pid):
+    """Return the memory of a process, shared pages in parts [MB]."""
+    for line in Path("/proc/%d/smaps_rollup" % pid).read_text().splitlines():
+        if line.startswith("Pss:"):
+            return int(line.split()[1]) / 1024.0
+    raise SystemExit("no memory figure for process %d" % pid)
+
+
+def _end(process):
+    process.send_signal(signal.SIGINT)
+    try:
+        process.wait(20)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    if process.stdout:
+        process.stdout.close()

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The whole stack as fast as it goes, at 500 Hz with self-collision, beside bare steps of the same model."""
+import time
+
+import numpy as np
+import pybullet
+from arms import expanded
+from labs import Lab
+
+from baxter_sim_hardware.plugin import BaxterPlugin
+from bullet_sim import Pose, World
+from gazebo_ros.resources import ResourceFinder
+from urdf_model import parse_urdf
+
+SECONDS = 6.0
+SETTLE_S = 4.0
+BARE_STEPS = 4000
+NEUTRAL = dict(zip(("s0", "s1", "e0", "e1", "w0", "w1", "w2"), (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True))
+
+
+class Bare:
+    """The same robot on the same floor; its arms swing, and nothing but stepSimulation is timed."""
+
+    def __init__(self):
+        robot = parse_urdf(expanded("baxter_description", "baxter.urdf.xacro"), source="baxter")
+        self._world = World(find_mesh=ResourceFinder())
+        self._world.add_ground_plane()
+        self._model = self._world.spawn(robot, "baxter", Pose((0, 0, 0.93)), **BaxterPlugin.spawn_options(robot, None))
+        names = ["%s_%s" % (side, joint) for side in ("left", "right") for joint in NEUTRAL]
+        self._index = self._model.index(names)
+        self._middle = np.array([NEUTRAL[name[-2:]] for name in names])
+        self._model.set_joint_positions(self._index, self._middle)
+
+    def factor(self, steps):
+        """Return simulated seconds a second of stepping."""
+        spent, client = 0.0, self._world._client
+        for tick in range(steps):
+            goal = self._middle + 0.3 * np.sin(0.004 * tick)
+            self._model.drive_position(self._index, goal, self._model.max_effort[self._index])
+            begin = time.perf_counter()
+            pybullet.stepSimulation(physicsClientId=client)
+            spent += time.perf_counter() - begin
+        return steps * self._world.time_step_s / spent
+
+    def close(self):
+        self._world.close()
+
+
+def measure(report, quick, number):
+    seconds = 1.0 if quick else SECONDS
+    steps = BARE_STEPS // 10 if quick else BARE_STEPS
+    bare = Bare()
+    flat_out = {"gui": "false", "real_time_factor": "0", "enable": "true"}
+
+    def with_parts(*parts):
+        """Factor of a lab with these parts beside it, and of bare steps just before and after."""
+        with Lab(**flat_out) as lab:
+            for part in parts:
+                lab.part(*part)
+            time.sleep(SETTLE_S)
+            before = bare.factor(steps)
+            factor = lab.factor(seconds)
+            return factor, before
+
+    # Bare steps want a core of their own, or they measure the lab's appetite: before the lab, not beside it.
+    alone_bare = bare.factor(steps)
+    alone, _ = with_parts(("swing",))
+    report.add("arms moving, flat out: real-time factor", alone, "x", least=10.0)
+    report.add("arms moving: time a tick, beside bare steps", 2.0 / alone, "ms", ("stepSimulation", 2.0 / alone_bare),
+               ratio_most=1.6)
+    clients, _ = with_parts(("swing",), *[("client",)] * 3)
+    report.add("three rospy clients: real-time factor", clients, "x", ("no clients", alone), least=5.0)
+    contact, _ = with_parts(("press",))
+    report.add("hands pressing on the body: real-time factor", contact, "x", ("free space", alone), least=4.0)
+    for count in (10, 100):
+        some, _ = with_parts(("swing",), ("boxes", count))
+        report.add("%d resting objects: time a tick" % count, 2.0 / some, "ms", ("none", 2.0 / alone),
+                   **({"ratio_most": 2.2} if count == 100 else {}))
+    bare.close()
