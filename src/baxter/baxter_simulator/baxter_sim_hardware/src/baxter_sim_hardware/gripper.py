@@ -9,9 +9,12 @@ from .gripper_commands import Gripper, is_number
 FULL_SPEED = 0.1  # [m/s] of a finger at velocity 100 %
 REACH = 0.1  # share of the travel by which the set-point may lead fingers that something stops
 STILL = 0.05  # [travels/s] below which the fingers stand, and half of the commanded speed where that is less
-PUSHING = 0.5  # share of the allowed force from which fingers that stand are stopped by something
+PRESSING = 1.15  # force that moving fingers use, per moving force, which is what they must exceed to grip
+MOST = 95.0  # [%] force that counts as exceeding any moving force
+PUSHING = 0.5  # share of the allowed force from which fingers that stand for long are stopped by something all the same
 LOOSE = 0.25  # share of the allowed force below which what was held is gone
-SETTLE_S = 0.04  # for so long it must be so
+SETTLE_S = 0.04  # for so long they must stand, or what is held be gone
+CONFIRM_S = 0.1  # for so long they must press: clients that look at the force, 20 times a second, shall see it
 GIVE_UP_S = 0.5  # after which fingers that stand short of their target, with nothing between them, are left there
 END_STOP = 0.02  # share of the travel within which a calibration must find the ends
 OPEN, CLOSED = 1.0, 0.0
@@ -100,7 +103,7 @@ class ElectricGripper(Gripper):
         self._position = position
         stands = abs(speed) < min(STILL, 0.5 * self._speed) or self._speed == 0.0
         if self._phase is Phase.RESTING:
-            if abs(position - self._rest) <= max(self._dead, END_STOP):
+            if self._is_near(self._rest):
                 return None
             self._phase = Phase.MOVING
         if self._phase is Phase.MOVING:
@@ -118,7 +121,9 @@ class ElectricGripper(Gripper):
         step = 0.0 if self._stays else self._speed * self._dt
         setpoint = self._setpoint + min(max(self._target - self._setpoint, -step), step)
         self._setpoint = min(max(setpoint, position - REACH), position + REACH)
-        return self._setpoint, self.parameters["holding_force" if self.gripping else "moving_force"]
+        if self.gripping:
+            return self._setpoint, self.parameters["holding_force"]
+        return self._setpoint, min(PRESSING * self.parameters["moving_force"], 100.0)
 
     @property
     def _speed(self):
@@ -149,11 +154,12 @@ class ElectricGripper(Gripper):
 
     def _arrive(self, squeeze):
         """The fingers stand: find out why, and what comes next."""
-        is_there = abs(self._position - self._target) <= max(self._dead, END_STOP) and self._setpoint == self._target
-        if squeeze >= max(PUSHING * self._allowed, 1.0):
+        is_there = self._is_near(self._target) and self._setpoint == self._target
+        presses = squeeze > min(self.parameters["moving_force"], MOST)
+        if presses or (self._still_s >= GIVE_UP_S and squeeze >= max(PUSHING * self._allowed, 1.0)):
             if self._calibrating:
                 self._fail()
-            else:
+            elif self._still_s >= CONFIRM_S:
                 self._phase, self._loose_s = Phase.HOLDING, 0.0
         elif is_there and self._plan and self._at_end:
             self._move_to(self._plan.pop(0))
@@ -167,6 +173,9 @@ class ElectricGripper(Gripper):
                 self._fail()
             else:
                 self._come_to_rest()
+
+    def _is_near(self, target):
+        return abs(self._position - target) <= max(self._dead, END_STOP)
 
     @property
     def _at_end(self):
@@ -183,9 +192,12 @@ class ElectricGripper(Gripper):
     def _go_to(self, target):
         if not self.calibrated:
             raise CommandRefused("the gripper is not calibrated: calibrate it first")
-        self.missed = False
-        self._attempt = target <= self._dead
-        self._move_to(target)
+        before, self._attempt = self._target, target <= self._dead
+        if self.gripping and (target - self._position) * (before - self._position) > 0.0:
+            self._target, self._stays = target, False  # it holds on, and would now close so far
+        elif target != before or not (self.moving or self._is_near(target)):
+            self.missed = False
+            self._move_to(target)
 
     def _go(self, values):
         percent = values.get("position")

@@ -138,7 +138,7 @@ def test_what_is_held_comes_along_and_falls_on_release(lab):
     box = put_box_on_cup(lab)
     suck(lab)
     before = lab.model.link_pose("left_gripper").position
-    lab.run(8.0)  # whatever lies still falls asleep meanwhile
+    lab.run(6.0)  # whatever lies still falls asleep meanwhile
     swing(lab)
     assert np.linalg.norm(np.array(lab.model.link_pose("left_gripper").position) - before) > 0.1
     assert state(lab).gripping == 1
