@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How much of the physical robot's interface is here: its topics, counted by group, and why the others are missing."""
+from collections import Counter, defaultdict
+from fnmatch import fnmatchcase
+
+from .interface import TOPICS
+from .sides import SIDES
+
+
+def served(namespace="/robot"):
+    """{topic: type} of what the plugin opens."""
+    return {name if name.startswith("/") else "%s/%s" % (namespace, name): row.type
+            for row in TOPICS for _, name in row.names()}
+
+
+def physical(table):
+    """{topic: type} of the physical robot, from the parsed content of config/physical_robot.yaml."""
+    return {name.format(limb=side): kind for name, kind in table["topics"].items() for side in SIDES}
+
+
+def group_of(name):
+    """The group that a topic is counted in: the part of its name below /robot, or its first part."""
+    parts = name.strip("/").split("/")
+    if parts[0] != "robot":
+        return "/" + parts[0] if len(parts) > 1 else "/"
+    return "/robot/" + parts[1] if len(parts) > 2 else "/robot"
+
+
+def elsewhere(name, table):
+    """Which other node serves a topic, or None."""
+    return next((node for pattern, node in table["elsewhere"].items() if fnmatchcase(name, pattern)), None)
+
+
+def reason_to_leave_out(name, kind, table):
+    """Why a topic is missing, or None where nobody says."""
+    for entry in table["left_out"]:
+        if any(fnmatchcase(kind, pattern) for pattern in entry.get("types", ())) or any(
+                fnmatchcase(name, pattern) for pattern in entry.get("names", ())):
+            return entry["reason"]
+    return None
+
+
+def markdown(table):
+    """What docs/interface.md says of coverage: counts by group, then what is left out."""
+    here = served()
+    counts, left_out = defaultdict(Counter), defaultdict(list)
+    for name, kind in physical(table).items():
+        count = counts[group_of(name)]
+        count["physical"] += 1
+        if name in here:
+            count["here"] += 1
+        elif elsewhere(name, table):
+            count["elsewhere"] += 1
+        else:
+            count["left out"] += 1
+            left_out[reason_to_leave_out(name, kind, table)].append(name)
+    for name in set(here) - set(physical(table)):
+        counts[group_of(name)]["more"] += 1
+    columns = ("physical", "here", "elsewhere", "left out", "more")
+    lines = ["| Group | Physical robot | Served here | By other nodes | Left out | Here beyond it |",
+             "|---|" + "---:|" * len(columns)]
+    total = Counter()
+    for group in sorted(counts):
+        total.update(counts[group])
+        lines.append("| `%s` | %s |" % (group, " | ".join(str(counts[group][column]) for column in columns)))
+    lines.append("| all | %s |" % " | ".join(str(total[column]) for column in columns))
+    lines += ["", "Left out:", ""]
+    for reason in sorted(left_out):
+        lines.append("- %s (%d): %s" % (reason, len(left_out[reason]), ", ".join(
+            "`%s`" % name for name in _both_sides(left_out[reason]))))
+    return "\n".join(lines) + "\n"
+
+
+def _both_sides(names):
+    """The names, with one that stands for both where left and right are in the list."""
+    seen = []
+    for name in names:
+        joint = name
+        for side in SIDES:
+            other = name.replace(side, "%s")
+            if "%s" in other and all(other.replace("%s", each) in names for each in SIDES):
+                joint = other.replace("%s", "<limb>")
+        if joint not in seen:
+            seen.append(joint)
+    return seen
