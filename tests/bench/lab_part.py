@@ -134,7 +134,7 @@ def latency(count):
 
 
 def main():
-    name, arguments = sys.argv[1], sys.argv[2:]
+    name, *arguments = rospy.myargv(sys.argv)[1:]  # without what roslaunch adds
     rospy.init_node("bench_" + name, anonymous=True, disable_rostime=name not in ("client",))
     {function.__name__: function for function in (swing, press, client, boxes, empty, latency)}[name](*arguments)
 

@@ -31,11 +31,13 @@ SUITES = {
     "load": ("physics_bench", "loading and stepping Baxter beside PyBullet's own loaders"),
     "control": ("control_tick_bench", "the controllers of 18 joints beside a physics step"),
     "brain": ("robot_bench", "a tick of Baxter's brain beside the physics step of the same world"),
+    "collision": ("self_collision_bench", "a physics step of Baxter with self-collision beside one without"),
     "physics": ("world_bench", "the whole stack flat out beside bare steps: alone, with objects, clients, in contact"),
     "loop": ("loop_bench", "real time: CPU, joint_states jitter, latency, with 0, 5 and 20 subscribers"),
     "services": ("service_bench", "IK service beside an empty service"),
+    "tracking": ("tracking_bench", "trajActionServer: evenness of its commands, how closely the arm follows"),
     "start": ("start_bench", "launch to /robot/sim/started; memory of each process"),
-    "cameras": ("camera_bench", "pictures beside PyBullet's own; cameras and clouds a second, and what they cost physics"),
+    "cameras": ("camera_bench", "pictures beside PyBullet's own; how many a second, and what they cost physics"),
     "labs": ("labs_bench", "1, 2 and 4 labs side by side: factor and memory of each"),
 }
 # Longest that a round of a suite may take before it counts as hung [s].

@@ -1,12 +1,8 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """What Baxter's self-collision costs: the physics step with it, without it, and while parts press on each other.
 
-    python tests/bench/self_collision_bench.py
-
 The worlds take turns, step by step, so that what else the machine does hits all of them.
 """
-import argparse
 import statistics
 import time
 
@@ -73,7 +69,7 @@ class Lab:
                    if contact.distance <= 0.0)
 
 
-def measure(labs, steps):
+def step_times(labs, steps):
     for lab in labs:
         lab.times = []
     for _ in range(steps):
@@ -82,10 +78,8 @@ def measure(labs, steps):
     return [1e6 * statistics.median(lab.times) for lab in labs]
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=2000, help="ticks to time (default %(default)s)")
-    steps = parser.parse_args().steps
+def measure(report, quick, number):
+    steps = 200 if quick else 2000
     packages = rospkg.RosPack()
     file = packages.get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
     robot = parse_urdf(xacro.process_file(file).toxml(), source=file)
@@ -95,21 +89,18 @@ def main():
         return {name: poses.angles(pose, name.split("_")[0])[name] for name in NAMES}
 
     bare, whole = Lab(robot, False), Lab(robot, True)
-    print("%-14s %10s %10s %7s %9s" % ("", "without", "with", "ratio", "contacts"))
     for pose in poses.names:
         for lab in (bare, whole):
             lab.place(angles(pose))
             lab.step()
-        off, on = measure((bare, whole), steps)
-        print("%-14s %7.0f us %7.0f us %7.2f %9d" % (pose, off, on, on / off, whole.touches()))
+        off, on = step_times((bare, whole), steps)
+        report.add("step, %s" % pose, on, "us", ("without self-collision", off))
     for title, (start, goal) in PRESSING.items():
         start = start if isinstance(start, dict) else angles(start)
         for lab in (bare, whole):
             lab.place(start)
         whole.go(goal)
-        off, on = measure((bare, whole), steps)
-        print("%-14s %7.0f us %7.0f us %7.2f %9d" % (title, off, on, on / off, whole.touches()))
-
-
-if __name__ == "__main__":
-    main()
+        off, on = step_times((bare, whole), steps)
+        if not whole.touches():
+            raise SystemExit("%s: nothing touches, so the figure means nothing" % title)
+        report.add("step, %s" % title, on, "us", ("without self-collision", off))
