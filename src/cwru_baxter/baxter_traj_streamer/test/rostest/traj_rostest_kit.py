@@ -11,6 +11,7 @@ from baxter_traj_streamer.msg import trajAction
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from baxter_traj_streamer.ros_settings import read_limits
 from baxter_traj_streamer.settings import SIDES
 from baxter_traj_streamer.streamer import BaxterTrajStreamer
 from baxter_traj_streamer.traj_client import SentGoal
@@ -56,6 +57,7 @@ class FakeRobotTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.streamer = BaxterTrajStreamer()
+        cls.limits = read_limits()
         cls.enable = rospy.Publisher("/robot/set_super_enable", Bool, queue_size=1)
         cls.commands = []
         cls.subscribers = [rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, cls.on_command)
@@ -83,7 +85,13 @@ class FakeRobotTest(unittest.TestCase):
         return [(stamp, message.command[message.names.index(joint)]) for stamp, message in list(self.commands)
                 if message.mode == JointCommand.RAW_POSITION_MODE and joint in message.names]
 
+    def inwards(self, names, by):
+        """Angles that far from where the joints are, towards the middle of their ranges: room there is on this side."""
+        middle = [0.5 * (self.limits[name].lower + self.limits[name].upper) for name in names]
+        here = self.angles(names)
+        return here + np.where(here < middle, by, np.negative(by))
+
     def move(self, names, by, duration_s, **options):
-        goal = self.angles(names) + by
+        goal = self.inwards(names, by)
         self.client.send(names, [(0.0, self.angles(names)), (duration_s, goal)], **options)
         return goal
