@@ -77,6 +77,8 @@ class Naive:
         with open(path, "w", encoding="utf-8") as file:
             file.write(re.sub(r"package://[^\"']+", lambda found: finder(found.group()) or "", xml))
         self._robot = pybullet.loadURDF(path, [0, 0, 0.93], useFixedBase=True, physicsClientId=self._client)
+        floor = pybullet.createVisualShape(pybullet.GEOM_BOX, halfExtents=[50, 50, 0.001], physicsClientId=self._client)
+        pybullet.createMultiBody(baseVisualShapeIndex=floor, physicsClientId=self._client)
         self._index = {pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[1].decode(): k
                        for k in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client))}
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 #: Triangles that a mesh keeps; a robot of thirty links then draws in some 20 ms without a graphics card.
-TRIANGLES = 1500
+TRIANGLES = 800
 # Part of the name of cached files: raise it when the same mesh would come out differently.
 _VERSION = 2
 _FINEST_GRID = 512

@@ -4,6 +4,7 @@
 Everything here belongs to the thread that made the renderer.
 """
 import os
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,60 +13,60 @@ from sensor_renderer.errors import RenderingError
 # Direction that sunlight comes from where the world names no light: high, a little from the front left.
 _TO_SUN = np.array([0.45, 0.25, 0.86])
 _SKY = (0.62, 0.70, 0.80)
-# The shadow map covers this much around the place where robots work [m], with so many pixels a side.
+# The shadow map covers this much around the place where robots work [m], with so many pixels a side: 9 mm each.
 _SHADOW_CENTRE = np.array([0.3, 0.0, 0.7])
 _SHADOW_HALF_M = 2.2
-_SHADOW_PIXELS = 1024
+_SHADOW_PIXELS = 512
 
+# Light is reckoned at the vertices and only shadow at each pixel: without a graphics card pixels are what costs.
 _VERTEX = """
 #version 330
 uniform mat4 body;
 uniform mat4 to_clip;
 uniform mat4 to_shadow;
+uniform vec3 eye;
+uniform vec3 to_sun;
 in vec3 position;
 in vec3 normal;
-out vec3 place;
-out vec3 facing;
+in vec3 colour;
+out vec3 dim;
+out vec3 bright;
 out vec3 shadow_place;
+out vec2 place;
 void main() {
     vec4 there = body * vec4(position, 1.0);
-    place = there.xyz;
-    facing = mat3(body) * normal;
-    shadow_place = (to_shadow * there).xyz;
+    vec3 n = mat3(body) * normal;
+    // Thinned meshes are not closed everywhere: both sides of a triangle are outside.
+    n = dot(n, eye - there.xyz) < 0.0 ? -n : n;
+    dim = colour * (0.44 + 0.12 * n.z);
+    bright = colour * 0.54 * max(dot(n, to_sun), 0.0);
+    shadow_place = (to_shadow * there).xyz - vec3(0.0, 0.0, 0.004);
+    place = there.xy;
     gl_Position = to_clip * there;
 }
 """
 
 _FRAGMENT = """
 #version 330
-uniform vec3 colour;
-uniform vec3 eye;
-uniform vec3 to_sun;
-uniform bool is_floor;
 uniform sampler2DShadow shadow;
-in vec3 place;
-in vec3 facing;
+in vec3 dim;
+in vec3 bright;
 in vec3 shadow_place;
 out vec4 seen;
+void main() { seen = vec4(dim + bright * texture(shadow, shadow_place), 1.0); }
+"""
+
+_FLOOR_FRAGMENT = """
+#version 330
+uniform sampler2DShadow shadow;
+in vec3 dim;
+in vec3 bright;
+in vec3 shadow_place;
+in vec2 place;
+out vec4 seen;
 void main() {
-    vec3 view = normalize(eye - place);
-    vec3 n = normalize(facing);
-    // Thinned meshes are not closed everywhere: both sides of a triangle are outside.
-    n = dot(n, view) < 0.0 ? -n : n;
-    float sun = max(dot(n, to_sun), 0.0);
-    float lit = 0.0;
-    if (sun > 0.0) {
-        lit = 1.0;
-        if (all(lessThan(abs(shadow_place - 0.5), vec3(0.5))))
-            lit = texture(shadow, vec3(shadow_place.xy, shadow_place.z - 0.004));
-    }
-    vec3 base = colour;
-    if (is_floor) {
-        vec2 tile = floor(place.xy * 2.0);
-        base *= mod(tile.x + tile.y, 2.0) < 0.5 ? 1.0 : 0.92;
-    }
-    float shine = lit * pow(max(dot(n, normalize(view + to_sun)), 0.0), 24.0);
-    seen = vec4(base * (0.42 + 0.12 * n.z + 0.52 * sun * lit) + 0.10 * shine, 1.0);
+    vec2 tile = fract(place) - 0.5;
+    seen = vec4((dim + bright * texture(shadow, shadow_place)) * (tile.x * tile.y > 0.0 ? 1.0 : 0.92), 1.0);
 }
 """
 
@@ -83,6 +84,15 @@ void main() {}
 """
 
 
+class _Link(NamedTuple):
+    """What is drawn in one call: vertex arrays for colour and for depth alone, and a sphere around them."""
+
+    arrays: tuple
+    centre: np.ndarray
+    radius: float
+    is_floor: bool
+
+
 class GlRenderer:
     """Draws a :class:`sensor_renderer.mirror.Mirror`."""
 
@@ -97,21 +107,23 @@ class GlRenderer:
         except Exception as error:  # noqa: BLE001  (each layer below raises its own kind)
             raise RenderingError("no OpenGL 3.3 on EGL: %s" % error) from error
         context = self._context
-        self._moderngl = moderngl
         #: What draws, in the driver's own words.
         self.name = context.info["GL_RENDERER"]
         self._program = context.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
+        self._floor_program = context.program(vertex_shader=_VERTEX, fragment_shader=_FLOOR_FRAGMENT)
         self._shadow_program = context.program(vertex_shader=_SHADOW_VERTEX, fragment_shader=_SHADOW_FRAGMENT)
         self._shadow_map = context.depth_texture((_SHADOW_PIXELS, _SHADOW_PIXELS))
         self._shadow_map.compare_func = "<="
+        self._shadow_map.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._shadow_map.repeat_x = self._shadow_map.repeat_y = False
         self._shadow_buffer = context.framebuffer(depth_attachment=self._shadow_map)
-        self._arrays = {}
+        self._links = {}
         self._buffers = {}
         self._shadow_of = None
-        self._shadow_matrix, self._to_shadow = _shadow_matrices(_TO_SUN)
-        self._program["to_sun"].value = tuple(_TO_SUN / np.linalg.norm(_TO_SUN))
-        self._program["to_shadow"].write(_bytes(self._to_shadow))
+        self._shadow_matrix, to_shadow = _shadow_matrices(_TO_SUN)
+        for program in (self._program, self._floor_program):
+            program["to_sun"].value = tuple(_TO_SUN / np.linalg.norm(_TO_SUN))
+            program["to_shadow"].write(_bytes(to_shadow))
         context.enable(moderngl.DEPTH_TEST)
 
     def render(self, mirror, pinhole, pose, colour=True, depth=False):
@@ -122,18 +134,18 @@ class GlRenderer:
         """
         view = np.linalg.inv(pose)
         to_clip = pinhole.clip_matrix() @ view
-        seen = _visible(mirror, pinhole, view)
+        seen = _visible(self._everything(mirror), pinhole, view)
         buffer, depth_texture = self._framebuffer(pinhole.width, pinhole.height)
         picture = distance = None
         if colour:
             self._draw_shadows(mirror)
             buffer.use()
             buffer.clear(*_SKY, 1.0, depth=1.0)
-            program = self._program
             self._shadow_map.use(0)
-            program["to_clip"].write(_bytes(to_clip))
-            program["eye"].value = tuple(pose[:3, 3])
-            self._draw(program, seen, 0, with_colour=True)
+            for program, floor in ((self._program, False), (self._floor_program, True)):
+                program["to_clip"].write(_bytes(to_clip))
+                program["eye"].value = tuple(pose[:3, 3])
+                self._draw(program, [entry for entry in seen if entry[0].is_floor == floor], 0)
             picture = np.frombuffer(buffer.read(components=3, alignment=1), np.uint8)
             picture = picture.reshape(pinhole.height, pinhole.width, 3)
         else:
@@ -157,27 +169,36 @@ class GlRenderer:
         self._shadow_buffer.use()
         self._shadow_buffer.clear(depth=1.0)
         self._shadow_program["to_clip"].write(_bytes(self._shadow_matrix))
-        casting = [(part, matrix) for part, matrix in _everything(mirror) if not part.is_floor]
+        casting = [(link, matrix) for link, matrix in self._everything(mirror) if not link.is_floor]
         self._draw(self._shadow_program, casting, 1)
 
-    def _draw(self, program, parts, which, with_colour=False):
+    @staticmethod
+    def _draw(program, links, which):
         body = program["body"]
-        last = None
-        for part, matrix in parts:
-            if matrix is not last:
-                body.write(_bytes(matrix))
-                last = matrix
-            if with_colour:
-                program["colour"].value = part.colour[:3]
-                program["is_floor"].value = part.is_floor
-            self._vertex_arrays(part)[which].render()
+        for link, matrix in links:
+            body.write(_bytes(matrix))
+            link.arrays[which].render()
 
-    def _vertex_arrays(self, part):
-        found = self._arrays.get(part.key)
+    def _everything(self, mirror):
+        """What there is to draw: (:class:`_Link`, matrix), one for each link that has shapes."""
+        return [(self._link(parts), matrix) for body in mirror.bodies.values()
+                for parts, matrix in zip(body.parts, body.matrices, strict=True) if parts]
+
+    def _link(self, parts):
+        key = tuple((part.key, part.colour) for part in parts)
+        found = self._links.get(key)
         if found is None:
-            found = self._arrays[part.key] = (
-                self._vertex_array(self._program, part.triangles, "3f 3f", "position", "normal"),
-                self._vertex_array(self._shadow_program, part.triangles[:, :3], "3f", "position"))
+            # One call for each link: in software a call costs as much as some hundred triangles.
+            rows = np.concatenate([np.hstack([part.triangles, np.tile(np.float32(part.colour[:3]),
+                                                                      (len(part.triangles), 1))]) for part in parts])
+            is_floor = any(part.is_floor for part in parts)
+            program = self._floor_program if is_floor else self._program
+            arrays = (self._vertex_array(program, rows, "3f 3f 3f", "position", "normal", "colour"),
+                      self._vertex_array(self._shadow_program, rows[:, :3], "3f", "position"))
+            low, high = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
+            centre = (low + high) / 2.0
+            radius = float(np.linalg.norm(rows[:, :3] - centre, axis=1).max())
+            found = self._links[key] = _Link(arrays, centre, radius, is_floor)
         return found
 
     def _vertex_array(self, program, rows, layout, *names):
@@ -195,31 +216,25 @@ class GlRenderer:
         return self._buffers[width, height]
 
 
-def _everything(mirror):
-    for body in mirror.bodies.values():
-        for parts, matrix in zip(body.parts, list(body.matrices), strict=True):
-            for part in parts:
-                yield part, matrix
-
-
-def _visible(mirror, pinhole, view):
-    """The parts whose spheres reach into the camera's pyramid, with their bodies' matrices."""
+def _visible(listed, pinhole, view):
+    """Those of ``listed``, (:class:`_Link`, matrix), whose spheres reach into the camera's pyramid, near ones first."""
     # Outward normals of the four sides, in the optical frame; all go through the eye.
     left, right = -(pinhole.cx + 0.5) / pinhole.fx, (pinhole.width - 0.5 - pinhole.cx) / pinhole.fx
     top, bottom = -(pinhole.cy + 0.5) / pinhole.fy, (pinhole.height - 0.5 - pinhole.cy) / pinhole.fy
     sides = np.array([(-1.0, 0.0, left), (1.0, 0.0, -right), (0.0, -1.0, top), (0.0, 1.0, -bottom)])
     sides /= np.linalg.norm(sides, axis=1)[:, None]
-    listed = list(_everything(mirror))
     if not listed:
         return []
     matrices = np.array([matrix for _, matrix in listed])
-    centres = np.array([part.centre for part, _ in listed])
-    radii = np.array([part.radius for part, _ in listed])
+    centres = np.array([link.centre for link, _ in listed])
+    radii = np.array([link.radius for link, _ in listed])
     world = np.einsum("nij,nj->ni", matrices[:, :3, :3], centres) + matrices[:, :3, 3]
     local = world @ view[:3, :3].T + view[:3, 3]
     inside = (local @ sides.T < radii[:, None]).all(axis=1)
     inside &= (local[:, 2] > pinhole.near - radii) & (local[:, 2] < pinhole.far + radii)
-    return [entry for entry, wanted in zip(listed, inside.tolist(), strict=True) if wanted]
+    # Near ones first: what they cover need not be coloured.
+    order = np.argsort(local[:, 2] - radii, kind="stable")
+    return [listed[k] for k in order if inside[k]]
 
 
 def _shadow_matrices(to_sun):

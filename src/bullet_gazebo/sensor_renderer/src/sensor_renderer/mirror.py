@@ -16,16 +16,11 @@ FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
 
 
 class Part(NamedTuple):
-    """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1.
-
-    ``centre`` (3,) and ``radius`` [m] of a sphere about them, in the body's frame.
-    """
+    """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1."""
 
     key: tuple
     triangles: np.ndarray
     colour: tuple
-    centre: np.ndarray
-    radius: float
     is_floor: bool = False
 
 
@@ -136,16 +131,12 @@ class Mirror:
             points = raw[:, :3] @ origin[:3, :3].T + origin[:3, 3]
             normals = raw[:, 3:] @ np.linalg.inv(origin[:3, :3])
             normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
-            low, high = points.min(axis=0), points.max(axis=0)
-            centre = (low + high) / 2.0
-            self._parts[key] = (np.hstack([points, normals]).astype(np.float32), centre,
-                                float(np.linalg.norm(points - centre, axis=1).max()))
-        found, centre, radius = self._parts[key]
-        return Part(key, found, tuple(colour), centre, radius)
+            self._parts[key] = np.hstack([points, normals]).astype(np.float32)
+        return Part(key, self._parts[key], tuple(colour))
 
 
 def _floor():
     half = FLOOR_HALF_M
     corners = [(-half, -half), (half, -half), (half, half), (-half, -half), (half, half), (-half, half)]
     sheet = np.array([(x, y, 0.0, 0.0, 0.0, 1.0) for x, y in corners], dtype=np.float32)
-    return Part(("floor",), sheet, FLOOR_COLOUR, np.zeros(3), half * 1.5, is_floor=True)
+    return Part(("floor",), sheet, FLOOR_COLOUR, is_floor=True)
