@@ -4,6 +4,7 @@ import errno
 import os
 import signal
 import sys
+import threading
 
 import rospy
 
@@ -17,8 +18,8 @@ from .settings import CHECK_VERSION
 
 # A robot that has reported nothing for this long is lost [s, wall]; it reports 100 times a second.
 LOST_AFTER_S = 5.0
-# Nor is there a use in telling a robot something at the end that has been silent for this long [s, wall].
-SILENT_AFTER_S = 1.0
+# Longest time for disabling the robot at the end [s, wall]; one that is there takes a few hundredths.
+LAST_WORD_S = 5.0
 
 
 class ProgramFailed(OSError):
@@ -36,14 +37,16 @@ def run(node_name, body, **options):
     """Run a program: wait for the robot, become the node `node_name`, call `body()`; return the exit status.
 
     `options` go to rospy.init_node. The status is 0 after success, 1 after an OSError, a ValueError or a ROSException,
-    with one line on stderr, and 130 after Ctrl-C. `body` meets Ctrl-C and SIGTERM as KeyboardInterrupt, with ROS still
-    running, so that its `finally` and `with` can leave the robot in order.
+    with one line on stderr, or when ROS was shut down under it, and 130 after Ctrl-C. `body` meets Ctrl-C and
+    SIGTERM as KeyboardInterrupt, with ROS still running, so that its `finally` and `with` can leave the robot in order.
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         startup.init_node(node_name, disable_signals=True, **options)
         body()
+        # Nobody but others can have done that, and their log line says why: its work was cut short.
+        return 1 if rospy.is_shutdown() else 0
     except KeyboardInterrupt:
         return 130
     except (OSError, ValueError, rospy.ROSException) as error:
@@ -51,7 +54,6 @@ def run(node_name, body, **options):
         return 1
     finally:
         rospy.signal_shutdown("the program has ended")
-    return 0
 
 
 def expect(done, text):
@@ -78,10 +80,22 @@ class EnabledRobot:
     def __exit__(self, kind, error, traceback):
         if self._was_enabled or rospy.is_shutdown() or isinstance(error, RobotLost):
             return
-        if self.switch.silence_s() > SILENT_AFTER_S:
-            rospy.logwarn("the robot says nothing any more: it is not disabled")
-            return
-        self.switch.disable()
+        failures = []
+
+        def disable():
+            try:
+                self.switch.disable()
+            except OSError as failure:
+                failures.append(failure)
+
+        # Its time-out is one of ROS time, which may have ended along with a simulation.
+        worker = threading.Thread(target=disable, daemon=True)
+        worker.start()
+        worker.join(LAST_WORD_S)
+        if worker.is_alive():
+            rospy.logwarn("the robot does not answer any more: it is not disabled")
+        elif failures and error is None:
+            raise failures[0]
 
     def is_enabled(self):
         """Tell whether the robot is enabled now."""

@@ -2,19 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """RobotEnable and Limb in programs that start before the master, the clock, the parameters or the robot."""
 import os
-import pathlib
 import re
-import socket
-import subprocess
 import sys
-import tempfile
-import time
-import unittest
 
-import rosgraph
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from own_master import DEADLINE_S, OwnMasterTest  # noqa: E402
 
-DEADLINE_S = 20.0
-FAKE_ROBOT = pathlib.Path(__file__).with_name("fake_robot.py")
 # Simulated time of the fake robot: far from 0 and from the wall's.
 CLOCK_START_S = 1000.0
 
@@ -31,64 +24,9 @@ FIRST_NODE = "rospy.init_node('client'); print('node is up', flush=True)"
 IMPATIENT = "startup.STARTUP_TIMEOUT_S = 2.0; "
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-class StartupTest(unittest.TestCase):
-    def setUp(self):
-        self.uri = "http://localhost:%d" % free_port()
-        self.environment = dict(os.environ, ROS_MASTER_URI=self.uri, ROS_HOSTNAME="localhost", PYTHONUNBUFFERED="1")
-        self.environment.pop("ROS_NAMESPACE", None)
-
-    def start(self, *command, **environment):
-        """Start a process that ends with the test; its output goes to a file."""
-        output = tempfile.NamedTemporaryFile("w+")
-        self.addCleanup(output.close)
-        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT,
-                                   env=dict(self.environment, **environment))
-        process.output = lambda: pathlib.Path(output.name).read_text()
-
-        def end():
-            process.terminate()
-            process.wait(DEADLINE_S)
-
-        self.addCleanup(end)
-        return process
-
-    def start_master(self):
-        self.start("rosmaster", "--core", "-p", self.uri.rsplit(":", 1)[1])
-        self.master = rosgraph.Master("/sdk_startup", master_uri=self.uri)
-        self.wait_until(self.master_is_up, "the master is up")
-
-    def master_is_up(self):
-        try:
-            self.master.getPid()
-        except OSError:
-            return False
-        return True
-
-    def start_robot(self, **knobs):
-        self.start(sys.executable, str(FAKE_ROBOT), *("_%s:=%s" % knob for knob in knobs.items()))
-
+class StartupTest(OwnMasterTest):
     def start_client(self, before=FIRST_ROBOT, versioned=True, **environment):
         return self.start(sys.executable, "-c", PROGRAM.format(before=before, versioned=versioned), **environment)
-
-    def wait_until(self, holds, what):
-        end_s = time.monotonic() + DEADLINE_S
-        while not holds():
-            if time.monotonic() > end_s:
-                self.fail("waited in vain until " + what)
-            time.sleep(0.02)
-
-    def wait_for_text(self, process, text):
-        end_s = time.monotonic() + DEADLINE_S
-        while text not in process.output():
-            if time.monotonic() > end_s:
-                self.fail("no %r in: %s" % (text, process.output()))
-            time.sleep(0.02)
 
     def expect_success(self, client):
         """Wait for the client's end; returns its ROS time [s]."""
@@ -167,7 +105,8 @@ class StartupTest(unittest.TestCase):
         self.start_master()
         self.master.registerPublisher("/robot/state", "baxter_core_msgs/AssemblyState", "http://localhost:9")
         self.expect_failure(self.start_client(IMPATIENT + FIRST_ROBOT, versioned=False),
-                            "/sdk_startup publishes it, but no message of use came", "rosnode ping /sdk_startup")
+                            "/own_master_test publishes it, but no message of use came",
+                            "rosnode ping /own_master_test")
 
     def test_missing_clock_is_named(self):
         self.start_master()

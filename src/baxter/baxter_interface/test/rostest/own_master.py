@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""For tests in which the master and the robot come and go."""
+import os
+import pathlib
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import rosgraph
+
+DEADLINE_S = 60.0
+# A process has so long to end before it is ended by force [s].
+END_S = 10.0
+FAKE_ROBOT = pathlib.Path(__file__).with_name("fake_robot.py")
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class OwnMasterTest(unittest.TestCase):
+    """A test that starts, and can end, its master and its robot itself."""
+
+    def setUp(self):
+        self.uri = "http://localhost:%d" % free_port()
+        self.environment = dict(os.environ, ROS_MASTER_URI=self.uri, ROS_HOSTNAME="localhost", PYTHONUNBUFFERED="1")
+        self.environment.pop("ROS_NAMESPACE", None)
+
+    def start(self, *command, **environment):
+        """Start a process that ends with the test; its output goes to a file."""
+        output = tempfile.NamedTemporaryFile("w+")
+        self.addCleanup(output.close)
+        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT,
+                                   env=dict(self.environment, **environment))
+        process.output = lambda: pathlib.Path(output.name).read_text()
+
+        self.addCleanup(self.end, process)
+        return process
+
+    def end(self, process):
+        process.terminate()
+        try:
+            process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            # rospy shuts a node down inside its signal handler, which may wait for a lock that it interrupted.
+            process.kill()
+            process.wait(DEADLINE_S)
+
+    def start_master(self):
+        process = self.start("rosmaster", "--core", "-p", self.uri.rsplit(":", 1)[1])
+        self.master = rosgraph.Master("/own_master_test", master_uri=self.uri)
+        self.wait_until(self.master_is_up, "the master is up")
+        return process
+
+    def master_is_up(self):
+        try:
+            self.master.getPid()
+        except OSError:
+            return False
+        return True
+
+    def start_robot(self, **knobs):
+        return self.start(sys.executable, str(FAKE_ROBOT), *("_%s:=%s" % knob for knob in knobs.items()))
+
+    def wait_until(self, holds, what):
+        end_s = time.monotonic() + DEADLINE_S
+        while not holds():
+            if time.monotonic() > end_s:
+                self.fail("waited in vain until " + what)
+            time.sleep(0.02)
+
+    def wait_for_text(self, process, text):
+        end_s = time.monotonic() + DEADLINE_S
+        while text not in process.output():
+            if time.monotonic() > end_s:
+                self.fail("no %r in: %s" % (text, process.output()))
+            time.sleep(0.02)
