@@ -10,7 +10,8 @@ from urdf_model import parse_urdf
 FINGER = """<link name="%(n)s"><inertial><mass value="0.02"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial>
   <collision><origin xyz="0 %(y)g 0"/><geometry><box size="0.04 0.01 0.04"/></geometry></collision></link>
   <joint name="%(n)s" type="prismatic"><parent link="world"/><child link="%(n)s"/><axis xyz="0 1 0"/>
-    <limit lower="%(lower)g" upper="%(upper)g" effort="20" velocity="1"/></joint>"""
+    <limit lower="%(lower)g" upper="%(upper)g" effort="20" velocity="1"/></joint>
+  <gazebo reference="%(n)s"><kp>1e5</kp><kd>1</kd></gazebo>"""
 VICE = "<robot name='vice'><link name='world'/>%s%s</robot>" % (
     FINGER % {"n": "l", "y": 0.02, "lower": 0.0, "upper": 0.05},
     FINGER % {"n": "r", "y": -0.02, "lower": -0.05, "upper": 0.0})
