@@ -34,6 +34,9 @@ ANALOG = {**dict.fromkeys((*WHEELS, *VACUUM_SENSORS.values(), *RANGE_SENSORS.val
           "torso_fan": False, "torso_lighting": False}
 
 
+ESTOP = "estop"  # the emergency stop button, which is no channel of its own
+
+
 def navigator_name(navigator):
     """The name that topics give one of NAVIGATORS."""
     return "%s_navigator" % navigator

@@ -13,7 +13,7 @@ from std_msgs.msg import UInt32
 
 from baxter_sim_hardware.convert import stamp
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.panel import ANALOG, BUTTONS, DIGITAL, LIGHTS, NAVIGATORS, Panel, navigator_name
+from baxter_sim_hardware.panel import ANALOG, BUTTONS, DIGITAL, ESTOP, LIGHTS, NAVIGATORS, Panel, navigator_name
 
 PRESS_SERVICE = "sim/press"
 
@@ -22,8 +22,9 @@ class PanelTopics:
     """makers: {key of the interface table: function(time_s, part, snapshot) -> message};
     takers: {key: function(part, message, time_s)}, which raise CommandRefused."""
 
-    def __init__(self, context):
-        self._panel = Panel()
+    def __init__(self, context, press_estop):
+        """press_estop: function(whether the emergency stop is pressed now)."""
+        self._panel, self._press_estop = Panel(), press_estop
         self.reset = self._panel.reset
         self.attach = self._panel.attach
         self.makers = {
@@ -63,6 +64,8 @@ class PanelTopics:
         try:
             if request.action == PressRequest.TURN:
                 self._panel.turn(request.component, request.steps)
+            elif request.action in (PressRequest.PRESS, PressRequest.RELEASE) and request.component == ESTOP:
+                self._press_estop(request.action == PressRequest.PRESS)
             elif request.action in (PressRequest.PRESS, PressRequest.RELEASE):
                 self._panel.press(request.component, request.action == PressRequest.PRESS)
             else:

@@ -63,7 +63,7 @@ class BaxterPlugin(ModelPlugin):
             profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"))
         self._head = HeadTopics(model, self._baxter.state, self._dt)
         self._grippers = GripperTopics(context.world, model, self._baxter.state, self._dt)
-        self._panel = PanelTopics(context)
+        self._panel = PanelTopics(context, self._press_estop)
         senses = SensorTopics(context.world, model, robot, self._limb_index, self._dt)
         for part in (self._grippers, senses):
             part.attach_sensors(self._panel)
@@ -239,6 +239,9 @@ class BaxterPlugin(ModelPlugin):
                 self._head.stop()
                 self._grippers.stop()
             self.context.log.info("Baxter is %s" % self._baxter.state.state.value)
+
+    def _press_estop(self, pressed):
+        self._apply(Event.ESTOP_PRESS if pressed else Event.ESTOP_RELEASE, self.context.world.time_s)
 
     def _command(self, side, msg, time_s, position, velocity):
         try:

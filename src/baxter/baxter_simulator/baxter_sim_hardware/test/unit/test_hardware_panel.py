@@ -3,6 +3,7 @@
 import pytest
 from baxter_core_msgs.msg import AnalogOutputCommand, DigitalOutputCommand
 from bullet_sim_msgs.srv import PressRequest
+from std_msgs.msg import Empty
 
 from baxter_sim_hardware import CommandRefused
 from baxter_sim_hardware.panel import DIGITAL, NAVIGATORS, Panel
@@ -116,3 +117,22 @@ def test_reset_of_the_world_releases_everything(make_lab):
     lab.plugin.reset()
     lab.run(0.02)
     assert lab.last("digital_io/left_lower_cuff/state").state == 0
+
+
+def test_the_emergency_stop_button_stops_until_it_is_released_and_reset(lab):
+    press = lab.services["sim/press"]
+
+    def fields():
+        lab.run(0.02)
+        state = lab.last("state")
+        return state.enabled, state.stopped, state.estop_button, state.estop_source
+
+    assert fields() == (True, False, 0, 0)
+    assert press(PressRequest("estop", "press", 0)).success
+    assert fields() == (False, True, 1, 1)
+    lab.send("set_super_reset", Empty())
+    assert fields() == (False, True, 1, 1)
+    assert press(PressRequest("estop", "release", 0)).success
+    assert fields() == (False, True, 3, 1)
+    lab.send("set_super_reset", Empty())
+    assert fields() == (False, False, 0, 0)
