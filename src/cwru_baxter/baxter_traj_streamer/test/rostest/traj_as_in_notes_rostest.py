@@ -27,6 +27,8 @@ rospy.spin()
 
 
 class AsInNotesTest(FakeRobotTest):
+    last_joints = ARM
+
     def way(self, by, duration_s):
         here = self.angles(ARM)
         return [(0.0, here), (duration_s, here + np.eye(7)[3] * by)]

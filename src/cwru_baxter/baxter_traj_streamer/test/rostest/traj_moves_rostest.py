@@ -88,7 +88,7 @@ class TrajMovesTest(FakeRobotTest):
             way = [value for _, value in self.raw_stream("%s_e1" % side)]
             self.assertAlmostEqual(max(way), self.roomy(side)[3] + 0.2, delta=0.01)
             self.assertAlmostEqual(way[-1], self.roomy(side)[3], delta=0.01)
-        self.commands.clear()
+        self.forget_commands()
         code, text = run("baxter_playfile_jointspace", right, left, "--check")
         self.assertEqual(code, 0, text)
         self.assertIn("3 rows, 1.200 s for the right arm; can be played", text)
@@ -133,7 +133,7 @@ class TrajMovesTest(FakeRobotTest):
         code, text = run("cart_move", "left", "-0.06", "0", "0.04", "--speed", "0.2")
         self.assertEqual(code, 0, text)
         np.testing.assert_allclose(self.tip("left")[:3, 3] - there[:3, 3], [-0.06, 0.0, 0.04], atol=0.003)
-        self.commands.clear()
+        self.forget_commands()
         code, text = run("cart_move", "left", 2, 0, 0)
         self.assertEqual(code, 1)
         self.assertIn("leaves the arm's reach after 0.3", text)

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the rostests of trajActionServer share."""
+import random
 import time
 import unittest
 
 import actionlib
 import numpy as np
 import rospy
+from actionlib_msgs.msg import GoalStatus
 from baxter_core_msgs.msg import JointCommand
 from baxter_traj_streamer.msg import trajAction
 from std_msgs.msg import Bool
@@ -24,6 +26,10 @@ def wait_until(condition, what):
     while not condition():
         assert time.monotonic() < end, "waited %g s in vain: %s" % (DEADLINE_S, what)
         time.sleep(0.005)
+
+
+# As the launch files of the rostests call it.
+SERVER = "/traj_interpolator_as"
 
 
 class Client:
@@ -54,6 +60,9 @@ class Client:
 class FakeRobotTest(unittest.TestCase):
     """Against the SDK's fake robot, enabled."""
 
+    # What forget_commands moves.
+    last_joints = ("right_w2", "left_w2")
+
     @classmethod
     def setUpClass(cls):
         cls.streamer = BaxterTrajStreamer()
@@ -62,6 +71,8 @@ class FakeRobotTest(unittest.TestCase):
         cls.commands = []
         cls.subscribers = [rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, cls.on_command)
                            for side in SIDES]
+        wait_until(lambda: all(any(connection.callerid_pub == SERVER for connection in subscriber.impl.connections)
+                               for subscriber in cls.subscribers), "the commands of %s" % SERVER)
 
     @classmethod
     def on_command(cls, message):
@@ -70,8 +81,29 @@ class FakeRobotTest(unittest.TestCase):
     def setUp(self):
         wait_until(lambda: self.enable.get_num_connections() > 0, "the robot to listen")
         self.set_enabled(True)
-        self.commands.clear()
         self.client = Client()
+        self.forget_commands()
+
+    def forget_commands(self):
+        """Clear the list of commands, when all that were sent until now have arrived.
+
+        Results overtake commands, which have connections of their own; so a goal is sent whose last command is known.
+        """
+        names = self.last_joints
+        goal = self.angles(names) + 1e-4 * random.random()
+        self.client.send(names, [(0.05, goal)])
+        state, text, _ = self.client.end()
+        self.assertEqual(state, GoalStatus.SUCCEEDED, text)
+        wanted = dict(zip(names, goal.tolist(), strict=True))
+
+        def arrived(name):
+            return any(message.mode == JointCommand.POSITION_MODE and name in message.names
+                       and message.command[message.names.index(name)] == wanted[name]
+                       for _, message in list(self.commands))
+
+        wait_until(lambda: all(map(arrived, names)), "the last commands")
+        self.commands.clear()
+        self.client.feedback.clear()
 
     def set_enabled(self, enabled):
         self.enable.publish(Bool(data=enabled))
