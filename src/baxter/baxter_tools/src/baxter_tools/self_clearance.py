@@ -36,7 +36,7 @@ class SelfClearance:
         self._model.set_joint_positions(fingers, np.where(np.abs(lower) > np.abs(upper), lower, upper))
 
     def __call__(self, posture):
-        self._model.set_joint_positions(self._index, posture)
+        self._model.set_joint_positions(self._index, np.asarray(posture))
         self._world.detect_contacts()
         return min((contact.distance for contact in self._world.contacts(self._model)), default=self.FAR)
 
