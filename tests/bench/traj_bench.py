@@ -57,7 +57,7 @@ def draw(path, names, commands, states, errors):
     import pyqtgraph
     from pyqtgraph.Qt import QtWidgets
 
-    from rqt_plot.graph import COLOURS
+    from live_plot.graph import COLOURS
 
     pyqtgraph.mkQApp()
     pyqtgraph.setConfigOptions(antialias=True, background="w", foreground="k")

@@ -24,7 +24,7 @@ class PlotWindow(QtWidgets.QWidget):
         self._recording, self._subscribe, self._unsubscribe = recording, subscribe, unsubscribe
         self._span_s = span_s
         self._waiting = []
-        self.setWindowTitle("rqt_plot")
+        self.setWindowTitle("plot")
         self.resize(900, 600)
 
         self._entry = QtWidgets.QLineEdit(placeholderText="/topic/field[0]")

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rqt_plot.fields import PlotError, UnknownTopic, curves, expand, split
+from live_plot.fields import PlotError, UnknownTopic, curves, expand, split
 
 TYPES = {
     "sensor_msgs/JointState": {"header": "std_msgs/Header", "name": "string[]", "position": "float64[]"},
@@ -100,4 +100,4 @@ def test_wrong_field_is_told_what_there_is(type_name, tokens, text):
 def test_core_loads_without_ros_and_qt():
     block = "import sys; sys.modules.update(dict.fromkeys(%r)); " % (
         ["rospy", "roslib", "genpy", "rosgraph", "pyqtgraph", "PyQt5"],)
-    subprocess.run([sys.executable, "-c", block + "import rqt_plot.fields, rqt_plot.recording"], check=True)
+    subprocess.run([sys.executable, "-c", block + "import live_plot.fields, live_plot.recording"], check=True)

@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from rqt_plot.recording import RESTART_STEP_S, Recording
+from live_plot.recording import RESTART_STEP_S, Recording
 
 
 def recording_of(label, times, **arguments):

@@ -6,8 +6,8 @@ import os
 import numpy as np
 import pytest
 
-from rqt_plot.fields import PlotError, UnknownTopic
-from rqt_plot.recording import Recording
+from live_plot.fields import PlotError, UnknownTopic
+from live_plot.recording import Recording
 
 os.environ["QT_QPA_PLATFORM"] = "offscreen"  # before Qt is loaded
 pyqtgraph = pytest.importorskip("pyqtgraph", reason="./baxter.sh setup installs pyqtgraph")
@@ -48,7 +48,7 @@ def count(picture, colour):
 
 
 def test_every_curve_is_seen(application, recording):
-    from rqt_plot.graph import COLOURS, Graph
+    from live_plot.graph import COLOURS, Graph
 
     graph = Graph()
     graph.resize(800, 500)
@@ -65,7 +65,7 @@ def test_every_curve_is_seen(application, recording):
 
 
 def test_autoscroll_shows_the_last_seconds(application, recording):
-    from rqt_plot.graph import Graph
+    from live_plot.graph import Graph
 
     graph = Graph()
     graph.draw(recording, span_s=2.0)
@@ -75,7 +75,7 @@ def test_autoscroll_shows_the_last_seconds(application, recording):
 
 
 def test_curves_beyond_the_colours_differ_by_their_dashes(application):
-    from rqt_plot.graph import COLOURS, Graph
+    from live_plot.graph import COLOURS, Graph
 
     recording, graph = Recording(), Graph()
     for number in range(2 * len(COLOURS)):
@@ -101,7 +101,7 @@ class Topics:
 
 @pytest.fixture
 def window(application):
-    from rqt_plot.window import PlotWindow
+    from live_plot.window import PlotWindow
 
     recording = Recording()
     topics = Topics(recording)
