@@ -176,6 +176,13 @@ def test_primitives_are_closed_and_face_outwards(geometry, volume):
     assert np.linalg.norm(rows[:, 3:], axis=1) == pytest.approx(1.0, abs=1e-5)
 
 
+def test_the_field_of_view_ends_at_the_outer_edges_of_the_outer_pixels():
+    pinhole = Pinhole.from_field_of_view(640, 400, 1.2, 0.1, 10.0)
+    edge = np.tan(0.6)
+    found = pinhole.project([[-edge, 0.0, 1.0], [0.0, 0.0, 1.0], [edge, edge * 400 / 640, 1.0]])
+    assert found == pytest.approx(np.array([[-0.5, 199.5], [319.5, 199.5], [639.5, 399.5]]))
+
+
 @pytest.mark.parametrize(("arguments", "text"), [
     ((0, 480, 1.0, 0.1, 10.0), "0 x 480"), ((640, 99999, 1.0, 0.1, 10.0), "99999"),
     ((640, 480, 3.2, 0.1, 10.0), "3.2"), ((640, 480, 1.0, 1.0, 0.5), "clip")])
