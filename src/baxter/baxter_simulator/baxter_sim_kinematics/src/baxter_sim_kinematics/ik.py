@@ -81,8 +81,8 @@ def _search(chain, target, seed, posture, tolerance_m, tolerance_rad, position_o
             max_iterations):
     seed = chain.posture(seed)
     goal = seed if posture is None else chain.posture(posture)
-    return Search(chain, Target(target, position_only, free_axis), np.clip(seed, *chain.limit_arrays),
-                  np.clip(goal, *chain.limit_arrays), tolerance_m, tolerance_rad, max_starts, max_iterations)
+    return Search(chain, Target(target, position_only, free_axis), seed, goal, tolerance_m, tolerance_rad, max_starts,
+                  max_iterations)
 
 
 def warm_up(chain):

@@ -25,7 +25,8 @@ compile_cache.choose()
 
 import numba  # noqa: E402  (numba reads where its cache lies when it is imported)
 
-_compiled = numba.njit(cache=True, nogil=True)
+# Division as the processor does it, without a check each for a Python exception: a tenth faster, the same bits.
+_compiled = numba.njit(cache=True, nogil=True, error_model="numpy")
 
 # A pivot below this (the matrices are of order 1) means that a direction is lost.
 _SINGULAR = 1e-14
@@ -516,7 +517,7 @@ def _turn_towards(prismatic, lower, upper, goal, q):
 @_compiled
 def search(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, seed, goal, rows, basis,
            tolerance_m, tolerance_rad, max_iterations, max_starts, wanted, solution):
-    """Look for postures that put the tip on the target, and keep the one nearest ``goal``, (n,) inside the limits.
+    """Look for postures that put the tip on the target, and keep the one nearest ``goal`` (n,).
 
     The first start is the seed, the others are random postures inside the limits whose generator is seeded by the
     request itself, so the same request gives the same answer bit for bit. Ends after ``wanted`` starts that arrived.
@@ -526,7 +527,7 @@ def search(rotations, offsets, prismatic, lower, upper, target_rotation, target_
     """
     n = seed.shape[0]
     q, best, start = np.empty(n), np.empty(n), np.empty(n)
-    seed = _clamped(seed, lower, upper)
+    seed, goal = _clamped(seed, lower, upper), _clamped(goal, lower, upper)
     state = _stir(_stir(_stir(np.uint64(n), target_position), target_rotation.ravel()), seed)
     found, starts, iterations, least, nearest = 0, 0, 0, math.inf, math.inf
     for attempt in range(max_starts):
@@ -595,7 +596,7 @@ def gather(rotations, offsets, prismatic, lower, upper, target_rotation, target_
     """
     n = seed.shape[0]
     q, best, start = np.empty(n), np.empty(n), np.empty(n)
-    seed = _clamped(seed, lower, upper)
+    seed, goal = _clamped(seed, lower, upper), _clamped(goal, lower, upper)
     state = _stir(_stir(_stir(np.uint64(n), target_position), target_rotation.ravel()), seed)
     starts, iterations = 0, 0
     for attempt in range(first_start, max_starts):
@@ -693,6 +694,19 @@ def nearest(rotations, offsets, prismatic, lower, upper, target_rotation, target
             least = cost
             solution[:] = q
     return pose_error(rotations, offsets, prismatic, target_rotation, target_position, rows, basis, solution)
+
+
+@_compiled
+def beyond_reach(target_rotation, target_position, shoulder, tip_reach_m, wrist_in_tip, wrist_reach_m):
+    """Return how far the tip, and the wrist in this orientation, would be outside the balls around the shoulder [m]."""
+    tip, wrist = 0.0, 0.0
+    for a in range(3):
+        from_shoulder = target_position[a] - shoulder[a]
+        tip += from_shoulder * from_shoulder
+        for b in range(3):
+            from_shoulder -= target_rotation[a, b] * wrist_in_tip[b]
+        wrist += from_shoulder * from_shoulder
+    return math.sqrt(tip) - tip_reach_m, math.sqrt(wrist) - wrist_reach_m
 
 
 @_compiled

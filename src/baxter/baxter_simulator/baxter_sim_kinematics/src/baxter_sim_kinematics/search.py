@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One target and one chain, searched for under varying limits and budgets."""
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ _NEAREST_STARTS = 40
 _NEAREST_ITERATIONS = 100
 
 
-@dataclass(frozen=True)
-class IkResult:
+class IkResult(NamedTuple):
     """A solution. q: joint values (n,) in chain order, inside the limits. residual_m, residual_rad: what is left of the
     pose error. iterations, restarts: the effort, of all starts together."""
 
@@ -31,8 +30,7 @@ class IkResult:
     restarts: int
 
 
-@dataclass(frozen=True)
-class Found:
+class Found(NamedTuple):
     """What a search came to. arrived: starts that did; q: the chosen solution, or the best attempt where none did."""
 
     arrived: int

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from baxter_sim_kinematics import kernels
 from baxter_sim_kinematics.errors import NoSolution, Reason
 from baxter_sim_kinematics.search import MAX_ITERATIONS, MAX_STARTS
 
@@ -22,11 +23,11 @@ def beyond_reach(chain, target):
 
     With the orientation given, the origin of a last revolute joint is known, so there is a ball for that as well.
     """
-    over = math.dist(target.position, chain.shoulder) - chain.tip_reach_m
+    over, wrist_over = kernels.beyond_reach(target.rotation, target.position, chain.shoulder, chain.tip_reach_m,
+                                            chain.wrist_in_tip, chain.wrist_reach_m)
     text = "the target lies at least %.3f m beyond the outstretched arm; move it"
     if over <= 0.0 and chain.wrist_is_fixed and target.rows == 6:
-        wrist = target.position - target.rotation @ chain.wrist_in_tip
-        over = math.dist(wrist, chain.shoulder) - chain.wrist_reach_m
+        over = wrist_over
         text = "in this orientation the wrist would have to be at least %.3f m beyond the outstretched arm; turn the " \
             "target or move it"
     if over <= 0.0:
