@@ -84,7 +84,7 @@ class _Reader:
                     "%s, line %s: joint '%s' mimics '%s', which does not exist; joints: %s"
                     % (self.source, joint.line, joint.name, joint.mimic.joint, ", ".join(joints))
                 )
-        transmissions = [self.transmission(e, joints) for e in self.root.iterchildren("transmission")]
+        transmissions = [self.transmission(e) for e in self.root.iterchildren("transmission")]
         for element in self.root.iterchildren("gazebo"):
             if element.get("reference") in links:
                 self.gazebo_reference(element, links[element.get("reference")])
@@ -267,16 +267,13 @@ class _Reader:
         multiplier = self.number(element, "multiplier", default=1.0)
         return Mimic(other, multiplier, self.number(element, "offset", default=0.0))
 
-    def transmission(self, element, joints):
+    def transmission(self, element):
         name = element.get("name", "")
         kind = (element.findtext("type") or element.get("type") or "").strip()
         found = []
         for joint in element.iterchildren("joint"):
-            joint_name = joint.get("name", "")
-            if joint_name and joint_name not in joints:
-                self.warn(joint, "transmission '%s' names joint '%s', which does not exist" % (name, joint_name))
             interfaces = tuple((e.text or "").strip() for e in joint.iterchildren("hardwareInterface"))
-            found.append(TransmissionJoint(joint_name, interfaces))
+            found.append(TransmissionJoint(joint.get("name", ""), interfaces))
         reductions, actuators = [], []
         for actuator in element.iterchildren("actuator"):
             actuators.append(actuator.get("name", ""))
