@@ -228,7 +228,7 @@ class BaxterWorldTest(unittest.TestCase):
                     abs(state.message.position - percent) < 2.0 and not state.message.moving), "%g %%" % percent, 5.0)
 
     def test_e_aggregates(self):
-        for name, kind, count in (("digital_io_states", DigitalIOStates, 57), ("analog_io_states", AnalogIOStates, 6),
+        for name, kind, count in (("digital_io_states", DigitalIOStates, 57), ("analog_io_states", AnalogIOStates, 10),
                                   ("navigators_states", NavigatorStates, 4)):
             message = rospy.wait_for_message("/robot/" + name, kind, 5.0)
             self.assertEqual((len(message.names), len(message.states)), (count, count), name)
