@@ -49,7 +49,8 @@ def of(config):
 
 def test_descriptions_are_what_clients_read(server):
     description = decode_description(server.topics.messages["arm/pid/parameter_descriptions"][0])
-    assert [(row["name"], row["type"], row["min"], row["max"], row["default"]) for row in description["parameters"]] == [
+    columns = ("name", "type", "min", "max", "default")
+    assert [tuple(row[column] for column in columns) for row in description["parameters"]] == [
         ("p", "double", 0.0, 100.0, 10.0), ("steps", "int", 1, 9, 3), ("on", "bool", False, True, False)]
     assert of(server.told()) == {"p": 10.0, "steps": 3, "on": False}
 
