@@ -161,7 +161,13 @@ def write(rows, samples, machine, folder):
         distribution(title, entry, folder / ("".join(c if c.isalnum() else "_" for c in title) + ".png"))
 
 
+def end(*_):
+    """End as after Ctrl-C, so that labs are taken down."""
+    raise KeyboardInterrupt
+
+
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, end)
     try:
         sys.exit(main())
     except KeyboardInterrupt:
