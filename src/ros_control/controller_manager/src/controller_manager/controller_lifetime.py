@@ -121,10 +121,12 @@ class ControllerLifetime:
     @staticmethod
     def names_from(arguments):
         """Names of controllers; an argument that is an existing file is loaded to the parameter server, and its keys
-        are names. Raises :class:`NotThere` for a file without any."""
+        are names. Raises :class:`NotThere` for a file that is not there or has none."""
         names = []
         for argument in arguments:
             if not os.path.isfile(argument):
+                if argument.endswith((".yaml", ".yml")):
+                    raise NotThere("there is no file %s; give a YAML file or names of controllers" % argument)
                 names.append(argument)
                 continue
             try:

@@ -46,7 +46,7 @@ def wait_for(condition, what, deadline_s=DEADLINE_S):
         if found:
             return found
         time.sleep(0.01)
-    raise AssertionError("waited %.0f s in vain for %s" % (deadline_s, what))
+    raise AssertionError("waited %.0f s in vain for %s" % (deadline_s, what() if callable(what) else what))
 
 
 class Manager:
@@ -99,7 +99,7 @@ class Joints:
         """Wait until joints are at the positions given by name."""
         wait_for(lambda: self.newest and all(
             abs(dict(zip(self.newest.name, self.newest.position, strict=True))[name] - position) < tolerance
-            for name, position in wanted.items()), "%s at %s (last %s)" % (self._topic, wanted, self.newest))
+            for name, position in wanted.items()), lambda: "%s at %s (last %s)" % (self._topic, wanted, self.newest))
 
     def close(self):
         self._subscriber.unregister()
@@ -398,11 +398,12 @@ class GazeboControl(unittest.TestCase):
         states = []
         subscriber = rospy.Subscriber("/three/tuned/pid/state", PidState, states.append)
         self._cleanups_of_test.callback(subscriber.unregister)
+        self.send("/three/tuned/command", Float64(0.0))
         wait_for(lambda: states and abs(states[-1].error) > 0.1, "the elbow to hang, with so small a gain")
         elbow = dynamic_reconfigure.client.Client("/three/tuned/pid", timeout=DEADLINE_S)
         self._cleanups_of_test.callback(elbow.close)
         self.assertEqual(elbow.get_configuration(timeout=DEADLINE_S)["p"], 1.0)
-        self.assertEqual(elbow.update_configuration({"p": 2000.0, "d": 40.0})["p"], 2000.0)
+        self.assertEqual(elbow.update_configuration({"p": 400.0, "d": 10.0})["p"], 400.0)
         joints.at(elbow=0.0, tolerance=0.01)
         self.assertTrue(all(state.timestep.to_nsec() == 2_000_000 for state in states))
         shoulder = dynamic_reconfigure.client.Client("/three/gazebo_ros_control/pid_gains/shoulder", timeout=DEADLINE_S)
@@ -464,6 +465,9 @@ class GazeboControl(unittest.TestCase):
             self.assertEqual(code, 1)
             line, = [line for line in output.splitlines() if file.name in line]
             self.assertIn(words, line)
+        code, output = self.tool("spawner", "/nowhere/arm.yaml")
+        self.assertEqual(code, 1)
+        self.assertIn("there is no file /nowhere/arm.yaml", output)
 
     def test_the_spawner_takes_a_namespace_and_stopped(self):
         with self.process("spawner", "--namespace", "/one", "--stopped", "both", namespace="/"):
