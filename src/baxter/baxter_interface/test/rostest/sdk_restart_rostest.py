@@ -46,29 +46,28 @@ class RestartTest(OwnMasterTest):
         self.wait_until(lambda: self.beats(client) >= before + count or client.poll() is not None, "the loop turns")
         self.assertIsNone(client.poll(), client.output())
 
+    def start_loop_that_loses_its_simulation(self):
+        self.start_master()
+        robot = self.start_simulation()
+        client = self.start_loop()
+        self.wait_for_beats(client)
+        self.end(robot)
+        self.wait_for_text(client, "simulated time stands still")
+        return client
+
     def expect_end(self, client, text):
         self.assertEqual(client.wait(DEADLINE_S), 1, client.output())
         self.assertEqual(client.output().count(text), 1, client.output())
         self.assertNotIn("Traceback", client.output())
 
     def test_simulation_that_comes_back_disabled_ends_the_loop_with_one_line(self):
-        self.start_master()
-        robot = self.start_simulation()
-        client = self.start_loop()
-        self.wait_for_beats(client)
-        self.end(robot)
-        self.wait_for_text(client, "simulated time stands still")
+        client = self.start_loop_that_loses_its_simulation()
         self.assertIsNone(client.poll())
         self.start_simulation()
         self.expect_end(client, "lost the robot: it was disabled, or restarted")
 
     def test_simulation_that_comes_back_enabled_is_gone_on_with(self):
-        self.start_master()
-        robot = self.start_simulation()
-        client = self.start_loop()
-        self.wait_for_beats(client)
-        self.end(robot)
-        self.wait_for_text(client, "simulated time stands still")
+        client = self.start_loop_that_loses_its_simulation()
         robot = self.start_simulation(enabled=True)
         self.wait_for_beats(client)
         self.end(robot)
