@@ -82,7 +82,10 @@ class LabArm:
         message = EndEffectorCommand(command="go", args='{"position": %g}' % percent)
         self._lab.send("end_effector/left_gripper/command", message)
         self._run(0.1)
+        end_s = self._lab.world.time_s + LONGEST_S
         while self._lab.last(STATE).moving:
+            if self._lab.world.time_s > end_s:
+                raise Failure("the fingers did not come to rest at %.0f %%" % percent)
             self._run(PERIOD_S)
 
     def _run(self, seconds):
