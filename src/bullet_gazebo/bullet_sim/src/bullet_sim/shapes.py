@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Collision shapes, made once and shared: PyBullet leaks a quarter of a megabyte for a mesh that is loaded again."""
 
+import contextlib
 import hashlib
+import locale
 import os
 import tempfile
 from pathlib import Path
@@ -75,6 +77,18 @@ class MeshCache:
             part.write("\n".join(lines) + "\n")
         os.replace(part.name, str(target))
         return target
+
+
+@contextlib.contextmanager
+def _points_in_numbers():
+    """For as long as Bullet reads a file: where a library has put a comma-decimal locale in force, its reader of files
+    with several objects takes "0.8" for 0."""
+    in_force = locale.setlocale(locale.LC_NUMERIC)
+    locale.setlocale(locale.LC_NUMERIC, "C")
+    try:
+        yield
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, in_force)
 
 
 def _parts_as_wavefront(parts):
@@ -167,7 +181,8 @@ class ShapeStore:
             columns["flags"].append(pybullet.GEOM_FORCE_CONCAVE_TRIMESH if hollow and file else 0)
             columns["collisionFramePositions"].append(origin[:3, 3].tolist())
             columns["collisionFrameOrientations"].append(quaternion_from_matrix(origin).tolist())
-        shape = pybullet.createCollisionShapeArray(**columns, physicsClientId=self._client)
+        with _points_in_numbers():
+            shape = pybullet.createCollisionShapeArray(**columns, physicsClientId=self._client)
         if shape < 0:
             raise BulletSimError("PyBullet made no collision shape of %s" % ([part[:2] for part in parts],))
         return shape
