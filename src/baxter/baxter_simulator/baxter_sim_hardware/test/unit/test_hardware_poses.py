@@ -32,11 +32,11 @@ def test_published_angles(poses, pose, side):
 
 
 def test_names(poses):
-    assert set(poses.names) == {"start", "neutral", "tucked", "untucked"}
+    assert set(poses.names) == {"start", "neutral", "zero", "tucked", "untucked"}
 
 
 def test_unknown_pose_lists_the_known_ones(poses):
-    with pytest.raises(PoseError, match="unknown pose 'tuck'; choices are start, neutral, tucked, untucked"):
+    with pytest.raises(PoseError, match="unknown pose 'tuck'; choices are start, neutral, zero, tucked, untucked"):
         poses.angles("tuck", "left")
 
 
