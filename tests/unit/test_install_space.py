@@ -12,13 +12,13 @@ ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [pytest.mark.build, pytest.mark.long]
 
 
-def installed(place, command):
+def installed(place, command, shell="bash"):
     """A command in a clean environment that knows nothing but the install space."""
-    script = 'source "$1/setup.bash" && shift && exec "$@"'
+    script = f'place=$1; shift; . "$place/setup.{shell}" && exec "$@"'
     environment = {key: os.environ[key] for key in ("HOME", "LANG", "TMPDIR") if key in os.environ}
     environment |= {"PATH": "/usr/bin:/bin", "ROS_MASTER_URI": "http://localhost:23511"}
     return ["env", "-i", *(f"{key}={value}" for key, value in environment.items()),
-            "bash", "-c", script, "installed", str(place), *command]
+            shell, "-c", script, "installed", str(place), *command]
 
 
 @pytest.fixture(scope="module")
@@ -35,9 +35,10 @@ def place(tmp_path_factory):
     return moved
 
 
-def test_its_environment_names_the_new_place_only(place):
+@pytest.mark.parametrize("shell", ["bash", "sh"])
+def test_its_environment_names_the_new_place_only(place, shell):
     show = ["python3", "-c", "import os, sys; print(*os.environ.values(), *sys.path, sys.prefix, sep=':')"]
-    done = subprocess.run(installed(place, show), capture_output=True, text=True, check=True)
+    done = subprocess.run(installed(place, show, shell), capture_output=True, text=True, check=True)
     words = done.stdout.strip().split(":")
     assert any(word.startswith(str(place)) for word in words)
     old_places = tuple(str(ROOT / name) for name in ("src", "devel", "install", ".venv"))
