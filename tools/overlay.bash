@@ -11,6 +11,18 @@ import_overlay() {
         ln -sfn ../src_overlay "$root/src/overlay"
 }
 
+# drop_cut_off_clones ROOT: remove what git was killed over; it would take such a folder for a whole clone.
+drop_cut_off_clones() {
+    local git
+    for git in "$1"/src_overlay/*/.git; do
+        # The index is written last.
+        if [[ -d $git && ! -f $git/index ]]; then
+            echo "removing ${git%/.git}, which git did not finish"
+            rm -rf "${git%/.git}"
+        fi
+    done
+}
+
 # name_of PACKAGE.XML
 name_of() { sed -n 's/.*<name>[[:space:]]*\([^<[:space:]]*\).*/\1/p' "$1" | head -n 1; }
 

@@ -12,11 +12,12 @@ source "$LAB_ROOT/tools/environment.bash"
 source "$LAB_ROOT/tools/stand_ins.bash"
 # shellcheck source=overlay.bash
 source "$LAB_ROOT/tools/overlay.bash"
+# shellcheck source=platform.bash
+source "$LAB_ROOT/tools/platform.bash"
 CALLED_FROM=$PWD
 cd "$LAB_ROOT" || exit 1
 
 STATE=$LAB_ROOT/.baxter
-LOGS=$STATE/logs
 VENV=$LAB_ROOT/.venv
 NOETIC=/opt/ros/noetic/setup.bash
 DESCRIPTION=$LAB_ROOT/src/baxter/baxter_common/baxter_description
@@ -34,65 +35,12 @@ declare -A TITLES=(
     [urdf]="baxter.urdf"
     [kernels]="compiled inner loops"
 )
-
-# --- running and reporting --------------------------------------------------------------------------------------------
-
-step_name="" step_log="" note=""
-
-# run COMMAND…: run it with all output in the step's log; on failure show the log's end and leave.
-run() {
-    printf '\n$ %s\n' "$*" >>"$step_log"
-    local watcher="" status=0
-    if [[ -t 1 ]]; then
-        watch_log &
-        watcher=$!
-    fi
-    "$@" >>"$step_log" 2>&1 </dev/null 9>&- || status=$?
-    if [[ -n $watcher ]]; then
-        kill "$watcher" 2>/dev/null
-        wait "$watcher" 2>/dev/null
-        printf '\r\033[K'
-    fi
-    if [[ $status -ne 0 ]]; then
-        fail "$status" "$*"
-    fi
-}
-
-# The last line of the log, kept up to date on the terminal: somebody is waiting.
-watch_log() {
-    exec 9>&-
-    trap 'exit 0' TERM
-    local columns
-    columns=$(tput cols 2>/dev/null || echo 80)
-    while sleep 0.5; do
-        printf '\r\033[K      %.*s' $((columns - 8)) "$(tail -n 1 "$step_log" | tr -d '\r' | cut -c 1-300)"
-    done
-}
-
-# fail STATUS COMMAND
-fail() {
-    {
-        echo
-        echo "Set-up failed in step '${TITLES[$step_name]}' (exit code $1)."
-        echo "  command: $2"
-        echo "  log:     $step_log"
-        echo "The log ends with:"
-        tail -n 20 "$step_log" | sed 's/^/  | /'
-    } >&2
-    exit "$1"
-}
-
-# refuse REASON: a step that cannot even start.
-refuse() {
-    echo "$1" >>"$step_log"
-    echo >&2
-    echo "Set-up cannot go on in step '${TITLES[$step_name]}': $1" >&2
-    exit 1
-}
+# shellcheck source=setup_run.bash
+source "$LAB_ROOT/tools/setup_run.bash"
 
 # A step does its work only if its stamp does not hold the given key; step_done writes it.
 stamp_is() { [[ -f $STATE/$step_name.stamp && $(<"$STATE/$step_name.stamp") == "$1" ]]; }
-stamp() { printf '%s\n' "$1" >"$STATE/$step_name.stamp"; }
+stamp() { write "$STATE/$step_name.stamp" "$1"; }
 hash_of() { sha256sum "$@" 2>/dev/null | sha256sum; }
 
 # --- the steps --------------------------------------------------------------------------------------------------------
@@ -106,8 +54,15 @@ missing_packages() {
     comm -23 <(printf '%s\n' "${wanted[@]}" | sort) <(sort <<<"$have")
 }
 
+# Before a gigabyte is fetched for nothing.
+require_python() {
+    /usr/bin/python3 -c "import sys; sys.exit(sys.version_info < (${OLDEST_PYTHON/./, }))" 2>>"$step_log" ||
+        refuse "what requirements.txt pins needs Python $OLDEST_PYTHON or newer; this is $(/usr/bin/python3 --version)"
+}
+
 step_apt() {
     local missing as_root=()
+    if [[ -x /usr/bin/python3 ]]; then require_python; fi
     mapfile -t missing < <(missing_packages)
     if [[ ${#missing[@]} -eq 0 ]]; then
         note="all there"
@@ -120,9 +75,32 @@ step_apt() {
         sudo -v || refuse "sudo was refused. As root: apt-get install ${missing[*]}"
         as_root=(sudo)
     fi
-    run "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update
-    run "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}"
+    as_root+=(env DEBIAN_FRONTEND=noninteractive)
+    # A service that a package starts must not hold set-up's lock for good.
+    {
+        run wait_for_apt
+        # Where an earlier installation was killed, apt refuses to go on by itself.
+        run "${as_root[@]}" sh -c 'dpkg --configure -a || echo "the rest is for --fix-broken"'
+        run "${as_root[@]}" apt-get update
+        run "${as_root[@]}" apt-get install -y --no-install-recommends --fix-broken
+        run "${as_root[@]}" apt-get install -y --no-install-recommends "${missing[@]}"
+    } 9>&-
     note="${#missing[@]} asked for"
+}
+
+# Until no other program installs packages: an update in the background, or what a killed set-up has left running.
+wait_for_apt() {
+    local file inodes=()
+    for file in /var/lib/dpkg/lock-frontend /var/lib/dpkg/lock /var/lib/apt/lists/lock; do
+        if [[ -e $file ]]; then inodes+=(-e ":$(stat -c %i "$file") "); fi
+    done
+    for _ in {1..300}; do
+        if [[ ${#inodes[@]} -eq 0 ]] || ! grep -qF "${inodes[@]}" /proc/locks; then return 0; fi
+        echo "waiting for another program that installs packages"
+        sleep 2
+    done
+    echo "E: another program has been installing packages for ten minutes; find it with: ps -ef | grep -E 'apt|dpkg'"
+    return 1
 }
 
 # A usable environment is Debian's Python's, sees Debian's packages, and was made in this very folder.
@@ -133,13 +111,16 @@ venv_is_ours() {
 }
 
 step_venv() {
-    if venv_is_ours 2>/dev/null; then
+    if ! was_cut_off venv && ! was_cut_off pip && venv_is_ours 2>/dev/null; then
         note="all there"
         return
     fi
+    require_python
     # Always Debian's Python: rospy is installed for that one, whatever comes first in PATH.
-    run /usr/bin/python3 -m venv --clear --system-site-packages "$VENV"
     rm -f "$STATE/pip.stamp"
+    run /usr/bin/python3 -m venv --clear --system-site-packages "$VENV"
+    # Packages that pip was killed over are gone with it.
+    mended pip
 }
 
 step_pip() {
@@ -176,6 +157,7 @@ step_meshes() {
         note="all there"
         return
     fi
+    rm -f "$STATE/meshes.stamp"
     run rm -rf "$DESCRIPTION/meshes" "$GRIPPERS/meshes"
     run mkdir -p "$DESCRIPTION/meshes" "$GRIPPERS/meshes"
     local part
@@ -192,6 +174,7 @@ step_meshes() {
 # With --with FILE: fetch. In any case: check what lies in src_overlay, and let it win over packages of ours.
 step_overlay() {
     local file hidden
+    if was_cut_off overlay; then run drop_cut_off_clones "$LAB_ROOT"; fi
     for file in ${overlay_files[@]+"${overlay_files[@]}"}; do
         [[ -f $file ]] || refuse "there is no file $file; rosinstall/ has those that come with the workspace"
         run import_overlay "$LAB_ROOT" "$file"
@@ -217,6 +200,11 @@ step_build() {
     key="$LAB_ROOT $(cd src && find -L . \( -name meshes -o -name .git \) -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
         -o -name setup.py -o -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name '*.cfg' \
         -o -name CATKIN_IGNORE -o -path '*/env-hooks/*' \) -print0 | sort -z | xargs -0 sha256sum | sha256sum)"
+    # What a killed compiler has half written looks finished to make.
+    if was_cut_off build; then
+        run rm -rf build devel
+        mended build
+    fi
     if stamp_is "$key" && [[ -f devel/setup.bash && -f build/CMakeCache.txt ]]; then
         note="up to date"
         return
@@ -287,15 +275,6 @@ while [[ $# -gt 0 ]]; do
     shift
 done
 
-mkdir -p "$LOGS"
-# One set-up at a time: a launch and a node started together on a fresh clone must not both build.
-exec 9>"$STATE/lock"
-if ! flock -n 9; then
-    echo "Another set-up is at work here; waiting for it…"
-    flock 9
-    if [[ -f $STATE/done && $(<"$STATE/done") == "$(fingerprint)" ]]; then exit 0; fi
-fi
-
 # Nothing of another Python, workspace or virtual environment may leak into the build. Debian's own tools come first.
 unset PYTHONPATH PYTHONHOME VIRTUAL_ENV CMAKE_PREFIX_PATH ROS_PACKAGE_PATH ROS_DISTRO PKG_CONFIG_PATH
 export PATH=$VENV/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin:$PATH
@@ -306,18 +285,25 @@ if [[ -f $NOETIC ]]; then
     set -u
 fi
 
+start_run
 started=$SECONDS
 rm -f "$STATE/done" "$STATE/failed"
 echo "Setting up $LAB_ROOT"
+platform_line /etc/os-release "$NOETIC" "$(uname -m)"
 for index in "${!STEPS[@]}"; do
     [[ ${#chosen[@]} -eq 0 || " ${chosen[*]} " == *" ${STEPS[index]} "* ]] || continue
-    step_name=${STEPS[index]} step_log=$LOGS/${STEPS[index]}.log note="" step_started=$SECONDS
-    printf '%s\n' "# ${TITLES[$step_name]}, $(date)" >"$step_log"
+    step_started=$SECONDS
+    start_step "${STEPS[index]}"
     printf '[%d/%d] %s …\n' $((index + 1)) ${#STEPS[@]} "${TITLES[$step_name]}"
     "step_$step_name"
+    end_step
     printf '[%d/%d] %s: %s (%d s)\n' $((index + 1)) ${#STEPS[@]} "${TITLES[$step_name]}" "${note:-done}" \
         $((SECONDS - step_started))
 done
 # Some steps alone do not make a set-up.
-if [[ ${#chosen[@]} -eq 0 ]]; then fingerprint >"$STATE/done"; fi
+if [[ ${#chosen[@]} -eq 0 ]]; then
+    cut_off_step=""
+    write "$STATE/done" "$(fingerprint)"
+fi
+if [[ -z $cut_off_step ]]; then rm -f "$STATE/at_work"; fi
 echo "Set-up finished in $((SECONDS - started)) s."

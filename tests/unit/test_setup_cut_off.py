@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Set-up that is killed, interrupted or out of disk at any of its steps: what it says, and that the next run mends it.
+
+The commands of the steps are stand-ins here, which can be told to hang half-way or to fail; test_setup_for_real.py has
+the real ones.
+"""
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.build
+LIMIT_S = 60
+# The command that hangs or fails, step by step, as a pattern of the shell's. A step's half work is a file named half*.
+COMMANDS = {
+    "apt": "apt-get install*",
+    "venv": "python3 -m venv*",
+    "pip": "python3 -m pip install*",
+    "meshes": "cp -r*",
+    "overlay": "vcs import*",
+    "build": "catkin_make*",
+    "urdf": "rosrun xacro*",
+    "kernels": "python3 -m baxter_sim_kinematics*",
+}
+TITLES = {
+    "apt": "Debian packages", "venv": "virtual environment", "pip": "Python packages", "meshes": "Baxter's meshes",
+    "overlay": "other people's packages", "build": "catkin_make", "urdf": "baxter.urdf",
+    "kernels": "compiled inner loops",
+}
+STAND_IN = r"""#!/bin/bash
+here=${0%/*} root=$LAB_ROOT venv=$LAB_ROOT/.venv
+line="${0##*/} $*"
+site=$venv/lib/python3.11/site-packages
+data=$site/cmeel.prefix/share/example-robot-data/robots/baxter_description/meshes
+half_work() {
+    case $line in
+        "python3 -m venv"*) whole_work; touch "$site/half" ;;
+        "python3 -m pip install"*) touch "$site/half" ;;
+        "cp -r"*) mkdir -p "${!#}/torso"; touch "${!#}/torso/half" ;;
+        "vcs import"*) mkdir -p "$root/src_overlay/sdk/.git"; touch "$root/src_overlay/sdk/half" ;;
+        "catkin_make"*) whole_work; touch "$root/build/half.o" ;;
+        "rosrun xacro"*) echo half ;;
+    esac
+}
+whole_work() {
+    case $line in
+        "python3 -m venv"*)
+            rm -rf "$venv"
+            mkdir -p "$venv/bin" "$site"
+            echo "include-system-site-packages = true" >"$venv/pyvenv.cfg"
+            echo "#!$venv/bin/python3" >"$venv/bin/pip"
+            chmod +x "$venv/bin/pip"
+            printf '#!/bin/sh\nexec %s/python3 "$@"\n' "$here" >"$venv/bin/python3"
+            chmod +x "$venv/bin/python3"
+            ;;
+        "python3 -m pip install"*)
+            mkdir -p "$data/torso" "$data/electric_gripper"
+            touch "$data/torso/a.dae" "$data/electric_gripper/b.dae"
+            ;;
+        "cp "*) exec /bin/cp "${@}" ;;
+        "vcs import"*) mkdir -p "$root/src_overlay/sdk/.git"; touch "$root/src_overlay/sdk/.git/index" ;;
+        "catkin_make"*)
+            mkdir -p "$root/build" "$root/devel"
+            touch "$root/build/CMakeCache.txt" "$root/devel/setup.bash"
+            ;;
+        "rosrun xacro"*) echo whole ;;
+    esac
+}
+if [[ $line == $(cat "$here/hang" 2>/dev/null) ]]; then
+    half_work
+    touch "$here/hanging"
+    exec sleep 300
+fi
+if [[ $line == $(cat "$here/fail" 2>/dev/null) ]]; then
+    cat "$here/words" >&2
+    exit 9
+fi
+whole_work "$@"
+"""
+
+
+@pytest.fixture
+def workspace(tmp_path):
+    """(folder of a workspace as far as set-up reads it, folder of the stand-ins for all commands)."""
+    root, fakes = tmp_path / "ws", tmp_path / "fakes"
+    for folder in ("src/baxter/baxter_common/baxter_description/urdf", "src/cwru_baxter/cwru_baxter_sim",
+                   "src/baxter/baxter_common/rethink_ee_description", "src/compat/xacro"):
+        (root / folder).mkdir(parents=True)
+    (root / "src/baxter/baxter_common/baxter_description/urdf/baxter.urdf.xacro").write_text("<robot/>")
+    (root / "src/cwru_baxter/cwru_baxter_sim/cwru_baxter.urdf.xacro").write_text("<robot/>")
+    subprocess.run(["cp", "-r", *(ROOT / name for name in ("baxter.sh", "tools")), root], check=True)
+    for name in ("requirements.txt", "requirements-nodeps.txt"):
+        (root / name).write_text("something==1\n")
+    (root / "tools" / "apt_packages.txt").write_text("no-such-package\n")
+    (root / "theirs.rosinstall").write_text("")
+    fakes.mkdir()
+    for name in ("apt-get", "dpkg", "python3", "cp", "vcs", "catkin_make", "rosrun"):
+        (fakes / name).write_text(STAND_IN)
+        (fakes / name).chmod(0o755)
+    (fakes / "sudo").write_text('#!/bin/bash\n[[ $1 == -v ]] || exec "$@"\n')
+    (fakes / "sudo").chmod(0o755)
+    setup = (root / "tools" / "setup.bash").read_text()
+    setup = setup.replace("export PATH=", f"export PATH={fakes}:").replace("/usr/bin/python3", f"{fakes}/python3")
+    (root / "tools" / "setup.bash").write_text(setup)
+    return root, fakes
+
+
+def start(root):
+    command = [root / "baxter.sh", "setup", "--with", "theirs.rosinstall"]
+    return subprocess.Popen(command, cwd=root, text=True, start_new_session=True, stdin=subprocess.DEVNULL,
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+
+
+def finish(process):
+    """(exit status, what it said)"""
+    try:
+        said, _ = process.communicate(timeout=LIMIT_S)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+    return process.returncode, said
+
+
+def wait_for(path, process):
+    deadline = time.monotonic() + LIMIT_S
+    while not path.exists():
+        assert process.poll() is None, f"set-up ended before it made {path}: {process.communicate()[0]}"
+        assert time.monotonic() < deadline, f"set-up never made {path}"
+        time.sleep(0.02)
+
+
+def assert_whole(root):
+    """Nothing half is left, and everything is there."""
+    assert list(root.rglob("half*")) == []
+    description = root / "src/baxter/baxter_common/baxter_description"
+    assert (description / "meshes/torso/a.dae").exists()
+    assert (description / "urdf/baxter.urdf").read_text() == "whole\n"
+    for name in ("devel/setup.bash", "build/CMakeCache.txt", "src_overlay/sdk/.git/index", ".baxter/done"):
+        assert (root / name).exists(), name
+    assert not (root / ".baxter/at_work").exists()
+
+
+@pytest.mark.parametrize("step", COMMANDS)
+def test_killed_and_run_again(workspace, step):
+    root, fakes = workspace
+    (fakes / "hang").write_text(COMMANDS[step])
+    process = start(root)
+    wait_for(fakes / "hanging", process)
+    os.killpg(process.pid, signal.SIGKILL)
+    finish(process)
+    (fakes / "hang").unlink()
+    status, said = finish(start(root))
+    assert status == 0, said
+    assert f"cut off in step '{TITLES[step]}'" in said
+    assert_whole(root)
+    status, said = finish(start(root))
+    assert status == 0 and "cut off" not in said, said
+
+
+@pytest.mark.parametrize("step", COMMANDS)
+def test_a_failure_names_step_cause_command_and_log(workspace, step):
+    root, fakes = workspace
+    (fakes / "fail").write_text(COMMANDS[step])
+    (fakes / "words").write_text("something about a Temporary failure in name resolution\n")
+    status, said = finish(start(root))
+    assert status != 0
+    assert f"failed in step '{TITLES[step]}'" in said
+    assert "cause:   no way to the network" in said and "Temporary failure in name resolution" in said
+    assert f"log:     {root}/.baxter/logs/{step}.log" in said
+    (fakes / "fail").unlink()
+    status, said = finish(start(root))
+    assert status == 0 and "cut off" not in said, said
+    assert_whole(root)
+
+
+def test_a_full_disk_counts_as_cut_off(workspace):
+    root, fakes = workspace
+    (fakes / "fail").write_text(COMMANDS["build"])
+    (fakes / "words").write_text("cc1plus: fatal error: writing: No space left on device\n")
+    (root / "build").mkdir()
+    (root / "build" / "half.o").touch()
+    status, said = finish(start(root))
+    assert status == 9 and "cause:   the disk is full" in said
+    (fakes / "fail").unlink()
+    status, said = finish(start(root))
+    assert status == 0 and "cut off in step 'catkin_make'" in said
+    assert_whole(root)
+
+
+def test_an_interrupt_says_where_and_leaves_nothing_running(workspace):
+    root, fakes = workspace
+    (fakes / "hang").write_text(COMMANDS["pip"])
+    process = start(root)
+    wait_for(fakes / "hanging", process)
+    os.killpg(process.pid, signal.SIGINT)
+    status, said = finish(process)
+    assert status == 130
+    assert "interrupted in step 'Python packages'" in said and f"{root}/.baxter/logs/pip.log" in said
+    with pytest.raises(ProcessLookupError):
+        deadline = time.monotonic() + LIMIT_S
+        while time.monotonic() < deadline:  # the system may take a while to bury the dead
+            os.killpg(process.pid, 0)
+            time.sleep(0.05)
+
+
+def test_what_outlives_a_killed_set_up_is_waited_for(workspace):
+    root, fakes = workspace
+    (fakes / "hang").write_text(COMMANDS["build"])
+    first = start(root)
+    wait_for(fakes / "hanging", first)
+    first.kill()  # set-up alone; catkin_make goes on
+    first.wait()
+    (fakes / "hang").unlink()
+    second = start(root)
+    assert "Another set-up is at work" in second.stdout.readline()
+    assert (root / "build" / "half.o").exists()
+    os.killpg(first.pid, signal.SIGKILL)
+    status, said = finish(second)
+    assert status == 0, said
+    assert_whole(root)
+
+
+def test_a_state_that_could_not_be_written_is_taken_for_the_worst(workspace):
+    root, _ = workspace
+    assert finish(start(root))[0] == 0
+    (root / "build" / "half.o").touch()
+    (root / ".venv/lib/python3.11/site-packages/half").touch()
+    (root / ".baxter/at_work").write_text("")
+    status, said = finish(start(root))
+    assert status == 0 and "cut off in step 'unknown'" in said, said
+    assert_whole(root)
+
+
+SAYINGS = [
+    (1, "ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device", "the disk is full"),
+    (100, "E: You don't have enough free space in /var/cache/apt/archives/.", "the disk is full"),
+    (100, "Err:1 http://archive.example\n  Temporary failure resolving 'archive.example'", "no way to the network"),
+    (1, "NewConnectionError('Failed to establish a new connection: [Errno -2]", "no way to the network"),
+    (1, "SSLError(SSLCertVerificationError(1, '[SSL: CERTIFICATE_VERIFY_FAILED]", "a certificate that is not trusted"),
+    (100, "E: Unable to locate package ros-desktop", "this system's package sources lack something"),
+    (1, "cannot create directory 'build': Permission denied", "files that may not be written"),
+    (137, "c++: fatal error", "it was killed"),
+    (2, "CMake Error at CMakeLists.txt:7\n-- Configuring incomplete, errors occurred!", "-- Configuring incomplete"),
+]
+
+
+def cause(tmp_path, status, text, disk_free_kb=10**7):
+    (tmp_path / "log").write_text(f"# a log\n{text}\n")
+    (tmp_path / "df").write_text(f"#!/bin/sh\necho header\necho /dev/disk 1 1 {disk_free_kb} 1% /\n")
+    (tmp_path / "df").chmod(0o755)
+    script = 'STATE=$1 LAB_ROOT=$1; source "$2/tools/setup_run.bash"; step_log=$1/log; cause_of "$3"'
+    done = subprocess.run(["bash", "-uc", script, "test", tmp_path, ROOT, str(status)], capture_output=True, text=True,
+                          check=True, env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"})
+    return done.stdout
+
+
+@pytest.mark.parametrize(("status", "text", "expected"), SAYINGS)
+def test_the_cause_in_words(tmp_path, status, text, expected):
+    assert cause(tmp_path, status, text).startswith(expected)
+
+
+def test_a_disk_without_room_is_the_cause_whatever_the_log_says(tmp_path):
+    said = cause(tmp_path, 1, "OSError: write error", disk_free_kb=12)
+    assert said.startswith("the disk is full: nothing is left for")
+
+
+def test_nothing_can_be_written_at_all(workspace):
+    root, _ = workspace
+    (root / ".baxter").touch()  # in the way of the folder
+    status, said = finish(start(root))
+    assert status == 1 and f"cannot write to {root}/.baxter" in said

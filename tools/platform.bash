@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Which system this is, and what is known about the workspace on it; docs/platforms.md has the long form. Sourced by set-up.
+
+OLDEST_PYTHON=3.10
+
+# platform_line OS_RELEASE NOETIC_SETUP MACHINE: one line about the system that a file like /etc/os-release describes
+platform_line() {
+    local name verdict
+    name=$(sed -n 's/^PRETTY_NAME=//p' "$1" 2>/dev/null | tr -d '"')
+    case $(sed -n 's/^\(ID\|VERSION_ID\)=//p' "$1" 2>/dev/null | tr -d '"' | sort -r | paste -sd ' ') in
+        "debian 12") verdict="supported and tested" ;;
+        "debian 13") verdict="untested" ;;
+        "ubuntu 22.04" | "ubuntu 24.04") verdict="untested; the ROS 1 packages have to come from Ubuntu itself" ;;
+        "ubuntu 20.04")
+            verdict="not supported: its Python is 3.8, the pinned packages need $OLDEST_PYTHON"
+            if [[ -f $2 ]]; then verdict+="; ros-noetic is there, and stays unused"; fi
+            ;;
+        *) verdict="unknown here; it takes apt, ROS 1 packages and Python $OLDEST_PYTHON or newer" ;;
+    esac
+    if [[ $3 != x86_64 ]]; then verdict+="; on $3 untested: pybullet has no wheel for it and is compiled"; fi
+    echo "System: ${name:-unknown}: $verdict (docs/platforms.md)"
+}

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# How set-up runs the commands of its steps: output to the step's log, what went wrong in words, and what an earlier run
+# that was cut off has left half done. Sourced by setup.bash; LAB_ROOT, STATE and TITLES are its.
+
+LOGS=$STATE/logs
+# Less than this is free [kB]: the disk counts as full.
+FULL_BELOW_KB=4096
+step_name="" step_log="" note="" watcher=""
+# The step in which the run before this one was killed or ran out of disk; "?" if even that could not be written down.
+cut_off_step=""
+
+# start_run: one set-up at a time; learn whether the one before came to an end.
+start_run() {
+    if ! { mkdir -p "$LOGS" && exec 9>>"$STATE/lock"; } 2>/dev/null; then
+        echo "Set-up cannot start: it cannot write to $STATE. $(disk_note "a file there is not writable for $(id -un)")" >&2
+        exit 1
+    fi
+    # A launch and a node started together on a fresh clone must not both build. The lock passes on to the commands of the
+    # steps: what goes on after set-up itself was killed is waited for.
+    if ! flock -n 9; then
+        echo "Another set-up is at work here; waiting for it…"
+        flock 9
+        if [[ -f $STATE/done && $(<"$STATE/done") == "$(fingerprint)" ]]; then exit 0; fi
+    fi
+    if [[ -f $STATE/at_work ]]; then
+        cut_off_step=$(<"$STATE/at_work")
+        [[ -n ${TITLES[${cut_off_step:-none}]:-} ]] || cut_off_step="?"
+        echo "The set-up before this one was cut off in step '${TITLES[$cut_off_step]:-unknown}'; what it may have left" \
+             "half done is done again."
+    fi
+    trap interrupted INT
+}
+
+# was_cut_off STEP: may an earlier run have left this step half done?
+was_cut_off() { [[ $cut_off_step == "$1" || $cut_off_step == "?" ]]; }
+
+# start_step NAME
+start_step() {
+    step_name=$1 step_log=$LOGS/$1.log note=""
+    # Until the step that was cut off has been through, it stays the one to be mended.
+    if [[ -z $cut_off_step ]]; then write "$STATE/at_work" "$step_name"; fi
+    write "$step_log" "# ${TITLES[$step_name]}, $(date)"
+}
+
+end_step() { mended "$step_name"; }
+
+# mended STEP: nothing half done of it is left; from here on it is this run's own step that may be cut off
+mended() {
+    if [[ $cut_off_step == "$1" ]]; then
+        cut_off_step=""
+        write "$STATE/at_work" "$step_name"
+    fi
+}
+
+# write FILE TEXT: all of it or none.
+write() {
+    if ! { printf '%s\n' "$2" >"$1.part" && mv "$1.part" "$1"; } 2>/dev/null; then
+        refuse "cannot write $1. $(disk_note "it is not writable for $(id -un)")"
+    fi
+}
+
+# run COMMAND…: run it with all output in the step's log; on failure say what went wrong and leave.
+run() {
+    printf '\n$ %s\n' "$*" >>"$step_log"
+    local status=0
+    if [[ -t 1 ]]; then
+        watch_log &
+        watcher=$!
+    fi
+    "$@" >>"$step_log" 2>&1 </dev/null || status=$?
+    stop_watching
+    if [[ $status -ne 0 ]]; then
+        fail "$status" "$*"
+    fi
+}
+
+# The last line of the log, kept up to date on the terminal: somebody is waiting.
+watch_log() {
+    exec 9>&-
+    trap 'exit 0' TERM
+    local columns
+    columns=$(tput cols 2>/dev/null || echo 80)
+    while sleep 0.5 && kill -0 $$; do
+        printf '\r\033[K      %.*s' $((columns - 8)) "$(tail -n 1 "$step_log" | tr -d '\r' | cut -c 1-300)"
+    done
+}
+
+stop_watching() {
+    [[ -n $watcher ]] || return 0
+    kill "$watcher" 2>/dev/null
+    wait "$watcher" 2>/dev/null
+    watcher=""
+    printf '\r\033[K'
+}
+
+# fail STATUS COMMAND
+fail() {
+    # An interrupted command ends with 130, and so does set-up: its trap has its say.
+    if [[ $1 -eq 130 ]]; then interrupted; fi
+    local cause
+    cause=$(cause_of "$1")
+    {
+        echo
+        echo "Set-up failed in step '${TITLES[$step_name]}' (exit code $1)."
+        echo "  cause:   $cause"
+        echo "  command: $2"
+        echo "  log:     $step_log"
+        echo "The log ends with:"
+        tail -n 20 "$step_log" | sed 's/^/  | /'
+        echo "Mend the cause and run ./baxter.sh setup again; what is done is not done again."
+    } >&2
+    # A command that ran to its own end has tidied up; one that was killed or found no room may not have.
+    if [[ -z $cut_off_step && $1 -le 128 && $cause != "the disk is full"* ]]; then rm -f "$STATE/at_work"; fi
+    exit "$1"
+}
+
+# refuse REASON: a step that cannot even start.
+refuse() {
+    {
+        echo
+        echo "Set-up cannot go on in step '${TITLES[$step_name]}': $1"
+        echo "  log:     $step_log"
+    } >&2
+    echo "$1" 2>/dev/null >>"$step_log"
+    exit 1
+}
+
+interrupted() {
+    trap - INT
+    stop_watching
+    echo >&2
+    echo "Set-up was interrupted in step '${TITLES[${step_name:-none}]:-start}' (log: ${step_log:-none});" \
+         "./baxter.sh setup goes on from there." >&2
+    exit 130
+}
+
+# full_disks: the folders that set-up writes to and whose disk has no room
+full_disks() {
+    local folder free
+    for folder in "$LAB_ROOT" "${TMPDIR:-/tmp}" /var "${HOME:-/}"; do
+        free=$(df -Pk "$folder" 2>/dev/null | awk 'NR == 2 { print $4 }')
+        if [[ -n $free && $free -lt $FULL_BELOW_KB ]]; then printf '%s\n' "$folder"; fi
+    done
+}
+
+# disk_note ELSE: that the disk is full, if one is
+disk_note() {
+    local full
+    full=$(full_disks | paste -sd ' ')
+    if [[ -n $full ]]; then
+        echo "the disk is full: nothing is left for $full (df -h); all of set-up takes some 6 GB"
+    else
+        echo "$1"
+    fi
+}
+
+# first_line PATTERN: the first line of the log that the (extended, caseless) pattern meets
+first_line() { grep -aiEm 1 "$1" "$step_log" 2>/dev/null | sed 's/^[[:space:]]*//' | cut -c 1-200; }
+
+# cause_of STATUS: what most likely went wrong, in words. The line of the log that says so comes with it.
+cause_of() {
+    local line
+    line=$(first_line 'no space left on device|disk quota exceeded|enough free space|not enough space in')
+    if [[ -n $line ]]; then
+        echo "the disk is full (df -h; all of set-up takes some 6 GB): $line"
+    elif [[ -n $(full_disks) ]]; then
+        disk_note
+    elif [[ $1 -eq 137 || $1 -eq 143 ]]; then
+        echo "it was killed, by somebody or for lack of memory (free -h)"
+    elif line=$(first_line 'certificate.?verif|self.signed certificate|unable to get local issuer') && [[ -n $line ]]; then
+        echo "a certificate that is not trusted here (a company's proxy? PIP_CERT, update-ca-certificates): $line"
+    elif line=$(first_line 'temporary failure|could not resolve|name or service not known|network is unreachable|no route to host|failed to establish a new connection|connection (timed out|refused|failed)|could not connect|read timed out') &&
+        [[ -n $line ]]; then
+        echo "no way to the network (cable, Wi-Fi, proxy?): $line"
+    elif line=$(first_line 'unable to locate package|no installation candidate') && [[ -n $line ]]; then
+        echo "this system's package sources lack something (docs/platforms.md says which systems have it all): $line"
+    elif line=$(first_line 'permission denied|read-only file system') && [[ -n $line ]]; then
+        echo "files that may not be written (did somebody run set-up with sudo?): $line"
+    else
+        line=$(grep -aiE '(^E:|error|fatal|refused|failed)' "$step_log" 2>/dev/null | tail -n 1 | cut -c 1-200)
+        echo "${line:-see the log}"
+    fi
+}
