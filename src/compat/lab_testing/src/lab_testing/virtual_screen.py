@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A screen that nobody sees, and what is on it."""
+import os
+import struct
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+WIDTH, HEIGHT = 1200, 800
+_XWD_FIELDS = 25  # of 4 bytes each, at the start of an X window dump
+
+
+class VirtualScreen:
+    """An X server without a screen; `environment` makes programs draw on it, with software OpenGL."""
+
+    def __init__(self):
+        self._folder = tempfile.TemporaryDirectory()
+        reader, writer = os.pipe()
+        # Xvfb picks a free display by itself and says which.
+        self._server = subprocess.Popen(
+            ["Xvfb", "-displayfd", str(writer), "-screen", "0", "%dx%dx24" % (WIDTH, HEIGHT), "-nolisten", "tcp",
+             "-fbdir", self._folder.name], pass_fds=[writer], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(writer)
+        with os.fdopen(reader) as stream:
+            number = stream.readline().strip()
+        if not number:
+            raise RuntimeError("Xvfb did not start (exit code %s)" % self._server.wait())
+        self.environment = {**os.environ, "DISPLAY": ":" + number, "LIBGL_ALWAYS_SOFTWARE": "1",
+                            "QT_X11_NO_MITSHM": "1", "XDG_RUNTIME_DIR": self._folder.name}
+
+    def picture(self):
+        """What is on the screen now: (HEIGHT, WIDTH, 3) uint8, red first."""
+        data = (Path(self._folder.name) / "Xvfb_screen0").read_bytes()
+        fields = struct.unpack(">%dI" % _XWD_FIELDS, data[:4 * _XWD_FIELDS])
+        header_size, bytes_per_line, colours = fields[0], fields[12], fields[19]
+        begin = header_size + 12 * colours
+        rows = np.frombuffer(data, np.uint8, HEIGHT * bytes_per_line, begin).reshape(HEIGHT, bytes_per_line)
+        return rows[:, :4 * WIDTH].reshape(HEIGHT, WIDTH, 4)[:, :, 2::-1].copy()
+
+    def wait_until_still(self, part, timeout_s, still_s=2.0):
+        """Return the picture once `part(picture)` has been the same array for still_s [s].
+
+        part: function that picks what counts out of a picture, or returns None while it is not there yet.
+        Raises AssertionError after timeout_s.
+        """
+        deadline = time.monotonic() + timeout_s
+        last, since = None, time.monotonic()
+        while time.monotonic() < deadline:
+            picture = self.picture()
+            seen = part(picture)
+            if seen is None or last is None or not np.array_equal(seen, last):
+                last, since = seen, time.monotonic()
+            elif time.monotonic() - since > still_s:
+                return picture
+            time.sleep(0.25)
+        raise AssertionError("the screen did not come to rest within %g s" % timeout_s)
+
+    def close(self):
+        self._server.terminate()
+        self._server.wait(10.0)
+        self._folder.cleanup()

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Waiting for something with a deadline: the one place where a test's clock ticks."""
+import threading
+import time
+
+POLL_S = 0.01
+
+
+def wait_until(condition, what="the condition", timeout_s=20.0, interval_s=POLL_S):
+    """Ask ``condition()`` every ``interval_s`` [s] of wall time and return its first true answer.
+
+    what: what is awaited, for the error; a function is called then, to say how far it has come.
+    Raises AssertionError after ``timeout_s`` [s] of wall time; the last question is asked after the deadline, so that a
+    process that stood still meanwhile is not blamed.
+    """
+    deadline = time.monotonic() + timeout_s
+    while True:
+        is_last = time.monotonic() > deadline
+        answer = condition()
+        if answer:
+            return answer
+        if is_last:
+            raise AssertionError("waited %g s for %s" % (timeout_s, what() if callable(what) else what))
+        time.sleep(interval_s)
+
+
+def wait_for_message(topic, message_class, wanted=lambda message: True, timeout_s=60.0):
+    """The first message on ``topic`` for which ``wanted(message)`` is true.
+
+    Raises AssertionError after ``timeout_s`` [s] of wall time.
+    """
+    import rospy  # a unit test that only waits needs no ROS
+
+    found, done = [], threading.Event()
+
+    def take(message):
+        if not done.is_set() and wanted(message):
+            found.append(message)
+            done.set()
+
+    subscriber = rospy.Subscriber(topic, message_class, take, queue_size=1, buff_size=1 << 24)
+    try:
+        if not done.wait(timeout_s):
+            raise AssertionError("no message that fits on %s within %g s" % (topic, timeout_s))
+    finally:
+        subscriber.unregister()
+    return found[0]
