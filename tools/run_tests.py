@@ -3,6 +3,8 @@
 """`./baxter.sh test`: lint, unit tests, unit tests under a comma-decimal locale, rostests; one line of counts last."""
 
 import argparse
+import contextlib
+import functools
 import os
 import subprocess
 import sys
@@ -30,53 +32,101 @@ def run_linter(name: str) -> Tally:
     return failure(f"{name}:\n{done.stdout}{done.stderr}".rstrip())
 
 
-def run_unit(title: str, targets, arguments, environment=None) -> Tally:
-    """One pytest process; its own output goes straight to the terminal."""
-    report = WORK / f"{title}.xml"
-    report.unlink(missing_ok=True)
-    options = ["-q", "--continue-on-collection-errors", f"--junitxml={report}", *arguments]
-    command = [sys.executable, "-m", "pytest", *options, *targets]
-    done = subprocess.run(command, cwd=ROOT, env=environment)
-    if done.returncode == PYTEST_NO_TESTS_COLLECTED:
-        return Tally()
-    if not report.is_file():
-        return failure(f"{title}: pytest died with exit code {done.returncode} before it wrote its report")
-    tally = read_junit(report)
-    tally.details.clear()  # pytest has shown them
-    if done.returncode != 0 and tally.failed == 0:
-        tally.add(failure(f"{title}: pytest ended with exit code {done.returncode}"))
-    return tally
+class UnitRun:
+    """One pytest process, which starts at once; its own output goes to the terminal, or into a file."""
+
+    def __init__(self, title: str, targets, arguments, environment=None, output: Path | None = None):
+        self._title, self._output = title, output
+        self._report = WORK / f"{title}.xml"
+        self._report.unlink(missing_ok=True)
+        options = ["-q", "--continue-on-collection-errors", f"--junitxml={self._report}", *arguments]
+        command = [sys.executable, "-m", "pytest", *options, *targets]
+        with contextlib.nullcontext() if output is None else output.open("wb") as stream:
+            self._child = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=stream, stderr=stream)
+
+    def tally(self) -> Tally:
+        """Wait for its end and count."""
+        code = self._child.wait()
+        if code == PYTEST_NO_TESTS_COLLECTED:
+            return Tally()
+        if not self._report.is_file():
+            said = self._output.read_text(errors="replace") if self._output else ""
+            died = f"{self._title}: pytest died with exit code {code} before it wrote its report"
+            return failure(f"{died}\n{said}".rstrip())
+        tally = read_junit(self._report)
+        if self._output is None:
+            tally.details.clear()  # pytest has shown them
+        if code != 0 and tally.failed == 0:
+            tally.add(failure(f"{self._title}: pytest ended with exit code {code}"))
+        return tally
+
+    def kill(self):
+        self._child.kill()
+        self._child.wait()
 
 
-def run_unit_under_comma_locale(targets) -> Tally:
+class FailedStart:
+    """Stands for a UnitRun that could not begin."""
+
+    def __init__(self, detail: str):
+        self._detail = detail
+
+    def tally(self) -> Tally:
+        return failure(self._detail)
+
+    def kill(self):
+        """There is nothing to kill."""
+
+
+def start_unit_under_comma_locale(targets):
     try:
         environment = comma_locale.environment(WORK.parent / "locale")
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", None) or ""
-        return failure(f"cannot make the locale {comma_locale.NAME}: {error}\n{detail}")
+        return FailedStart(f"cannot make the locale {comma_locale.NAME}: {error}\n{detail}")
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT / "tools"), environment.get("PYTHONPATH")]))
-    # What takes long or builds has nothing to do with decimal points.
-    arguments = ["-p", "lab_tests.comma_locale", "-m", "not long and not build"]
-    return run_unit("unit-comma-locale", targets, arguments, environment)
+    # What takes long or builds has nothing to do with decimal points. Two pytests share no cache.
+    arguments = ["-p", "lab_tests.comma_locale", "-p", "no:cacheprovider", "-m", "not long and not build"]
+    return UnitRun("unit-comma-locale", targets, arguments, environment, WORK / "unit-comma-locale.txt")
 
 
-def layers(selection, long: bool):
-    """(title, function that runs it) of everything chosen, fastest first."""
+def layers(selection, long: bool, ending: contextlib.ExitStack):
+    """(title, function that runs it) of everything chosen, fastest first. What `ending` holds ends with the tests."""
     for name in selection.linters:
-        yield name, lambda name=name: run_linter(name)
+        yield name, functools.partial(run_linter, name)
     if selection.unit_targets:
         # Whoever names a single test means it, long or not; a -m of the user's own comes later and wins.
         is_single = any("::" in target for target in selection.unit_targets)
         marker = [] if long or is_single else ["-m", "not long"]
-        yield "unit tests", lambda: run_unit("unit", selection.unit_targets, marker + selection.pytest_arguments)
+        runs = {"unit tests": UnitRun("unit", selection.unit_targets, marker + selection.pytest_arguments)}
+        ending.callback(runs["unit tests"].kill)
         if selection.is_whole_suite:
-            yield (
-                f"unit tests under {comma_locale.NAME}",
-                lambda: run_unit_under_comma_locale(selection.unit_targets),
-            )
+            # At the same time: each keeps one core busy.
+            again = start_unit_under_comma_locale(selection.unit_targets)
+            ending.callback(again.kill)
+            runs[f"unit tests under {comma_locale.NAME}, meanwhile"] = again
+        for title, run in runs.items():
+            yield title, run.tally
     for test in selection.rostests:
         folder = WORK / f"{test.package}-{test.path.stem}"
-        yield f"{test.package} {test.path.name}", lambda test=test, folder=folder: rostests.run(test, folder)
+        yield f"{test.package} {test.path.name}", functools.partial(rostests.run, test, folder)
+
+
+def run_layers(selection, long: bool) -> Tally:
+    """Run everything chosen, one after the other, and tell of each."""
+    total = Tally()
+    with contextlib.ExitStack() as ending:
+        for title, run in layers(selection, long, ending):
+            print(f"=== {title}", flush=True)
+            started = time.monotonic()
+            tally = run()
+            for detail in tally.details:
+                print(detail)
+            verdict = "FAILED" if tally.failed else "ok" if tally.passed else "nothing to run"
+            counts = f"{tally.passed} passed, {tally.failed} failed, {tally.skipped} skipped"
+            print(f"--- {title}: {verdict} ({counts}; {time.monotonic() - started:.1f} s)", flush=True)
+            total.add(tally)
+    return total
 
 
 def main() -> int:
@@ -90,17 +140,7 @@ def main() -> int:
         print(error, file=sys.stderr)
         return 2
 
-    total = Tally()
-    for title, run in layers(selection, options.long):
-        print(f"=== {title}", flush=True)
-        started = time.monotonic()
-        tally = run()
-        for detail in tally.details:
-            print(detail)
-        verdict = "FAILED" if tally.failed else "ok" if tally.passed else "nothing to run"
-        counts = f"{tally.passed} passed, {tally.failed} failed, {tally.skipped} skipped"
-        print(f"--- {title}: {verdict} ({counts}; {time.monotonic() - started:.1f} s)", flush=True)
-        total.add(tally)
+    total = run_layers(selection, options.long)
     if total.passed + total.failed == 0:
         print("No test ran.")
     print(f"{total.passed} passed, {total.failed} failed", flush=True)

@@ -4,6 +4,7 @@
 import os
 import subprocess
 import sys
+import uuid
 from pathlib import Path
 
 import pytest
@@ -121,12 +122,13 @@ def test_failure_text_is_kept(tmp_path):
 
 
 def test_processes_left_behind_are_found_and_ended():
-    child = subprocess.Popen(["sleep", "60"], env={**os.environ, processes.MARKER: "unit-test"}, start_new_session=True)
+    run_id = uuid.uuid4().hex
+    child = subprocess.Popen(["sleep", "60"], env={**os.environ, processes.MARKER: run_id}, start_new_session=True)
     try:
-        assert list(processes.wait_until_gone("unit-test", 0.2)) == [child.pid]
-        processes.kill_all("unit-test")
+        assert list(processes.wait_until_gone(run_id, 0.2)) == [child.pid]
+        processes.kill_all(run_id)
         assert child.wait(5) != 0
-        assert processes.wait_until_gone("unit-test", 5.0) == {}
+        assert processes.wait_until_gone(run_id, 5.0) == {}
     finally:
         child.kill()
         child.wait()
