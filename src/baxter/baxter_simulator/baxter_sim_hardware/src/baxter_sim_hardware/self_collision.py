@@ -15,12 +15,13 @@ HAND = ("lower_forearm", "wrist")
 
 # Planes through the meshes of the body [m, in the link's frame]: where its outline changes. Above -0.64 the pedestal
 # is a column, below it has legs; the torso has lugs for the arms from 0.08 to 0.17, a ledge up to 0.22, its back and
-# chest up to 0.48, handles up to 0.62, and a neck above.
+# chest up to 0.48, handles up to 0.62, and a neck above. Up to the chest it is widest in front of -0.02, beside whose
+# back the arms are folded: cut there, it has no boxes that reach around them.
 MESH_CUTS = {
     "pedestal": (("z", -0.64), *((axis, offset, -2.0, -0.64) for axis in "xy" for offset in (-0.17, 0.17))),
     "torso": (("z", 0.08), ("z", 0.17), ("z", 0.22), ("z", 0.48), ("z", 0.7),
               *(("y", offset, 0.08, 0.17) for offset in (-0.17, 0.17)),
-              *(("y", offset, 0.48, 0.7) for offset in (-0.09, 0.09))),
+              *(("y", offset, 0.48, 0.7) for offset in (-0.09, 0.09)), ("x", -0.02, -0.1, 0.485)),
 }
 
 
