@@ -55,6 +55,7 @@ class Model:
         self._world = world
         self._root_offset = root_offset
         self._root_offset_inverse = inverse(root_offset)
+        self._root_is_centre = bool(np.array_equal(root_offset, np.eye(4)))
         # Of a fixed root; known here so that a tick need not ask for it.
         self._base_quaternion = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)[1]
         self._gravity_key = None
@@ -269,6 +270,8 @@ class Model:
 
     def base_pose(self):
         """Return the pose of the model's frame in the world; for a URDF that is the root link's."""
+        if self._root_is_centre:
+            return Pose(*pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client))
         return Pose.from_matrix(self._body_matrix(BASE))
 
     def set_base_pose(self, pose):

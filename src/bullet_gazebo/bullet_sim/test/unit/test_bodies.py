@@ -4,6 +4,7 @@
 import math
 
 import numpy as np
+import pybullet
 import pytest
 
 from bullet_sim import BulletSimError, Pose, World
@@ -17,6 +18,11 @@ ROD = """<robot name="rod"><link name="post"/>
   <link name="rod"><inertial><origin xyz="0.5 0 0"/><mass value="2"/>
     <inertia ixx="0.01" iyy="0.2" izz="0.2"/></inertial></link>
   <joint name="pivot" type="continuous"><parent link="post"/><child link="rod"/><axis xyz="0 0 1"/></joint></robot>"""
+SLIDER = """<robot name="slider"><link name="rail"/><link name="pusher"><inertial><mass value="1"/>
+    <inertia ixx="0.0017" iyy="0.0017" izz="0.0017"/></inertial>
+    <collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
+  <joint name="slide" type="prismatic"><parent link="rail"/><child link="pusher"/><axis xyz="1 0 0"/>
+    <limit lower="0" upper="1" velocity="1" effort="50"/></joint></robot>"""
 ASLEEP_AFTER = 2500  # ticks
 
 
@@ -50,6 +56,34 @@ def test_a_sleeping_body_wakes_up_when_it_is_touched(world, sleeping_box, touch,
     touch(world, sleeping_box)
     step(world, 50)
     assert moved(sleeping_box)
+
+
+def bullet_passes_it_over(world, box):
+    """Whether Bullet leaves a push out, as it does for a body that sleeps: World wakes what it pushes itself."""
+    before = box.base_pose()
+    pybullet.applyExternalForce(
+        box.body, -1, (0, 0, 2000), before.position, pybullet.WORLD_FRAME, physicsClientId=world._client)
+    world.step()
+    return box.base_pose() == before
+
+
+@pytest.mark.parametrize("hit", ["by another body", "by a robot's joint"])
+def test_sleeping_bodies_wake_up_when_something_runs_into_them(world, sleeping_box, hit):
+    others = [world.spawn(parse_urdf(BOX % ""), "box_%d" % i, Pose((0.5 * i + 1.0, 0, 0.05))) for i in range(9)]
+    step(world, ASLEEP_AFTER)
+    resting = [box.base_pose() for box in others]
+    assert bullet_passes_it_over(world, sleeping_box)
+    start = sleeping_box.base_pose()
+    if hit == "by another body":
+        other = world.spawn(parse_urdf(BOX % ""), "other", Pose((-0.15, 0, 0.051)))
+        other.set_base_twist((2.0, 0, 0), (0, 0, 0))
+    else:
+        robot = world.spawn(parse_urdf(SLIDER), "robot", Pose((-0.3, 0, 0.06)), static=True)
+        robot.drive_velocity(robot.index(["slide"]), np.array([0.5]), np.array([50.0]))
+    step(world, 400)
+    assert sleeping_box.base_pose().position[0] > start.position[0] + 0.02
+    # Who is not hit sleeps on.
+    assert [box.base_pose() for box in others] == resting
 
 
 def test_a_push_in_its_sleep_gives_a_body_the_whole_impulse(world):
