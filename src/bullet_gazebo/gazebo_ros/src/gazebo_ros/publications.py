@@ -13,8 +13,10 @@ from gazebo_ros.pacing import RateMeter, SlownessWatch, ticks_between
 
 _CLOCK_MESSAGE = struct.Struct("<III")
 _CLOCK_BYTES = 8
-# Faster than real time the clock is not published at every tick: at most this often per wall second [Hz].
+# Faster than real time the clock is not published at every tick, nor is the snapshot written as often as in real time:
+# at most this often per wall second [Hz]. No viewer draws more often than that.
 MAX_WALL_CLOCK_RATE = 500.0
+MAX_WALL_SNAPSHOT_RATE = 200.0
 # Model and link states and the snapshot go out at this rate, in simulation time [Hz].
 STATES_RATE = 100.0
 # How often the snapshot is written in a paused world, where services still move things [Hz, wall time].
@@ -62,16 +64,18 @@ class Publications:
         simulation = self._simulation
         tick = simulation.tick
         self._set_rospy_time()
-        if tick % self._clock_divisor == 0 or simulation.paused:
-            if simulation.real_time_factor == 1.0 and not simulation.paused:
-                self.publish_clock()
-            else:
-                now = time.perf_counter()
-                if now - self._clock_sent_at >= 1.0 / MAX_WALL_CLOCK_RATE:
-                    self._clock_sent_at = now
-                    self.publish_clock()
+        now = time.perf_counter()
+        paused = simulation.paused
+        in_real_time = simulation.real_time_factor == 1.0 and not paused
+        if (tick % self._clock_divisor == 0 or paused) and (
+                in_real_time or now - self._clock_sent_at >= 1.0 / MAX_WALL_CLOCK_RATE):
+            self._clock_sent_at = now
+            self.publish_clock()
         if tick % self._states_divisor == 0:
-            self.write_snapshot()
+            # In lock-step every state counts.
+            if in_real_time or paused or now - self._snapshot_written_at >= 1.0 / MAX_WALL_SNAPSHOT_RATE:
+                self._snapshot_written_at = now
+                self.write_snapshot()
             self._publish_states()
         factor = self._meter.update(simulation.time_s)
         if factor is not None:

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How often the clock and the snapshot go out: at every tick that asks for it, and no oftener than somebody can use."""
+from types import SimpleNamespace
+
+import pytest
+
+from gazebo_ros import publications
+
+STEP_S = 0.002
+
+
+class World:
+    """What Publications looks at, run at a factor of wall time that the test chooses."""
+
+    def __init__(self, monkeypatch, factor, paused=False, asked=None):
+        self.wall_s, self.factor, self.snapshots, self.clocks = 100.0, factor, [], 0
+        monkeypatch.setattr(publications.time, "perf_counter", lambda: self.wall_s)
+        self.simulation = SimpleNamespace(step_s=STEP_S, tick=0, time_ns=0, time_s=0.0, paused=paused, is_stepping=True,
+                                          real_time_factor=asked, world=SimpleNamespace(models={}))
+        publisher = SimpleNamespace(has_listeners=False, publish_serialized=self._count)
+        ros = SimpleNamespace(publisher=lambda *arguments, **options: publisher)
+        snapshot = SimpleNamespace(write=lambda tick, time_s, parts: self.snapshots.append(tick))
+        self._publications = publications.Publications(self.simulation, ros, snapshot, log=None, clock_rate=500.0)
+        self.clocks = 0
+
+    def _count(self, data):
+        self.clocks += 1
+
+    def run(self, seconds):
+        for _ in range(round(seconds / STEP_S)):
+            self.simulation.tick += 1
+            self.simulation.time_s = self.simulation.tick * STEP_S
+            self.simulation.time_ns = self.simulation.tick * 2000000
+            self.wall_s += STEP_S / self.factor
+            self._publications.on_tick()
+
+
+def test_in_real_time_every_tick_that_is_due_counts(monkeypatch):
+    world = World(monkeypatch, factor=1.7, asked=1.0)  # it makes up for a stall
+    world.run(2.0)
+    assert world.clocks == 1000
+    assert world.snapshots == list(range(5, 1001, 5))
+
+
+def test_flat_out_nobody_gets_more_than_he_can_use(monkeypatch):
+    world = World(monkeypatch, factor=20.0, asked=0.0)
+    world.run(20.0)
+    wall_s = world.wall_s - 100.0
+    assert wall_s == pytest.approx(1.0)
+    assert 0.8 * publications.MAX_WALL_CLOCK_RATE < world.clocks <= publications.MAX_WALL_CLOCK_RATE + 1
+    assert 0.5 * publications.MAX_WALL_SNAPSHOT_RATE < len(world.snapshots) <= publications.MAX_WALL_SNAPSHOT_RATE + 1
+
+
+def test_in_lock_step_every_state_is_shown(monkeypatch):
+    world = World(monkeypatch, factor=50.0, paused=True, asked=1.0)
+    world.run(2.0)
+    assert world.snapshots == list(range(5, 1001, 5))
