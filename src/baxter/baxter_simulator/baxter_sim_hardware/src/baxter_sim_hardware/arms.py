@@ -26,7 +26,7 @@ import numpy as np
 
 from .errors import CommandRefused
 from .joint_command import CommandParser, Mode
-from .setpoint import MovingAverage, approach, stopping_point
+from .setpoint import MovingAverage, advance, any_beyond, stopping_point
 
 COMMAND_TIMEOUT_S = 0.2  # the robot's own
 SPEED_RATIO = {"sim": 1.0, "robot": 0.3}  # at start, by profile; 0.3 is what the physical robot starts with
@@ -115,6 +115,7 @@ class Arms:
         self._mode = np.full(count, Mode.POSITION, dtype=int)
         self._value = np.zeros(count)  # last commanded velocity or torque
         self._deadline = np.full(count, np.inf)
+        self._may_expire = False
         self._stream_goal = np.zeros(count)  # raw mode: where the target is on its way to, and how fast
         self._stream_rate = np.zeros(count)
         self._stream_stamp = np.full(count, -np.inf)
@@ -123,6 +124,7 @@ class Arms:
         self._brakes = False
         self._brake_ticks = 0  # left, of BRAKES_S
         self._yielding = np.zeros(count, dtype=bool)
+        self._any_yields = False
         self._balanced = np.ones(count)  # 1 where torque mode adds the torque that balances gravity, 0 where not
         self._feed_forward = np.zeros(count)  # [rad/s]
         self._feed_forward_stamp = np.full(count, -np.inf)
@@ -222,12 +224,14 @@ class Arms:
             self._value[command.index] = command.values
         if command.mode is not Mode.POSITION:
             self._deadline[command.index] = time_s + limb.timeout_s
+            self._may_expire = True
         self._refresh_speed()
         return command
 
     def set_yielding(self, side, yields):
         """Whether a limb, in position and velocity mode, pushes with no more than YIELD_FACTOR of its effort limits."""
         self._yielding[self._limbs[side].index] = yields
+        self._any_yields = bool(self._yielding.any())
 
     def set_gravity_compensation(self, side, on):
         """Whether a limb's torque mode adds the torque that balances gravity."""
@@ -290,21 +294,22 @@ class Arms:
         position, velocity: (n,) measured [rad, rad/s]; gravity: (n,) [Nm] the torque that balances gravity here.
         """
         if not self._is_settled:
-            expired = self._deadline <= time_s + 1e-9
-            if expired.any():
-                self._hold(expired, position, velocity)
+            if self._may_expire:
+                expired = self._deadline <= time_s + 1e-9
+                if expired.any():
+                    self._hold(expired, position, velocity)
             self._move_reference()
         self._keep_within_reach(position, velocity)
 
         bound = (BRAKES_EFFORT_FACTOR if self._brake_ticks else 1.0) * self.limits.effort + np.abs(gravity)
         if self._brake_ticks:
             self._brake_ticks -= 1
-        elif self._yielding.any():
+        elif self._any_yields:
             gentle = self._yielding & (self._mode != _RAW_POSITION)
             bound = np.where(gentle, YIELD_FACTOR * self.limits.effort + np.abs(gravity), bound)
-        in_torque = self._mode == _TORQUE
-        if self._is_settled or not in_torque.any():
+        if self._is_settled or not self._any_in_torque:
             return Drives(self._all, self._output, self._output_rate, bound, self._none, self._none, self._none)
+        in_torque = self._in_torque
         self._follow_joint(in_torque, position, velocity)
         motor = np.flatnonzero(in_torque)
         servo = np.flatnonzero(~in_torque)
@@ -355,58 +360,46 @@ class Arms:
         self._stream_goal[index] = goal
         self._stream_stamp[index] = time_s
 
-    def _move_stream(self, raw):
-        """Move the targets of raw mode by one tick; return their velocities, (n,) [rad/s], zero in other modes."""
-        ahead = np.where(raw, self._stream_goal - self._target, 0.0)
-        pace = np.minimum(np.abs(self._stream_rate), np.abs(ahead) / self._dt)
-        return np.copysign(pace, ahead)
-
     def _move_reference(self):
-        acceleration = np.where(self._braking, self._stopping_acceleration(), self._acceleration)
+        acceleration = self._acceleration
+        brakes = bool(self._braking.any())
+        if brakes:
+            acceleration = np.where(self._braking, self._stopping_acceleration(), acceleration)
         before = self._output
-        raw = self._mode == _RAW_POSITION
-        if raw.any():
-            # The profile runs in a frame that moves with the target, so that a smooth stream is followed without lag.
-            target_rate = self._move_stream(raw)
-            offset, rate = approach(self._reference - self._target, self._rate - target_rate, 0.0,
-                                    self._speed - np.abs(target_rate), acceleration, self._dt)
-            self._target = self._target + target_rate * self._dt
-            reference, rate = self._target + offset, rate + target_rate
-        else:
-            reference, rate = approach(
-                self._reference, self._rate, self._target, self._speed, acceleration, self._dt)
-        direct = raw | self._braking
-        if direct.any():
-            self._smoothing.restart(direct, reference[direct])
-        self._reference = reference
-        self._rate = rate
-        self._output = self._smoothing.push(reference)
+        moving = advance(self._reference, self._rate, self._target, self._speed, acceleration, self._streams,
+                         self._stream_goal, self._stream_rate, self._dt)
+        if brakes or self._any_streams:
+            direct = self._streams | self._braking
+            self._smoothing.restart(direct, self._reference[direct])
+        self._output = self._smoothing.push(self._reference)
         self._output_rate = (self._output - before) / self._dt
-        if self._braking.any():
+        if brakes:
             # At the target and at rest: with the weaker acceleration of other motions it would overshoot.
-            self._braking &= (reference != self._target) | (rate != 0.0)
+            self._braking &= (self._reference != self._target) | (self._rate != 0.0)
             self._refresh_speed()
         # Nothing to do until the next command or push: every set-point rests on its target.
-        if not rate.any() and (np.abs(self._output - self._target) < 1e-12).all() and (self._mode == _POSITION).all():
+        if not moving and (np.abs(self._output - self._target) < 1e-12).all() and (self._mode == _POSITION).all():
             self._output = self._target.copy()
             self._is_settled = True
+            self._may_expire = False
 
     def _keep_within_reach(self, position, velocity):
-        # The joints have not made this tick's step yet.
-        lead = self._output - self._output_rate * self._dt - position
         reach = BRAKES_REACH_RAD if self._brake_ticks else REACH_RAD
+        # The joints have not made this tick's step yet.
+        if not any_beyond(reach, self._output, self._output_rate, position, self._dt):
+            return
+        lead = self._output - self._output_rate * self._dt - position
         far = np.abs(lead) > reach
-        if far.any():
-            offset = np.clip(lead[far], -reach, reach) - lead[far]
-            self._reference[far] += offset
-            self._output[far] += offset
-            self._smoothing.shift(far, offset)
-            self._is_settled = False
-            self._rate[far] = velocity[far]
-            self._output_rate[far] = velocity[far]
-            # What brakes and slips stays where it stops; going back would be a motion that nobody asked for.
-            slipped = far & self._braking
-            self._target[slipped] = self._resting_point()[slipped]
+        offset = np.clip(lead[far], -reach, reach) - lead[far]
+        self._reference[far] += offset
+        self._output[far] += offset
+        self._smoothing.shift(far, offset)
+        self._is_settled = False
+        self._rate[far] = velocity[far]
+        self._output_rate[far] = velocity[far]
+        # What brakes and slips stays where it stops; going back would be a motion that nobody asked for.
+        slipped = far & self._braking
+        self._target[slipped] = self._resting_point()[slipped]
 
     def _resting_point(self):
         """(n,) [rad] where the set-points come to rest if they brake now."""
@@ -438,6 +431,8 @@ class Arms:
     def _set_mode(self, joints, mode):
         self._is_settled = False
         self._mode[joints] = mode
+        self._streams, self._in_torque = self._mode == _RAW_POSITION, self._mode == _TORQUE
+        self._any_streams, self._any_in_torque = bool(self._streams.any()), bool(self._in_torque.any())
         self._value[joints] = 0.0
         self._deadline[joints] = np.inf
         self._braking &= ~joints

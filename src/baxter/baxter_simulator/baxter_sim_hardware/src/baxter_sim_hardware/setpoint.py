@@ -1,8 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Set-points that move no faster and no harder than allowed, and arrive exactly."""
+import math
+
 import numpy as np
 
+# Makes sure that numba has a place for its cache; numba looks for one when it is imported.
+import baxter_sim_kinematics  # noqa: F401  isort: skip
+import numba  # isort: skip
 
+# All that is compiled stands in one file: numba's cache notices a change of that file alone.
+_compiled = numba.njit(cache=True, error_model="numpy")
+
+
+@_compiled
+def _approach(position, velocity, target, speed, acceleration, dt):
+    distance = target - position
+    step = acceleration * dt
+    left = abs(distance) / (step * dt)
+    whole = np.floor(math.sqrt(0.25 + 2.0 * left) - 0.5)
+    braking = step * (whole + (left - 0.5 * whole * (whole + 1.0)) / (whole + 1.0))
+    wanted = math.copysign(min(braking, speed), distance)
+    velocity += min(max(wanted - velocity, -step), step)
+    moved = velocity * dt
+    return (target if abs(distance - moved) < 1e-12 else position + moved), velocity
+
+
+@_compiled
 def approach(position, velocity, target, speed, acceleration, dt):
     """One tick of a trapezoidal velocity profile in discrete time, for n joints at once.
 
@@ -14,21 +37,62 @@ def approach(position, velocity, target, speed, acceleration, dt):
     n (n + 1) / 2 <= d and f = (d - n (n + 1) / 2) / (n + 1). The sum is the discrete one, so the profile ends on the
     target itself, without a creep and without an overshoot.
     """
-    distance = target - position
-    step = acceleration * dt
-    left = np.abs(distance) / (step * dt)
-    whole = np.floor(np.sqrt(0.25 + 2.0 * left) - 0.5)
-    braking = step * (whole + (left - 0.5 * whole * (whole + 1.0)) / (whole + 1.0))
-    wanted = np.copysign(np.minimum(braking, speed), distance)
-    velocity = velocity + np.minimum(np.maximum(wanted - velocity, -step), step)
-    moved = velocity * dt
-    arrived = np.abs(distance - moved) < 1e-12
-    return np.where(arrived, target, position + moved), velocity
+    new_position, new_velocity = np.empty_like(position), np.empty_like(velocity)
+    for i in range(len(position)):
+        new_position[i], new_velocity[i] = _approach(
+            position[i], velocity[i], target[i], speed[i], acceleration[i], dt)
+    return new_position, new_velocity
+
+
+@_compiled
+def advance(position, velocity, target, speed, acceleration, streams, goal, pace, dt):
+    """One tick of `approach` for set-points of which some follow a stream; all arrays (n,), those of the first three
+    are moved in place. Returns whether any of them still has a velocity.
+
+    streams: the joints whose target is itself on the way to goal [rad], by at most pace [rad/s] (of either sign); their
+    profile runs in a frame that moves with the target, so that a smooth stream is followed without lag.
+    """
+    moving = False
+    for i in range(len(position)):
+        rate = 0.0
+        if streams[i]:
+            ahead = goal[i] - target[i]
+            rate = math.copysign(min(abs(pace[i]), abs(ahead) / dt), ahead)
+            offset, velocity[i] = _approach(
+                position[i] - target[i], velocity[i] - rate, 0.0, speed[i] - abs(rate), acceleration[i], dt)
+            target[i] += rate * dt
+            position[i] = target[i] + offset
+            velocity[i] += rate
+        else:
+            position[i], velocity[i] = _approach(
+                position[i], velocity[i], target[i], speed[i], acceleration[i], dt)
+        moving |= velocity[i] != 0.0
+    return moving
+
+
+@_compiled
+def any_beyond(reach, position, velocity, measured, dt):
+    """Whether any set-point, `position` (n,) [rad] as it was a tick of `velocity` (n,) ago, is farther than reach [rad]
+    from what is measured there, (n,)."""
+    for i in range(len(position)):
+        if abs(position[i] - velocity[i] * dt - measured[i]) > reach:
+            return True
+    return False
 
 
 def stopping_point(position, velocity, acceleration):
     """Where set-points that brake now come to rest [rad]; all (n,)."""
     return position + velocity * np.abs(velocity) / (2.0 * acceleration)
+
+
+@_compiled
+def _push(window, oldest, values):
+    """Replace the oldest row of window (k, n) by values (n,); return (the row that is oldest now, the mean (n,))."""
+    window[oldest] = values
+    mean = np.zeros_like(values)
+    for k in range(len(window)):
+        mean += window[k]
+    return (oldest + 1) % len(window), mean / len(window)
 
 
 class MovingAverage:
@@ -45,9 +109,8 @@ class MovingAverage:
 
     def push(self, values):
         """Take the newest values, (n,); return the mean, (n,)."""
-        self._window[self._oldest] = values
-        self._oldest = (self._oldest + 1) % len(self._window)
-        return np.add.reduce(self._window) / len(self._window)
+        self._oldest, mean = _push(self._window, self._oldest, values)
+        return mean
 
     def shift(self, mask, offset):
         """Move the past of the joints in `mask` by `offset`, so that their mean moves by exactly that."""
