@@ -7,6 +7,7 @@ STAND_INS=(
     src/ros_control/controller_manager_msgs
     src/compat/xacro
     src/compat/rqt_plot
+    src/compat/joy
 )
 
 # leave_out_stand_ins ROOT SHARE…: where an installed ROS (its share folders) has a package of that name, hide ours from

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A joystick's device file."""
+import array
+import errno
+import fcntl
+import os
+import select
+
+# linux/joystick.h: how many axes and buttons there are, one byte each.
+_AXES, _BUTTONS = 0x80016A11, 0x80016A12
+_CHUNK = 8 * 64  # [bytes] of 64 events
+_HINTS = {errno.ENOENT: "plug one in, or set ~dev", errno.ENODEV: "plug one in, or set ~dev",
+          errno.EACCES: "put yourself into the group that owns the device (sudo usermod -aG input $USER)"}
+
+
+class DeviceLost(Exception):
+    """There is no such device, or there is none any more; the text says why in one line."""
+
+
+class Device:
+    """An open joystick. Attributes: `axes`, `buttons`, how many it says it has (0 where it does not say).
+
+    Raises DeviceLost when it cannot be opened.
+    """
+
+    def __init__(self, path):
+        self._path = path
+        try:
+            self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        except OSError as error:
+            hint = _HINTS.get(error.errno)
+            raise DeviceLost("no joystick at %s: %s%s" % (path, error.strerror, "; " + hint if hint else "")) from None
+        self.axes, self.buttons = self._count(_AXES), self._count(_BUTTONS)
+
+    def read(self, timeout_s):
+        """Return what has come in within a time [s] as bytes, empty for nothing. Raises DeviceLost."""
+        try:
+            if not select.select([self._file], [], [], timeout_s)[0]:
+                return b""
+            data = os.read(self._file, _CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise DeviceLost("joystick %s is lost: %s" % (self._path, error.strerror)) from None
+        if not data:
+            raise DeviceLost("joystick %s is lost: it was closed" % self._path)
+        return data
+
+    def close(self):
+        os.close(self._file)
+
+    def _count(self, request):
+        found = array.array("B", [0])
+        try:
+            fcntl.ioctl(self._file, request, found)
+        except OSError:  # a pipe or a terminal that stands in for a joystick
+            return 0
+        return found[0]
