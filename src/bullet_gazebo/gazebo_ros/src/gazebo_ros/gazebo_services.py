@@ -61,7 +61,7 @@ class GazeboServices:
     """Advertises the services; the loop's work runs in the loop, what is slow in the thread of the request."""
 
     def __init__(self, simulation, spawner, lights, ros, log):
-        """Advertises everything at once; requests wait until the loop runs. ``lights``: list of ``sdf_model.Light``."""
+        """Advertises everything at once; requests wait until the loop runs. ``lights``: :class:`WorldLights`."""
         self._simulation = simulation
         self._world = simulation.world
         self._spawner = spawner

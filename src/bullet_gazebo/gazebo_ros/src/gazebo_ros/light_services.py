@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The services under /gazebo that are about lights. Nothing here is lit by them: the window has a light of its own."""
+"""The services under /gazebo that are about lights. Cameras see by them; the window follows the sun."""
+import numpy as np
 from gazebo_msgs.srv import (
     DeleteLight,
     DeleteLightResponse,
@@ -10,36 +11,54 @@ from gazebo_msgs.srv import (
 )
 from std_msgs.msg import ColorRGBA
 
+from gazebo_ros.entities import UnknownEntity
+from urdf_model.transforms import matrix_from_quaternion, rigid
+
 
 class LightServices:
-    """Knows the lights of the world file and says what they are."""
+    """Tells of the world's lights, and changes them."""
 
     def __init__(self, lights, ros):
-        """``lights``: list of ``sdf_model.Light``."""
-        self._lights = {light.name: light for light in lights}
+        """``lights``: :class:`gazebo_ros.world_lights.WorldLights`."""
+        self._lights = lights
         for name, srv_class, handler in (("delete_light", DeleteLight, self._delete),
                                          ("get_light_properties", GetLightProperties, self._get),
                                          ("set_light_properties", SetLightProperties, self._set)):
             ros.service("/gazebo/" + name, srv_class, handler)
 
-    def _missing(self, name):
-        return "light '%s' does not exist; lights: %s" % (name, ", ".join(self._lights) or "none")
-
     def _get(self, request):
-        light = self._lights.get(request.light_name)
-        if light is None:
-            return GetLightPropertiesResponse(status_message="GetLightProperties: %s"
-                                              % self._missing(request.light_name))
+        try:
+            light = self._lights.get(request.light_name)
+        except UnknownEntity as error:
+            return GetLightPropertiesResponse(status_message="GetLightProperties: %s" % error)
         return GetLightPropertiesResponse(ColorRGBA(*light.diffuse), *light.attenuation, True,
                                           "GetLightProperties: got properties")
 
     def _set(self, request):
-        if request.light_name not in self._lights:
-            return SetLightPropertiesResponse(False, "SetLightProperties: %s" % self._missing(request.light_name))
-        return SetLightPropertiesResponse(False, "SetLightProperties: lights have no effect here, the window has one "
-                                                 "of its own; light '%s' stays as it is" % request.light_name)
+        def colour(message):
+            return message.r, message.g, message.b, message.a
+
+        try:
+            # Requests of clients that know only the older fields have zeros in place of a direction and a pose.
+            values = {"cast_shadows": request.cast_shadows}
+            direction, q = request.direction, request.pose.orientation
+            if direction.x or direction.y or direction.z:
+                values["direction"] = (direction.x, direction.y, direction.z)
+            if q.x or q.y or q.z or q.w:
+                at, turn = request.pose.position, np.array([q.x, q.y, q.z, q.w])
+                turn /= np.linalg.norm(turn)
+                values["pose"] = rigid(matrix_from_quaternion(turn), (at.x, at.y, at.z))
+            self._lights.change(
+                request.light_name, diffuse=colour(request.diffuse), specular=colour(request.specular),
+                attenuation=(request.attenuation_constant, request.attenuation_linear, request.attenuation_quadratic),
+                **values)
+        except (UnknownEntity, ValueError) as error:
+            return SetLightPropertiesResponse(False, "SetLightProperties: %s" % error)
+        return SetLightPropertiesResponse(True, "SetLightProperties: attributes set")
 
     def _delete(self, request):
-        if self._lights.pop(request.light_name, None) is None:
-            return DeleteLightResponse(False, "DeleteLight: %s" % self._missing(request.light_name))
+        try:
+            self._lights.delete(request.light_name)
+        except UnknownEntity as error:
+            return DeleteLightResponse(False, "DeleteLight: %s" % error)
         return DeleteLightResponse(True, "DeleteLight: successfully deleted light")

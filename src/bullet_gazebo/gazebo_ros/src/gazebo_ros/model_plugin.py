@@ -5,6 +5,7 @@ A plugin lives in the loop thread. Everything it is given here may be called fro
 things other threads touch are the mailboxes and queues that the context hands out. Nothing it can call blocks: topics
 and services are registered with the ROS master by a thread of their own, messages are sent without waiting.
 """
+import numpy as np
 
 
 class PluginError(Exception):
@@ -73,9 +74,10 @@ class PluginContext:
         ``info``, ``warn``, ``error`` and ``*_throttle(period_s, text)``; never blocks the loop.
     """
 
-    def __init__(self, world, model, robot, element, namespace, urdf_xml, log, ros, parameters):
+    def __init__(self, world, model, robot, element, namespace, urdf_xml, log, ros, parameters,
+                 add_screen=None):
         """``ros`` makes the communication objects (see :mod:`gazebo_ros.ros_objects`); ``parameters`` is the tree of
-        the parameter server at spawn time."""
+        the parameter server at spawn time; ``add_screen``: what :meth:`screen` calls."""
         self.world = world
         self.model = model
         self.robot = robot
@@ -85,6 +87,7 @@ class PluginContext:
         self.log = log
         self._ros = ros
         self._parameters = parameters
+        self._add_screen = add_screen
         self._opened = []
 
     def resolve(self, name):
@@ -128,7 +131,16 @@ class PluginContext:
     def branch(self):
         """A context for a part of the plugin that opens topics and services, and closes them, on its own."""
         return PluginContext(self.world, self.model, self.robot, self.element, self.namespace, self.urdf_xml, self.log,
-                             self._ros, self._parameters)
+                             self._ros, self._parameters, self._add_screen)
+
+    def screen(self, link, place, size_m, pixels):
+        """A rectangle of the model that shows pictures to who draws the world; for a plugin's constructor.
+
+        It hangs on ``link`` at ``place`` (4, 4): in its middle, x to the right and y up for who looks at it.
+        ``size_m``: width and height; ``pixels``: columns and rows. Returns a
+        :class:`gazebo_ros.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
+        """
+        return self._add_screen(link, np.asarray(place, dtype=float), size_m, pixels)
 
     def param(self, name, default=None):
         """Value of a ROS parameter as it was when the model was spawned; relative names as in :meth:`resolve`."""

@@ -29,6 +29,7 @@ from gazebo_ros.simulation import Simulation
 from gazebo_ros.single_instance import refusal, running_instance
 from gazebo_ros.spawning import Spawner
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
+from gazebo_ros.world_lights import WorldLights
 from sdf_model import ModelFolders
 
 # How long threads may hold the interpreter [s]. PyBullet keeps it during a step, and with the default of 5 ms one busy
@@ -118,11 +119,17 @@ def _build(log, cleanup, line):
                             paused=line.paused or bool(rospy.get_param("~paused", False)), deliveries=ros.deliveries)
     publications = Publications(simulation, ros, writer, log,
                                 clock_rate=float(rospy.get_param("~clock_rate", 1.0 / description.time_step_s)))
-    spawner = Spawner(simulation, table, ros, finder, folders, log,
-                      on_change=lambda: _tell_viewers(writer, publications, world, spawner))
-    services = GazeboServices(simulation, spawner, description.lights, ros, log)
+    lights = WorldLights(description.lights, description.scene)
+
+    def tell_viewers():
+        writer.write_scene(spawner.listed(), lights.listed())
+        publications.write_snapshot()
+
+    spawner = Spawner(simulation, table, ros, finder, folders, log, on_change=tell_viewers, folder=writer.folder)
+    services = GazeboServices(simulation, spawner, lights, ros, log)
     spawner.spawn_world(description.models)
-    _tell_viewers(writer, publications, world, spawner)
+    tell_viewers()
+    lights.on_change = tell_viewers
     rospy.set_param("~snapshot", str(writer.folder))
     ros.flush()
 
@@ -141,13 +148,6 @@ def _build(log, cleanup, line):
 
 def _resource_folders():
     return [folder for folder in os.environ.get("GAZEBO_RESOURCE_PATH", "").split(":") if folder]
-
-
-def _tell_viewers(writer, publications, world, spawner):
-    writer.write_scene([{"name": model.name, "joints": list(model.joint_names),
-                         "urdf": spawner.drawings.get(model.name), "sensors": spawner.sensors.get(model.name, [])}
-                        for model in world.models.values()])
-    publications.write_snapshot()
 
 
 def _end(log, code):

@@ -18,6 +18,7 @@ import os
 import struct
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -85,16 +86,17 @@ class SnapshotWriter:
         _HEADER.pack_into(self._memory, 0, MAGIC, 0)
         self.write_scene([])
 
-    def write_scene(self, bodies):
-        """Say which bodies there are.
+    def write_scene(self, bodies, light=None):
+        """Say which bodies there are, and by which light they are seen.
 
         ``bodies``: list of dictionaries with ``name``, ``joints`` (names) and whatever a viewer needs to draw it.
-        States written from here on refer to this list.
+        States written from here on refer to this list. ``light``: as :meth:`WorldLights.listed` says it.
         """
         self.revision += 1
         path = self.folder / "scene.json"
         draft = path.with_suffix(".new")
-        draft.write_text(json.dumps({"revision": self.revision, "bodies": bodies}), encoding="utf-8")
+        draft.write_text(json.dumps({"revision": self.revision, "bodies": bodies, "light": light or {}}),
+                         encoding="utf-8")
         draft.replace(path)
 
     def write(self, tick, time_s, parts):
@@ -126,6 +128,14 @@ class SnapshotWriter:
             self._memory.close()
         _remove(self.folder)
         self._file.close()
+
+
+class Scene(NamedTuple):
+    """What :meth:`SnapshotWriter.write_scene` was told, and how many times it was told something."""
+
+    revision: int
+    bodies: list
+    light: dict
 
 
 class Snapshot:
@@ -175,9 +185,9 @@ class SnapshotReader:
                 return Snapshot(revision, tick, time_s, values)
 
     def scene(self):
-        """``(revision, bodies)`` as the writer's :meth:`SnapshotWriter.write_scene` said last."""
+        """The :class:`Scene` as it is now."""
         try:
             scene = json.loads((self._folder / "scene.json").read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise SnapshotError("no scene in %s: %s" % (self._folder, error)) from error
-        return scene["revision"], scene["bodies"]
+        return Scene(scene["revision"], scene["bodies"], scene["light"])

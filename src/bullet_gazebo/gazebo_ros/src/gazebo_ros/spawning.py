@@ -5,6 +5,8 @@ What is slow (parsing, importing plugins, looking for files) happens in the thre
 the bodies.
 """
 import gc
+import itertools
+from pathlib import Path
 
 import numpy as np
 from lxml import etree
@@ -13,6 +15,7 @@ from bullet_sim import BulletSimError, MeshFiles, Pose, with_stand_ins
 from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
 from gazebo_ros.model_plugin import PluginContext, PluginError
+from gazebo_ros.shared_picture import PictureWriter
 from gazebo_ros.simulation import HostedPlugin
 from sdf_model import SdfError, parse_sdf_model
 from urdf_model import Plane, UrdfError, drawing_urdf, merge_fixed, parse_urdf
@@ -44,10 +47,10 @@ class Prepared:
 class Spawner:
     """Makes models and their plugins, and keeps the list that viewers are told."""
 
-    def __init__(self, simulation, table, ros, finder, model_folders, log, on_change):
+    def __init__(self, simulation, table, ros, finder, model_folders, log, on_change, folder=None):
         """``table``: :class:`PluginTable`; ``finder``: :class:`ResourceFinder`; ``on_change()``: models changed.
 
-        ``model_folders``: ``sdf_model.ModelFolders``.
+        ``model_folders``: ``sdf_model.ModelFolders``. ``folder``: where viewers find the pictures of screens.
         """
         self._simulation = simulation
         self._table = table
@@ -61,6 +64,17 @@ class Spawner:
         self.drawings = {}
         #: The sensors that need pictures, for who draws them: {model name: list of dictionaries}.
         self.sensors = {}
+        # The screens that plugins have: {model name: list of (what the scene says, PictureWriter)}.
+        self._screens = {}
+        self._folder = Path(folder or ".")
+        self._number = itertools.count()
+
+    def listed(self):
+        """What the scene says of each model of the world."""
+        return [{"name": model.name, "joints": list(model.joint_names), "urdf": self.drawings.get(model.name),
+                 "sensors": self.sensors.get(model.name, []),
+                 "screens": [entry for entry, _ in self._screens.get(model.name, [])]}
+                for model in self._simulation.world.models.values()]
 
     def prepare(self, name, xml, namespace, parameters):
         """Any thread but the loop's: read a URDF. Raises :class:`SpawnRefused`.
@@ -158,6 +172,8 @@ class Spawner:
         self._simulation.world.delete(name)
         self.drawings.pop(name, None)
         self.sensors.pop(name, None)
+        for _, picture in self._screens.pop(name, []):
+            picture.close()
 
     def _set_start(self, model, start):
         names = list(start)
@@ -178,13 +194,24 @@ class Spawner:
         # By name: an earlier plugin may have replaced the model by a fixed one.
         model = simulation.world.models[model_name]
         context = PluginContext(simulation.world, model, prepared.robot, element, namespace, prepared.xml, self._log,
-                                self._ros, prepared.parameters)
+                                self._ros, prepared.parameters,
+                                lambda *screen: self._add_screen(prepared, *screen))
         try:
             plugin = plugin_class(context)
         except Exception:
             context.close()
             raise
         simulation.host(HostedPlugin(plugin, context, model_name, label))
+
+    def _add_screen(self, prepared, link, place, size_m, pixels):
+        frames = merge_fixed(prepared.robot).frames
+        if link not in frames:
+            raise PluginError("a screen shall hang on link '%s', which '%s' has not" % (link, prepared.robot.name))
+        picture = PictureWriter(self._folder / ("screen%d" % next(self._number)), *pixels)
+        entry = {"link": frames[link].link, "offset": (frames[link].offset @ place).ravel().tolist(),
+                 "size": list(size_m), "picture": str(picture.path)}
+        self._screens.setdefault(prepared.name, []).append((entry, picture))
+        return picture
 
     def _plugins(self, robot, spawn_namespace):
         found, sensors, options = [], [], {}

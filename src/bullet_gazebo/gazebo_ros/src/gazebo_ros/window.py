@@ -13,6 +13,7 @@ from urdf_model.transforms import quaternion_from_matrix
 # Where the camera stands at the start: in front of a robot that looks along x, a little to its left.
 _CAMERA = {"cameraDistance": 1.9, "cameraYaw": 55.0, "cameraPitch": -15.0, "cameraTargetPosition": [0.25, 0.0, 0.85]}
 _DEFAULT_COLOUR = (0.7, 0.7, 0.7, 1.0)
+_LAMP_DISTANCE_M = 10.0
 _FLOOR_HALF_M, _TILE_M = 4.0, 0.5
 _FLOOR_COLOURS = ((0.78, 0.80, 0.82, 1.0), (0.70, 0.72, 0.75, 1.0))
 _PROBE = "import pybullet, sys; sys.exit(pybullet.connect(pybullet.GUI, options='--width=64 --height=48') < 0)"
@@ -72,6 +73,14 @@ class Window:
         self._shown = {}
         self.set_state(values)
         pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_RENDERING, 1, physicsClientId=self._client)
+
+    def set_lights(self, lights):
+        """Light comes from where the first directional one of ``lights`` does, as :meth:`WorldLights.listed` lists."""
+        for light in lights or ():
+            if light["type"] == "directional":
+                position = (-_LAMP_DISTANCE_M * np.asarray(light["direction"])).tolist()
+                pybullet.configureDebugVisualizer(lightPosition=position, physicsClientId=self._client)
+                return
 
     def set_state(self, values):
         """Move everything to where the snapshot's ``values`` say it is."""

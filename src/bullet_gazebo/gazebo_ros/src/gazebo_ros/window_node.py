@@ -60,10 +60,11 @@ def _show(window, stop):
         started = time.monotonic()
         snapshot = reader.read()
         if snapshot is not None and snapshot.revision != shown_revision:
-            revision, bodies = reader.scene()
-            if revision == snapshot.revision:
-                view.set_scene(bodies, snapshot.values)
-                shown_revision = revision
+            scene = reader.scene()
+            if scene.revision == snapshot.revision:
+                view.set_scene(scene.bodies, snapshot.values)
+                view.set_lights(scene.light.get("lights"))
+                shown_revision = scene.revision
         if snapshot is not None and snapshot.revision == shown_revision:
             view.set_state(snapshot.values)
         time.sleep(max(0.005, 1.0 / _FRAME_RATE - (time.monotonic() - started)))

@@ -310,7 +310,11 @@ class GazeboBodies(unittest.TestCase):
         self.accepted(sun)
         self.assertAlmostEqual(sun.attenuation_constant, 0.9)
         self.refused(self.get_light_properties("lamp"), "lamp", "sun")
-        self.refused(self.set_light_properties(light_name="sun", diffuse=ColorRGBA(1, 0, 0, 1)), "no effect", "sun")
+        self.accepted(self.set_light_properties(light_name="sun", diffuse=ColorRGBA(1, 0, 0, 1),
+                                                attenuation_constant=0.5))
+        changed = self.get_light_properties("sun")
+        self.assertEqual((changed.diffuse.r, changed.diffuse.g, changed.attenuation_constant), (1.0, 0.0, 0.5))
+        self.refused(self.set_light_properties(light_name="lamp"), "lamp", "sun")
         self.refused(self.delete_light("lamp"), "lamp", "sun")
 
     def test_solver_iterations_are_the_part_of_ode_config_that_counts(self):

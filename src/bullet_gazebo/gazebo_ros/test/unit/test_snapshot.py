@@ -42,11 +42,12 @@ def test_what_was_read_does_not_change_afterwards(writer):
 
 def test_a_new_scene_raises_the_revision(writer):
     reader = SnapshotReader(writer.folder)
-    writer.write_scene([{"name": "robot", "joints": ["a"], "urdf": "<robot/>"}])
-    revision, bodies = reader.scene()
-    assert revision == writer.revision and bodies[0]["name"] == "robot"
+    writer.write_scene([{"name": "robot", "joints": ["a"], "urdf": "<robot/>"}], {"shadows": False})
+    scene = reader.scene()
+    assert scene.revision == writer.revision and scene.bodies[0]["name"] == "robot"
+    assert scene.light == {"shadows": False}
     writer.write(1, 0.0, [[0.0] * 8])
-    assert reader.read().revision == revision
+    assert reader.read().revision == scene.revision
 
 
 def test_too_many_values_are_refused(writer):

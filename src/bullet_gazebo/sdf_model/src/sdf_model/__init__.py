@@ -3,13 +3,14 @@
 
 from .document import SdfError
 from .folders import ModelFolders, description_file
-from .lights import Light
+from .lights import Light, Scene
 from .model import SdfModel, parse_sdf_model
 from .world import SdfWorld, parse_sdf_world
 
 __all__ = [
     "Light",
     "ModelFolders",
+    "Scene",
     "SdfError",
     "SdfModel",
     "SdfWorld",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The <light> element."""
+"""The <light> element, and what <scene> says of light."""
 
 from dataclasses import dataclass
 
@@ -16,19 +16,33 @@ class Light:
     diffuse: tuple
     specular: tuple
     attenuation: tuple  # constant, linear, quadratic
-    direction: tuple
+    direction: tuple  # in the frame of its pose
     cast_shadows: bool
+    range_m: float = 10.0  # further away it lights nothing
+    spot: tuple | None = None  # of a spot light: inner angle, outer angle [rad, of the whole cone], falloff
+
+
+@dataclass
+class Scene:
+    """What a world says of light that is everywhere. Colours red, green, blue from 0 to 1; None: it does not say."""
+
+    ambient: tuple | None = None
+    background: tuple | None = None
+    shadows: bool = True
 
 
 def read_light(document, element, origin):
     """Return the Light of ``element``; ``origin`` (4x4) is where its <pose> refers to."""
     attenuation = element.find("attenuation")
-    factors = (1.0, 0.0, 0.0)  # of SDF's specification
+    factors = (1.0, 0.0, 0.0)  # of SDF's specification, as the other defaults
+    range_m = Light.range_m
     if attenuation is not None:
+        range_m = document.number(attenuation, "range", range_m)
         factors = tuple(
             document.number(attenuation, tag, default)
             for tag, default in zip(("constant", "linear", "quadratic"), factors, strict=True)
         )
+    spot = element.find("spot")
     return Light(
         document.name(element),
         element.get("type", "point"),
@@ -38,6 +52,20 @@ def read_light(document, element, origin):
         factors,
         document.vector(element, "direction", (0.0, 0.0, -1.0)),
         document.flag(element, "cast_shadows"),
+        range_m,
+        None if spot is None else tuple(
+            document.number(spot, tag, default)
+            for tag, default in (("inner_angle", 0.0), ("outer_angle", 0.0), ("falloff", 0.0))
+        ),
+    )
+
+
+def read_scene(document, element):
+    """Return the Scene of the ``<scene>`` element."""
+    return Scene(
+        *(None if element.find(tag) is None else colour(document, element, tag, None)[:3]
+          for tag in ("ambient", "background")),
+        document.flag(element, "shadows", True),
     )
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from .document import Document, Notes, SdfError
 from .folders import ModelFolders
 from .frames import Frames
-from .lights import Light, read_light
+from .lights import Light, Scene, read_light, read_scene
 from .model import ModelReader, SdfModel
 
 # What a world says about windows, sound and weather, and about solvers that are not here.
-_QUIET = ("scene", "gui", "audio", "wind", "atmosphere", "magnetic_field", "spherical_coordinates")
+_QUIET = ("gui", "audio", "wind", "atmosphere", "magnetic_field", "spherical_coordinates")
 
 
 @dataclass
@@ -29,6 +29,7 @@ class SdfWorld:
     time_step_s: float | None = None
     models: list[SdfModel] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
+    scene: Scene = field(default_factory=Scene)
     problems: list[str] = field(default_factory=list)
     warning: str = ""
 
@@ -60,12 +61,14 @@ class _WorldReader:
     def world(self, element):
         document = self._document
         self._world = SdfWorld(element.get("name", "default"))
-        known = ("gravity", "physics", "include", "model", "light", "frame", "state", *_QUIET)
+        known = ("gravity", "physics", "include", "model", "light", "frame", "state", "scene", *_QUIET)
         document.note_unknown(element, known)
         if element.find("gravity") is not None:
             self._world.gravity = document.vector(element, "gravity", (0.0,) * 3)
         for child in element.iterchildren("physics"):
             self._physics(child)
+        for child in element.iterchildren("scene"):
+            self._world.scene = read_scene(document, child)
         for child in element.iterchildren("frame"):
             self._frames.add(document.name(child), child, child.get("attached_to", ""))
         for child in document.children(element):

@@ -239,6 +239,18 @@ def test_an_include_brings_models_and_lights(tmp_path, shelf):
     assert [(light.name, light.diffuse) for light in found.lights] == [("lamp", (1, 0, 0, 1))]
 
 
+def test_light_and_ambience(tmp_path):
+    found = world(tmp_path, """<scene><ambient>0.1 0.2 0.3 1</ambient><shadows>false</shadows></scene>
+      <light name="beam" type="spot"><pose>0 0 2 0 0 0</pose><attenuation><range>5</range><linear>0.1</linear>
+      </attenuation><spot><inner_angle>0.5</inner_angle><outer_angle>0.7</outer_angle><falloff>2</falloff></spot></light>
+      <light name="bulb" type="point"/>""")
+    assert (found.problems, found.warning) == ([], "")
+    assert (found.scene.ambient, found.scene.background, found.scene.shadows) == ((0.1, 0.2, 0.3), None, False)
+    beam, bulb = found.lights
+    assert (beam.spot, beam.range_m, beam.attenuation) == ((0.5, 0.7, 2.0), 5.0, (1.0, 0.1, 0.0))
+    assert (bulb.spot, bulb.range_m) == (None, 10.0)
+
+
 def test_a_saved_state_says_where_the_models_are(tmp_path, shelf):
     found = world(tmp_path, '<include><uri>model://can</uri></include><state world_name="w"><model name="can">'
                             "<pose>5 0 0 0 0 0</pose></model></state>", shelf)

@@ -9,18 +9,44 @@ from typing import NamedTuple
 import numpy as np
 
 from sensor_renderer.errors import RenderingError
+from sensor_renderer.light import MOST_LAMPS, Lamp
 
-# Direction that sunlight comes from where the world names no light: high, a little from the front left.
-_TO_SUN = np.array([0.45, 0.25, 0.86])
-_SKY = (0.62, 0.70, 0.80)
 # The shadow map covers this much around the place where robots work [m], with so many pixels a side: 9 mm each.
 _SHADOW_CENTRE = np.array([0.3, 0.0, 0.7])
 _SHADOW_HALF_M = 2.2
 _SHADOW_PIXELS = 512
+_NO_LAMP = Lamp((0.0,) * 4, (0.0,) * 3, (0.0,) * 4, (0.0,) * 3, (0.0,) * 3)
 
-# Light is reckoned at the vertices and only shadow at each pixel: without a graphics card pixels are what costs.
-_VERTEX = """
+# Light without shadows, of up to MOST_LAMPS lamps.
+_LAMPS = """
 #version 330
+uniform int lamps;
+uniform vec4 lamp_place[%d];
+uniform vec3 lamp_colour[%d];
+uniform vec4 lamp_fade[%d];
+uniform vec3 lamp_beam[%d];
+uniform vec3 lamp_cone[%d];
+vec3 lamplight(vec3 there, vec3 n) {
+    vec3 sum = vec3(0.0);
+    for (int k = 0; k < lamps; ++k) {
+        vec3 ray = lamp_place[k].xyz - lamp_place[k].w * there;
+        vec3 to_lamp = ray / max(length(ray), 1e-6);
+        float away = lamp_place[k].w * length(ray);
+        vec4 fade = lamp_fade[k];
+        vec3 cone = lamp_cone[k];
+        float part = clamp((dot(-to_lamp, lamp_beam[k]) - cone.y) / (cone.x - cone.y), 0.0, 1.0);
+        float strength = pow(part, cone.z) / max(fade.x + away * (fade.y + away * fade.z), 1e-6);
+        sum += lamp_colour[k] * max(dot(n, to_lamp), 0.0) * (away > fade.w ? 0.0 : strength);
+    }
+    return sum;
+}
+""" % ((MOST_LAMPS,) * 5)
+
+# Light is reckoned at the vertices and only shadow at each pixel: without a graphics card pixels are what costs. Of the
+# floor, which has no more than four corners, lamps are reckoned at each pixel, and only where there are any.
+_VERTEX = """
+uniform vec3 ambient;
+uniform vec3 sun;
 uniform mat4 body;
 uniform mat4 to_clip;
 uniform mat4 to_shadow;
@@ -32,16 +58,18 @@ in vec3 colour;
 out vec3 dim;
 out vec3 bright;
 out vec3 shadow_place;
-out vec2 place;
+out vec3 place;
+out vec3 own;
 void main() {
     vec4 there = body * vec4(position, 1.0);
     vec3 n = mat3(body) * normal;
     // Thinned meshes are not closed everywhere: both sides of a triangle are outside.
     n = dot(n, eye - there.xyz) < 0.0 ? -n : n;
-    dim = colour * (0.44 + 0.12 * n.z);
-    bright = colour * 0.54 * max(dot(n, to_sun), 0.0);
+    own = colour;
+    dim = colour * (ambient * (1.1 + 0.3 * n.z) + LAMPLIGHT);
+    bright = colour * sun * max(dot(n, to_sun), 0.0);
     shadow_place = (to_shadow * there).xyz - vec3(0.0, 0.0, 0.004);
-    place = there.xy;
+    place = there.xyz;
     gl_Position = to_clip * there;
 }
 """
@@ -57,16 +85,18 @@ void main() { seen = vec4(dim + bright * texture(shadow, shadow_place), 1.0); }
 """
 
 _FLOOR_FRAGMENT = """
-#version 330
 uniform sampler2DShadow shadow;
 in vec3 dim;
 in vec3 bright;
 in vec3 shadow_place;
-in vec2 place;
+in vec3 place;
+in vec3 own;
 out vec4 seen;
 void main() {
-    vec2 tile = fract(place) - 0.5;
-    seen = vec4((dim + bright * texture(shadow, shadow_place)) * (tile.x * tile.y > 0.0 ? 1.0 : 0.92), 1.0);
+    vec2 tile = fract(place.xy) - 0.5;
+    vec3 light = dim + bright * texture(shadow, shadow_place);
+    if (lamps > 0) light += own * lamplight(place, vec3(0.0, 0.0, 1.0));
+    seen = vec4(light * (tile.x * tile.y > 0.0 ? 1.0 : 0.92), 1.0);
 }
 """
 
@@ -81,6 +111,27 @@ void main() { gl_Position = to_clip * (body * vec4(position, 1.0)); }
 _SHADOW_FRAGMENT = """
 #version 330
 void main() {}
+"""
+
+
+_SCREEN_VERTEX = """
+#version 330
+uniform mat4 body;
+uniform mat4 to_clip;
+in vec2 corner;
+out vec2 place;
+void main() {
+    place = vec2(0.5 + corner.x, 0.5 - corner.y);
+    gl_Position = to_clip * (body * vec4(corner, 0.0, 1.0));
+}
+"""
+
+_SCREEN_FRAGMENT = """
+#version 330
+uniform sampler2D picture;
+in vec2 place;
+out vec4 seen;
+void main() { seen = texture(picture, place); }
 """
 
 
@@ -109,8 +160,17 @@ class GlRenderer:
         context = self._context
         #: What draws, in the driver's own words.
         self.name = context.info["GL_RENDERER"]
-        self._program = context.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
-        self._floor_program = context.program(vertex_shader=_VERTEX, fragment_shader=_FLOOR_FRAGMENT)
+        lit = _VERTEX.replace("LAMPLIGHT", "lamplight(there.xyz, n)")
+        unlit = "#version 330\n" + _VERTEX.replace("LAMPLIGHT", "0.0")
+        self._program = context.program(vertex_shader=_LAMPS + lit, fragment_shader=_FRAGMENT)
+        self._floor_program = context.program(vertex_shader=unlit, fragment_shader=_LAMPS + _FLOOR_FRAGMENT)
+        self._screen_program = context.program(vertex_shader=_SCREEN_VERTEX, fragment_shader=_SCREEN_FRAGMENT)
+        corners = np.array([(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)], dtype=np.float32)
+        self._screen = context.vertex_array(self._screen_program, [(context.buffer(corners.tobytes()), "2f", "corner")])
+        self._screen_program["picture"].value = 1
+        self._strip = moderngl.TRIANGLE_STRIP
+        self._smooth = moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR
+        self._pictures = {}
         self._shadow_program = context.program(vertex_shader=_SHADOW_VERTEX, fragment_shader=_SHADOW_FRAGMENT)
         self._shadow_map = context.depth_texture((_SHADOW_PIXELS, _SHADOW_PIXELS))
         self._shadow_map.compare_func = "<="
@@ -120,10 +180,7 @@ class GlRenderer:
         self._links = {}
         self._buffers = {}
         self._shadow_of = None
-        self._shadow_matrix, to_shadow = _shadow_matrices(_TO_SUN)
-        for program in (self._program, self._floor_program):
-            program["to_sun"].value = tuple(_TO_SUN / np.linalg.norm(_TO_SUN))
-            program["to_shadow"].write(_bytes(to_shadow))
+        self._lit_by = self._shadow_matrix = None
         context.enable(moderngl.DEPTH_TEST)
 
     def render(self, mirror, pinhole, pose, colour=True, depth=False):
@@ -138,14 +195,22 @@ class GlRenderer:
         buffer, depth_texture = self._framebuffer(pinhole.width, pinhole.height)
         picture = distance = None
         if colour:
+            self._light_by(mirror.light)
             self._draw_shadows(mirror)
+            screens = self._screens(mirror, pinhole, view)
             buffer.use()
-            buffer.clear(*_SKY, 1.0, depth=1.0)
+            buffer.clear(*mirror.light.background, 1.0, depth=1.0)
             self._shadow_map.use(0)
             for program, floor in ((self._program, False), (self._floor_program, True)):
                 program["to_clip"].write(_bytes(to_clip))
                 program["eye"].value = tuple(pose[:3, 3])
                 self._draw(program, [entry for entry in seen if entry[0].is_floor == floor], 0)
+            if screens:
+                self._screen_program["to_clip"].write(_bytes(to_clip))
+            for texture, matrix in screens:
+                texture.use(1)
+                self._screen_program["body"].write(_bytes(matrix))
+                self._screen.render(self._strip)
             picture = np.frombuffer(buffer.read(components=3, alignment=1), np.uint8)
             picture = picture.reshape(pinhole.height, pinhole.width, 3)
         else:
@@ -162,12 +227,57 @@ class GlRenderer:
         """Give the context back."""
         self._context.release()
 
+    def _light_by(self, light):
+        if light == self._lit_by:
+            return
+        self._lit_by, self._shadow_of = light, None
+        self._shadow_matrix, to_shadow = _shadow_matrices(np.array(light.to_sun))
+        for program in (self._program, self._floor_program):
+            program["ambient"].value, program["sun"].value = light.ambient, light.sun
+            program["to_sun"].value = light.to_sun
+            program["to_shadow"].write(_bytes(to_shadow))
+            program["lamps"].value = len(light.lamps)
+            for name in Lamp._fields:
+                values = np.zeros((MOST_LAMPS, len(getattr(_NO_LAMP, name))), dtype=np.float32)
+                for row, lamp in zip(values, light.lamps, strict=False):
+                    row[:] = getattr(lamp, name)
+                program["lamp_" + name].write(values.tobytes())
+
+    def _screens(self, mirror, pinhole, view):
+        """The screens that show their faces: (texture, matrix of a square of 1 m)."""
+        found = []
+        for body in mirror.bodies.values():
+            for screen in body.screens:
+                matrix = body.link_matrix(screen.link) @ screen.offset
+                face = _Link((), np.zeros(3), float(np.hypot(*screen.size)) / 2.0, False)
+                local = view @ matrix
+                if local[:3, 2] @ local[:3, 3] < 0.0 and _visible([(face, matrix)], pinhole, view):
+                    found.append((self._texture(mirror, screen.picture), matrix @ np.diag([*screen.size, 1.0, 1.0])))
+        return found
+
+    def _texture(self, mirror, picture):
+        texture = self._pictures.get(picture)
+        if texture is None:
+            there = {screen.picture for body in mirror.bodies.values() for screen in body.screens}
+            for gone in self._pictures.keys() - there:
+                self._pictures.pop(gone).release()
+            texture = self._pictures[picture] = self._context.texture((picture.width, picture.height), 3, alignment=1)
+            texture.filter = self._smooth
+            texture.repeat_x = texture.repeat_y = False
+        pixels = picture.read()
+        if pixels is not None:
+            texture.write(pixels.tobytes(), alignment=1)
+            texture.build_mipmaps()
+        return texture
+
     def _draw_shadows(self, mirror):
         if self._shadow_of == (id(mirror), mirror.version):
             return
         self._shadow_of = (id(mirror), mirror.version)
         self._shadow_buffer.use()
         self._shadow_buffer.clear(depth=1.0)
+        if not mirror.light.shadows:
+            return
         self._shadow_program["to_clip"].write(_bytes(self._shadow_matrix))
         casting = [(link, matrix) for link, matrix in self._everything(mirror) if not link.is_floor]
         self._draw(self._shadow_program, casting, 1)
@@ -237,10 +347,9 @@ def _visible(listed, pinhole, view):
     return [listed[k] for k in order if inside[k]]
 
 
-def _shadow_matrices(to_sun):
-    """From the world to the clip space of the light, and to places 0 to 1 in its picture."""
-    away = to_sun / np.linalg.norm(to_sun)
-    right = np.cross((0.0, 1.0, 0.0), away)
+def _shadow_matrices(away):
+    """From the world to the clip space of the light that comes from ``away``, and to places 0 to 1 in its picture."""
+    right = np.cross((0.0, 1.0, 0.0) if abs(away[1]) < 0.9 else (1.0, 0.0, 0.0), away)
     right /= np.linalg.norm(right)
     rotation = np.array([right, np.cross(away, right), away])
     to_clip = np.eye(4)

@@ -5,7 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gazebo_ros.drawing import DrawingError
+from gazebo_ros.shared_picture import PictureReader
+from gazebo_ros.snapshot import SnapshotError
 from sensor_renderer import triangles
+from sensor_renderer.light import Light
 from urdf_model import Mesh, merge_fixed, parse_urdf
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, rigid
 
@@ -24,13 +27,25 @@ class Part(NamedTuple):
     is_floor: bool = False
 
 
-class Body:
-    """A model: its links as parts, and where they are."""
+class Screen(NamedTuple):
+    """A rectangle that shows a picture. ``offset`` (4, 4) in the frame of ``link``: in its middle, x to the right and y
+    up for who looks at it; ``size``: width, height [m]; ``picture``:
+    :class:`gazebo_ros.shared_picture.PictureReader`."""
 
-    def __init__(self, links, joints):
+    link: str
+    offset: np.ndarray
+    size: tuple
+    picture: PictureReader
+
+
+class Body:
+    """A model: its links as parts, its screens, and where they are."""
+
+    def __init__(self, links, joints, screens=()):
         """``links``: list of (name, parts), parents first; ``joints``: one ``urdf_model.Joint`` per link but the first.
 
         """
+        self.screens = screens
         self._joints = joints
         self._index = {name: number for number, (name, _) in enumerate(links)}
         self.parts = [parts for _, parts in links]
@@ -75,16 +90,19 @@ class Mirror:
         self._bodies = {}
         #: Bodies by name, in the scene's order.
         self.bodies = {}
-        #: Counts changes of what is to be seen.
+        #: What everything is seen by: :class:`sensor_renderer.light.Light`.
+        self.light = Light.of_scene({})
+        #: Counts changes of what is to be seen, but for pictures on screens.
         self.version = 0
 
-    def set_scene(self, listed):
+    def set_scene(self, listed, light=None):
         """Show what :meth:`gazebo_ros.snapshot.SnapshotWriter.write_scene` lists; what is known already stays."""
+        self.light = Light.of_scene(light or {})
         known = self._bodies
         self._bodies = {}
         for entry in listed:
             name = entry["name"]
-            key = (entry["urdf"], tuple(entry["joints"]))
+            key = (entry["urdf"], tuple(entry["joints"]), str(entry.get("screens")))
             old = known.get(name)
             self._bodies[name] = old if old is not None and old[0] == key else (key, self._build(entry))
         self.bodies = {name: body for name, (_, body) in self._bodies.items()}
@@ -106,7 +124,15 @@ class Mirror:
         order = [merged.root, *(joint.child for joint in joints)]
         links = [(name, [part for shape in merged.links[name].visuals for part in self._parts_of(shape)])
                  for name in order]
-        return Body(links, joints)
+        return Body(links, joints, [screen for screen in map(self._screen, entry.get("screens", ())) if screen])
+
+    def _screen(self, listed):
+        try:
+            picture = PictureReader(listed["picture"])
+        except SnapshotError as error:
+            self._warn(str(error))
+            return None
+        return Screen(listed["link"], np.reshape(listed["offset"], (4, 4)), tuple(listed["size"]), picture)
 
     def _parts_of(self, shape):
         geometry, colour = shape.geometry, shape.colour or DEFAULT_COLOUR

@@ -63,12 +63,12 @@ class SensorRenderer:
         if snapshot is None:
             return
         if snapshot.revision != self._revision:
-            revision, bodies = reader.scene()
-            if revision != snapshot.revision:
+            scene = reader.scene()
+            if scene.revision != snapshot.revision:
                 return  # a state of the new scene follows
-            self._mirror.set_scene(bodies)
-            self._set_sensors(bodies)
-            self._revision = revision
+            self._mirror.set_scene(scene.bodies, scene.light)
+            self._set_sensors(scene.bodies)
+            self._revision = scene.revision
         due = [driver for driver in list(self._sensors.values()) if driver.is_due(snapshot.time_s)]
         if not due or snapshot.time_s == self._drawn_s:
             return

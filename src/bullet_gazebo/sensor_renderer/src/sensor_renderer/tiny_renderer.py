@@ -6,9 +6,7 @@ import pybullet
 from sensor_renderer.errors import RenderingError
 from urdf_model.transforms import quaternion_from_matrix
 
-# PyBullet's light: where it stands seen from the middle of the world.
-_TO_SUN = [0.45, 0.25, 0.86]
-_AMBIENT, _DIFFUSE, _SPECULAR = 0.55, 0.5, 0.05
+_SPECULAR = 0.05
 
 
 class TinyRenderer:
@@ -27,14 +25,16 @@ class TinyRenderer:
     def render(self, mirror, pinhole, pose, colour=True, depth=False):
         """As :meth:`GlRenderer.render`."""
         self._follow(mirror)
+        light = mirror.light
         clip = pinhole.clip_matrix()
         clip[1] *= -1.0  # PyBullet turns the picture over by itself
         # OpenGL's eye looks along -z with y up.
         turn = np.diag([1.0, -1.0, -1.0, 1.0])
         _, _, rgba, values, _ = pybullet.getCameraImage(
             pinhole.width, pinhole.height, (turn @ np.linalg.inv(pose)).T.ravel().tolist(),
-            (clip @ turn).T.ravel().tolist(), lightDirection=_TO_SUN, shadow=0, lightAmbientCoeff=_AMBIENT,
-            lightDiffuseCoeff=_DIFFUSE, lightSpecularCoeff=_SPECULAR, flags=pybullet.ER_NO_SEGMENTATION_MASK,
+            (clip @ turn).T.ravel().tolist(), lightDirection=list(light.to_sun), shadow=0,
+            lightAmbientCoeff=1.1 * float(np.mean(light.ambient)), lightDiffuseCoeff=float(np.mean(light.sun)),
+            lightSpecularCoeff=_SPECULAR, flags=pybullet.ER_NO_SEGMENTATION_MASK,
             renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client)
         size = pinhole.height, pinhole.width
         picture = np.array(rgba, dtype=np.uint8).reshape(*size, 4)[:, :, :3] if colour else None

@@ -71,7 +71,7 @@ class BaxterPlugin(ModelPlugin):
             context.world, model, self._baxter.arms, self._feel, self._panel.cuff_squeezed)
         self._procedures = ProcedureTopics(self._baxter.state)
         self._parts = (
-            self._panel, self._head, self._grippers, self._collision, self._procedures, senses, ScreenTopics(),
+            self._panel, self._head, self._grippers, self._collision, self._procedures, senses, ScreenTopics(context),
             StatusTopics(self._baxter, self._chains, self._read_arms, robot.links, context.urdf_xml, context.log))
         if self._switch("enable", False):
             self._apply(Event.ENABLE)

@@ -2,11 +2,17 @@
 """The head's screen: pictures of any usual encoding, put into its upper left corner."""
 import numpy as np
 
+from urdf_model import Box
+
 from .errors import CommandRefused
 from .topic_row import Topic
 
 WIDTH, HEIGHT = 1024, 600
 SCREEN_RATE_HZ = 10.0
+#: The link whose only shape is the glass, a thin box that looks along its z.
+GLASS_LINK = "display"
+# How far before the glass pictures are, so that nobody sees glass instead [m].
+_BEFORE_M = 0.0005
 # Channels of a pixel, and which of them are red, green and blue; cv_bridge's 8UC3 and 8UC1 say nothing of colours, and
 # clients mean blue first.
 ENCODINGS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "8UC3": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)),
@@ -18,6 +24,18 @@ SCREEN_TOPICS = (
           "mono8, 8UC1, 8UC3, 8UC4; it stays until the next one"),
     Topic("screen", "sim/screen", "sensor_msgs/Image", SCREEN_RATE_HZ, "what the screen shows, 1024 x 600, rgb8"),
 )
+
+
+def on_glass(robot):
+    """Where pictures are on GLASS_LINK of a urdf_model.Robot: (place (4, 4), x to the right and y up for who looks at
+    them; width and height [m]), as wide as the glass. None for a robot without one."""
+    shapes = robot.links[GLASS_LINK].visuals if GLASS_LINK in robot.links else []
+    if len(shapes) != 1 or not isinstance(shapes[0].geometry, Box):
+        return None
+    width, _, thickness = shapes[0].geometry.size
+    before = np.eye(4)
+    before[2, 3] = thickness / 2.0 + _BEFORE_M
+    return shapes[0].origin @ before, (width, width * HEIGHT / WIDTH)
 
 
 class Screen:

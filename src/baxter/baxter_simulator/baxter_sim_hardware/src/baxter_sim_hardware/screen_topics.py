@@ -4,20 +4,34 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
 from baxter_sim_hardware.convert import stamp
-from baxter_sim_hardware.screen import HEIGHT, WIDTH, Screen
+from baxter_sim_hardware.screen import GLASS_LINK, HEIGHT, WIDTH, Screen, on_glass
 
 SCREEN_FRAME = "screen"
 
 
 class ScreenTopics:
-    """makers and takers: as in PanelTopics; `screen`: the Screen, for whoever draws the robot."""
+    """makers and takers: as in PanelTopics; `screen`: the Screen."""
 
-    def __init__(self):
+    def __init__(self, context):
+        """`context`: the plugin's PluginContext; whoever draws the world gets the picture there."""
         self.screen = Screen()
-        self.reset = self.screen.reset
+        glass = on_glass(context.robot)
+        self._drawn = context.screen(GLASS_LINK, *glass, (WIDTH, HEIGHT)) if glass else None
         self.makers = {"screen": self._image}
-        self.takers = {"xdisplay": lambda part, msg, time_s: self.screen.show(
-            msg.width, msg.height, msg.encoding, msg.step, msg.data)}
+        self.takers = {"xdisplay": self._show}
+
+    def reset(self):
+        """A dark screen."""
+        self.screen.reset()
+        self._draw()
+
+    def _show(self, part, msg, time_s):
+        self.screen.show(msg.width, msg.height, msg.encoding, msg.step, msg.data)
+        self._draw()
+
+    def _draw(self):
+        if self._drawn is not None:
+            self._drawn.show(self.screen.pixels)
 
     def _image(self, time_s, part, snapshot):
         return Image(Header(stamp=stamp(time_s), frame_id=SCREEN_FRAME), HEIGHT, WIDTH, "rgb8", 0, 3 * WIDTH,

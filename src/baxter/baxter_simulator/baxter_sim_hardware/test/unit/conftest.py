@@ -45,6 +45,15 @@ class _Outbox:
         self.messages.append((self._lab.world.time_s, message))
 
 
+class _Drawn:
+    def __init__(self, link, place, size_m, pixels):
+        self.link, self.place, self.size_m = link, place, size_m
+        self.pixels = np.zeros((*pixels[::-1], 3), dtype=np.uint8)
+
+    def show(self, pixels):
+        self.pixels = pixels.copy()
+
+
 class _Log:
     def __init__(self):
         self.lines = []
@@ -90,6 +99,10 @@ class Lab:
 
     def service(self, name, srv_class, handler):
         self.services[name] = handler
+
+    def screen(self, link, place, size_m, pixels):
+        self.drawn = _Drawn(link, place, size_m, pixels)
+        return self.drawn
 
     # -- what tests do with it
 

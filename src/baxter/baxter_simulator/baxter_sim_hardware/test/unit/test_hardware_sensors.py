@@ -155,6 +155,17 @@ def test_a_picture_is_shown_from_the_upper_left_corner_and_stays(make_lab, encod
     lab.run(1.0)
     pixels = shown(lab)
     assert (pixels[:50, :100] == colour).all() and not pixels[50:].any() and not pixels[:, 100:].any()
+    assert np.array_equal(lab.drawn.pixels, pixels)
+    lab.plugin.reset()
+    assert not lab.drawn.pixels.any()
+
+
+def test_pictures_are_on_the_glass(make_lab):
+    drawn = make_lab().drawn
+    assert drawn.link == "display" and drawn.size_m == pytest.approx((0.218, 0.218 * 600 / 1024))
+    # 15 degrees back from the link's z, half of the glass and half a millimetre out.
+    assert drawn.place[:3, 2] == pytest.approx([0.0, -np.sin(np.radians(15)), np.cos(np.radians(15))])
+    assert drawn.place[:3, 3] @ drawn.place[:3, 2] == pytest.approx(0.001)
 
 
 @pytest.mark.parametrize("message, reason", [

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A picture in shared memory, beside the snapshot: what a screen in the world shows. ROS-free.
+
+The file begins with width, height and a sequence number, odd while the picture is being written; then come the rows of
+red, green, blue. A reader that was overtaken notices, and has the picture next time.
+"""
+import mmap
+import struct
+
+import numpy as np
+
+from gazebo_ros.snapshot import SnapshotError
+
+_HEADER = struct.Struct("<QQQ")
+_SEQUENCE = struct.Struct("<Q")
+_SEQUENCE_AT = 16
+
+
+class PictureWriter:
+    """The simulator's side; the picture is black at first."""
+
+    def __init__(self, path, width, height):
+        """``path``: a file that is not there yet; ``width``, ``height`` [pixels]."""
+        self.path = path
+        self._sequence = 0
+        size = _HEADER.size + 3 * width * height
+        with open(path, "w+b") as file:
+            file.truncate(size)
+            self._memory = mmap.mmap(file.fileno(), size)
+        _HEADER.pack_into(self._memory, 0, width, height, 0)
+        self._pixels = np.frombuffer(self._memory, np.uint8, 3 * width * height, _HEADER.size).reshape(height, width, 3)
+
+    def show(self, pixels):
+        """Show ``pixels`` (height, width, 3), uint8, red first."""
+        _SEQUENCE.pack_into(self._memory, _SEQUENCE_AT, self._sequence + 1)
+        self._pixels[:] = pixels
+        self._sequence += 2
+        _SEQUENCE.pack_into(self._memory, _SEQUENCE_AT, self._sequence)
+
+    def close(self):
+        """Remove the file. Readers that have it open keep the last picture."""
+        self.path.unlink(missing_ok=True)
+
+
+class PictureReader:
+    """A viewer's side. ``width``, ``height`` [pixels]."""
+
+    def __init__(self, path):
+        """Raises ``SnapshotError`` when there is no picture."""
+        try:
+            with open(path, "rb") as file:
+                self._memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        except (OSError, ValueError) as error:
+            raise SnapshotError("no picture in %s: %s" % (path, error)) from error
+        self.width, self.height, _ = _HEADER.unpack_from(self._memory, 0)
+        self._seen = None
+
+    def read(self):
+        """The picture (height, width, 3), a copy, when it is another than the last time; else None."""
+        sequence, = _SEQUENCE.unpack_from(self._memory, _SEQUENCE_AT)
+        if sequence == self._seen or sequence % 2:
+            return None
+        pixels = np.frombuffer(self._memory, np.uint8, 3 * self.width * self.height, _HEADER.size).copy()
+        if _SEQUENCE.unpack_from(self._memory, _SEQUENCE_AT)[0] != sequence:
+            return None
+        self._seen = sequence
+        return pixels.reshape(self.height, self.width, 3)

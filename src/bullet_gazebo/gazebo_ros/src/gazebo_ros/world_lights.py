@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The lights of the world: what the world file says, what services make of it, what viewers are told. ROS-free."""
+import dataclasses
+
+import numpy as np
+
+from gazebo_ros.entities import UnknownEntity
+from sdf_model import Scene
+
+
+class WorldLights:
+    """Lights by name."""
+
+    def __init__(self, lights, scene=None):
+        """``lights``: list of ``sdf_model.Light``; ``scene``: ``sdf_model.Scene``."""
+        self._lights = {light.name: light for light in lights}
+        self._scene = scene or Scene()
+        # A world without any is not a dark one: viewers choose. One whose lights were deleted is.
+        self._unlit = not lights
+        #: Called when viewers have to be told.
+        self.on_change = lambda: None
+
+    def get(self, name):
+        """The ``sdf_model.Light``; raises :class:`UnknownEntity`."""
+        try:
+            return self._lights[name]
+        except KeyError:
+            raise UnknownEntity("light '%s' does not exist; lights: %s"
+                                % (name, ", ".join(self._lights) or "none")) from None
+
+    def change(self, name, **values):
+        """Change some fields of a light; raises :class:`UnknownEntity`, and ``ValueError`` for what is no number."""
+        light = self.get(name)
+        for key, value in values.items():
+            if not np.isfinite(np.asarray(value, dtype=float)).all():
+                raise ValueError("%s of light '%s' is %s, expected finite numbers" % (key, name, value))
+        self._lights[name] = dataclasses.replace(light, **values)
+        self.on_change()
+
+    def delete(self, name):
+        """Take a light out of the world; raises :class:`UnknownEntity`."""
+        self.get(name)
+        del self._lights[name]
+        self.on_change()
+
+    def listed(self):
+        """What the scene says of light: plain data.
+
+        ``ambient``, ``background``: red, green, blue or None where the viewer may choose; ``shadows``; ``lights``: a
+        list of dictionaries, or None where the viewer may choose. Places and directions are the world's.
+        """
+        return {"ambient": self._scene.ambient, "background": self._scene.background, "shadows": self._scene.shadows,
+                "lights": None if self._unlit else [_listed(light) for light in self._lights.values()]}
+
+
+def _listed(light):
+    return {"type": light.type, "place": light.pose[:3, 3].tolist(),
+            "direction": (light.pose[:3, :3] @ light.direction).tolist(), "diffuse": list(light.diffuse[:3]),
+            "attenuation": list(light.attenuation), "range": light.range_m, "spot": light.spot,
+            "cast_shadows": light.cast_shadows}

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lights as services change them, and pictures in shared memory."""
+import numpy as np
+import pytest
+
+from gazebo_ros.entities import UnknownEntity
+from gazebo_ros.shared_picture import PictureReader, PictureWriter
+from gazebo_ros.snapshot import SnapshotError
+from gazebo_ros.world_lights import WorldLights
+from sdf_model import Light, Scene
+from urdf_model.transforms import pose_matrix
+
+SUN = Light("sun", "directional", pose_matrix((1.0, 2.0, 3.0), (0.0, 0.0, np.pi / 2)), (0.8, 0.8, 0.8, 1.0),
+            (0.2, 0.2, 0.2, 1.0), (0.9, 0.01, 0.001), (1.0, 0.0, -1.0), True)
+
+
+def test_viewers_are_told_in_the_frame_of_the_world_and_of_each_change():
+    lights, told = WorldLights([SUN], Scene(ambient=(0.1, 0.2, 0.3))), []
+    lights.on_change = lambda: told.append(lights.listed())
+    listed = lights.listed()
+    assert listed["ambient"] == (0.1, 0.2, 0.3) and listed["background"] is None and listed["shadows"]
+    sun, = listed["lights"]
+    assert sun["direction"] == pytest.approx([0.0, 1.0, -1.0]) and sun["place"] == [1.0, 2.0, 3.0]
+    lights.change("sun", diffuse=(1.0, 0.0, 0.0, 1.0))
+    assert told[-1]["lights"][0]["diffuse"] == [1.0, 0.0, 0.0]
+    with pytest.raises(ValueError, match="diffuse of light 'sun' is .*nan.*, expected finite"):
+        lights.change("sun", diffuse=(float("nan"), 0.0, 0.0, 1.0))
+    with pytest.raises(UnknownEntity, match="'lamp' does not exist; lights: sun"):
+        lights.change("lamp", diffuse=(1.0, 0.0, 0.0, 1.0))
+    lights.delete("sun")
+    assert told[-1]["lights"] == [] and len(told) == 2
+
+
+def test_a_world_that_names_no_light_leaves_it_to_the_viewer():
+    assert WorldLights([]).listed()["lights"] is None
+
+
+def test_a_picture_is_read_when_it_is_new(tmp_path):
+    writer = PictureWriter(tmp_path / "p", 4, 2)
+    reader = PictureReader(tmp_path / "p")
+    assert (reader.width, reader.height) == (4, 2)
+    assert not reader.read().any() and reader.read() is None
+    writer.show(np.full((2, 4, 3), 7, dtype=np.uint8))
+    assert (reader.read() == 7).all() and reader.read() is None
+    writer.close()
+    assert not (tmp_path / "p").exists() and reader.read() is None
+    with pytest.raises(SnapshotError, match="no picture in"):
+        PictureReader(tmp_path / "p")

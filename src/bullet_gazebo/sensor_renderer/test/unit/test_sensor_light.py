@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""By which light things are seen, and pictures on screens."""
+import numpy as np
+import pytest
+
+from gazebo_ros.drawing import DrawingCache
+from gazebo_ros.shared_picture import PictureWriter
+from sensor_renderer.gl_renderer import GlRenderer
+from sensor_renderer.light import MOST_LAMPS, Light
+from sensor_renderer.mirror import Mirror
+from sensor_renderer.pinhole import OPTICAL, Pinhole
+from urdf_model.transforms import pose_matrix
+
+CUBE = """<robot name="cube"><link name="link"><visual><geometry><box size="0.2 0.2 0.2"/></geometry>
+<material name="r"><color rgba="0.9 0.9 0.9 1"/></material></visual></link></robot>"""
+SHEET = CUBE.replace("0.2 0.2 0.2", "1 1 0.002")
+FLOOR = {"name": "floor", "urdf": None, "joints": []}
+UPRIGHT = [0, 0, 0, 1]
+# Straight down on x, y = 0, 0 from a height of 2 m; the picture's right is -y of the world, its upper edge +x.
+ABOVE = pose_matrix((0.0, 0.0, 2.0), (0.0, np.pi / 2, 0.0)) @ OPTICAL
+PINHOLE = Pinhole.from_field_of_view(200, 200, 0.927, 0.05, 20.0)  # 2 m wide on the floor, 1 cm a pixel
+
+
+def lamp(kind, **values):
+    return {"type": kind, "place": [0, 0, 1], "direction": [0, 0, -1], "diffuse": [1.0, 1.0, 1.0],
+            "attenuation": [1, 0, 0], "range": 10.0, "spot": None, "cast_shadows": False, **values}
+
+
+@pytest.fixture
+def renderer():
+    made = GlRenderer()
+    yield made
+    made.close()
+
+
+def world(tmp_path, light, *bodies):
+    """A Mirror of the floor and [(entry of the scene, values)]."""
+    mirror = Mirror(DrawingCache(tmp_path), lambda uri: None, pytest.fail)
+    mirror.set_scene([FLOOR, *(entry for entry, _ in bodies)], light)
+    mirror.set_state(np.concatenate([[0, 0, 0, *UPRIGHT], *(values for _, values in bodies)]))
+    return mirror
+
+
+def seen(renderer, mirror, pose=ABOVE):
+    return renderer.render(mirror, PINHOLE, pose)[0].astype(int)
+
+
+def at(picture, x, y):
+    """The colour of the floor at x, y [m]."""
+    return picture[round(99.5 - 100 * x), round(99.5 - 100 * y)]
+
+
+def test_shadows_fall_away_from_the_sun_of_the_world(renderer, tmp_path):
+    cube = {"name": "cube", "urdf": CUBE, "joints": []}, [0, 0, 0.6, *UPRIGHT]
+    for direction, side in (((0.0, 1.0, -1.0), 1), ((0.0, -1.0, -1.0), -1)):
+        sun = lamp("directional", direction=direction, cast_shadows=True)
+        picture = seen(renderer, world(tmp_path, {"lights": [sun]}, cube))
+        assert at(picture, 0.0, 0.6 * side).sum() < 0.7 * at(picture, 0.0, -0.6 * side).sum()
+        for off in ({"shadows": False}, {"lights": [{**sun, "cast_shadows": False}]}):
+            even = seen(renderer, world(tmp_path, {"lights": [sun], **off}, cube))
+            assert at(even, 0.0, 0.6) == pytest.approx(at(even, 0.0, -0.6), rel=0.1)  # tiles differ
+
+
+def test_without_a_lamp_there_is_the_ambience_alone(renderer, tmp_path):
+    dark = seen(renderer, world(tmp_path, {"lights": []}))
+    assert dark.mean() < 0.6 * seen(renderer, world(tmp_path, {})).mean()
+    red = seen(renderer, world(tmp_path, {"lights": [], "ambient": [0.8, 0.1, 0.1]}))
+    assert red[..., 0].mean() == pytest.approx(2 * dark[..., 0].mean(), rel=0.05) and red[..., 1].max() < 30
+    away = pose_matrix((0.0, 0.0, 2.0), (0.0, -np.pi / 2, 0.0)) @ OPTICAL
+    assert (seen(renderer, world(tmp_path, {"background": [1.0, 0.0, 0.2]}), away) == (255, 0, 51)).all()
+
+
+def test_lamps_light_what_they_reach(renderer, tmp_path):
+    for bodies in ((), (({"name": "sheet", "urdf": SHEET, "joints": []}, [0, 0, 0.001, *UPRIGHT]),)):
+        spot = lamp("spot", diffuse=[0.0, 1.0, 0.0], spot=[0.5, 0.7, 1.0])
+        picture = seen(renderer, world(tmp_path, {"lights": [spot], "ambient": [0.1] * 3}, *bodies))
+        if not bodies:  # the floor is lit pixel by pixel: inside of half the outer angle and nowhere else
+            assert at(picture, 0.1, 0.0)[1] > at(picture, 0.1, 0.0)[0] + 80
+            assert at(picture, 0.5, 0.0)[1] < at(picture, 0.5, 0.0)[0] + 10
+        point = lamp("point", diffuse=[0.0, 0.0, 1.0], place=[0.4, 0.4, 0.3], attenuation=[1, 0, 4.0])
+        picture = seen(renderer, world(tmp_path, {"lights": [point], "ambient": [0.1] * 3}, *bodies))
+        assert at(picture, 0.4, 0.4)[2] > at(picture, -0.4, -0.4)[2] + 40
+        short = seen(renderer, world(tmp_path, {"lights": [{**point, "range": 0.2}], "ambient": [0.1] * 3}, *bodies))
+        assert short[..., 2].max() < 50
+
+
+def test_strange_lights_do_no_harm():
+    nowhere = lamp("directional", direction=[0, 0, 0], cast_shadows=True)
+    many = [lamp("point") for _ in range(MOST_LAMPS + 5)]
+    light = Light.of_scene({"lights": [nowhere, *many, lamp("spot", spot=None)]})
+    assert light.sun == (0.0, 0.0, 0.0) and len(light.lamps) == MOST_LAMPS
+    assert np.isfinite(light.to_sun).all()
+    first, second = lamp("directional"), lamp("directional", diffuse=[1, 0, 0], cast_shadows=True)
+    light = Light.of_scene({"lights": [first, second]})
+    assert light.sun[1] == 0.0 and len(light.lamps) == 1, "the sun is the one that casts shadows"
+
+
+def test_a_screen_shows_its_picture_the_right_way_round(renderer, tmp_path):
+    pictures = PictureWriter(tmp_path / "screen", 100, 50)
+    # Its face up, its right towards -y, so that this camera sees it upright.
+    place = np.array([[0, 1, 0, 0.0], [-1, 0, 0, 0.0], [0, 0, 1, 0.02], [0, 0, 0, 1]])
+    body = {"name": "sheet", "urdf": SHEET, "joints": [], "screens": [
+        {"link": "link", "offset": place.ravel().tolist(), "size": [0.8, 0.4], "picture": str(pictures.path)}]}
+    mirror = world(tmp_path, {}, (body, [0, 0, 0.5, *UPRIGHT]))
+    black = seen(renderer, mirror)
+    assert (black[90:110, 60:140] == 0).all()
+
+    pixels = np.zeros((50, 100, 3), dtype=np.uint8)
+    pixels[:25, :50], pixels[:25, 50:], pixels[25:, :50] = (255, 0, 0), (0, 255, 0), (0, 0, 255)
+    pictures.show(pixels)
+    shown = seen(renderer, mirror)
+    for row, column, colour in ((85, 80, (255, 0, 0)), (85, 120, (0, 255, 0)), (115, 80, (0, 0, 255)),
+                                (115, 120, (0, 0, 0))):
+        assert shown[row, column] == pytest.approx(colour, abs=2)
+    # 0.8 m wide at 1.48 m below the camera.
+    width = (shown[85].max(axis=1) - shown[85].min(axis=1) > 200).sum()
+    assert width == pytest.approx(0.8 / 1.48 * PINHOLE.fx, abs=2)
+
+    below = pose_matrix((0.0, 0.0, 0.05), (0.0, -np.pi / 2, 0.0)) @ OPTICAL
+    assert np.ptp(seen(renderer, mirror, below)[100, 100]) < 10, "nobody sees it from behind"
+    pictures.close()
+    mirror.set_scene([FLOOR], {})
+    assert not mirror.bodies["floor"].screens
+
+
+def test_a_screen_whose_picture_is_gone_is_left_out(tmp_path):
+    said = []
+    mirror = Mirror(DrawingCache(tmp_path), lambda uri: None, said.append)
+    mirror.set_scene([{"name": "sheet", "urdf": SHEET, "joints": [], "screens": [
+        {"link": "link", "offset": np.eye(4).ravel().tolist(), "size": [1, 1], "picture": str(tmp_path / "gone")}]}])
+    assert not mirror.bodies["sheet"].screens and "gone" in said[0]
