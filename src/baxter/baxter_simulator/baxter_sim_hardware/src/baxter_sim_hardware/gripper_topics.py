@@ -9,7 +9,8 @@ from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.gripper import ElectricGripper
 from baxter_sim_hardware.gripper_commands import CustomGripper
 from baxter_sim_hardware.hands import NoHand, hand_of
-from baxter_sim_hardware.panel import VACUUM_SENSORS
+from baxter_sim_hardware.panel import BLOWERS, PUMPS, VACUUM_SENSORS
+from baxter_sim_hardware.robot import ENABLE_HINT
 from baxter_sim_hardware.sides import SIDES
 from baxter_sim_hardware.suction import SuctionGripper
 
@@ -60,11 +61,22 @@ class GripperTopics:
             hand.reset()
 
     def attach_sensors(self, panel):
-        """Show the vacuum sensors, 0 to 255, among the panel's channels."""
-        for side, name in VACUUM_SENSORS.items():
-            gripper = self._hands[side].gripper
+        """Have the vacuum sensors, 0 to 255, and the valves of suction grippers among the panel's channels."""
+        for side, hand in self._hands.items():
+            gripper = hand.gripper
             if isinstance(gripper, SuctionGripper):
-                panel.attach(name, lambda gripper=gripper: gripper.sensor)
+                panel.attach(VACUUM_SENSORS[side], lambda gripper=gripper: gripper.sensor)
+                panel.attach_valve(PUMPS[side], lambda gripper=gripper: gripper.sucking, self._valve(gripper.set_pump))
+                panel.attach_valve(BLOWERS[side], lambda gripper=gripper: gripper.blowing,
+                                   self._valve(gripper.set_blow))
+
+    def _valve(self, switch):
+        def write(on):
+            if on and not self._state.enabled:
+                raise CommandRefused(ENABLE_HINT)
+            switch(on)
+
+        return write
 
     def _command(self, side, msg, time_s):
         gripper = self._hands[side].gripper

@@ -23,7 +23,8 @@ TOPICS = (
           "baxter_core_msgs/SEAJointState", STATE_RATE_HZ,
           "per joint, torso to wrist: set-points, measured state, torque that balances gravity"),
     Topic("digital_io", "digital_io/{digital}/state", "baxter_core_msgs/DigitalIOState", STATE_RATE_HZ,
-          "one button, light, ... : 0 or 1, and whether it is an input"),
+          "one button, light, ... : 0 or 1, and whether it is an input; `<limb>_suck` and `<limb>_blow` are the valves "
+          "of a suction gripper"),
     Topic("digital_io_states", "digital_io_states", "baxter_core_msgs/DigitalIOStates", STATE_RATE_HZ,
           "all of them"),
     Topic("analog_io", "analog_io/{analog}/state", "baxter_core_msgs/AnalogIOState", STATE_RATE_HZ,

@@ -28,6 +28,8 @@ DIGITAL = {
                      "limit_switch_3", "motor_fault_signal"), True),
 }
 WHEELS = tuple("%s_wheel" % navigator for navigator in NAVIGATORS)
+PUMPS = {side: "%s_suck" % side for side in SIDES}  # the valves of a suction gripper
+BLOWERS = {side: "%s_blow" % side for side in SIDES}
 VACUUM_SENSORS = {side: "%s_vacuum_sensor_analog" % side for side in SIDES}
 RANGE_SENSORS = {side: "%s_hand_range" % side for side in SIDES}
 ANALOG = {**dict.fromkeys((*WHEELS, *VACUUM_SENSORS.values(), *RANGE_SENSORS.values()), True),
@@ -46,12 +48,20 @@ class Panel:
     """The present value of every channel: `digital` {name: bool}, `analog` {name: int}; all zero at the start."""
 
     def __init__(self):
-        self._sensors = {}
+        self._sensors, self._valves = {}, {}
         self.reset()
 
     def attach(self, name, read):
         """Have an analog input show what `read()` returns, an integer from 0."""
         self._sensors[name] = read
+
+    def attach_valve(self, name, read, write):
+        """Have a digital output show what `read()` returns, and call `write(value)` when it is switched."""
+        self._valves[name] = read, write
+
+    def read_digital(self, name):
+        """Whether a digital channel is on."""
+        return bool(self._valves[name][0]()) if name in self._valves else self.digital[name]
 
     def read_analog(self, name):
         """The present integer of an analog channel."""
@@ -63,9 +73,12 @@ class Panel:
         self.analog = dict.fromkeys(ANALOG, 0)
 
     def set_digital(self, name, value):
-        """Switch an output. Raises CommandRefused for an unknown name and for an input."""
+        """Switch an output. Raises CommandRefused for an unknown name and for an input, and where its valve does."""
         _require(name, DIGITAL, "digital output", is_input=False)
-        self.digital[name] = bool(value)
+        if name in self._valves:
+            self._valves[name][1](bool(value))
+        else:
+            self.digital[name] = bool(value)
 
     def set_analog(self, name, value):
         """Set an output to an integer, 0 to 65535. Raises CommandRefused for what is not one, and for an input."""

@@ -26,7 +26,7 @@ class PanelTopics:
         """press_estop: function(whether the emergency stop is pressed now)."""
         self._panel, self._press_estop = Panel(), press_estop
         self.reset = self._panel.reset
-        self.attach = self._panel.attach
+        self.attach, self.attach_valve = self._panel.attach, self._panel.attach_valve
         self.makers = {
             "digital_io": lambda time_s, name, _: self._digital(name),
             "digital_io_states": lambda time_s, part, _: DigitalIOStates(
@@ -51,7 +51,7 @@ class PanelTopics:
         return self._panel.digital["%s_lower_cuff" % side]
 
     def _digital(self, name):
-        return DigitalIOState(int(self._panel.digital[name]), DIGITAL[name])
+        return DigitalIOState(int(self._panel.read_digital(name)), DIGITAL[name])
 
     def _analog(self, name, time_s):
         return AnalogIOState(stamp(time_s), float(self._panel.read_analog(name)), ANALOG[name])

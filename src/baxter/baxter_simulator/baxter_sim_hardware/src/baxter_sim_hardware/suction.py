@@ -100,17 +100,33 @@ class SuctionGripper(Gripper):
         return BLOW_PA if self.blowing else -FULL_VACUUM_PA * self._level
 
     def end_attempt(self):
-        """Suck on only if something is held: nothing falls because the robot was disabled."""
+        """Suck on only if something is held, and blow no more: nothing falls because the robot was disabled."""
         if not self.vacuum:
             self._stop({})
+
+    def set_pump(self, on):
+        """Suck for as long as it takes, or end that: what the digital output of the pump's valve does."""
+        if on and not self.sucking:
+            self._start(math.inf)
+        elif not on and self.sucking:
+            self._stop({})
+
+    def set_blow(self, on):
+        """Blow until told otherwise, or end that: what the digital output of the blow-off valve does."""
+        if on:
+            self._stop({})
+        self._blow_left_s = math.inf if on else 0.0
 
     def _go(self, values):
         seconds = values.get("grip_attempt_seconds", ATTEMPT_S)
         if set(values) - {"grip_attempt_seconds"} or not (is_number(seconds) or seconds == math.inf):
             raise CommandRefused('%s needs {"grip_attempt_seconds": SECONDS}, less than 0 for as long as it takes, '
                                  "not %s" % (self.command, json.dumps(values)))
+        self._start(seconds if seconds >= 0.0 else math.inf)
+
+    def _start(self, attempt_s):
         self.sucking, self.missed = True, False
-        self._attempt_s = self._attempt_left_s = seconds if seconds >= 0.0 else math.inf
+        self._attempt_s = self._attempt_left_s = attempt_s
         self._blow_left_s = 0.0
 
     def _release(self, values):

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from baxter_core_msgs.msg import EndEffectorCommand
+from baxter_core_msgs.msg import DigitalOutputCommand, EndEffectorCommand
 
 import xacro
 from baxter_sim_hardware import CommandRefused, ModelMismatch
@@ -188,6 +188,47 @@ def test_disabling_drops_nothing_but_ends_an_attempt(lab):
     assert distance(lab, box) == pytest.approx(0.0, abs=1e-3)
     tell(lab, "stop", seconds=0.5)
     assert state(lab).gripping == 0
+
+
+def switch(lab, output, on, seconds=0.05):
+    lab.send("digital_io/command", DigitalOutputCommand(output, on))
+    lab.run(seconds)
+    return lab.last("digital_io/%s/state" % output).state
+
+
+def test_the_valves_among_the_digital_outputs_suck_and_blow(lab):
+    look_down(lab)
+    box = put_box_on_cup(lab)
+    lab.world.set_gravity((0.0, 0.0, 0.0))
+    assert switch(lab, "left_suck", True, 1.0) == 1
+    lab.world.set_gravity((0.0, 0.0, -9.81))
+    lab.run(6.0)  # longer than an attempt of a command
+    assert (details(lab)["sucking"], details(lab)["vacuum"], state(lab).gripping) == (True, True, 1)
+    assert switch(lab, "left_blow", False) == 0 and details(lab)["sucking"]
+    assert distance(lab, box) == pytest.approx(0.0, abs=1e-3)
+    assert lab.last("digital_io/right_suck/state").state == 0
+    assert switch(lab, "left_blow", True) == 1
+    assert (details(lab)["sucking"], details(lab)["blowing"]) == (False, True)
+    assert lab.last("digital_io/left_suck/state").state == 0
+    lab.run(1.0)
+    assert details(lab)["blowing"]
+    assert switch(lab, "left_blow", False) == 0
+    assert not details(lab)["blowing"]
+    assert distance(lab, box) > 0.3
+
+
+def test_the_valves_show_what_commands_do(lab):
+    tell(lab, "go", '{"grip_attempt_seconds": -1}')
+    assert lab.last("digital_io/left_suck/state").state == 1
+    tell(lab, "release")
+    assert [lab.last("digital_io/left_%s/state" % name).state for name in ("suck", "blow")] == [0, 1]
+
+
+def test_a_disabled_robot_opens_no_valve(lab):
+    lab.enable(False)
+    assert switch(lab, "left_suck", True) == 0
+    assert "disabled" in lab.log.lines[-1]
+    assert switch(lab, "left_suck", False) == 0
 
 
 def test_idle_cup_costs_no_rays(lab):
