@@ -352,6 +352,16 @@ class Model:
         index = self._link_index[self._frame(link).link]
         pybullet.changeDynamics(self.body, index, frictionAnchor=1, physicsClientId=self._client)
 
+    def renew_contacts(self, link):
+        """Forget the contacts of a link's body; the next step finds those that there are.
+
+        Bullet keeps contacts from step to step, and once in a while one that is none: with a normal that two nearly
+        parallel edges made up, it can hold a body that should come free.
+        """
+        index = self._link_index[self._frame(link).link]
+        # Every body is in group 1 and collides with all; saying so again has Bullet begin anew with it.
+        pybullet.setCollisionFilterGroupMask(self.body, index, 1, -1, physicsClientId=self._client)
+
     def remove(self):
         """For World: take the body out of the physics."""
         for gear in self._gears:

@@ -92,6 +92,31 @@ def test_too_weak_a_grip_lets_go(world, vice):
     assert box.base_pose().position[2] < 0.9
 
 
+def test_renewed_contacts_are_found_again_and_hold_as_before(world, vice):
+    box = world.spawn(parse_urdf(BOX), "box", Pose((0, 0, 1)))
+    vice.couple(0, 1, -1.0)
+    squeeze(world, vice, 6.0)
+    assert world.contacts(vice, box)
+    for link in ("l", "r"):
+        vice.renew_contacts(link)
+    assert not world.contacts(vice, box)
+    squeeze(world, vice, 6.0)
+    np.testing.assert_allclose(vice.contact_force("l"), [0, 6, 0], atol=0.3)
+    assert box.base_pose().position[2] == pytest.approx(1.0, abs=5e-3)
+
+
+def test_renewed_contacts_leave_self_collision_as_it_was(world):
+    """Of two fingers that were driven into each other."""
+    for pairs in ((), (("l", "r"),)):
+        vice = world.spawn(parse_urdf(VICE), "vice%d" % len(pairs), Pose((3.0 * len(pairs), 0, 1)), static=True,
+                           self_collision_pairs=pairs)
+        for link in ("l", "r"):
+            vice.renew_contacts(link)
+        vice.set_joint_positions(np.arange(2), np.array([-0.018, 0.018]))
+        world.step()
+        assert bool(world.contacts(vice, vice)) == bool(pairs)
+
+
 def test_rays_say_whom_they_meet(world):
     world.spawn(parse_urdf(BOX), "box", Pose((0, 0, 1)), static=True)
     hits = world.first_hits([(0, 0, 2), (1, 0, 2), (0, 0, 1.0)], [(0, 0, 1), (1, 0, 1), (0, 0, 2)])

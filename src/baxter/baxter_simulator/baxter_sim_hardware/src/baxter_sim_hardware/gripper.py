@@ -95,19 +95,23 @@ class ElectricGripper(Gripper):
         """Whether something keeps the fingers, pressing on it, from where they were told to go."""
         return self._phase is Phase.HOLDING
 
-    def update(self, position, speed, squeeze):
+    @property
+    def hooked(self):
+        """Whether something keeps the fingers from opening."""
+        return self.moving and self._still_s >= SETTLE_S and self._target > self._position + self._dead
+
+    def update(self, position, squeeze):
         """One tick. Returns (set-point, force [% of the joints'] that may be used), or None: the last one still holds.
 
-        position, speed [travels/s]: of the fingers; squeeze: function that returns the force on them [%].
+        position: of the fingers; squeeze: function that returns the force on them [%].
         """
         self._position = position
-        stands = abs(speed) < min(STILL, 0.5 * self._speed) or self._speed == 0.0
         if self._phase is Phase.RESTING:
             if self._is_near(self._rest):
                 return None
             self._phase = Phase.MOVING
         if self._phase is Phase.MOVING:
-            self._still_s = self._still_s + self._dt if stands else 0.0
+            self._watch()
             if self._still_s >= SETTLE_S:
                 self._arrive(squeeze())
         elif squeeze() >= LOOSE * self._allowed:
@@ -151,6 +155,13 @@ class ElectricGripper(Gripper):
         self._stays = False  # whether to stay here when what is held is gone
         self._phase = Phase.MOVING
         self._still_s = self._loose_s = 0.0
+        self._here = self._position  # where they have been, nearly, for so long
+
+    def _watch(self):
+        """Count for how long the fingers have stood. Where they are counts, not how fast: what jams may rattle."""
+        self._still_s += self._dt
+        if abs(self._position - self._here) > min(STILL, 0.5 * self._speed) * SETTLE_S and self._speed:
+            self._here, self._still_s = self._position, 0.0
 
     def _arrive(self, squeeze):
         """The fingers stand: find out why, and what comes next."""

@@ -46,7 +46,11 @@ class FingersHand:
 
     def update(self, joints):
         """One tick; joints: (position, velocity, effort) of the whole model."""
-        drive = self.gripper.update(self._share(joints[0]), self._share(joints[1]), self._squeeze)
+        drive = self.gripper.update(self._share(joints[0]), self._squeeze)
+        if self.gripper.hooked:
+            # Bullet may keep a contact with a wrong normal where two edges were parallel, which holds what should open.
+            for link in self._links:
+                self._model.renew_contacts(link)
         if drive is not None:
             setpoint, force = drive
             self._model.drive_position(self._index, setpoint * self._openings, force / 100.0 * self._max_effort)
@@ -63,7 +67,7 @@ class FingersHand:
         return self._share(self._model.read_joints()[0])
 
     def _share(self, values):
-        # Two at every tick: numpy would take ten times as long.
+        # At every tick: numpy would take ten times as long.
         return float(sum(values[index] * weight for index, weight in self._weights))
 
 

@@ -220,6 +220,19 @@ def test_fingers_that_may_use_no_force_give_up(lab):
     assert tell(lab, "go", '{"position": 0}', seconds=1.0).moving == 0
 
 
+@pytest.mark.parametrize("target, hooked", [(100.0, True), (0.0, False)])
+def test_fingers_that_rattle_where_they_jam_come_to_rest(target, hooked):
+    """At a speed that would be motion, and to no avail; with less force than would be a grip."""
+    gripper, seen = ElectricGripper(0.02, 0.6), []
+    take(gripper, "go", '{"position": %g}' % target)
+    for tick in range(500):
+        gripper.update(0.6 + 3e-4 * (-1) ** tick, lambda: 36.0)
+        seen.append((gripper.moving, gripper.hooked))
+    assert seen[0] == (True, False)
+    assert ((True, True) in seen) == hooked
+    assert seen[-1] == (False, False)
+
+
 def test_fingers_move_as_one_even_pushed_from_one_side(lab):
     joints = lab.model.index(["l_gripper_l_finger_joint", "l_gripper_r_finger_joint"])
     tell(lab, "go", '{"position": 50}', seconds=1.0)
