@@ -9,7 +9,6 @@ import unittest
 import rospy
 from baxter_core_msgs.msg import JointCommand
 from bullet_sim_msgs.srv import Press, PressRequest
-from sensor_msgs.msg import Joy
 
 from baxter_dataflow.ros_clock import RosClock
 from baxter_examples import recording
@@ -17,7 +16,7 @@ from baxter_interface import Limb, RobotEnable
 from baxter_interface.joint_checks import SIDES
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from example_program import Program, wait_until  # noqa: E402
+from example_program import FakeJoystick, Program, wait_until  # noqa: E402
 
 STEP_RAD = 0.1
 NEAR_RAD = 0.02
@@ -64,30 +63,22 @@ class JoggingTest(ArmsTest):
 
     def test_joystick(self):
         self.go_neutral()
-        joy = rospy.Publisher("/joy", Joy, queue_size=10)
-        program = self.start("joint_position_joystick.py", "-j", "xbox")
+        joystick = FakeJoystick(sticks=[0, 0, 1, 0, 0, 1, 0, 0], buttons=[0] * 11)
+        self.addCleanup(joystick.close)
+        program = self.start("joint_position_joystick.launch", "joystick:=xbox", "dev:=" + joystick.path)
+        joystick.plug_in()
         program.wait_for("Ctrl-C: quit")
-        wait_until(joy.get_num_connections, "the example to listen to /joy")
-
-        def publish(stick=None, value=0.0, button=None):
-            axes, buttons = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0], [0] * 11
-            if stick is not None:
-                axes[stick] = value
-            if button is not None:
-                buttons[button] = 1
-            joy.publish(Joy(axes=axes, buttons=buttons))
-
         before = self.angle("right_s0")
-        publish(stick=3, value=1.0)
+        joystick.push(stick=3, value=1.0)
         wait_until(lambda: self.angle("right_s0") > before + 2 * STEP_RAD, "the right stick to move right_s0")
-        publish()
-        publish(button=4)
+        joystick.release()
+        joystick.press(button=4)
         program.wait_for("left stick: s1 and e0")
         before = self.angle("left_e0")
-        publish(stick=1, value=-1.0)
+        joystick.push(stick=1, value=-1.0)
         wait_until(lambda: self.angle("left_e0") < before - STEP_RAD, "the left stick to move left_e0")
-        publish()
-        self.assertEqual(program.interrupt(), 130)
+        joystick.release()
+        program.interrupt()
 
 
 class RecordingTest(ArmsTest):

@@ -11,16 +11,15 @@ import numpy as np
 import rospy
 from baxter_core_msgs.msg import AnalogIOState, DigitalIOState, HeadState, URDFConfiguration
 from bullet_sim_msgs.srv import Press, PressRequest
-from sensor_msgs.msg import Image, Joy
+from sensor_msgs.msg import Image
 
 from baxter_interface import Gripper, RobotEnable
 from baxter_interface.joint_checks import SIDES
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from example_program import Program, wait_until  # noqa: E402
+from example_program import FakeJoystick, Program, wait_until  # noqa: E402
 
 FAN, LIGHT = "torso_fan", "torso_left_outer_light"
-LEFT_STICK_UP = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
 
 
 class Seen:
@@ -153,22 +152,21 @@ class GripperTest(ExamplesTest):
         self.assertEqual(program.wait(), 0)
 
     def test_joystick(self):
-        joy = rospy.Publisher("/joy", Joy, queue_size=10)
-        program = self.start("gripper_joystick.py", "-j", "logitech")
+        joystick = FakeJoystick(sticks=[0] * 6, buttons=[0] * 12)
+        self.addCleanup(joystick.close)
+        program = self.start("gripper_joystick.launch", "joystick:=logitech", "dev:=" + joystick.path)
+        joystick.plug_in()
         program.wait_for("Ctrl-C: quit")
-        wait_until(joy.get_num_connections, "the example to listen to /joy")
-        still = Joy(axes=[0.0] * 6, buttons=[0] * 12)
-        joy.publish(still)
         for button, side, test, what in ((6, "left", lambda p: p < 5.0, "to close"),
                                          (7, "right", lambda p: p < 5.0, "to close"),
                                          (5, "right", lambda p: p > 95.0, "to open")):
-            joy.publish(Joy(axes=still.axes, buttons=[int(number == button) for number in range(12)]))
+            joystick.press(button)
             self.wait_for_position(side, test, what)
-            joy.publish(still)
-        joy.publish(Joy(axes=LEFT_STICK_UP, buttons=still.buttons))
+            joystick.release()
+        joystick.push(stick=1, value=1.0)
         self.wait_for_position("left", lambda p: p > 30.0, "to open by the stick")
-        joy.publish(still)
-        self.assertEqual(program.interrupt(), 130)
+        joystick.release()
+        program.interrupt()
 
     def test_cuff_control(self):
         light = Seen("/robot/digital_io/left_inner_light/state", DigitalIOState, lambda message: message.state)
