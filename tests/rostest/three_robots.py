@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Three robots in one world move at the same time, each by its own commands and nobody else's."""
 
-import time
 import unittest
 
 import actionlib
@@ -15,22 +14,15 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 import baxter_interface
+from lab_testing.waiting import wait_until
 
+WAIT_S = 60.0
 ANNO_JOINTS = ["joint_%d" % number for number in range(1, 7)]
 GOALS = {
     "left_anno": [0.4, -0.3, 0.3, 0.2, -0.4, 0.5],
     "right_anno": [-0.5, -0.2, 0.4, -0.3, 0.3, -0.6],
 }
 NEUTRAL = {"s0": 0.0, "s1": -0.55, "e0": 0.0, "e1": 0.75, "w0": 0.0, "w1": 1.26, "w2": 0.0}
-
-
-def wait_for(condition, what, deadline_s=60.0):
-    """Poll until ``condition()`` is true; an error that says what was awaited otherwise."""
-    end = time.monotonic() + deadline_s
-    while not condition():
-        if time.monotonic() > end:
-            raise AssertionError(f"waited {deadline_s:g} s in vain for {what}")
-        rospy.rostime.wallsleep(0.05)
 
 
 def running(name):
@@ -49,8 +41,8 @@ def enabled():
 class ThreeRobots(unittest.TestCase):
     def test_all_arrive_where_they_were_sent(self):
         for name in GOALS:
-            wait_for(lambda name=name: running(name), f"the controller of {name} to run")
-        wait_for(enabled, "Baxter to be enabled")
+            wait_until(lambda name=name: running(name), f"the controller of {name} to run", WAIT_S)
+        wait_until(enabled, "Baxter to be enabled", WAIT_S)
         clients = {}
         for name in GOALS:
             action = f"/{name}/probot_anno/arm_joint_controller/follow_joint_trajectory"
@@ -82,7 +74,5 @@ class ThreeRobots(unittest.TestCase):
 
 if __name__ == "__main__":
     rospy.init_node("three_robots")
-    deadline = time.monotonic() + 40
-    while rospy.get_time() == 0.0 and time.monotonic() < deadline:
-        rospy.rostime.wallsleep(0.05)
+    wait_until(lambda: rospy.get_time() > 0.0, "simulation time", WAIT_S)
     rostest.rosrun("workspace_tests", "three_robots", ThreeRobots)

@@ -6,10 +6,11 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 
 import rosgraph
+
+from lab_testing.waiting import wait_until
 
 DEADLINE_S = 60.0
 # A process has so long to end before it is ended by force [s].
@@ -54,7 +55,7 @@ class OwnMasterTest(unittest.TestCase):
     def start_master(self):
         process = self.start("rosmaster", "--core", "-p", self.uri.rsplit(":", 1)[1])
         self.master = rosgraph.Master("/own_master_test", master_uri=self.uri)
-        self.wait_until(self.master_is_up, "the master is up")
+        wait_until(self.master_is_up, "the master", DEADLINE_S)
         return process
 
     def master_is_up(self):
@@ -67,16 +68,5 @@ class OwnMasterTest(unittest.TestCase):
     def start_robot(self, **knobs):
         return self.start(sys.executable, str(FAKE_ROBOT), *("_%s:=%s" % knob for knob in knobs.items()))
 
-    def wait_until(self, holds, what):
-        end_s = time.monotonic() + DEADLINE_S
-        while not holds():
-            if time.monotonic() > end_s:
-                self.fail("waited in vain until " + what)
-            time.sleep(0.02)
-
     def wait_for_text(self, process, text):
-        end_s = time.monotonic() + DEADLINE_S
-        while text not in process.output():
-            if time.monotonic() > end_s:
-                self.fail("no %r in: %s" % (text, process.output()))
-            time.sleep(0.02)
+        wait_until(lambda: text in process.output(), lambda: "%r in: %s" % (text, process.output()), DEADLINE_S)

@@ -4,6 +4,8 @@
 import os
 import sys
 
+from lab_testing.waiting import wait_until
+
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from own_master import DEADLINE_S, OwnMasterTest  # noqa: E402
 
@@ -43,7 +45,8 @@ class RestartTest(OwnMasterTest):
 
     def wait_for_beats(self, client, count=5):
         before = self.beats(client)
-        self.wait_until(lambda: self.beats(client) >= before + count or client.poll() is not None, "the loop turns")
+        wait_until(lambda: self.beats(client) >= before + count or client.poll() is not None, "beats of the loop",
+                   DEADLINE_S)
         self.assertIsNone(client.poll(), client.output())
 
     def start_loop_that_loses_its_simulation(self):

@@ -6,6 +6,7 @@ import time
 import pytest
 
 from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue, RequestBoard
+from lab_testing.waiting import wait_until
 
 
 def test_only_the_newest_message_counts():
@@ -80,9 +81,7 @@ def test_each_of_many_callers_gets_the_own_answer(board):
 
 def test_callers_that_still_wait_at_the_end_are_told(board):
     thread, results = in_thread(lambda: board.call(lambda: None))
-    deadline = time.monotonic() + 5.0
-    while not board._requests and time.monotonic() < deadline:
-        time.sleep(0.001)
+    wait_until(lambda: board._requests, "the request")
     board.close()
     thread.join(5.0)
     assert isinstance(results[0], LoopEnded) and "shutting down" in str(results[0])

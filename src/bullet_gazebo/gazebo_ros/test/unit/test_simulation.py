@@ -8,6 +8,7 @@ import pytest
 from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros.simulation import AdvanceRefused, HostedPlugin, Simulation
+from lab_testing.waiting import wait_until
 
 
 class FakeWorld:
@@ -162,10 +163,9 @@ def test_a_paused_world_stands_still_and_answers(running):
 def test_a_world_runs_in_real_time(running):
     running.paused = False
     start, start_tick = time.monotonic(), running.tick
-    while running.tick - start_tick < 250:
-        assert time.monotonic() - start < 10.0, "the world does not run"
-        time.sleep(0.005)
-    assert time.monotonic() - start == pytest.approx(0.5, abs=0.2)
+    wait_until(lambda: running.tick - start_tick >= 250, "half a second of simulation")
+    # A busy machine makes it later, nothing makes it earlier.
+    assert time.monotonic() - start > 0.45
 
 
 def test_an_advance_makes_exactly_so_many_ticks(running):
@@ -177,8 +177,10 @@ def test_an_advance_makes_exactly_so_many_ticks(running):
 
 def test_an_advance_waits_for_its_topics_each_time(running, counts):
     future = advance(running, 2, ["/command"])
-    time.sleep(0.05)
-    assert not future.done() and running.tick == 0
+    # The loop has taken the request up and gone round since, and waits.
+    assert running.board.call(lambda: running.tick) == 0
+    assert running.board.call(lambda: running.tick) == 0
+    assert not future.done()
     counts["/command"] += 1
     assert future.result(5.0)[0] == 2
     # What arrived before does not count again.

@@ -6,13 +6,14 @@ import os
 import signal
 import subprocess
 import tempfile
-import time
 import unittest
 from pathlib import Path
 
 import rospy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+
+from lab_testing.waiting import wait_until
 
 TOPIC = "/test_arm/joint_states"
 
@@ -82,11 +83,8 @@ class PlotTest(unittest.TestCase):
         child = subprocess.Popen(["rosrun", "live_plot", "plot", "/test_nowhere/x", TOPIC + "/position[0]"],
                                  env=environment, start_new_session=True)
         try:
-            deadline = time.monotonic() + 30.0
-            while self.publisher.get_num_connections() == 0:
-                self.assertIsNone(child.poll(), "plot has ended")
-                self.assertLess(time.monotonic(), deadline, "no subscription within 30 s")
-                time.sleep(0.1)
+            wait_until(lambda: self.publisher.get_num_connections() or child.poll() is not None, "a subscription", 30.0)
+            self.assertIsNone(child.poll(), "plot has ended")
             os.killpg(child.pid, signal.SIGINT)
             self.assertEqual(child.wait(15.0), 0)
         finally:

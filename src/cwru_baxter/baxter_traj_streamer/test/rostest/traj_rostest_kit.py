@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the rostests of trajActionServer share."""
+import functools
 import random
 import time
 import unittest
@@ -17,17 +18,12 @@ from baxter_traj_streamer.ros_settings import read_limits
 from baxter_traj_streamer.settings import SIDES
 from baxter_traj_streamer.streamer import BaxterTrajStreamer
 from baxter_traj_streamer.traj_client import SentGoal
+from lab_testing import waiting
 
 DEADLINE_S = 30.0
 
 
-def wait_until(condition, what):
-    end = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < end, "waited %g s in vain: %s" % (DEADLINE_S, what)
-        time.sleep(0.005)
-
-
+wait_until = functools.partial(waiting.wait_until, timeout_s=DEADLINE_S)
 # As the launch files of the rostests call it.
 SERVER = "/traj_interpolator_as"
 

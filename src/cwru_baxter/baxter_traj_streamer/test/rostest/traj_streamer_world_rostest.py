@@ -7,7 +7,6 @@ import random
 import signal
 import subprocess
 import sys
-import time
 import unittest
 
 import numpy as np
@@ -20,6 +19,7 @@ from baxter_traj_streamer.judging import KNOWN_JOINTS
 from baxter_traj_streamer.ros_settings import read_limits
 from baxter_traj_streamer.settings import SIDES
 from baxter_traj_streamer.traj_client import TrajClient, joint_trajectory
+from lab_testing.waiting import wait_until
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1]))
 from spoilt_goals import WORDS, spoilt_goal  # noqa: E402
@@ -91,7 +91,7 @@ class TrajInTheWorldTest(unittest.TestCase):
         client = self.ready_client()
         stop = rospy.Publisher("/robot/set_super_stop", Empty, queue_size=1)
         enable = rospy.Publisher("/robot/set_super_enable", Bool, queue_size=1)
-        self.wait_until(lambda: stop.get_num_connections() and enable.get_num_connections(), "the robot to listen")
+        wait_until(lambda: stop.get_num_connections() and enable.get_num_connections(), "the robot to listen")
         robot = client.streamer.robot
         joint = ["right_e1"]
         for interrupt, word in ((lambda: stop.publish(Empty()), "stopped"),
@@ -99,9 +99,9 @@ class TrajInTheWorldTest(unittest.TestCase):
             begin = client.here(joint)[0]
             way = -0.8 if begin > 1.2 else 0.8
             goal = client.send(joint_trajectory(joint, [0.0, 4.0], [[begin], [begin + way]]))
-            self.wait_until(lambda: abs(client.here(joint)[0] - begin) > 0.2, "the arm to move")  # noqa: B023
+            wait_until(lambda: abs(client.here(joint)[0] - begin) > 0.2, "the arm to move")  # noqa: B023
             interrupt()
-            self.wait_until(robot.why_not_ready, "the robot to stop")
+            wait_until(robot.why_not_ready, "the robot to stop")
             at = client.here(joint)[0]
             self.assertTrue(goal.wait(DEADLINE_S))
             status, text, _ = goal.outcome()
@@ -109,14 +109,14 @@ class TrajInTheWorldTest(unittest.TestCase):
             self.assertIn(word, text)
             subprocess.run(["rosrun", "baxter_tools", "enable_robot.py", "-r"], check=True, timeout=DEADLINE_S)
             subprocess.run(["rosrun", "baxter_tools", "enable_robot.py", "-e"], check=True, timeout=DEADLINE_S)
-            self.wait_until(lambda: not robot.why_not_ready(), "the robot to be enabled")
+            wait_until(lambda: not robot.why_not_ready(), "the robot to be enabled")
             # Neither the stop nor being enabled again made the arm jump.
             self.assertLess(abs(client.here(joint)[0] - at), COASTING)
 
     def test_4_speed_ratio_does_not_throttle_a_goal(self):
         client = self.ready_client()
         ratio = rospy.Publisher("/robot/limb/left/set_speed_ratio", Float64, queue_size=1)
-        self.wait_until(ratio.get_num_connections, "the robot to listen")
+        wait_until(ratio.get_num_connections, "the robot to listen")
         ratio.publish(0.05)
         begin = client.here(["left_e1"])[0]
         # At 0.05 of 1.5 rad/s this would take 11 s, and 4 s are granted.
@@ -133,15 +133,8 @@ class TrajInTheWorldTest(unittest.TestCase):
         client.wait_until_ready()
         return client
 
-    @staticmethod
-    def wait_until(condition, what):
-        end = time.monotonic() + DEADLINE_S
-        while not condition():
-            assert time.monotonic() < end, "waited %g s in vain: %s" % (DEADLINE_S, what)
-            time.sleep(0.01)
-
     def arrives(self, measured, pose):
-        self.wait_until(lambda: np.abs(np.subtract(measured(), pose)).max() <= TOLERANCE, "pose %s" % pose)
+        wait_until(lambda: np.abs(np.subtract(measured(), pose)).max() <= TOLERANCE, "pose %s" % pose)
         print("farthest joint is off by %.5f rad" % np.abs(np.subtract(measured(), pose)).max())
 
 

@@ -4,17 +4,14 @@
 import os
 import signal
 import subprocess
-import sys
 import time
 import unittest
 from pathlib import Path
 
 import numpy as np
-import rospkg
 import rospy
 
-sys.path.insert(0, rospkg.RosPack().get_path("baxter_gazebo") + "/test/rostest")
-from virtual_screen import VirtualScreen  # noqa: E402
+from lab_testing.virtual_screen import VirtualScreen
 
 SCENE_COLUMNS = slice(380, 1150)  # right of the panels
 

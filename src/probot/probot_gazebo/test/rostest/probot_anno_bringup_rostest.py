@@ -14,6 +14,8 @@ import rospy
 from control_msgs.msg import FollowJointTrajectoryAction
 from sensor_msgs.msg import JointState
 
+from lab_testing.waiting import wait_until
+
 TIMEOUT_S = 60.0
 
 
@@ -56,10 +58,7 @@ class BringupTest(unittest.TestCase):
         missing = ["rviz is not started: there is no display"]
         if not has_planning_server():
             missing.append("move_group is not started: package moveit_ros_move_group is not installed")
-        deadline = rospy.get_time() + TIMEOUT_S
-        while not all(self.printed(text) for text in missing):
-            self.assertLess(rospy.get_time(), deadline, "not told: %s" % missing)
-            rospy.rostime.wallsleep(0.2)
+        wait_until(lambda: all(self.printed(text) for text in missing), "the lines %s" % missing, TIMEOUT_S)
         for text in missing:
             self.assertEqual(len(self.printed(text)), 1)
         self.assertEqual(self.printed("has died"), [])

@@ -17,6 +17,8 @@ from controller_manager_msgs.srv import ListControllers
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from lab_testing.waiting import wait_until
+
 JOINTS = ["joint_%d" % number for number in range(1, 7)]
 ACTION = "/probot_anno/arm_joint_controller/follow_joint_trajectory"
 TIMEOUT_S = 60.0
@@ -69,11 +71,12 @@ class ProbotTest(unittest.TestCase):
         expected = {
             "joint_state_controller": ("joint_state_controller/JointStateController", "running"),
             "arm_joint_controller": ("position_controllers/JointTrajectoryController", "running")}
-        listed, deadline = {}, rospy.get_time() + TIMEOUT_S
-        while listed != expected and rospy.get_time() < deadline:  # each has a spawner of its own
-            rospy.sleep(0.05)
-            listed = {item.name: (item.type, item.state) for item in list_controllers().controller}
-        self.assertEqual(listed, expected)
+
+        def listed():
+            return {item.name: (item.type, item.state) for item in list_controllers().controller}
+
+        # Each has a spawner of its own.
+        wait_until(lambda: listed() == expected, lambda: "both controllers, there are %s" % listed(), TIMEOUT_S)
 
     def test_joint_states_come_at_50_hz_of_simulated_time(self):
         stamps, names = [], []
@@ -83,10 +86,7 @@ class ProbotTest(unittest.TestCase):
             names.append(message.name)
 
         subscriber = rospy.Subscriber("/probot_anno/joint_states", JointState, note, queue_size=200)
-        deadline = rospy.get_time() + TIMEOUT_S
-        while len(stamps) < 101:
-            self.assertLess(rospy.get_time(), deadline, "only %d messages" % len(stamps))
-            rospy.sleep(0.05)
+        wait_until(lambda: len(stamps) > 100, lambda: "101 messages, %d came" % len(stamps), TIMEOUT_S)
         subscriber.unregister()
         self.assertEqual(sorted(names[-1]), JOINTS)
         self.assertAlmostEqual(stamps[100] - stamps[0], 2.0, delta=0.05)
@@ -120,10 +120,8 @@ class ProbotTest(unittest.TestCase):
         echo = subprocess.Popen(["rostopic", "echo", "-n", "1", ACTION + "/goal"], stdout=subprocess.PIPE, text=True)
         try:
             # Listeners of a topic are known by the publisher, which is the action client here.
-            deadline = rospy.get_time() + TIMEOUT_S
-            while self.client.action_client.pub_goal.get_num_connections() < 2:
-                self.assertLess(rospy.get_time(), deadline, "rostopic does not listen")
-                rospy.sleep(0.05)
+            wait_until(lambda: self.client.action_client.pub_goal.get_num_connections() > 1,
+                       "rostopic to listen", TIMEOUT_S)
             self.assert_arrives([0.0] * 6, 0.5)
             text = echo.communicate(timeout=TIMEOUT_S)[0]
         finally:

@@ -1,189 +1,25 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers on a robot of two joints in the running simulator: services, tools, mistakes."""
-import contextlib
-import os
 import random
-import signal
-import subprocess
 import tempfile
 import threading
 import time
-import unittest
 
 import dynamic_reconfigure.client
 import rospy
 import rostest
+from control_case import BEST_EFFORT, DEADLINE_S, POSITION, STRICT, ControlCase, Manager
 from control_msgs.msg import PidState
-from controller_manager_msgs.srv import (
-    ListControllers,
-    ListControllerTypes,
-    LoadController,
-    ReloadControllerLibraries,
-    SwitchController,
-    UnloadController,
-)
-from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SetModelConfiguration, SpawnModel
-from geometry_msgs.msg import Point, Pose, Quaternion
-from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray
 from std_msgs.msg import Empty as EmptyMessage
-from std_srvs.srv import Empty
 
 from controller_manager_msgs import utils
-
-BEST_EFFORT, STRICT = 1, 2
-DEADLINE_S = 20.0
-POSITION = "hardware_interface::PositionJointInterface"
+from lab_testing.waiting import wait_until
 
 
-def wait_for(condition, what, deadline_s=DEADLINE_S):
-    """Poll until ``condition()`` is true; an error that says what was awaited otherwise."""
-    end = time.monotonic() + deadline_s
-    while time.monotonic() < end:
-        found = condition()
-        if found:
-            return found
-        time.sleep(0.01)
-    raise AssertionError("waited %.0f s in vain for %s" % (deadline_s, what() if callable(what) else what))
-
-
-class Manager:
-    """The services of one robot's controller manager."""
-
-    def __init__(self, namespace):
-        self.namespace = namespace
-        for name, srv_class in (("list_controllers", ListControllers), ("list_controller_types", ListControllerTypes),
-                                ("load_controller", LoadController), ("unload_controller", UnloadController),
-                                ("switch_controller", SwitchController),
-                                ("reload_controller_libraries", ReloadControllerLibraries)):
-            proxy = rospy.ServiceProxy("%s/controller_manager/%s" % (namespace, name), srv_class)
-            proxy.wait_for_service(DEADLINE_S)
-            setattr(self, "_" + name, proxy)
-
-    def load(self, name):
-        return self._load_controller(name).ok
-
-    def unload(self, name):
-        return self._unload_controller(name).ok
-
-    def switch(self, start=(), stop=(), strictness=STRICT, timeout=0.0):
-        return self._switch_controller(list(start), list(stop), strictness, False, timeout).ok
-
-    def listing(self):
-        return self._list_controllers().controller
-
-    def states(self):
-        return {controller.name: controller.state for controller in self.listing()}
-
-    def types(self):
-        return self._list_controller_types()
-
-    def reload(self, force):
-        return self._reload_controller_libraries(force).ok
-
-
-class Joints:
-    """The newest message on a robot's joint_states."""
-
-    def __init__(self, namespace):
-        self.newest, self.count = None, 0
-        self._topic = namespace + "/joint_states"
-        self._subscriber = rospy.Subscriber(self._topic, JointState, self._take)
-
-    def _take(self, message):
-        self.newest, self.count = message, self.count + 1
-
-    def at(self, tolerance=0.002, **wanted):
-        """Wait until joints are at the positions given by name."""
-        wait_for(lambda: self.newest and all(
-            abs(dict(zip(self.newest.name, self.newest.position, strict=True))[name] - position) < tolerance
-            for name, position in wanted.items()), lambda: "%s at %s (last %s)" % (self._topic, wanted, self.newest))
-
-    def close(self):
-        self._subscriber.unregister()
-
-
-class GazeboControl(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        for name, srv_class in (("spawn_urdf_model", SpawnModel), ("delete_model", DeleteModel),
-                                ("get_world_properties", GetWorldProperties), ("pause_physics", Empty),
-                                ("unpause_physics", Empty), ("reset_world", Empty), ("reset_simulation", Empty),
-                                ("set_model_configuration", SetModelConfiguration)):
-            proxy = rospy.ServiceProxy("/gazebo/" + name, srv_class)
-            proxy.wait_for_service(DEADLINE_S)
-            setattr(cls, name, staticmethod(proxy))
-        cls.urdf = rospy.get_param("/robot_description")
-        cls.log = []
-        cls._rosout = rospy.Subscriber("/rosout", Log, cls.log.append)
-
-    def setUp(self):
-        self._publishers = {}
-        self._cleanups_of_test = contextlib.ExitStack()
-        self.spawn("one")
-        self.one = Manager("/one")
-
-    def tearDown(self):
-        self._cleanups_of_test.close()
-        self.unpause_physics()
-        for name in self.get_world_properties().model_names:
-            if name != "ground_plane":
-                self.delete_model(name)
-
-    def spawn(self, name, urdf=None):
-        xml = (urdf or self.urdf).replace("/one<", "/%s<" % name)
-        response = self.spawn_urdf_model(name, xml, "/", Pose(Point(0, 0, 0), Quaternion(0, 0, 0, 1)), "")
-        self.assertTrue(response.success, response.status_message)
-
-    def joints(self, namespace="/one"):
-        joints = Joints(namespace)
-        self._cleanups_of_test.callback(joints.close)
-        return joints
-
-    def send(self, topic, message):
-        if topic not in self._publishers:
-            publisher = rospy.Publisher(topic, type(message), queue_size=1)
-            self._publishers[topic] = publisher
-            self._cleanups_of_test.callback(publisher.unregister)
-            wait_for(publisher.get_num_connections, "a listener on " + topic)
-        self._publishers[topic].publish(message)
-
-    def said(self, *words):
-        """Wait for one line in the log that has all ``words``."""
-        return wait_for(lambda: [m.msg for m in self.log if all(word in m.msg for word in words)],
-                        "a log line with %s" % (words,))[0]
-
-    def start(self, *names, manager=None):
-        manager = manager or self.one
-        for name in names:
-            self.assertTrue(manager.load(name), name)
-        self.assertTrue(manager.switch(names))
-
-    @contextlib.contextmanager
-    def process(self, *command, namespace="/one"):
-        """Run a tool in a namespace; it is told to end afterwards and must do so."""
-        process = subprocess.Popen(["rosrun", "controller_manager", *command], stdout=subprocess.PIPE, text=True,
-                                   stderr=subprocess.STDOUT, env={**os.environ, "ROS_NAMESPACE": namespace},
-                                   start_new_session=True)
-        try:
-            yield process
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGINT)
-            try:
-                process.communicate(timeout=DEADLINE_S)
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                raise
-
-    def tool(self, *command, namespace="/one"):
-        """(exit code, output) of a tool that ends by itself."""
-        done = subprocess.run(["rosrun", "controller_manager", *command], capture_output=True, text=True,
-                              env={**os.environ, "ROS_NAMESPACE": namespace}, timeout=DEADLINE_S)
-        return done.returncode, done.stdout + done.stderr
-
+class GazeboControl(ControlCase):
     # -- services ---------------------------------------------------------------------------------------------------
 
     def test_joints_move_where_the_controller_says(self):
@@ -199,7 +35,7 @@ class GazeboControl(unittest.TestCase):
         stamps = []
         subscriber = rospy.Subscriber("/one/joint_states", JointState,
                                       lambda message: stamps.append(message.header.stamp.to_nsec()))
-        wait_for(lambda: len(stamps) > 50, "50 joint states")
+        wait_until(lambda: len(stamps) > 50, "50 joint states")
         subscriber.unregister()
         self.assertEqual({b - a for a, b in zip(stamps[:50], stamps[1:51], strict=True)}, {20_000_000})
 
@@ -351,18 +187,18 @@ class GazeboControl(unittest.TestCase):
         self.send("/one/stop", Bool(True))
         self.send("/one/both/command", Float64MultiArray(data=[0.5, 0.5]))
         count = joints.count
-        wait_for(lambda: joints.count > count + 25, "half a second of joint states")
+        wait_until(lambda: joints.count > count + 25, "half a second of joint states")
         joints.at(shoulder=0.0, elbow=0.0)
         self.send("/one/stop", Bool(False))
         count = joints.count
-        wait_for(lambda: joints.count > count + 25, "half a second of joint states")
+        wait_until(lambda: joints.count > count + 25, "half a second of joint states")
         joints.at(shoulder=0.0, elbow=0.0)  # the restart has dropped the command
 
         def released():
             self.send("/one/both/command", Float64MultiArray(data=[0.5, 0.4]))
             return joints.newest.position[1] > 0.1
 
-        wait_for(released, "the joints to move again")
+        wait_until(released, "the joints to move again")
         joints.at(shoulder=0.5, elbow=0.4)
 
     def test_reset_returns_to_the_start_and_controllers_hold_there(self):
@@ -374,7 +210,7 @@ class GazeboControl(unittest.TestCase):
             reset()
             joints.at(shoulder=0.0, elbow=0.0)
             count = joints.count
-            wait_for(lambda count=count: joints.count > count + 10, "joint states after the reset")
+            wait_until(lambda count=count: joints.count > count + 10, "joint states after the reset")
             joints.at(shoulder=0.0, elbow=0.0)
 
     def test_joints_that_were_set_stay_until_a_command(self):
@@ -383,7 +219,7 @@ class GazeboControl(unittest.TestCase):
         self.set_model_configuration("one", "", ["shoulder", "elbow"], [0.3, -0.3])
         joints.at(shoulder=0.3, elbow=-0.3)
         count = joints.count
-        wait_for(lambda: joints.count > count + 10, "joint states")
+        wait_until(lambda: joints.count > count + 10, "joint states")
         joints.at(shoulder=0.3, elbow=-0.3)
 
     def test_gains_are_tuned_while_controllers_run(self):
@@ -399,7 +235,7 @@ class GazeboControl(unittest.TestCase):
         subscriber = rospy.Subscriber("/three/tuned/pid/state", PidState, states.append)
         self._cleanups_of_test.callback(subscriber.unregister)
         self.send("/three/tuned/command", Float64(0.0))
-        wait_for(lambda: states and abs(states[-1].error) > 0.1, "the elbow to hang, with so small a gain")
+        wait_until(lambda: states and abs(states[-1].error) > 0.1, "the elbow to hang, with so small a gain")
         elbow = dynamic_reconfigure.client.Client("/three/tuned/pid", timeout=DEADLINE_S)
         self._cleanups_of_test.callback(elbow.close)
         self.assertEqual(elbow.get_configuration(timeout=DEADLINE_S)["p"], 1.0)
@@ -422,27 +258,27 @@ class GazeboControl(unittest.TestCase):
         self.assertIn("mistyped", utils.get_rosparam_controller_names("/one"))
         self.assertNotIn("untyped", utils.get_rosparam_controller_names("/one"))
         self.delete_model("two")
-        wait_for(lambda: lister() == ["/one/controller_manager"], "the other controller manager to be gone")
+        wait_until(lambda: lister() == ["/one/controller_manager"], "the other controller manager to be gone")
 
     # -- tools --------------------------------------------------------------------------------------------------------
 
     def test_the_spawner_brings_up_and_takes_down(self):
         with self.process("spawner", "joint_state_controller", "both") as spawner:
-            wait_for(lambda: self.one.states() == {"joint_state_controller": "running", "both": "running"},
+            wait_until(lambda: self.one.states() == {"joint_state_controller": "running", "both": "running"},
                      "the spawner's controllers")
             self.assertIsNone(spawner.poll())
         self.assertEqual(self.one.states(), {})
 
     def test_the_spawner_takes_down_what_others_have_stopped(self):
         with self.process("spawner", "joint_state_controller", "shoulder", "elbow"):
-            wait_for(lambda: list(self.one.states().values()) == ["running"] * 3, "the spawner's controllers")
+            wait_until(lambda: list(self.one.states().values()) == ["running"] * 3, "the spawner's controllers")
             self.assertTrue(self.one.switch((), ["shoulder", "elbow"]))
             self.assertTrue(self.one.unload("elbow"))
         self.assertEqual(self.one.states(), {})
 
     def test_the_spawner_ends_while_physics_is_paused(self):
         with self.process("spawner", "both"):
-            wait_for(lambda: self.one.states() == {"both": "running"}, "the spawner's controller")
+            wait_until(lambda: self.one.states() == {"both": "running"}, "the spawner's controller")
             self.pause_physics()
 
     def test_the_spawner_loads_a_file_and_what_stands_in_it(self):
@@ -451,7 +287,7 @@ class GazeboControl(unittest.TestCase):
                        "also: {type: position_controllers/JointPositionController, joint: shoulder}\n")
             file.flush()
             with self.process("spawner", file.name):
-                wait_for(lambda: self.one.states() == {"from_file": "running", "also": "running"},
+                wait_until(lambda: self.one.states() == {"from_file": "running", "also": "running"},
                          "the controllers of the file")
         self.assertEqual(rospy.get_param("/one/also/joint"), "shoulder")
         self.assertEqual(self.one.states(), {})
@@ -471,7 +307,7 @@ class GazeboControl(unittest.TestCase):
 
     def test_the_spawner_takes_a_namespace_and_stopped(self):
         with self.process("spawner", "--namespace", "/one", "--stopped", "both", namespace="/"):
-            wait_for(lambda: self.one.states() == {"both": "initialized"}, "the spawner's controller")
+            wait_until(lambda: self.one.states() == {"both": "initialized"}, "the spawner's controller")
 
     def test_the_spawner_waits_for_a_topic(self):
         with self.process("spawner", "--wait-for", "/go", "both"):
@@ -482,7 +318,7 @@ class GazeboControl(unittest.TestCase):
                 self.send("/go", Bool(True))
                 return self.one.states() == {"both": "running"}
 
-            wait_for(go, "the spawner's controller")
+            wait_until(go, "the spawner's controller")
 
     def test_the_spawner_says_when_there_is_no_controller_manager(self):
         code, output = self.tool("spawner", "--timeout", "1", "both", namespace="/nobody")
@@ -491,14 +327,14 @@ class GazeboControl(unittest.TestCase):
 
     def test_the_spawner_goes_on_without_what_cannot_be_loaded(self):
         with self.process("spawner", "untyped", "both"):
-            wait_for(lambda: self.one.states() == {"both": "running"}, "the spawner's controller")
+            wait_until(lambda: self.one.states() == {"both": "running"}, "the spawner's controller")
             self.said("'untyped' could not be loaded")
 
     def test_the_unspawner_keeps_controllers_stopped(self):
         self.start("both")
         with self.process("unspawner", "both"):
-            wait_for(lambda: self.one.states() == {"both": "stopped"}, "the controller to be stopped")
-        wait_for(lambda: self.one.states() == {"both": "running"}, "the controller to run again")
+            wait_until(lambda: self.one.states() == {"both": "stopped"}, "the controller to be stopped")
+        wait_until(lambda: self.one.states() == {"both": "running"}, "the controller to run again")
 
     def test_the_controller_manager_tool(self):
         self.assertIn("No controllers", self.tool("controller_manager", "list")[1])

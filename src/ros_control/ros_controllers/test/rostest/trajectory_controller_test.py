@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What clients see of a trajectory controller: Debian's action clients on joints with faults, no physics."""
 import sys
-import time
 import unittest
 
 import actionlib
@@ -24,18 +23,12 @@ from controller_manager_msgs.srv import LoadController, SwitchController
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from lab_testing.waiting import wait_until
+
 JOINTS = ["shoulder", "elbow"]
 ACTION = "/robot/arm/follow_joint_trajectory"
 WAIT_S = 5.0
 R = FollowJointTrajectoryResult
-
-
-def wait_until(condition, what):
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        if time.monotonic() > deadline:
-            raise AssertionError("waited %g s for %s" % (WAIT_S, what))
-        time.sleep(0.005)
 
 
 def trajectory(*points, names=JOINTS, start=None):

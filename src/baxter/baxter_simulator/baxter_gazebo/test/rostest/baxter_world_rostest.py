@@ -25,8 +25,10 @@ from baxter_core_msgs.msg import (
     SEAJointState,
 )
 from bullet_sim_msgs.srv import Press
-from robot_client import POSITION, RAW, SIDES, SUFFIXES, TORQUE, VELOCITY, Latest, Robot, joints, wait_for
+from robot_client import POSITION, RAW, SIDES, SUFFIXES, TORQUE, VELOCITY, Latest, Robot, joints
 from std_msgs.msg import Bool
+
+from lab_testing.waiting import wait_until
 
 START = {
     "left": (0.192483, 1.047, 0.000806359, 0.491094, -0.178079, -0.0610333, -0.0124707),
@@ -61,7 +63,7 @@ class BaxterWorldTest(unittest.TestCase):
         before = robot.positions
         robot.stream(POSITION, {"left_w1": 0.5, "right_w1": 0.5}, 0.5)
         self.assertLess(robot.error(before), 1e-3)
-        wait_for(lambda: any("enable_robot.py -e" in line for line in robot.lines), "a log line that says what to do")
+        wait_until(lambda: any("enable_robot.py -e" in line for line in robot.lines), "a log line that says what to do")
 
     def test_b_joint_states_have_19_names_in_order_at_50_hz(self):
         robot = self.robot
@@ -82,12 +84,12 @@ class BaxterWorldTest(unittest.TestCase):
         buffer = tf2_ros.Buffer()
         listener = tf2_ros.TransformListener(buffer)
         for frame in ("head", "left_hand", "right_hand", "head_camera", "left_gripper_base", "left_gripper"):
-            wait_for(lambda frame=frame: buffer.can_transform("base", frame, rospy.Time()), "tf of " + frame)
+            wait_until(lambda frame=frame: buffer.can_transform("base", frame, rospy.Time()), "tf of " + frame)
         transform = buffer.lookup_transform("world", "base", rospy.Time()).transform
         self.assertEqual((transform.translation.x, transform.translation.y, transform.translation.z), (0.0, 0.0, 0.0))
         self.assertEqual(transform.rotation.w, 1.0)
         tip = buffer.lookup_transform("base", "left_gripper", rospy.Time()).transform.translation
-        seen = wait_for(lambda: self.robot.endpoints.get("left"), "endpoint_state").pose.position
+        seen = wait_until(lambda: self.robot.endpoints.get("left"), "endpoint_state").pose.position
         for axis in "xyz":
             self.assertAlmostEqual(getattr(tip, axis), getattr(seen, axis), delta=1e-3)
         listener.unregister()
@@ -97,13 +99,13 @@ class BaxterWorldTest(unittest.TestCase):
         robot.restart()
         self.assertTrue(robot.state.ready)
         robot.super_stop.publish()
-        wait_for(lambda: robot.state.stopped, "stopped", 3.0)
+        wait_until(lambda: robot.state.stopped, "stopped", 3.0)
         self.assertFalse(robot.state.enabled or robot.state.ready)
         robot.super_enable.publish(True)
         robot.wait_sim(0.3)
         self.assertTrue(robot.state.stopped and not robot.state.enabled)
         robot.super_reset.publish()
-        wait_for(lambda: not robot.state.stopped, "reset", 3.0)
+        wait_until(lambda: not robot.state.stopped, "reset", 3.0)
         self.assertEqual((robot.state.enabled, robot.state.error, robot.state.estop_button, robot.state.estop_source),
                          (False, False, 0, 0))
         robot.set_enabled(True)
@@ -165,20 +167,20 @@ class BaxterWorldTest(unittest.TestCase):
         light = Latest("/robot/digital_io/left_outer_light/state", DigitalIOState)
         navigator = Latest("/robot/navigators/left_navigator/state", NavigatorState)
         command = rospy.Publisher("/robot/digital_io/command", DigitalOutputCommand, queue_size=10)
-        wait_for(lambda: light.message and navigator.message and command.get_num_connections(), "the light's topics")
+        wait_until(lambda: light.message and navigator.message and command.get_num_connections(), "the light's topics")
         self.assertFalse(light.message.isInputOnly)
         for value in (True, False):
             command.publish("left_outer_light", value)
-            wait_for(lambda value=value: light.message.state == value, "light is %s" % value, 2.0)
-            wait_for(lambda value=value: navigator.message.lights == [False, value], "navigator: %s" % value, 2.0)
+            wait_until(lambda value=value: light.message.state == value, "light is %s" % value, 2.0)
+            wait_until(lambda value=value: navigator.message.lights == [False, value], "navigator: %s" % value, 2.0)
 
     def test_e_the_fan_echoes_the_integer(self):
         fan = Latest("/robot/analog_io/torso_fan/state", AnalogIOState)
         command = rospy.Publisher("/robot/analog_io/command", AnalogOutputCommand, queue_size=10)
-        wait_for(lambda: fan.message and command.get_num_connections(), "the fan's topics")
+        wait_until(lambda: fan.message and command.get_num_connections(), "the fan's topics")
         for value in (70, 0):
             command.publish("torso_fan", value)
-            wait_for(lambda value=value: fan.message.value == value, "fan at %d" % value, 2.0)
+            wait_until(lambda value=value: fan.message.value == value, "fan at %d" % value, 2.0)
 
     def test_e_buttons_and_wheels_are_pressed_and_turned(self):
         cuff = Latest("/robot/digital_io/left_lower_cuff/state", DigitalIOState)
@@ -186,11 +188,11 @@ class BaxterWorldTest(unittest.TestCase):
         rospy.wait_for_service("/robot/sim/press", 10.0)
         press = rospy.ServiceProxy("/robot/sim/press", Press)
         self.assertTrue(press("left_lower_cuff", "press", 0).success)
-        wait_for(lambda: cuff.message and cuff.message.state == 1 and cuff.message.isInputOnly, "cuff squeezed", 5.0)
+        wait_until(lambda: cuff.message and cuff.message.state == 1 and cuff.message.isInputOnly, "cuff squeezed", 5.0)
         subprocess.run(["rosrun", "baxter_sim_hardware", "press", "--release", "left_lower_cuff"], check=True)
-        wait_for(lambda: cuff.message.state == 0, "cuff released", 5.0)
+        wait_until(lambda: cuff.message.state == 0, "cuff released", 5.0)
         self.assertTrue(press("torso_right_wheel", "turn", -2).success)
-        wait_for(lambda: navigator.message and navigator.message.wheel == 254, "wheel turned back by 2", 5.0)
+        wait_until(lambda: navigator.message and navigator.message.wheel == 254, "wheel turned back by 2", 5.0)
         self.assertEqual(navigator.message.button_names, ["ok", "back", "show"])
         refused = press("torso_right_inner_light", "press", 0)
         self.assertFalse(refused.success)
@@ -201,14 +203,15 @@ class BaxterWorldTest(unittest.TestCase):
         head = Latest("/robot/head/head_state", HeadState)
         pan = rospy.Publisher("/robot/head/command_head_pan", HeadPanCommand, queue_size=10)
         nod = rospy.Publisher("/robot/head/command_head_nod", Bool, queue_size=10)
-        wait_for(lambda: head.message and pan.get_num_connections() and nod.get_num_connections(), "the head's topics")
+        wait_until(lambda: head.message and pan.get_num_connections() and nod.get_num_connections(),
+                   "the head's topics")
         for target, ratio in ((1.0, 0.1), (0.0, 0.0)):
             pan.publish(target, ratio, HeadPanCommand.REQUEST_PAN_ENABLE)
-            wait_for(lambda target=target: abs(head.message.pan - target) < 1e-2 and not head.message.isTurning,
+            wait_until(lambda target=target: abs(head.message.pan - target) < 1e-2 and not head.message.isTurning,
                      "head at %g rad" % target, 10.0)
         nod.publish(True)
-        wait_for(lambda: head.message.isNodding, "nodding", 5.0)
-        wait_for(lambda: not head.message.isNodding, "nod over", 5.0)
+        wait_until(lambda: head.message.isNodding, "nodding", 5.0)
+        wait_until(lambda: not head.message.isNodding, "nod over", 5.0)
 
     def test_e_grippers_go_and_acknowledge(self):
         self.robot.restart()
@@ -217,14 +220,14 @@ class BaxterWorldTest(unittest.TestCase):
             state = Latest(topic + "state", EndEffectorState)
             properties = Latest(topic + "properties", EndEffectorProperties)
             command = rospy.Publisher(topic + "command", EndEffectorCommand, queue_size=10)
-            wait_for(lambda state=state, properties=properties, command=command: (
+            wait_until(lambda state=state, properties=properties, command=command: (
                 state.message and properties.message and command.get_num_connections()), "the gripper's topics")
             self.assertEqual((properties.message.id, properties.message.ui_type, state.message.id), (65538, 2, 65538))
             for sequence, percent in enumerate((0.0, 100.0), start=1):
                 command.publish(65538, "go", '{"position": %g}' % percent, "test_go", sequence)
-                wait_for(lambda state=state, sequence=sequence: (
+                wait_until(lambda state=state, sequence=sequence: (
                     (state.message.command_sender, state.message.command_sequence) == ("test_go", sequence)), "echo")
-                wait_for(lambda state=state, percent=percent: (
+                wait_until(lambda state=state, percent=percent: (
                     abs(state.message.position - percent) < 2.0 and not state.message.moving), "%g %%" % percent, 5.0)
 
     def test_e_aggregates(self):
@@ -244,7 +247,7 @@ class BaxterWorldTest(unittest.TestCase):
                 robot.wait_sim(0.02)
         robot.wait_sim(0.2)
         self.assertLess(robot.error(NEUTRAL), 1e-3)
-        wait_for(lambda: any("this limb's joints are left_s0, left_s1" in line for line in robot.lines),
+        wait_until(lambda: any("this limb's joints are left_s0, left_s1" in line for line in robot.lines),
                  "a log line with the right names")
         robot.move({"left_w1": 1.0, "right_w1": 1.0}, timeout_s=5.0)
 

@@ -4,7 +4,9 @@
 import unittest
 
 import rospy
-from robot_client import SIDES, Robot, joints, wait_for
+from robot_client import SIDES, Robot, joints
+
+from lab_testing.waiting import wait_until
 
 UNTUCKED = {"left": (-0.08, -1.0, -1.19, 1.94, 0.67, 1.03, -0.50), "right": (0.08, -1.0, 1.19, 1.94, -0.67, 1.03, 0.50)}
 
@@ -42,7 +44,7 @@ class BaxterWorldVariantTest(unittest.TestCase):
         robot = self.robot
         robot.set_enabled(False)
         before = robot.positions["left_s1"]
-        wait_for(lambda: robot.positions["left_s1"] > before + 0.05, "the left shoulder sinks")
+        wait_until(lambda: robot.positions["left_s1"] > before + 0.05, "the left shoulder sinks")
         robot.set_enabled(True)
         robot.wait_sim(0.5)
         held = robot.positions

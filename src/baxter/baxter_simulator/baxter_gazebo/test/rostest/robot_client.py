@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the end-to-end tests need of a client: no SDK, only topics."""
 import collections
-import time
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState, EndpointState, JointCommand
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Empty, Float64
+
+from lab_testing.waiting import wait_until
 
 SIDES = ("left", "right")
 SUFFIXES = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
@@ -16,17 +17,6 @@ POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
 
 def joints(side):
     return ["%s_%s" % (side, suffix) for suffix in SUFFIXES]
-
-
-def wait_for(condition, what, timeout_s=20.0):
-    """Return the first true value of condition(); raise AssertionError that names `what` after timeout_s [wall s]."""
-    deadline = time.monotonic() + timeout_s
-    while time.monotonic() < deadline:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.005)
-    raise AssertionError("not within %g s: %s" % (timeout_s, what))
 
 
 class Latest:
@@ -67,11 +57,11 @@ class Robot:
         self.commands = {side: publisher("limb/%s/joint_command" % side, JointCommand) for side in SIDES}
         self.timeouts = {side: publisher("limb/%s/joint_command_timeout" % side, Float64) for side in SIDES}
         self.ratios = {side: publisher("limb/%s/set_speed_ratio" % side, Float64) for side in SIDES}
-        wait_for(lambda: self._started, "/robot/sim/started", 60.0)
+        wait_until(lambda: self._started, "/robot/sim/started", 60.0)
         everything = [self.super_enable, self.super_stop, self.super_reset]
         everything += [*self.commands.values(), *self.timeouts.values(), *self.ratios.values()]
-        wait_for(lambda: all(topic.get_num_connections() for topic in everything), "the robot listens to its topics")
-        wait_for(lambda: self.state and self.history, "the robot's first states")
+        wait_until(lambda: all(topic.get_num_connections() for topic in everything), "the robot listens to its topics")
+        wait_until(lambda: self.state and self.history, "the robot's first states")
 
     def _on_state(self, msg):
         self.state = msg
@@ -97,11 +87,11 @@ class Robot:
     def wait_sim(self, seconds):
         """Let so much simulation time pass."""
         end = self.now() + seconds
-        wait_for(lambda: self.now() >= end, "%g s of simulation" % seconds, 10.0 + 5.0 * seconds)
+        wait_until(lambda: self.now() >= end, "%g s of simulation" % seconds, 10.0 + 5.0 * seconds)
 
     def set_enabled(self, on):
         self.super_enable.publish(on)
-        wait_for(lambda: self.state.enabled == on, "enabled is %s" % on, 5.0)
+        wait_until(lambda: self.state.enabled == on, "enabled is %s" % on, 5.0)
 
     def restart(self):
         """From any state to enabled, with the defaults of both limbs.
@@ -110,7 +100,7 @@ class Robot:
         """
         if self.state.stopped or self.state.error:
             self.super_reset.publish()
-            wait_for(lambda: not (self.state.stopped or self.state.error), "reset", 5.0)
+            wait_until(lambda: not (self.state.stopped or self.state.error), "reset", 5.0)
         elif self.state.enabled:
             self.set_enabled(False)
         for side in SIDES:
@@ -128,11 +118,11 @@ class Robot:
     def stream(self, mode, values, seconds):
         """Repeat a command at 100 Hz of wall time for so much simulation time."""
         end = self.now() + seconds
-        deadline = time.monotonic() + 10.0 + 5.0 * seconds
-        while self.now() < end:
-            assert time.monotonic() < deadline, "simulation time stands still"
+        def step():
             self.command(mode, values() if callable(values) else values)
-            time.sleep(0.01)
+            return self.now() >= end
+
+        wait_until(step, "%g s of simulation" % seconds, 10.0 + 5.0 * seconds)
 
     def error(self, goal):
         """Largest distance of a joint from {joint: angle} [rad]."""
@@ -142,5 +132,5 @@ class Robot:
     def move(self, goal, timeout_s=20.0):
         """Position mode: send {joint: angle} once and wait until it is reached."""
         self.command(POSITION, goal)
-        wait_for(lambda: self.error(goal) < 2e-3 and max(map(abs, self.velocities.values())) < 1e-3,
+        wait_until(lambda: self.error(goal) < 2e-3 and max(map(abs, self.velocities.values())) < 1e-3,
                  "joints reach %s" % goal, timeout_s)

@@ -4,17 +4,17 @@
 
 The right arm carries no gripper, so that custom tools can be told to the robot there.
 """
-import time
 import unittest
 
 import roslib.message
 import rospy
 from baxter_core_msgs.msg import EndEffectorCommand, HeadPanCommand, JointCommand, URDFConfiguration
 from bullet_sim_msgs.srv import Press
-from robot_client import POSITION, RAW, SIDES, TORQUE, VELOCITY, Robot, joints, wait_for
+from robot_client import POSITION, RAW, SIDES, TORQUE, VELOCITY, Robot, joints
 from sensor_msgs.msg import Image
 
 from baxter_sim_hardware import collision, interface
+from lab_testing.waiting import wait_until
 
 NEUTRAL = {name: angle for side in SIDES
            for name, angle in zip(joints(side), (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True)}
@@ -44,7 +44,7 @@ class Table:
         if name not in self._subscribers:
             self._subscribers[name] = rospy.Subscriber(
                 name, kind, lambda message: self._newest.update({name: message}), queue_size=1)
-        return wait_for(lambda: self._newest.get(name), "a message on " + name, 30.0)
+        return wait_until(lambda: self._newest.get(name), "a message on " + name, 30.0)
 
     def publish(self, key, message, part=None):
         """Publish on a listening row, once the robot is connected. `message`: its fields, or a message."""
@@ -52,7 +52,7 @@ class Table:
         name = names[part]
         if name not in self._publishers:
             self._publishers[name] = rospy.Publisher(name, kind, queue_size=20, tcp_nodelay=True)
-            wait_for(self._publishers[name].get_num_connections, "the robot listens to " + name, 30.0)
+            wait_until(self._publishers[name].get_num_connections, "the robot listens to " + name, 30.0)
         self._publishers[name].publish(message if isinstance(message, kind) else kind(*message))
 
     def until(self, condition, what, *sends):
@@ -60,10 +60,9 @@ class Table:
         def step():
             for send in sends:
                 self.publish(*send)
-            time.sleep(0.02)
             return condition()
 
-        wait_for(step, what, 30.0)
+        wait_until(step, what, 30.0, interval_s=0.02)
 
 
 class RobotInterfaceTest(unittest.TestCase):
@@ -75,10 +74,10 @@ class RobotInterfaceTest(unittest.TestCase):
         cls.press = staticmethod(rospy.ServiceProxy("/robot/sim/press", Press))
 
     def see(self, key, part, condition, what):
-        wait_for(lambda: condition(self.table.newest(key, part)), what, 30.0)
+        wait_until(lambda: condition(self.table.newest(key, part)), what, 30.0)
 
     def refused(self, text):
-        wait_for(lambda: any(text in line for line in self.robot.lines), "the log says '%s'" % text, 30.0)
+        wait_until(lambda: any(text in line for line in self.robot.lines), "the log says '%s'" % text, 30.0)
 
     def neutral(self):
         self.robot.restart()
@@ -115,8 +114,8 @@ class RobotInterfaceTest(unittest.TestCase):
 
     def effect_joint_state_publish_rate(self):
         self.table.publish("joint_state_publish_rate", (100,))
-        wait_for(lambda: abs(self.robot.history[-1].header.stamp.to_sec() - self.robot.history[-2].header.stamp.to_sec()
-                             - 0.01) < 1e-6, "joint states 10 ms apart", 30.0)
+        wait_until(lambda: abs((self.robot.history[-1].header.stamp - self.robot.history[-2].header.stamp).to_sec()
+                               - 0.01) < 1e-6, "joint states 10 ms apart", 30.0)
         self.table.publish("joint_state_publish_rate", (50,))
 
     # -- limbs
@@ -125,14 +124,14 @@ class RobotInterfaceTest(unittest.TestCase):
         self.neutral()
         for side in SIDES:
             self.table.publish("joint_command", JointCommand(POSITION, [0.9], [side + "_w1"]), side)
-        wait_for(lambda: self.robot.error({side + "_w1": 0.9 for side in SIDES}) < 2e-3, "both w1 at 0.9", 30.0)
+        wait_until(lambda: self.robot.error({side + "_w1": 0.9 for side in SIDES}) < 2e-3, "both w1 at 0.9", 30.0)
 
     def effect_joint_command_timeout(self):
         """One velocity command goes on for as long as it may."""
         self.neutral()
         self.set_both("joint_command_timeout", "command time-out [s]", 1.5)
         self.robot.command(VELOCITY, {side + "_w1": -0.4 for side in SIDES})
-        wait_for(lambda: max(self.robot.positions[side + "_w1"] for side in SIDES) < 0.9, "0.36 rad further", 30.0)
+        wait_until(lambda: max(self.robot.positions[side + "_w1"] for side in SIDES) < 0.9, "0.36 rad further", 30.0)
 
     def effect_set_speed_ratio(self):
         self.neutral()
@@ -142,7 +141,7 @@ class RobotInterfaceTest(unittest.TestCase):
         self.robot.wait_sim(0.5)
         self.assertLess(self.robot.error({name: here[name] for name in NEUTRAL}), 1e-3)
         self.set_both("set_speed_ratio", "speed ratio", 1.0)
-        wait_for(lambda: self.robot.error({side + "_w1": 0.5 for side in SIDES}) < 2e-3, "w1 at 0.5", 30.0)
+        wait_until(lambda: self.robot.error({side + "_w1": 0.5 for side in SIDES}) < 2e-3, "w1 at 0.5", 30.0)
 
     def effect_inverse_dynamics_command(self):
         """Raw set-points with a velocity are led by as much as the velocity says; senseless ones are refused."""
@@ -159,10 +158,9 @@ class RobotInterfaceTest(unittest.TestCase):
             self.robot.command(RAW, goal)
             for side in SIDES:
                 self.table.publish("inverse_dynamics_command", ([], [3.0] * 7, [], [], rospy.Duration()), side)
-            time.sleep(0.01)
             return led()
 
-        wait_for(send, "set-points led by their velocity", 30.0)
+        wait_until(send, "set-points led by their velocity", 30.0)
 
     def effect_command_twist_stamped(self):
         self.neutral()
@@ -182,10 +180,10 @@ class RobotInterfaceTest(unittest.TestCase):
         self.set_both("set_speed_ratio", "speed ratio", 0.1)
         goal = {side + "_w1": 0.0 for side in SIDES}
         self.robot.command(POSITION, goal)
-        wait_for(lambda: min(abs(self.robot.velocities[name]) for name in goal) > 0.1, "both wrists move", 30.0)
+        wait_until(lambda: min(abs(self.robot.velocities[name]) for name in goal) > 0.1, "both wrists move", 30.0)
         for side in SIDES:
             self.table.publish("command_velocity_tozero", (True,), side)
-        wait_for(lambda: max(abs(self.robot.velocities[name]) for name in goal) < 1e-3, "both wrists stand", 30.0)
+        wait_until(lambda: max(abs(self.robot.velocities[name]) for name in goal) < 1e-3, "both wrists stand", 30.0)
         self.assertGreater(self.robot.error(goal), 0.05)
 
     # -- what an arm runs into
@@ -241,7 +239,7 @@ class RobotInterfaceTest(unittest.TestCase):
                 return abs(self.robot.positions[wrist] - 0.9) < 2e-3
 
             before = len(self.robot.lines)
-            wait_for(lambda side=side, before=before: self.robot.command(POSITION, {side + "_w1": 0.9}) or any(
+            wait_until(lambda side=side, before=before: self.robot.command(POSITION, {side + "_w1": 0.9}) or any(
                 "its cuff is squeezed" in line for line in self.robot.lines[before:]), "commands refused", 30.0)
             self.table.until(moved, "commands obeyed again", (collision.CUFF, (), side))
             self.assertTrue(self.press(side + "_lower_cuff", "release", 0).success)
@@ -345,7 +343,7 @@ class RobotInterfaceTest(unittest.TestCase):
 
             self.table.until(lambda status=status: status().isEnabled and status().controlUid == "sdk", "running", ask)
             self.table.publish("procedure_enable_" + name, kind(isEnabled=False, uid="sdk"), side)
-            wait_for(lambda status=status: not status().isEnabled, "ended", 30.0)
+            wait_until(lambda status=status: not status().isEnabled, "ended", 30.0)
 
     def effect_procedure_enable_Tare(self):
         self.procedure("Tare")
@@ -372,7 +370,7 @@ class RobotInterfaceTest(unittest.TestCase):
                 name, rospy.AnyMsg, lambda message, name=name, headers=headers: headers.setdefault(
                     name, message._connection_header)) for name, _ in batch]
             names = {name for name, _ in batch}
-            wait_for(lambda headers=headers, names=names: len(headers) == len(names),
+            wait_until(lambda headers=headers, names=names: len(headers) == len(names),
                      "a message on each of %s" % sorted(names), 60.0)
             for subscriber in subscribers:
                 subscriber.unregister()

@@ -15,7 +15,8 @@ import rospy
 import tf2_ros
 import yaml
 from robot_client import Robot, joints
-from virtual_screen import VirtualScreen
+
+from lab_testing.virtual_screen import VirtualScreen
 
 # Links of the moving arm, torso to tip; each is thinner than THICKNESS_M around the line to the next.
 ARM = ("left_upper_shoulder", "left_lower_shoulder", "left_upper_elbow", "left_lower_elbow", "left_upper_forearm",

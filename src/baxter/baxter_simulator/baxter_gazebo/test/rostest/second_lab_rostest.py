@@ -7,8 +7,10 @@ import xmlrpc.client
 
 import rosgraph
 import rospy
-from robot_client import Latest, Robot, wait_for
+from robot_client import Latest, Robot
 from tf2_msgs.msg import TFMessage
+
+from lab_testing.waiting import wait_until
 
 HELPERS = ("/base_to_world", "/robot_state_publisher", "/baxter_sim_kinematics_left", "/baxter_sim_kinematics_right")
 LAUNCH = ["roslaunch", "baxter_gazebo", "baxter_world.launch", "gui:=false"]
@@ -37,17 +39,17 @@ class SecondLabTest(unittest.TestCase):
 
     def test_a_the_first_lab_is_whole_again_after_a_second_launch(self):
         for node in HELPERS:
-            wait_for(lambda node=node: process_of(node), node)
+            wait_until(lambda node=node: process_of(node), node)
         simulator = process_of("/gazebo")
         _, output = launch()
         self.assertIn("A simulator is running on this ROS master", output)
         self.assertEqual(process_of("/gazebo"), simulator)
         # The nodes of the second launch bear the same names and so shut the first one's down; roslaunch restarts them.
         for node in HELPERS:
-            wait_for(lambda node=node: process_of(node), node + " is back")
+            wait_until(lambda node=node: process_of(node), node + " is back")
         for topic in ("/tf", "/tf_static"):
             latest = Latest(topic, TFMessage)
-            wait_for(lambda latest=latest: latest.message, topic)
+            wait_until(lambda latest=latest: latest.message, topic)
 
     def test_b_a_gripper_argument_that_is_neither_true_nor_false_is_named(self):
         for side in ("left", "right"):

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The IK service told to keep the robot off itself: a verdict where nothing is clear, else a clear answer."""
 import sys
-import time
 import unittest
 
 import rospy
@@ -12,6 +11,7 @@ from baxter_kinematics_msgs.msg import IKReport, IKVerdict
 from geometry_msgs.msg import PoseStamped
 
 from baxter_sim_kinematics import Chain, convert
+from lab_testing.waiting import wait_until
 from urdf_model import parse_urdf
 
 # The left hand in the chest, in whatever way the arm is held; and the neutral posture.
@@ -35,10 +35,8 @@ class ClearIk(unittest.TestCase):
             poses[-1].header.frame_id = "base"
         answer = rospy.ServiceProxy(name + "IKService", SolvePositionIK)(SolvePositionIKRequest(pose_stamp=poses))
         self.assertEqual(answer.isValid, [False, True])
-        deadline = time.monotonic() + WAIT_S
-        while not reports:  # latched, so it comes whenever the connection is made
-            self.assertLess(time.monotonic(), deadline, "the report has not come")
-            time.sleep(0.02)
+        # Latched, so it comes whenever the connection is made.
+        wait_until(lambda: reports, "the report", WAIT_S)
         inside, clear = reports[-1].verdicts
         self.assertEqual((inside.verdict, clear.verdict), (IKVerdict.SELF_COLLISION, IKVerdict.SOLVED))
         self.assertIn("base", inside.links)

@@ -20,6 +20,7 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 
 from baxter_sim_kinematics import Chain
+from lab_testing.waiting import wait_until
 from urdf_model import parse_urdf
 from urdf_model.transforms import quaternion_from_matrix
 
@@ -46,14 +47,6 @@ def pose(position, quaternion, frame="base"):
 
 def seed(side, values=NEUTRAL):
     return JointState(name=["%s_%s" % (side, joint) for joint in JOINTS[:len(values)]], position=list(values))
-
-
-def wait_until(condition, what):
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        if time.monotonic() > deadline:
-            raise AssertionError("waited %g s for %s" % (WAIT_S, what))
-        time.sleep(0.02)
 
 
 class PositionKinematics(unittest.TestCase):
