@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What digital and analogue channels have in common: finding one, and setting it until it reports what was set."""
+import errno
+
+import rospy
+
+from baxter_dataflow import wait_for
+
+from . import startup
+
+
+class IOChannel:
+    """A channel of the robot by its name.
+
+    A subclass says what it is (`KIND` in the topics' names, `ADJECTIVE` in errors), its messages, and how to read a
+    value out of a state, and may do something `_on_change`.
+    Raises OSError with errno ETIMEDOUT if the channel does not report, rospy.ROSInitException before rospy.init_node.
+    """
+
+    KIND = ADJECTIVE = STATE = COMMAND = None
+
+    def __init__(self, component_id):
+        self._id = component_id
+        self._last = None
+        self._publisher = None
+        topic = "/robot/%s_io/%s/state" % (self.KIND, component_id)
+        self._subscriber = rospy.Subscriber(topic, self.STATE, self._on_state, queue_size=10)
+        try:
+            startup.wait_for_part(topic, lambda: self._last is not None)
+        except BaseException:
+            self._subscriber.unregister()
+            raise
+        self._is_output = not self._last.isInputOnly
+        if self._is_output:
+            self._publisher = rospy.Publisher("/robot/%s_io/command" % self.KIND, self.COMMAND, queue_size=10)
+            startup.wait_for_subscribers(self._publisher)
+
+    @staticmethod
+    def _value(message):
+        """The value in a message of state."""
+        raise NotImplementedError
+
+    def _on_change(self, value):
+        """Called when the reported value differs from the last one."""
+
+    def _require_output(self):
+        """Raise OSError with errno EACCES if the channel is an input."""
+        if not self._is_output:
+            raise OSError(errno.EACCES, "the %s channel %s is an input: it cannot be set" % (self.ADJECTIVE, self._id))
+
+    def _set(self, value, timeout):
+        """Set the channel and wait until it reports `value`; with `timeout` 0 [s, ROS time] do not wait.
+
+        Raises OSError with errno ETIMEDOUT if it did not follow.
+        """
+        command = self.COMMAND(name=self._id, value=value)
+        self._publisher.publish(command)
+        if timeout != 0:
+            wait_for(lambda: self._value(self._last) == value, timeout, rate=100,
+                     body=lambda: self._publisher.publish(command),
+                     timeout_msg="the %s channel %s was set to %s, but did not report that within %.1f s"
+                                 % (self.ADJECTIVE, self._id, value, timeout))
+
+    def _on_state(self, message):
+        before, self._last = self._last, message
+        if before is not None and self._value(before) != self._value(message):
+            self._on_change(self._value(message))
