@@ -96,6 +96,40 @@ def test_an_arm_pressed_hard_is_a_collision_unless_suppressed(crossed):
     assert detected(lab, "left")
 
 
+@pytest.mark.parametrize("mode, value", [(POSITION, 1.5), (VELOCITY, 1.0), (TORQUE, 40.0), (RAW, 1.5)])
+@pytest.mark.parametrize("seconds", [0.73, 2.0])
+def test_a_stop_holds_arms_that_meet_and_arms_that_press_on_each_other(make_lab, mode, value, seconds):
+    """Stretched out, they meet after 0.73 s at full speed."""
+    lab = make_lab(angles=np.zeros(14), meshes=True, parameters={"enable": True})
+    names = ["left_s0", "right_s0"]
+    lab.run(seconds, before=lambda lab: lab.command(mode, [-value, value], names=names))
+    where = lab.position
+    lab.stop()
+    position, velocity, _ = lab.record(0.6)
+    assert np.abs(position - where).max() < 0.02
+    assert np.abs(position[100:] - position[100]).max() < 0.01  # 0.2 s later; they ease off each other a little
+    assert np.abs(velocity[-1]).max() < 0.02
+
+
+def test_an_arm_that_is_pushed_aside_is_a_collision_unless_that_is_suppressed(lab):
+    """By 50 N at the hand, which are not too much for the hand itself but for the joints."""
+    def push(lab):
+        lab.model.apply_wrench("left_gripper", (0.0, 50.0, 0.0), position=lab.model.link_pose("left_gripper").position)
+
+    def push_suppressed(lab):
+        push(lab)
+        suppress(lab, collision.CONTACT, sides=("left",))(lab)
+
+    lab.run(0.3, before=push)
+    assert detected(lab, "left") and not detected(lab, "right")
+    lab.run(0.3, before=push_suppressed)
+    assert not detected(lab, "left")
+    lab.run(collision.SUPPRESSION_S - 0.2, before=push)
+    assert not detected(lab, "left")
+    lab.run(0.3, before=push)
+    assert detected(lab, "left")
+
+
 @pytest.mark.parametrize("force, found", [(50.0, False), (130.0, True)])
 def test_a_hand_that_feels_too_much_is_a_collision(lab, force, found):
     """The push is along the line from the shoulder, so that the joints' own bounds say little."""

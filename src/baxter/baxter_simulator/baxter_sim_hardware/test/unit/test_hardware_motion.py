@@ -293,6 +293,23 @@ def test_stop_and_disable_halt_any_motion(lab, mode, values, end):
     assert np.abs(position - rest).max() < 1e-3
 
 
+def test_a_far_goal_with_the_physical_robots_speed_ratio(make_lab):
+    """0.3 of the velocity limits until a client asks for more; both times the arms arrive where they shall."""
+    lab = make_lab(pose="neutral", parameters={"enable": True, "profile": "robot"})
+    start, far = lab.position, np.tile([-0.8, 0.6, 1.5, 0.8, 2.5, -1.5, 2.5], 2)
+    limits = lab.model.max_velocity[lab.arm]
+    for ratio, goal in ((0.3, start + far), (1.0, start)):
+        if ratio != 0.3:
+            for side in ("left", "right"):
+                lab.send("limb/%s/set_speed_ratio" % side, Float64(ratio))
+        lab.command(POSITION, goal)
+        seconds = (np.abs(goal - lab.position) / (ratio * limits)).max() + 0.6
+        position, velocity, _ = lab.record(seconds)
+        assert np.abs(position[-1] - goal).max() < 2e-3
+        assert (np.abs(velocity).max(axis=0) < 1.02 * ratio * limits + 0.01).all()
+        assert (np.abs(velocity).max(axis=0) > 0.95 * ratio * limits).any()
+
+
 def test_disabled_arms_sink_slowly_if_asked(make_lab):
     lab = make_lab(pose="neutral", parameters={"disabled": "sink"})
     start = lab.position
