@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joints over time. ROS-free."""
+import numpy as np
+
+from .picture import Picture, new_figure
+
+# Colours that stay apart on white paper, also for most of those who see colours differently.
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#333333", "#8c564b")
+
+
+class NothingRecorded(ValueError):
+    """There are no samples to plot."""
+
+
+def figure_of(samples, unit="rad", title=""):
+    """Return a matplotlib figure of {label: (2, n) array of times [s] and values}, time counted from the first sample.
+
+    Left and right arm have a panel each, other joints a third. Labels without a sample are left out; raises
+    NothingRecorded if none has any.
+    """
+    filled = {label: np.asarray(part) for label, part in samples.items() if np.asarray(part).size}
+    if not filled:
+        raise NothingRecorded("nothing was recorded: did the topic publish while the recording ran?")
+    begin = min(part[0, 0] for part in filled.values())
+    panels = {}
+    for label in sorted(filled, key=lambda label: (_side(label), list(filled).index(label))):
+        panels.setdefault(_side(label), []).append(label)
+    figure = new_figure(8.0, 1.2 + 2.2 * len(panels))
+    all_axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, labels in zip(all_axes, panels.values(), strict=True):
+        for k, label in enumerate(labels):
+            times, values = filled[label]
+            axes.plot(times - begin, values, label=label, linewidth=1.3, color=_COLOURS[k % len(_COLOURS)],
+                      linestyle="-" if k < len(_COLOURS) else "--")
+        axes.set_ylabel(unit)
+        axes.grid(True, color="#dddddd", linewidth=0.6)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
+    all_axes[-1].set_xlabel("simulated time [s]")
+    if title:
+        figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def _side(label):
+    """left, right, or ~ for what belongs to no arm, which sorts last."""
+    side = label.partition("_")[0]
+    return side if side in ("left", "right") else "~"
+
+
+def draw(samples, unit="rad", title=""):
+    """The same as a :class:`Picture`."""
+    return Picture.of_figure(figure_of(samples, unit, title))

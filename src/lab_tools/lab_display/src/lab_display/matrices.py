@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Homogeneous matrices, made readable. ROS-free."""
+import math
+
+import numpy as np
+
+from urdf_model.transforms import rotation_angle
+
+
+class FrameMatrix:
+    """The pose of frame `source` in frame `target`: the matrix that takes points from `source` to `target`."""
+
+    def __init__(self, target, source, matrix):
+        """`matrix`: (4, 4), rotation and translation [m]."""
+        self.target, self.source = target, source
+        self.matrix = np.array(matrix, dtype=float)
+
+    def __array__(self, dtype=None):
+        return self.matrix.astype(dtype or float)
+
+    def __repr__(self):
+        rows = ["  [%s ]" % "".join("%9s" % _tidy(value) for value in row) for row in self.matrix]
+        x, y, z = self.matrix[:3, 3]
+        angle, axis = angle_and_axis(self.matrix[:3, :3])
+        turn = "not turned" if axis is None else "turned by %.1f degrees about (%s)" % (
+            math.degrees(angle), ", ".join(_tidy(value, 3) for value in axis))
+        return "%s in %s:\n%s\n%s m, %s" % (self.source, self.target, "\n".join(rows),
+                                            "x %s, y %s, z %s" % (_tidy(x), _tidy(y), _tidy(z)), turn)
+
+
+def angle_and_axis(rotation):
+    """Return (angle [rad, 0 to pi], unit axis (3,)) of a (3, 3) rotation; the axis is None where there is no turn."""
+    angle = rotation_angle(rotation)
+    if angle < 1e-6:
+        return 0.0, None
+    # The axis is what the rotation leaves alone.
+    _, _, rows = np.linalg.svd(rotation - np.eye(3))
+    axis = rows[2]
+    skew = rotation - rotation.T
+    twist = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+    # At half a turn both directions are right: then the first component that is not zero is positive.
+    reference = float(twist @ axis) if np.linalg.norm(twist) > 1e-9 else float(axis[np.argmax(np.abs(axis) > 1e-9)])
+    return angle, axis if reference >= 0.0 else -axis
+
+
+def _tidy(value, digits=4):
+    """A number without -0.0000."""
+    text = "%.*f" % (digits, value)
+    return text[1:] if float(text) == 0.0 and text.startswith("-") else text

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A picture that a notebook shows and a terminal saves. ROS-free."""
+import cv2
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+
+class Picture:
+    """A picture as PNG. The last line of a notebook's cell is shown: let it be one of these."""
+
+    def __init__(self, png):
+        self.png = bytes(png)
+
+    @classmethod
+    def of_array(cls, pixels):
+        """Of a uint8 array (height, width, 3), red, green, blue."""
+        return cls(cv2.imencode(".png", np.ascontiguousarray(pixels[:, :, ::-1]))[1].tobytes())
+
+    @classmethod
+    def of_figure(cls, figure):
+        """Of a matplotlib figure."""
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        return cls.of_array(np.asarray(canvas.buffer_rgba())[:, :, :3])
+
+    def array(self):
+        """The uint8 array (height, width, 3), red, green, blue."""
+        return cv2.imdecode(np.frombuffer(self.png, np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
+
+    def save(self, path):
+        """Write a PNG file; raises OSError."""
+        with open(path, "wb") as file:
+            file.write(self.png)
+
+    def _repr_png_(self):
+        return self.png
+
+    def __repr__(self):
+        height, width, _ = self.array().shape
+        return "picture of %d x %d pixels" % (width, height)
+
+
+def new_figure(width, height):
+    """A matplotlib figure of that size [inches at 80 dots], which belongs to nobody else."""
+    return Figure(figsize=(width, height), dpi=80, layout="constrained")

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What notebooks and `rosrun lab_display show` show: asks ROS, hands on to the modules that draw.
+
+Every function belongs into a process that is a ROS node. What does not come within its time raises ShowError.
+"""
+import contextlib
+import threading
+import time
+
+import numpy as np
+import rosgraph
+import rospy
+import tf2_ros
+from cv_bridge import CvBridge
+from sensor_msgs.msg import Image, JointState
+
+from baxter_interface.patience import Condition, wait_in_order
+from gazebo_ros.snapshot import SnapshotError
+from live_plot.recording import Recording
+from urdf_model import parse_urdf
+from urdf_model.transforms import matrix_from_quaternion, rigid
+
+from . import joint_plot
+from .matrices import FrameMatrix
+from .outside import Outside
+from .picture import Picture
+from .trees import Tree
+
+# Longest wait for a message or a picture [s, wall].
+TIMEOUT_S = 30.0
+# A frame whose name is wrong is not worth as much.
+TRANSFORM_TIMEOUT_S = 10.0
+JOINT_STATES = "/robot/joint_states"
+
+# A renderer belongs to the thread that made it.
+_outside = threading.local()
+
+
+class ShowError(Exception):
+    """There is nothing to show; the text says why."""
+
+
+def picture(eye=None, target=None, frames=(), size=(640, 480), length=0.12):
+    """The simulated world from outside, as a Picture; with the axes of tf frames in it (x red, y green, z blue).
+
+    `eye`, `target`: where the camera stands and where it looks [m, physics' world: the floor is at z = 0, Baxter's base
+    at 0.93]; by default everything is in view. `size`: width and height [pixels]. `length` of the axes [m].
+    """
+    view = _view()
+    _wait("a picture of the world", view.follow, "the simulator has written none yet")
+    placed = {}
+    if frames:
+        root = robot().root
+        root_pose = view.link_pose(root)
+        if root_pose is None:
+            raise ShowError("the world has no model whose root is '%s'" % root)
+        with _transforms() as buffer:
+            placed = {name: root_pose @ _look_up(buffer, root, name) for name in frames}
+    return Picture.of_array(view.look(*size, eye, target, placed, length))
+
+
+def camera(name):
+    """The newest image of a camera, as a Picture. `name`: a topic, or for /cameras/NAME/image: NAME."""
+    topic = name if name.startswith("/") else "/cameras/%s/image" % name
+    message = _message(topic, Image, "is the camera open? rosrun baxter_tools camera_control.py -l")
+    return Picture.of_array(CvBridge().imgmsg_to_cv2(message, "rgb8"))
+
+
+class JointLog:
+    """Positions of joints while a `with` block runs; `joints`: which ones, None for all."""
+
+    def __init__(self, topic, joints):
+        self._topic, self._joints = topic, joints
+        self._recording = Recording()
+        self._subscriber = None
+        self._arrived = threading.Event()
+
+    def __enter__(self):
+        """Returns once the first message is in, so that nothing of what follows is missed."""
+        self._subscriber = rospy.Subscriber(self._topic, JointState, self._take)
+        try:
+            _wait(self._topic, self._arrived.is_set, "nobody publishes it; rostopic list shows what there is")
+        except ShowError:
+            self._subscriber.unregister()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        self._subscriber.unregister()
+
+    def _take(self, message):
+        for name, position in zip(message.name, message.position, strict=True):
+            if self._joints is None or name in self._joints:
+                self._recording.add(name)
+                self._recording.append(name, message.header.stamp.to_sec(), position)
+        self._arrived.set()
+
+    @property
+    def samples(self):
+        """{joint: (2, n) array of times [s] and positions}."""
+        return self._recording.samples()[0]
+
+
+def recording(topic=JOINT_STATES, joints=None):
+    """`with show.recording() as log: ...` records joint states; then `show.plot(log)`."""
+    return JointLog(topic, joints)
+
+
+def plot(log, title="", unit="rad"):
+    """Joints over time, as a Picture."""
+    return joint_plot.draw(log.samples, unit, title)
+
+
+def robot(parameter="robot_description"):
+    """The `urdf_model.Robot` on the parameter server."""
+    try:
+        # rospy.get_param answers from a cache, which a new simulator would leave stale.
+        return parse_urdf(rosgraph.Master(rospy.get_name()).getParam(rospy.resolve_name(parameter)), source=parameter)
+    except rosgraph.MasterError as error:
+        raise ShowError("the parameter %s is not set: is a robot running?" % parameter) from error
+
+
+def urdf_tree(parameter="robot_description", below=None):
+    """Links and joints of the robot's description, as a Tree: print it, or draw() it. `below`: from that link down."""
+    tree = Tree.of_urdf(robot(parameter))
+    return tree if below is None else tree.below(below)
+
+
+def tf_tree(below=None):
+    """Frames that tf knows, as a Tree. Joints that move are told from fixed ones by the robot's description."""
+    description = robot()
+    moving = {joint.child: joint.name for joint in description.joints.values() if joint.type != "fixed"}
+    with _transforms() as buffer:
+        def is_complete():
+            return set(description.links) <= {*_frames(buffer), *(parent for parent in _frames(buffer).values())}
+
+        _wait("tf to name every link of the robot", is_complete, "robot_state_publisher has not sent all of them")
+        tree = Tree({child: (parent, moving.get(child, ""), child in moving)
+                     for child, parent in sorted(_frames(buffer).items())})
+    return tree if below is None else tree.below(below)
+
+
+def matrix(target, source):
+    """Where frame `source` is in frame `target`, as a FrameMatrix: print it, or use it as a (4, 4) array."""
+    with _transforms() as buffer:
+        return FrameMatrix(target, source, _look_up(buffer, target, source))
+
+
+@contextlib.contextmanager
+def _transforms():
+    buffer = tf2_ros.Buffer(debug=False)
+    listener = tf2_ros.TransformListener(buffer)
+    try:
+        yield buffer
+    finally:
+        listener.unregister()
+
+
+def _frames(buffer):
+    """{frame: its parent}; lines are `Frame CHILD exists with parent PARENT.`"""
+    words = [line.rstrip(".").split() for line in buffer.all_frames_as_string().splitlines()]
+    return {line[1]: line[5] for line in words if len(line) == 6 and line[5] != "NO_PARENT"}
+
+
+def _look_up(buffer, target, source):
+    def known():
+        return bool(buffer.can_transform_core(target, source, rospy.Time())[0])
+
+    def why():
+        names = sorted({*_frames(buffer), *_frames(buffer).values()})
+        missing = [name for name in (target, source) if name not in names]
+        return "tf knows no frame %s; it knows %s" % (" and no ".join(missing), ", ".join(names) or "none") if missing \
+            else "they are not connected"
+
+    _wait("the transform %s -> %s" % (target, source), known, why, TRANSFORM_TIMEOUT_S)
+    transform = buffer.lookup_transform(target, source, rospy.Time()).transform
+    rotation = matrix_from_quaternion([getattr(transform.rotation, axis) for axis in "xyzw"])
+    return rigid(rotation, np.array([getattr(transform.translation, axis) for axis in "xyz"]))
+
+
+def _view():
+    try:
+        folder = rosgraph.Master(rospy.get_name()).getParam("/gazebo/snapshot")
+        known = getattr(_outside, "view", None)
+        if known is None or _outside.folder != folder or not known.is_alive:
+            _outside.view, _outside.folder = Outside(folder, rospy.logwarn), folder
+        return _outside.view
+    except (rosgraph.MasterError, SnapshotError) as error:
+        raise ShowError("no simulator on the master at %s: %s" % (rosgraph.get_master_uri(), error)) from error
+
+
+def _message(topic, message_class, hint):
+    found, arrived = [], threading.Event()
+
+    def take(message):
+        found.append(message)
+        arrived.set()
+
+    subscriber = rospy.Subscriber(topic, message_class, take, queue_size=1, buff_size=1 << 24)
+    try:
+        _wait("a message on %s" % topic, arrived.is_set, hint)
+    finally:
+        subscriber.unregister()
+    return found[-1]
+
+
+def _wait(what, is_met, hint, timeout_s=TIMEOUT_S):
+    explain = hint if callable(hint) else lambda: hint
+    try:
+        wait_in_order([Condition(what, lambda: bool(is_met()), explain)], timeout_s, say=rospy.logwarn,
+                      is_shutdown=rospy.is_shutdown, sleep=lambda _: time.sleep(0.02))
+    except OSError as error:
+        raise ShowError(error.strerror) from error

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Finds the simulator on this master, or starts one that ends with this process."""
+import atexit
+import contextlib
+import errno
+import fcntl
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import urlparse
+
+import rosgraph
+import rospkg
+import rospy
+
+from baxter_interface import startup
+from baxter_interface.patience import Condition, wait_in_order
+
+from . import keeper
+from .labs import LABS
+
+# A simulator that somebody else has started may still be coming up; after this its robot is another one [s].
+FOUND_TIMEOUT_S = 10.0
+# A simulator of ours has this long, on a machine that has much else to do [s].
+START_TIMEOUT_S = 120.0
+# Ports of further labs beside the first one.
+FURTHER_PORTS = range(11411, 11500)
+LOG_LINES_SHOWN = 12
+
+
+class LabError(Exception):
+    """There is no lab to work with; the text says why and what to do."""
+
+
+class Lab:
+    """What :func:`connect` returns. Printing it says what runs and how to stop it."""
+
+    def __init__(self, command, topic):
+        self._command = command
+        self._topic = topic
+        self._master_keeper = None
+        self._keeper = None
+        self._programs = {}
+        self._log = None
+
+    @property
+    def is_ours(self):
+        """Whether this process has started the simulator that it works with, and it still runs."""
+        return self._keeper is not None and self._keeper.poll() is None
+
+    @property
+    def nodes(self):
+        """Names of the nodes that the master knows."""
+        try:
+            listed = rosgraph.Master("/lab_session").getSystemState()
+        except (OSError, rosgraph.MasterException):
+            return []
+        return sorted({name for group in listed for _, names in group for name in names})
+
+    def run(self, *command):
+        """Run a program beside the notebook, until :meth:`stop` or until the notebook's kernel ends.
+
+        One that runs already is not started again. Returns the file that its output goes to.
+        """
+        name = "-".join(word.rpartition("/")[2] for word in command[:3])
+        log = _state_folder() / ("lab_session-%d-%s.log" % (os.getpid(), name))
+        known = self._programs.get(command)
+        if known is not None and known.poll() is None:
+            print("runs already: %s" % " ".join(command))
+            return log
+        with open(log, "w") as output:
+            self._programs[command] = _keep(log.with_suffix(".state"), list(command), output)
+        print("started: %s (its output: %s)" % (" ".join(command), log))
+        return log
+
+    def stop(self):
+        """End what this process has started: programs and simulator. The master stays until this process ends."""
+        for command, program in self._programs.items():
+            _closed(program)
+            print("stopped: %s" % " ".join(command))
+        self._programs.clear()
+        if self._keeper is None:
+            print("the simulator goes on: this notebook has not started it")
+            return
+        self._keeper = _closed(self._keeper)
+        print("stopped: %s" % " ".join(self._command))
+
+    def close(self):
+        """End everything that this process has started, the master too."""
+        for program in self._programs.values():
+            _closed(program)
+        self._keeper, self._master_keeper = _closed(self._keeper), _closed(self._master_keeper)
+
+    def __repr__(self):
+        uri = os.environ["ROS_MASTER_URI"]
+        names = self.nodes
+        if not names:
+            return "No master answers at %s: run the cell that connects again." % uri
+        running = "running on %s: %s" % (uri, ", ".join(names))
+        shell = "./baxter.sh" if uri == "http://localhost:11311" else "ROS_MASTER_URI=%s ./baxter.sh" % uri
+        if self.is_ours:
+            stop = "lab.stop() stops it; it also ends with this notebook's kernel. Its output: %s" % self._log
+        elif self._is_up():
+            stop = "It was there before this notebook: stop it where it was started, with Ctrl-C."
+        else:
+            stop = "The simulator is stopped: run the cell that connects again."
+        return "%s\n%s\nThe same lab in a terminal: %s" % (running, stop, shell)
+
+    def _is_up(self):
+        return self._topic in {name for name, _ in _published_topics()}
+
+    def _start(self, port, has_master):
+        """Start the simulator, and a master for it if there is none."""
+        folder = _state_folder()
+        state = folder / ("lab_session-%d" % port)
+        self._log = folder / ("lab_session-%d.log" % port)
+        log = open(self._log, "w")  # noqa: SIM115  (handed on to the children)
+        with log:
+            if not has_master:
+                self._master_keeper = _keep(folder / ("lab_session-%d.master" % port), ["roscore", "-p", str(port)],
+                                            log, after=state)
+            self._keeper = _keep(state, ["roslaunch", "--wait", *self._command], log)
+        self._wait(START_TIMEOUT_S)
+
+    def _wait(self, timeout_s):
+        """Wait for the robot's topic; raises OSError, or LabError when a simulator of ours has died."""
+        ours = self._keeper
+        condition = startup.topic_published(self._topic)
+        met = Condition(condition.what, lambda: condition.is_met() or (ours and ours.poll() is not None),
+                        condition.explain)
+        wait_in_order([met], timeout_s, say=_say)
+        if ours and ours.poll() is not None:
+            lines = Path(self._log).read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:]
+            self.close()
+            raise LabError("%s ended at once. Its output (%s) ends with:\n%s"
+                           % (" ".join(self._command), self._log, "\n".join("  | " + line for line in lines)))
+
+
+_labs = {}
+_run_id = None
+
+
+def connect(name, *arguments):
+    """Return the :class:`Lab` of that name (a key of :data:`lab_session.labs.LABS`), and make this process a ROS node.
+
+    Uses the simulator on the master that ROS_MASTER_URI names; where there is none, starts one there, with further
+    launch `arguments` such as "gui:=false"; where the robot there is another one, on a port of its own (ROS_MASTER_URI
+    follows). Calling it again is safe: it finds what the first call has started, or starts it again.
+
+    Raises :class:`LabError` when there is no lab to be had.
+    """
+    if name not in LABS:
+        raise LabError("there is no lab '%s'; there are: %s" % (name, ", ".join(LABS)))
+    start = LABS[name]
+    lab = _labs.setdefault(name, Lab([*start.command, *arguments], start.topic))
+    try:
+        with _only_one():
+            _find_or_start(lab)
+        _become_node("notebook")
+        startup.wait_for_start([], START_TIMEOUT_S)
+    except OSError as error:
+        raise LabError(error.strerror or str(error)) from error
+    print(lab)
+    return lab
+
+
+def _find_or_start(lab):
+    if lab.is_ours:
+        lab._wait(START_TIMEOUT_S)
+        return
+    port = urlparse(rosgraph.get_master_uri()).port
+    is_local = rosgraph.get_master_uri().split("://")[-1].startswith(("localhost:", "127."))
+    state = _state_folder() / ("lab_session-%d" % port)
+    # What another notebook's kernel has left behind is on its way out, or still on its way up.
+    if keeper.is_held(state) and state.read_text().startswith("ending"):
+        wait_in_order([Condition("the simulator before this one to end", lambda: not keeper.is_held(state),
+                                 lambda: "it still runs")], keeper.STOP_TIMEOUT_S + 10.0, say=_say)
+    has_simulator = any(name == "/gazebo" for name in lab.nodes)
+    if has_simulator or keeper.is_held(state) or not is_local:
+        try:
+            lab._wait(START_TIMEOUT_S if _holds(state, lab) else FOUND_TIMEOUT_S)
+            return
+        except OSError as error:
+            if not is_local or rospy.core.is_initialized():
+                raise LabError("the lab at %s has no %s: %s. Stop it, or restart this notebook's kernel to work beside "
+                               "it." % (rosgraph.get_master_uri(), lab._topic, error.strerror)) from error
+        _say("the simulator at %s has no %s; starting another one beside it" % (rosgraph.get_master_uri(), lab._topic))
+        port = _free_port()
+        os.environ["ROS_MASTER_URI"] = "http://localhost:%d" % port
+        os.environ["ROS_HOSTNAME"] = "localhost"
+    _say("starting roslaunch %s ..." % " ".join(lab._command))
+    lab._start(port, has_master=bool(lab.nodes))
+
+
+def _holds(state, lab):
+    return keeper.is_held(state) and " ".join(lab._command) in state.read_text()
+
+
+def _become_node(name):
+    """rospy.init_node, once in a process; its master has to stay the same."""
+    global _run_id
+    run_id = rosgraph.Master("/lab_session").getParam("/run_id")
+    if not rospy.core.is_initialized():
+        rospy.init_node(name, anonymous=True, disable_signals=True)
+        _run_id = run_id
+    elif run_id != _run_id:
+        raise LabError("the master at %s is not the one that this notebook has worked with; restart the notebook's "
+                       "kernel (Kernel > Restart Kernel)" % rosgraph.get_master_uri())
+
+
+def _published_topics():
+    try:
+        return rosgraph.Master("/lab_session").getPublishedTopics("/")
+    except (OSError, rosgraph.MasterException):
+        return []
+
+
+def _keep(state, command, log, after=None):
+    environment = dict(os.environ)
+    environment.pop("LAB_SESSION_AFTER", None)
+    if after:
+        environment["LAB_SESSION_AFTER"] = str(after)
+    return subprocess.Popen([sys.executable, keeper.__file__, str(state), *command], stdin=subprocess.PIPE,
+                            stdout=log, stderr=subprocess.STDOUT, env=environment, start_new_session=True)
+
+
+def _closed(process):
+    """Let a keeper end what it keeps, and wait for it; returns None, which is what remains."""
+    if process is not None:
+        with contextlib.suppress(OSError):
+            process.stdin.close()
+        process.wait(keeper.STOP_TIMEOUT_S + 10.0)
+
+
+def _state_folder():
+    folder = Path(rospkg.get_ros_home())
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@contextlib.contextmanager
+def _only_one():
+    """Two notebooks that connect to the same master at the same time do so one after the other."""
+    with open(_state_folder() / ("lab_session-%s.lock" % urlparse(rosgraph.get_master_uri()).port), "a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def _free_port():
+    for port in FURTHER_PORTS:
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise OSError(errno.EADDRINUSE, "no port from %d to %d is free: that many labs run already"
+                  % (FURTHER_PORTS[0], FURTHER_PORTS[-1]))
+
+
+def _say(text):
+    print(text, file=sys.stderr, flush=True)
+
+
+@atexit.register
+def _end_labs():
+    for lab in _labs.values():
+        lab.close()

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The keeper ends what it keeps when its owner is gone, however that happened; and what the labs' names stand for."""
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import rospkg
+
+from lab_session import keeper
+from lab_session.labs import LABS
+
+DEADLINE_S = 30.0
+# A child that ignores every polite signal, of a command that obeys Ctrl-C.
+STUBBORN = """import signal, sys, time
+for number in (signal.SIGINT, signal.SIGTERM):
+    signal.signal(number, signal.SIG_IGN)
+open(sys.argv[1], "w").write("up")
+time.sleep(600)
+"""
+COMMAND = """import subprocess, sys, time
+folder = sys.argv[1]
+child = subprocess.Popen([sys.executable, folder + "/stubborn.py", folder + "/up"])
+open(folder + "/pid", "w").write(str(child.pid))
+try:
+    time.sleep(600)
+except KeyboardInterrupt:
+    open(folder + "/ended", "w").write("ended")
+"""
+
+
+def wait_until(condition, what):
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.02)
+
+
+def is_alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def keep(state, *command):
+    return subprocess.Popen([sys.executable, keeper.__file__, str(state), *command], stdin=subprocess.PIPE,
+                            start_new_session=True)
+
+
+@pytest.fixture
+def kept(tmp_path):
+    """A keeper at work, its state file, and the folder that its command writes to."""
+    (tmp_path / "stubborn.py").write_text(STUBBORN)
+    (tmp_path / "command.py").write_text(COMMAND)
+    process = keep(tmp_path / "state", sys.executable, str(tmp_path / "command.py"), str(tmp_path))
+    try:
+        wait_until(lambda: (tmp_path / "up").exists() and (tmp_path / "pid").exists(), "the command does not start")
+        yield process, tmp_path / "state", tmp_path
+    finally:
+        process.stdin.close()
+        process.wait(DEADLINE_S)
+
+
+def test_state_is_locked_while_it_runs(kept):
+    process, state, _ = kept
+    assert keeper.is_held(state) and state.read_text().startswith("running\n" + sys.executable)
+    process.stdin.close()
+    assert process.wait(DEADLINE_S) == 0
+    assert not keeper.is_held(state) and not state.exists()
+
+
+def test_command_gets_ctrl_c_and_what_it_leaves_is_killed(kept):
+    process, _, folder = kept
+    child = int((folder / "pid").read_text())
+    process.stdin.close()
+    process.wait(DEADLINE_S)
+    assert (folder / "ended").read_text() == "ended"
+    assert not is_alive(child)
+
+
+def test_ctrl_c_and_kill_of_the_keeper_itself_change_nothing(kept):
+    process, state, folder = kept
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        process.send_signal(number)
+    process.stdin.write(b"a word\n")
+    process.stdin.flush()
+    wait_until(lambda: keeper.is_held(state), "the keeper has gone")
+    assert process.poll() is None and is_alive(int((folder / "pid").read_text()))
+
+
+def test_command_that_ends_by_itself_hands_its_status_on(tmp_path):
+    assert keep(tmp_path / "state", "sh", "-c", "exit 7").wait(DEADLINE_S) == 7
+
+
+@pytest.mark.parametrize("name", LABS)
+def test_launch_file_of_a_lab_is_there(name):
+    start = LABS[name]
+    folder = rospkg.RosPack().get_path(start.package)
+    assert any(start.launch_file in files for _, _, files in os.walk(os.path.join(folder, "launch")))
