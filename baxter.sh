@@ -21,6 +21,7 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
   setup                 install and build what is missing; runs by itself the first time anything is used
   setup --with FILE     also fetch the packages of a rosinstall file, and prefer them to ours: rosinstall/README.md
   test [NAMES] [--long] lint, unit tests and rostests. NAMES: packages, test files, or pytest arguments such as -k
+  notebook [NAME]       the labs' notebooks in a browser: starts Jupyter on this machine alone and prints the address
   bench [NAMES]         measure where the stack stands, beside its peers; --list says which suites there are
   doctor [HOST]         look for what is wrong with master, network, clock, build, Python and robot, and say the fix
   help                  this text
@@ -73,6 +74,12 @@ main() {
             use_loopback
             use_build || exit
             exec python3 "$LAB_ROOT/tests/bench/run.py" "$@"
+            ;;
+        notebook)
+            bring_up_to_date || exit
+            use_loopback
+            use_build || exit
+            exec python3 "$LAB_ROOT/tools/notebook.py" "$@"
             ;;
         sim | local | localhost | 127.*)
             bring_up_to_date || exit

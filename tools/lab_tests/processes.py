@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Processes that a test started: known by a variable in their environment, which every child inherits."""
+"""Processes that a test or a notebook started: known by a variable in their environment, which every child inherits."""
 
 import os
 import signal
@@ -7,11 +7,12 @@ import time
 from pathlib import Path
 
 MARKER = "LAB_TEST_RUN"
+NOTEBOOK_MARKER = "LAB_NOTEBOOK_RUN"
 
 
-def marked(value: str) -> dict[int, str]:
-    """pid -> command line of all living processes, but this one, whose environment says MARKER=value."""
-    needle = f"{MARKER}={value}".encode()
+def marked(value: str, marker: str = MARKER) -> dict[int, str]:
+    """pid -> command line of all living processes, but this one, whose environment says marker=value."""
+    needle = f"{marker}={value}".encode()
     found = {}
     for entry in Path("/proc").iterdir():
         if not entry.name.isdigit() or int(entry.name) == os.getpid():
@@ -26,7 +27,7 @@ def marked(value: str) -> dict[int, str]:
     return found
 
 
-def wait_until_gone(value: str, timeout_s: float) -> dict[int, str]:
+def wait_until_gone(value: str, timeout_s: float, marker: str = MARKER) -> dict[int, str]:
     """What is still alive after at most timeout_s.
 
     Gone means not found twice in a row: a process shows no environment for the moment in which it becomes another
@@ -35,17 +36,17 @@ def wait_until_gone(value: str, timeout_s: float) -> dict[int, str]:
     deadline = time.monotonic() + timeout_s
     was_gone = False
     while True:
-        alive = marked(value)
+        alive = marked(value, marker)
         if (not alive and was_gone) or (alive and time.monotonic() >= deadline):
             return alive
         was_gone = not alive
         time.sleep(0.05)
 
 
-def kill_all(value: str):
+def kill_all(value: str, marker: str = MARKER):
     """End every marked process, and what it starts meanwhile."""
     for _ in range(5):
-        alive = wait_until_gone(value, 0.0)
+        alive = wait_until_gone(value, 0.0, marker)
         if not alive:
             return
         for pid in alive:

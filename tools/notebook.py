@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`./baxter.sh notebook [NAME]`: JupyterLab on loopback with the labs' notebooks, until Ctrl-C."""
+
+import argparse
+import json
+import os
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+import uuid
+from pathlib import Path
+
+from lab_tests import processes
+
+ROOT = Path(__file__).resolve().parent.parent
+# Everything that Jupyter writes, so that nothing gets into the user's home.
+STATE = ROOT / ".baxter" / "jupyter"
+KERNEL = "baxter"
+FIRST_PORT = 8888
+START_TIMEOUT_S = 60.0
+# A simulator that a notebook has started is given as long to end as roslaunch may need.
+STOP_TIMEOUT_S = 40.0
+
+
+class NotebookError(Exception):
+    """The notebook cannot be opened; the text says why and what could be."""
+
+
+def notebooks() -> list[Path]:
+    """The labs' notebooks, in the order of the course."""
+    return sorted(path for path in ROOT.glob("src/*/*/notebooks/*.ipynb") if ".ipynb_checkpoints" not in path.parts)
+
+
+def find(name: str) -> Path:
+    """The one notebook whose name contains these letters; raises NotebookError for none or several."""
+    wanted = name.removesuffix(".ipynb")
+    exact = [path for path in notebooks() if path.stem == wanted]
+    found = exact or [path for path in notebooks() if wanted in path.stem]
+    if len(found) != 1:
+        names = ", ".join(path.stem for path in found or notebooks())
+        raise NotebookError(f"'{name}' names {'several notebooks' if found else 'no notebook'}; "
+                            f"{'which of' if found else 'there are'}: {names}")
+    return found[0]
+
+
+def write_kernel(folder: Path):
+    """Tell Jupyter, by a file below `folder`, about the kernel `Baxter lab`: tools/notebook_kernel.bash."""
+    kernel = folder / "kernels" / KERNEL
+    kernel.mkdir(parents=True, exist_ok=True)
+    command = [str(ROOT / "tools" / "notebook_kernel.bash"), "-f", "{connection_file}"]
+    spec = {"argv": command, "display_name": "Baxter lab", "language": "python"}
+    (kernel / "kernel.json").write_text(json.dumps(spec, indent=1) + "\n", encoding="utf-8")
+
+
+def environment(state: Path) -> dict[str, str]:
+    """The environment of Jupyter: our kernel beside its own, and all of its files in one folder."""
+    folders = {"JUPYTER_CONFIG_DIR": "config", "JUPYTER_DATA_DIR": "data", "JUPYTER_RUNTIME_DIR": "runtime",
+               "IPYTHONDIR": "ipython", "MPLCONFIGDIR": "matplotlib"}
+    made = {**os.environ, "JUPYTER_PATH": str(state)}
+    for variable, name in folders.items():
+        (state / name).mkdir(parents=True, exist_ok=True)
+        made[variable] = str(state / name)
+    return made
+
+
+def free_port(first: int) -> int:
+    """The first port from there on that nobody listens on."""
+    for port in range(first, first + 100):
+        with socket.socket() as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+                return port
+            except OSError:
+                continue
+    raise NotebookError(f"no port from {first} to {first + 99} is free; --port names another one")
+
+
+def command(port: int) -> list[str]:
+    """JupyterLab on loopback. It looks for no updates, asks nothing, and writes warnings only."""
+    options = {
+        "ServerApp.ip": "127.0.0.1", "ServerApp.port": port, "ServerApp.port_retries": 0,
+        "ServerApp.open_browser": False, "ServerApp.root_dir": str(ROOT), "ServerApp.answer_yes": True,
+        "ServerApp.allow_root": os.geteuid() == 0, "Application.log_level": "WARN",
+        "KernelManager.shutdown_wait_time": 10.0,
+        "LabApp.check_for_updates_class": "jupyterlab.NeverCheckForUpdate", "LabApp.news_url": "",
+    }
+    return [sys.executable, "-m", "jupyterlab", *(f"--{name}={value}" for name, value in options.items())]
+
+
+def wait_for(url: str, server: subprocess.Popen):
+    """Wait until the server answers; raises NotebookError when it does not."""
+    deadline = time.monotonic() + START_TIMEOUT_S
+    while time.monotonic() < deadline and server.poll() is None:
+        try:
+            urllib.request.urlopen(url, timeout=5.0).close()
+            return
+        except OSError:
+            time.sleep(0.1)
+    raise NotebookError("Jupyter did not start; what it said stands above")
+
+
+def serve(page: str, first_port: int) -> int:
+    """Run JupyterLab until Ctrl-C or until it ends; nothing that its notebooks have started outlives it."""
+    port, token, run_id = free_port(first_port), secrets.token_urlsafe(24), uuid.uuid4().hex
+    write_kernel(STATE)
+    # In the environment and not on the command line, which every user of the machine can read.
+    marked = {**environment(STATE), "JUPYTER_TOKEN": token, processes.NOTEBOOK_MARKER: run_id}
+    # A session of its own: Ctrl-C reaches us alone, and we end it once.
+    server = subprocess.Popen(command(port), env=marked, stdin=subprocess.DEVNULL, start_new_session=True)
+    try:
+        wait_for(f"http://127.0.0.1:{port}/api?token={token}", server)
+        print(f"Open in a browser:\n\n    http://127.0.0.1:{port}/lab{page}?token={token}\n\n"
+              "Ctrl-C here ends it, with all notebooks and the simulators that they have started.", flush=True)
+        return server.wait()
+    except KeyboardInterrupt:
+        print("ending ...", flush=True)
+        return 0
+    finally:
+        # One Ctrl-C is enough; a second one must not leave half of it behind.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if server.poll() is None:
+            server.send_signal(signal.SIGTERM)
+        processes.wait_until_gone(run_id, STOP_TIMEOUT_S, processes.NOTEBOOK_MARKER)
+        processes.kill_all(run_id, processes.NOTEBOOK_MARKER)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="./baxter.sh notebook", description=__doc__)
+    parser.add_argument("name", nargs="?", help="a part of a notebook's name; without it the list of all")
+    parser.add_argument("--port", type=int, default=FIRST_PORT, help="the first port to try (default: %(default)s)")
+    parser.add_argument("--list", action="store_true", help="print the notebooks and end")
+    options = parser.parse_args()
+    try:
+        if options.list:
+            print("\n".join(f"{path.stem:40} {path.relative_to(ROOT)}" for path in notebooks()))
+            return 0
+        page = f"/tree/{find(options.name).relative_to(ROOT)}" if options.name else ""
+        return serve(page, options.port)
+    except NotebookError as error:
+        print(f"baxter.sh notebook: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    # kill ends it like Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)
