@@ -7,4 +7,5 @@ export LAB_ROOT
 source "$LAB_ROOT/tools/environment.bash"
 use_loopback
 use_build || exit
-exec python3 -m ipykernel_launcher "$@"
+# Errors only: on this machine alone, nobody but root can listen to the kernel, whatever it warns of.
+exec python3 -m ipykernel_launcher --IPKernelApp.log_level=ERROR "$@"

@@ -5,9 +5,16 @@
 The pictures go to .baxter/pictures, and with them those of docs/labs.md.
 """
 import base64
+import json
 import os
+import re
+import signal
+import subprocess
 import sys
 import unittest
+import urllib.error
+import urllib.request
+import uuid
 from pathlib import Path
 
 import cv2
@@ -19,10 +26,13 @@ from nbclient.exceptions import CellExecutionError
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 import notebook as tool  # noqa: E402  (a tool at the root of the workspace is no installed package)
+from lab_tests import processes  # noqa: E402
 from lab_tests.rostests import free_port  # noqa: E402
 
 PICTURES = ROOT / ".baxter" / "pictures"
 CELL_TIMEOUT_S = 150
+# Set for one server and all that it starts.
+MARKER = "LAB_NOTEBOOK_TEST"
 # Notebooks that find no robot of theirs on the test's master: the launch argument, so that no window opens.
 OWN_LABS = ("joint_states_and_trajectories", "ros_control")
 # What docs/labs.md shows, drawn by a cell after the last one: notebook -> (file, expression for a matplotlib figure).
@@ -109,6 +119,32 @@ class LabNotebooksTest(unittest.TestCase):
         self.assertEqual(len(paths), len(OWN_LABS))
         self.run_all(paths, lambda path: {**os.environ, "ROS_MASTER_URI": "http://localhost:%d" % free_port(),
                                           "ROS_HOSTNAME": "localhost"})
+
+    def test_jupyter_starts_a_kernel_and_ctrl_c_leaves_nothing(self):
+        run_id = uuid.uuid4().hex
+        server = subprocess.Popen([str(ROOT / "baxter.sh"), "notebook", "waving", "--port", str(free_port())],
+                                  env={**os.environ, MARKER: run_id}, stdout=subprocess.PIPE, text=True,
+                                  stdin=subprocess.DEVNULL, start_new_session=True)
+        try:
+            address = next(line.strip() for line in server.stdout if "http://" in line)
+            found = re.fullmatch(r"(http://127\.0\.0\.1:\d+)/lab/tree/(\S+)\?token=(\S+)", address)
+            self.assertTrue(found, address)
+            base, page, token = found.groups()
+            self.assertTrue((ROOT / page).is_file(), page)
+            request = urllib.request.Request(base + "/api/kernels", json.dumps({"name": tool.KERNEL}).encode(),
+                                             {"Authorization": "token " + token, "Content-Type": "application/json"})
+            with urllib.request.urlopen(request, timeout=CELL_TIMEOUT_S) as answer:
+                self.assertEqual(json.load(answer)["name"], tool.KERNEL)
+            with self.assertRaises(urllib.error.HTTPError):
+                urllib.request.urlopen(base + "/api/kernels", timeout=CELL_TIMEOUT_S)
+            self.assertGreater(len(processes.marked(run_id, MARKER)), 2)
+            server.send_signal(signal.SIGINT)
+            server.wait(CELL_TIMEOUT_S)
+            self.assertEqual(processes.marked(run_id, MARKER), {})
+        finally:
+            processes.kill_all(run_id, MARKER)
+            server.wait()
+            server.stdout.close()
 
 
 if __name__ == "__main__":
