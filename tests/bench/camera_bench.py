@@ -31,7 +31,8 @@ CWRU = ("cwru_baxter_sim", "baxter_world.launch")
 
 def measure(report, quick, number):
     pictures(report, 4 if quick else PICTURES, 1 if quick else NAIVE_PICTURES)
-    streams(report, 2.0 if quick else SECONDS)
+    for pace in ("1.0", "0"):
+        streams(report, 2.0 if quick else SECONDS, pace)
 
 
 def pictures(report, count, naive_count):
@@ -99,9 +100,12 @@ class Naive:
         pybullet.disconnect(physicsClientId=self._client)
 
 
-def streams(report, seconds):
-    """Case Western's world with both arms moving: the real-time factor without pictures, then with them."""
-    with Lab(CWRU, gui="false", enable="true") as lab:
+def streams(report, seconds, pace="1.0"):
+    """Case Western's world with both arms moving: the real-time factor without pictures, then with them.
+
+    ``pace``: the real-time factor that is asked for; at 0, as fast as can be, physics alone is looked at.
+    """
+    with Lab(CWRU, gui="false", enable="true", real_time_factor=pace) as lab:
         lab.part("swing")
         for camera in CAMERAS:
             settings = "{name: %s, settings: {width: %d, height: %d, fps: 60}}" % (camera, *SIZE)
@@ -112,8 +116,12 @@ def streams(report, seconds):
                                      ("three cameras and the Kinect's points",
                                       [*topics, ("/kinect/depth/points", PointCloud2)], 8.0)):
             counts, factor = count_messages(lab, watched, seconds)
+            if pace == "0":
+                report.add("%s, no pace: real-time factor" % title, factor, "", ("nobody looks", blind))
+                continue
             report.add("%s: pictures a second of each" % title, min(counts) / seconds, "Hz", least=goal)
-            report.add("%s: real-time factor" % title, factor, "", ("nobody looks", blind), least=0.95)
+            report.add("%s: real-time factor" % title, factor, "", least=0.95)
+            report.add("%s: real-time factor beside" % title, factor, "", ("nobody looks", blind), ratio_least=0.98)
 
 
 def count_messages(lab, watched, seconds):

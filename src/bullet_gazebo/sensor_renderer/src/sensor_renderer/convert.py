@@ -8,7 +8,8 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, Poi
 from sensor_renderer.pictures import Cloud, encoded
 
 _BIG_ENDIAN = sys.byteorder == "big"
-_JPEG_QUALITY = 80  # image_transport's own default
+#: image_transport's own default.
+JPEG_QUALITY = 80
 
 
 def header(message, time_s, frame):
@@ -32,11 +33,11 @@ def depth_image(values):
                  is_bigendian=_BIG_ENDIAN, step=width * values.dtype.itemsize, data=values.tobytes())
 
 
-def compressed_image(picture):
-    """sensor_msgs/CompressedImage, JPEG, of a colour picture (height, width, 3)."""
+def compressed_image(picture, quality=JPEG_QUALITY):
+    """sensor_msgs/CompressedImage, JPEG of ``quality`` (1 to 100), of a colour picture (height, width, 3)."""
     import cv2
 
-    _, data = cv2.imencode(".jpg", picture[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    _, data = cv2.imencode(".jpg", picture[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
     return CompressedImage(format="rgb8; jpeg compressed bgr8", data=data.tobytes())
 
 

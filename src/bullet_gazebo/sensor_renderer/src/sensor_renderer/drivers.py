@@ -7,12 +7,16 @@ happen in the thread that draws. ``config/camera_drivers.yaml`` says which drive
 import threading
 
 import rospy
+from rosgraph.names import is_legal_name
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 
+from loop_reconfigure import Setting, SettingsServer
 from sensor_renderer import convert
+from sensor_renderer.errors import SensorError
 from sensor_renderer.pictures import Cloud, Noise, millimetres, within
 
 _SMALLEST_TIME_S = 1e-6
+_FASTEST_HZ = 1000.0
 
 
 class Topic:
@@ -43,14 +47,61 @@ class Topic:
             publisher.unregister()
 
 
+class Settings:
+    """Numbers that dynamic_reconfigure's clients read and change; closed like a topic."""
+
+    #: Nothing of this asks for a picture.
+    has_listeners = False
+
+    def __init__(self, name, settings, apply):
+        """As :class:`loop_reconfigure.SettingsServer`; ``apply`` is called in a service's thread."""
+        self._opened = []
+        self._lock = threading.Lock()
+        SettingsServer(self, name, settings, apply)
+
+    def publisher(self, topic, msg_class, latch):
+        """For SettingsServer."""
+        publisher = rospy.Publisher(topic, msg_class, latch=latch, queue_size=1)
+        self._opened.append(publisher.unregister)
+        return publisher
+
+    def service(self, name, srv_class, handler):
+        """For SettingsServer."""
+        def one_at_a_time(request):
+            with self._lock:
+                return handler(request)
+
+        try:
+            service = rospy.Service(name, srv_class, one_at_a_time)
+        except rospy.ServiceException:
+            rospy.logwarn("%s: another camera of this name has it already" % name)
+            return
+        self._opened.append(lambda: service.shutdown("the sensor is gone"))
+
+    def close(self):
+        """Take topics and service back."""
+        while self._opened:
+            self._opened.pop()()
+
+
 class Pace:
     """Tells when the next picture is due, in simulation time."""
 
     def __init__(self, rate):
         """``rate`` [Hz]; 0: at every new state."""
+        self.rate = rate
+        self._last_s = None
+
+    @property
+    def rate(self):
+        """Pictures a second [Hz]; 0: at every new state."""
+        return self._rate
+
+    @rate.setter
+    def rate(self, rate):
+        self._rate = rate
         self.period_s = 1.0 / rate if rate > 0.0 else _SMALLEST_TIME_S
         self._next_s = None
-        self._last_s = None
 
     def is_due(self, time_s):
         """Whether a picture of the state at ``time_s`` is wanted. Time may have jumped back."""
@@ -72,7 +123,13 @@ class ColourTopics:
         self.image = Topic(image_topic, Image)
         self.compressed = Topic(image_topic + "/compressed", CompressedImage)
         self.infos = [Topic(name, CameraInfo) for name in info_topics]
-        self.all = [self.image, self.compressed, *self.infos]
+        self._quality = convert.JPEG_QUALITY
+        settings = Settings(image_topic + "/compressed", [
+            Setting("jpeg_quality", self._quality, 1, 100, "of the pictures, in percent")], self._apply)
+        self.all = [self.image, self.compressed, *self.infos, settings]
+
+    def _apply(self, values):
+        self._quality = values["jpeg_quality"]
 
     @property
     def want_picture(self):
@@ -87,7 +144,7 @@ class ColourTopics:
         if picture is not None and self.image.has_listeners:
             self.image.publish(convert.header(convert.image(picture, encoding), time_s, frame))
         if picture is not None and self.compressed.has_listeners:
-            self.compressed.publish(convert.header(convert.compressed_image(picture), time_s, frame))
+            self.compressed.publish(convert.header(convert.compressed_image(picture, self._quality), time_s, frame))
 
 
 class Driver:
@@ -100,8 +157,21 @@ class Driver:
         self._pace = Pace(entry.rate)
 
     def name(self, text):
-        """A ROS name: relative ones live in the sensor's namespace."""
-        return text if text.startswith("/") else "%s/%s" % (self.entry.namespace, text)
+        """A ROS name: relative ones live in the sensor's namespace. Raises :class:`SensorError` for what is none."""
+        name = text if text.startswith("/") else "%s/%s" % (self.entry.namespace, text)
+        if not is_legal_name(name):
+            raise SensorError("%s: '%s' is no name in ROS; expected letters, digits and _ between slashes"
+                              % (self.entry, name))
+        return name
+
+    def rate_setting(self, camera_name):
+        """The rate as a client may change it, where Gazebo's cameras have it."""
+        def apply(values):
+            self._pace.rate = values["imager_rate"]
+
+        return Settings(self.name(camera_name), [
+            Setting("imager_rate", self._pace.rate, 0.0, _FASTEST_HZ, "pictures a second [Hz]; 0: one of every state")],
+            apply)
 
     def under_camera(self, text, camera_name):
         """A topic below the camera's own name."""
@@ -151,6 +221,7 @@ class Camera(Driver):
             self._cameras.append((camera, topics, Noise(camera.noise) if camera.noise else None,
                                   convert.camera_info(camera.pinhole, baseline)))
             self.topics += topics.all
+        self.topics.append(self.rate_setting(base))
 
     def publish(self, time_s, link_pose, draw):
         for camera, topics, noise, info in self._cameras:
@@ -183,7 +254,7 @@ class DepthCamera(Driver):
         self._depth = topic("depthImageTopicName", "depth/image_raw", Image)
         self._depth_info = topic("depthImageCameraInfoTopicName", "depth/camera_info", CameraInfo)
         self._points = topic("pointCloudTopicName", "depth/points", PointCloud2)
-        self.topics = [*self._colour.all, self._depth, self._depth_info, self._points]
+        self.topics = [*self._colour.all, self._depth, self._depth_info, self._points, self.rate_setting(base)]
         self._cloud = Cloud(pinhole)
         self._noise = Noise(self._camera.noise) if self._camera.noise else None
         self._info = convert.camera_info(pinhole, entry.number(entry.plugin, "hackBaseline", 0.0))

@@ -17,7 +17,13 @@ _SHADOW_HALF_M = 2.2
 _SHADOW_PIXELS = 512
 _NO_LAMP = Lamp((0.0,) * 4, (0.0,) * 3, (0.0,) * 4, (0.0,) * 3, (0.0,) * 3)
 
-# Light without shadows, of up to MOST_LAMPS lamps.
+# Light without shadows, of up to MOST_LAMPS lamps. In software even a loop of no turns costs as much as the rest of a
+# picture: where there are no lamps, the shaders have none.
+_NO_LAMPS = """
+#version 330
+vec3 lamplight(vec3 there, vec3 n) { return vec3(0.0); }
+"""
+
 _LAMPS = """
 #version 330
 uniform int lamps;
@@ -43,7 +49,7 @@ vec3 lamplight(vec3 there, vec3 n) {
 """ % ((MOST_LAMPS,) * 5)
 
 # Light is reckoned at the vertices and only shadow at each pixel: without a graphics card pixels are what costs. Of the
-# floor, which has no more than four corners, lamps are reckoned at each pixel, and only where there are any.
+# floor, which has no more than four corners, lamps are reckoned at each pixel.
 _VERTEX = """
 uniform vec3 ambient;
 uniform vec3 sun;
@@ -95,7 +101,7 @@ out vec4 seen;
 void main() {
     vec2 tile = fract(place.xy) - 0.5;
     vec3 light = dim + bright * texture(shadow, shadow_place);
-    if (lamps > 0) light += own * lamplight(place, vec3(0.0, 0.0, 1.0));
+    light += own * lamplight(place, vec3(0.0, 0.0, 1.0));
     seen = vec4(light * (tile.x * tile.y > 0.0 ? 1.0 : 0.92), 1.0);
 }
 """
@@ -160,10 +166,6 @@ class GlRenderer:
         context = self._context
         #: What draws, in the driver's own words.
         self.name = context.info["GL_RENDERER"]
-        lit = _VERTEX.replace("LAMPLIGHT", "lamplight(there.xyz, n)")
-        unlit = "#version 330\n" + _VERTEX.replace("LAMPLIGHT", "0.0")
-        self._program = context.program(vertex_shader=_LAMPS + lit, fragment_shader=_FRAGMENT)
-        self._floor_program = context.program(vertex_shader=unlit, fragment_shader=_LAMPS + _FLOOR_FRAGMENT)
         self._screen_program = context.program(vertex_shader=_SCREEN_VERTEX, fragment_shader=_SCREEN_FRAGMENT)
         corners = np.array([(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)], dtype=np.float32)
         self._screen = context.vertex_array(self._screen_program, [(context.buffer(corners.tobytes()), "2f", "corner")])
@@ -180,7 +182,7 @@ class GlRenderer:
         self._links = {}
         self._buffers = {}
         self._shadow_of = None
-        self._lit_by = self._shadow_matrix = None
+        self._lit_by = self._shadow_matrix = self._program = self._floor_program = None
         context.enable(moderngl.DEPTH_TEST)
 
     def render(self, mirror, pinhole, pose, colour=True, depth=False):
@@ -191,11 +193,12 @@ class GlRenderer:
         """
         view = np.linalg.inv(pose)
         to_clip = pinhole.clip_matrix() @ view
+        if mirror.light != self._lit_by:
+            self._light_by(mirror.light)
         seen = _visible(self._everything(mirror), pinhole, view)
         buffer, depth_texture = self._framebuffer(pinhole.width, pinhole.height)
         picture = distance = None
         if colour:
-            self._light_by(mirror.light)
             self._draw_shadows(mirror)
             screens = self._screens(mirror, pinhole, view)
             buffer.use()
@@ -228,20 +231,33 @@ class GlRenderer:
         self._context.release()
 
     def _light_by(self, light):
-        if light == self._lit_by:
-            return
+        if self._lit_by is None or bool(light.lamps) != bool(self._lit_by.lamps):
+            self._compile(_LAMPS if light.lamps else _NO_LAMPS)
         self._lit_by, self._shadow_of = light, None
         self._shadow_matrix, to_shadow = _shadow_matrices(np.array(light.to_sun))
         for program in (self._program, self._floor_program):
             program["ambient"].value, program["sun"].value = light.ambient, light.sun
             program["to_sun"].value = light.to_sun
             program["to_shadow"].write(_bytes(to_shadow))
+            if not light.lamps:
+                continue
             program["lamps"].value = len(light.lamps)
             for name in Lamp._fields:
                 values = np.zeros((MOST_LAMPS, len(getattr(_NO_LAMP, name))), dtype=np.float32)
                 for row, lamp in zip(values, light.lamps, strict=False):
                     row[:] = getattr(lamp, name)
                 program["lamp_" + name].write(values.tobytes())
+
+    def _compile(self, lamps):
+        for drawn in (*(array for link in self._links.values() for array in link.arrays), self._program,
+                      self._floor_program):
+            if drawn is not None:
+                drawn.release()
+        self._links = {}
+        corners = _VERTEX.replace("LAMPLIGHT", "lamplight(there.xyz, n)")
+        self._program = self._context.program(vertex_shader=lamps + corners, fragment_shader=_FRAGMENT)
+        corners = _NO_LAMPS + _VERTEX.replace("LAMPLIGHT", "0.0")
+        self._floor_program = self._context.program(vertex_shader=corners, fragment_shader=lamps + _FLOOR_FRAGMENT)
 
     def _screens(self, mirror, pinhole, view):
         """The screens that show their faces: (texture, matrix of a square of 1 m)."""

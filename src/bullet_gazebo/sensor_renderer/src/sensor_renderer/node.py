@@ -35,6 +35,7 @@ class SensorRenderer:
         self._drivers = drivers
         self._mirror = Mirror(DrawingCache(), ResourceFinder(), rospy.logwarn)
         self._sensors = {}
+        self._refused = set()
         self._revision = None
         self._drawn_s = None
 
@@ -86,6 +87,7 @@ class SensorRenderer:
             return  # the node is shutting down
         except Exception as error:  # noqa: BLE001  (one sensor that fails must not blind the others)
             rospy.logerr("%s failed and is left out from now on: %s: %s" % (entry, type(error).__name__, error))
+            self._refused.update(key for key, other in self._sensors.items() if other is driver)
             self._sensors = {key: other for key, other in self._sensors.items() if other is not driver}
             driver.close()
 
@@ -101,12 +103,16 @@ class SensorRenderer:
                 wanted[body["name"], str(sorted(listed.items()))] = body["name"], listed
         for key in [key for key in self._sensors if key not in wanted]:
             self._sensors.pop(key).close()
+        # What is of no use is said once, not at every change of the world.
+        self._refused &= wanted.keys()
         for key, (model, listed) in wanted.items():
-            if key not in self._sensors:
+            if key not in self._sensors and key not in self._refused:
                 try:
                     self._sensors[key] = self._driver(SensorEntry(model, listed))
-                except (SensorError, ImportError, AttributeError) as error:
-                    rospy.logerr("no pictures: %s" % error)
+                except Exception as error:  # noqa: BLE001  (a driver that fails must not blind the others)
+                    kind = "" if isinstance(error, SensorError) else "%s: " % type(error).__name__
+                    rospy.logerr("no pictures: %s%s" % (kind, error))
+                    self._refused.add(key)
 
     def _driver(self, entry):
         try:

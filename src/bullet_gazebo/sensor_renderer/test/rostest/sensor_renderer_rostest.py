@@ -13,6 +13,7 @@ import rosgraph
 import rospy
 from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, Image
 
 CAMERA = """<camera%s><horizontal_fov>1.0</horizontal_fov><image><width>160</width><height>120</height></image>
@@ -27,6 +28,13 @@ RIG = """<sdf version="1.6"><model name="rig"><static>true</static><link name="p
 <link name="deep"><pose>0 0 1 0 0 0</pose><sensor type="depth" name="depth"><update_rate>20</update_rate>""" + (
     CAMERA % "") + """<plugin name="p" filename="libgazebo_ros_depth_camera.so"><cameraName>deep</cameraName>
 <useDepth16UC1Format>true</useDepth16UC1Format></plugin></sensor></link></model></sdf>"""
+EYE = """<sdf version="1.6"><model name="m"><static>true</static><link name="l"><sensor type="camera" name="eye">
+<update_rate>20</update_rate>%s<plugin name="p" filename="libgazebo_ros_camera.so"><cameraName>%s</cameraName></plugin>
+</sensor></link></model></sdf>"""
+BLOCK = """<sdf version="1.6"><model name="b"><link name="l"><collision name="c">
+<geometry><box><size>0.1 0.1 0.1</size></box></geometry></collision><visual name="v"><geometry><box>
+<size>0.1 0.1 0.1</size></box></geometry></visual></link></model></sdf>"""
+MESH = BLOCK.replace("<box>\n<size>0.1 0.1 0.1</size></box>", "<mesh><uri>file:///nowhere/a.stl</uri></mesh>")
 WALL = """<robot name="wall"><link name="l"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0"
 iyz="0"/></inertial><visual><geometry><box size="0.1 4 4"/></geometry><material name="g"><color rgba="0 0.8 0 1"/>
 </material></visual></link><gazebo><static>true</static></gazebo></robot>"""
@@ -62,7 +70,40 @@ def spawn(kind, name, xml, x):
 
 
 class SensorRendererTest(unittest.TestCase):
-    def test_models_and_simulators_come_and_go(self):
+    def test_1_what_is_of_no_use_blinds_nobody(self):
+        said = []
+        log = rospy.Subscriber("/rosout", Log, lambda line: said.append(line.msg), queue_size=1000)
+        wait_until(lambda: log.get_num_connections() > 1)
+        spawn("sdf", "huge", EYE % (CAMERA.replace(">160<", ">99999999<") % "", "huge"), -1.0)
+        spawn("sdf", "nameless", EYE % (CAMERA % "", "no name!"), -2.0)
+        spawn("sdf", "mesh", MESH, -3.0)
+        spawn("sdf", "first", EYE % (CAMERA % "", "twin"), 5.0)
+        spawn("sdf", "second", EYE % (CAMERA % "", "twin"), 7.0)
+        for number in range(50):
+            spawn("sdf", "block%d" % number, BLOCK, 10.0 + 0.2 * number)
+        # Two look at once; a model goes while it is being drawn.
+        seen = [[], []]
+        looking = [rospy.Subscriber("/twin/image_raw", Image, part.append, queue_size=1) for part in seen]
+        wait_until(lambda: min(map(len, seen)) > 3)
+        for name in ("second", "mesh", *("block%d" % number for number in range(50))):
+            rospy.ServiceProxy("/gazebo/delete_model", DeleteModel)(name)
+        counts = [len(part) for part in seen]
+        wait_until(lambda: all(len(part) > count + 5 for part, count in zip(seen, counts, strict=True)))
+        for text in ("a picture of 99999999 x 120 pixels is out of range", "'/no name!/image_raw' is no name in ROS"):
+            self.assertEqual(sum(text in line for line in said), 1, "said once: %s" % text)
+
+        # The renderer is killed without a word; it comes back and goes on.
+        old = api_of("/sensor_renderer")
+        os.kill(xmlrpc.client.ServerProxy(old).getPid("/test")[2], signal.SIGKILL)
+        wait_until(lambda: api_of("/sensor_renderer") not in (None, old))
+        last = [part[-1].header.stamp for part in seen]
+        wait_until(lambda: all(part[-1].header.stamp > stamp for part, stamp in zip(seen, last, strict=True)))
+        for subscriber in (log, *looking):
+            subscriber.unregister()
+        for name in ("huge", "nameless", "first"):
+            rospy.ServiceProxy("/gazebo/delete_model", DeleteModel)(name)
+
+    def test_2_models_and_simulators_come_and_go(self):
         spawn("sdf", "rig", RIG, 0.0)
         # One sensor of this model has no <camera>: the others see.
         first = wait_for(LEFT, Image)

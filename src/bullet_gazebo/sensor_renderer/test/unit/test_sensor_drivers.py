@@ -2,9 +2,11 @@
 """Between a description and the wire: what a <sensor> says, when a picture is due, what messages hold."""
 import numpy as np
 import pytest
+from dynamic_reconfigure.msg import Config, DoubleParameter, IntParameter
+from dynamic_reconfigure.srv import ReconfigureRequest
 from sensor_msgs.msg import PointField
 
-from sensor_renderer import convert, node
+from sensor_renderer import convert, drivers, node
 from sensor_renderer.drivers import Pace
 from sensor_renderer.errors import RenderingError, SensorError
 from sensor_renderer.pictures import Cloud, Noise, encoded, millimetres, within
@@ -103,3 +105,52 @@ def test_without_egl_pictures_come_from_pybullet_and_that_is_said(monkeypatch):
     assert isinstance(renderer, TinyRenderer)
     assert "libEGL.so not found" in said[0] and "Install libegl1" in said[0]
     renderer.close()
+
+
+def test_settings_are_served_once_and_felt_at_once(monkeypatch):
+    class Opened:
+        def __init__(self, *arguments, **_):
+            self.arguments, self.sent, self.open = arguments, [], True
+            found.append(self)
+
+        def publish(self, message):
+            self.sent.append(message)
+
+        def unregister(self, *_):
+            self.open = False
+
+        shutdown = unregister
+        get_num_connections = staticmethod(lambda: 1)
+
+    found = []
+    monkeypatch.setattr(drivers.rospy, "Publisher", Opened)
+    monkeypatch.setattr(drivers.rospy, "Service", Opened)
+    camera = drivers.Camera(entry())
+    names = [opened.arguments[0] for opened in found]
+    assert "/ns/eye/image_raw/compressed/set_parameters" in names and "/ns/eye/parameter_updates" in names
+    handler = {opened.arguments[0]: opened.arguments[-1] for opened in found}
+    handler["/ns/eye/image_raw/compressed/set_parameters"](ReconfigureRequest(Config(ints=[
+        IntParameter("jpeg_quality", 5)])))
+    noise = np.random.default_rng(0).integers(0, 255, (48, 64, 3)).astype(np.uint8)
+
+    def taken(time_s):
+        camera.take(time_s, np.eye(4), lambda *_: (noise, None))
+        compressed, = (opened for opened in found if opened.arguments[0] == "/ns/eye/image_raw/compressed")
+        return len(compressed.sent[-1].data)
+
+    small = taken(0.0)
+    handler["/ns/eye/image_raw/compressed/set_parameters"](ReconfigureRequest(Config(ints=[
+        IntParameter("jpeg_quality", 90)])))
+    assert taken(1.0) > 2 * small
+    assert not camera.is_due(1.05)
+    handler["/ns/eye/set_parameters"](ReconfigureRequest(Config(doubles=[DoubleParameter("imager_rate", 100.0)])))
+    assert camera.is_due(1.05)
+    camera.close()
+    assert not any(opened.open for opened in found)
+
+
+def test_names_that_are_none_are_refused():
+    with pytest.raises(SensorError, match="'/n s/eye' is no name in ROS"):
+        drivers.Driver(SensorEntry("robot", {
+            "link": "base", "member": "head", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/n s",
+            "xml": SENSOR % ("10", "", "0")})).name("eye")

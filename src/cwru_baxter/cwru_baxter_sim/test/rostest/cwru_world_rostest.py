@@ -10,6 +10,7 @@ import tf2_ros
 from baxter_core_msgs.msg import CameraControl, CameraSettings
 from baxter_core_msgs.srv import CloseCamera, ListCameras, OpenCamera
 from cv_bridge import CvBridge
+from dynamic_reconfigure.client import Client
 from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from seen import is_red, matrix_of, picture_of, points_of, wait_for
@@ -23,11 +24,17 @@ CUBE = """<sdf version="1.6"><model name="cube"><static>true</static><link name=
 <visual name="v"><geometry><box><size>0.06 0.06 0.06</size></box></geometry>
 <material><ambient>0.9 0.02 0.02 1</ambient><diffuse>0.9 0.02 0.02 1</diffuse></material></visual></link></model>
 </sdf>"""
+ONLOOKER = """<sdf version="1.6"><model name="onlooker"><static>true</static><link name="l">
+<pose>%f %f %f %f %f %f</pose>
+<sensor type="camera" name="onlooker"><update_rate>20</update_rate><camera><horizontal_fov>0.8</horizontal_fov><image>
+<width>320</width><height>240</height></image><clip><near>0.05</near><far>20</far></clip></camera>
+<plugin name="p" filename="libgazebo_ros_camera.so"/></sensor></link></model></sdf>"""
 # The region of the Kinect's picture where the red frame of the robot's own screen is not.
 ROBOT_FREE_ROWS = 380
 KINECT = {"/kinect/%s" % name for name in (
     "rgb/image_raw", "rgb/image_raw/compressed", "rgb/camera_info", "depth/image_raw", "depth/camera_info",
-    "depth/points")}
+    "depth/points", *(place + "parameter_" + what for place in ("", "rgb/image_raw/compressed/")
+                      for what in ("descriptions", "updates")))}
 
 
 def service(name, kind):
@@ -122,6 +129,25 @@ class CwruWorldTest(unittest.TestCase):
                          lambda message: message.header.stamp.to_sec() > image.header.stamp.to_sec() + 0.5)
         self.assertGreater(picture_of(later).std(), 10.0)
 
+    def test_settings_that_can_be_changed_are_felt(self):
+        topic = "/kinect/rgb/image_raw/compressed"
+        size = len(wait_for(topic, CompressedImage).data)
+        quality, rate = (Client(name, timeout=60.0) for name in (topic, "/kinect"))
+        self.assertEqual((quality.get_configuration()["jpeg_quality"], rate.get_configuration()["imager_rate"]),
+                         (80, 10.0))
+        self.assertEqual(quality.update_configuration({"jpeg_quality": 5})["jpeg_quality"], 5)
+        wait_for(topic, CompressedImage, lambda message: len(message.data) < 0.5 * size)
+        rate.update_configuration({"imager_rate": 2.0})
+        stamps = []
+
+        def are_half_a_second_apart(message):
+            stamps.append(message.header.stamp.to_sec())
+            return len(stamps) > 1 and abs(stamps[-1] - stamps[-2] - 0.5) < 0.1
+
+        wait_for(topic, CompressedImage, are_half_a_second_apart)
+        quality.update_configuration({"jpeg_quality": 80})
+        rate.update_configuration({"imager_rate": 10.0})
+
     def test_cameras_open_and_close_with_what_the_robot_has(self):
         opening, closing = service("/cameras/open", OpenCamera), service("/cameras/close", CloseCamera)
         cameras = service("/cameras/list", ListCameras)().cameras
@@ -144,6 +170,34 @@ class CwruWorldTest(unittest.TestCase):
         service("/cameras/reset", Empty)()
         for camera in cameras:
             self.assertEqual(wait_for("/cameras/%s/image" % camera, Image).width, 800)
+
+    def test_the_screen_shows_its_picture_to_who_looks_at_the_robot(self):
+        # 0.5 m before the glass and looking straight at it; where that is says tf, base stands upright in the world.
+        self.buffer.lookup_transform("base", "display", rospy.Time(), rospy.Duration(30.0))
+        glass = np.linalg.inv(self.base_in("display"))
+        tilt = np.radians(15.0)
+        out = glass[:3, :3] @ [0.0, -np.sin(tilt), np.cos(tilt)]
+        x, y, z = glass[:3, 3] + 0.5 * out + [0.0, 0.0, BASE_Z]
+        pitch, yaw = np.arcsin(out[2]), np.arctan2(-out[1], -out[0])
+        onlooker = ONLOOKER % (x, y, z, 0.0, pitch, yaw)
+        answer = service("/gazebo/spawn_sdf_model", SpawnModel)("onlooker", onlooker, "", Pose(), "world")
+        self.assertTrue(answer.success, answer.status_message)
+        self.addCleanup(service("/gazebo/delete_model", DeleteModel), "onlooker")
+
+        pixels = np.zeros((600, 1024, 3), dtype=np.uint8)
+        pixels[:300, :512], pixels[300:, 512:] = (0, 255, 0), (255, 0, 0)
+        show = rospy.Publisher("/robot/xdisplay", Image, queue_size=1, latch=True)
+        show.publish(CvBridge().cv2_to_imgmsg(np.ascontiguousarray(pixels[:, :, ::-1]), "bgr8"))
+
+        def is_shown(message):
+            found = picture_of(message).astype(int)
+            upper_left, lower_right = found[100:115, 130:145], found[125:140, 175:190]
+            dark = found[125:140, 130:145]
+            return (upper_left == (0, 255, 0)).all() and (lower_right == (255, 0, 0)).all() and (dark == 0).all()
+
+        wait_for("/onlooker/image_raw", Image, is_shown)
+        show.publish(CvBridge().cv2_to_imgmsg(np.zeros((600, 1024, 3), dtype=np.uint8), "bgr8"))
+        wait_for("/onlooker/image_raw", Image, lambda message: not picture_of(message)[100:140, 130:190].any())
 
     def test_lasers_and_the_names_of_topics(self):
         for side in ("left", "right"):
