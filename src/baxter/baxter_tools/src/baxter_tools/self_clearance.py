@@ -14,19 +14,19 @@ from urdf_model import parse_urdf
 class SelfClearance:
     """Called with a posture (n,) [rad] of the joints `names`, returns the least distance between parts [m].
 
-    Negative where parts overlap; FAR where none is nearer than about 20 mm, beyond which nobody looks. Fingers count as
-    spread as far as they go.
+    Negative where parts overlap; FAR where none is nearer than SEEN_M, or a fiftieth of the smaller one's size. Fingers
+    count as spread as far as they go.
 
     Parameters: the text of the robot's URDF; `names` of the joints; `warn` takes a line of text.
     Raises UrdfError and BulletSimError for a description that is none of Baxter.
     Attributes: lower, upper: limits (n,) [rad].
     """
 
-    FAR = 1.0
+    FAR, SEEN_M = 1.0, 0.02
 
     def __init__(self, urdf_xml, names, warn=lambda text: None):
         robot = parse_urdf(urdf_xml, source="robot_description")
-        self._world = World(find_mesh=ResourceFinder(), warn=warn)
+        self._world = World(find_mesh=ResourceFinder(), warn=warn, contact_ahead_m=self.SEEN_M)
         self._model = self._world.spawn(robot, "baxter", static=True, mesh_cuts=MESH_CUTS,
                                         self_collision_pairs=self_collision_pairs(robot.links))
         self._index = self._model.index(names)

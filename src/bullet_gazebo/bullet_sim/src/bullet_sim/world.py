@@ -15,11 +15,6 @@ from .pose import Pose
 from .shapes import MeshFiles, ShapeStore
 from .stand_ins import with_stand_ins
 
-# Bodies nearer than this are solved as a contact before they touch [m]: what the fastest of them, 2 m/s, travel in a
-# tick of 2 ms. Bullet's own 0.02 m has an arm that is folded beside its body pay for contacts that never come. Small
-# bodies have less anyway, a fiftieth of their size. PyBullet keeps one figure for all worlds of a process.
-_CONTACT_AHEAD_M = 0.004
-
 
 def plain_path(uri):
     """Return the file that ``uri`` (a path or file://…) names, or None: for a world without packages."""
@@ -41,10 +36,15 @@ class World:
     :param time_step_s: length of a tick [s]
     :param gravity: (3,) [m/s^2]
     :param solver_iterations: of Bullet's constraint solver
+    :param contact_ahead_m: how far apart bodies may be to count as a contact, which is solved before they touch [m].
+        The default is what 2 m/s travel in a tick of 2 ms; Bullet's own 0.02 m has an arm that is folded beside its
+        body pay for contacts that never come. For small bodies it is less in any case, a fiftieth of their size.
     :param seed: of ``World.random``, for whoever needs noise
     :param find_mesh: function from a mesh URI to a file path, or None when there is no such file
     :param warn: function that is told what was mended, in one line
     """
+
+    _contact_ahead_in_force_m = None
 
     def __init__(
         self,
@@ -52,6 +52,7 @@ class World:
         gravity=(0.0, 0.0, -9.81),
         solver_iterations=20,
         seed=0,
+        contact_ahead_m=0.004,
         find_mesh=plain_path,
         warn=lambda text: None,
     ):
@@ -75,9 +76,10 @@ class World:
             numSolverIterations=solver_iterations,
             numSubSteps=0,
             deterministicOverlappingPairs=1,
-            contactBreakingThreshold=_CONTACT_AHEAD_M,
             physicsClientId=self._client,
         )
+        self._contact_ahead_m = contact_ahead_m
+        self._put_contact_ahead()
         self.set_gravity(gravity)
 
     @property
@@ -192,8 +194,17 @@ class World:
         if model not in self._touched:
             self._touched.append(model)
 
+    def _put_contact_ahead(self):
+        """PyBullet keeps one figure for all worlds of a process: put ours there, if another world's is."""
+        if World._contact_ahead_in_force_m != self._contact_ahead_m:
+            World._contact_ahead_in_force_m = self._contact_ahead_m
+            pybullet.setPhysicsEngineParameter(
+                contactBreakingThreshold=self._contact_ahead_m, physicsClientId=self._client
+            )
+
     def step(self):
         """Advance the world by one tick."""
+        self._put_contact_ahead()
         for model in self._weightless:
             model.cancel_weight()
         pybullet.stepSimulation(physicsClientId=self._client)
@@ -214,6 +225,7 @@ class World:
 
     def detect_contacts(self):
         """Find the contacts where everything stands now, without a step; ``contacts`` then returns them."""
+        self._put_contact_ahead()
         pybullet.performCollisionDetection(physicsClientId=self._client)
 
     def contacts(self, model=None, other=None):
@@ -232,7 +244,7 @@ class World:
 
     def touching(self, model):
         """Return the contacts of ``model`` where everything is now, as :meth:`contacts` does; no time passes."""
-        pybullet.performCollisionDetection(physicsClientId=self._client)
+        self.detect_contacts()
         return self.contacts(model)
 
     def ray_test_batch(self, starts, ends):

@@ -232,3 +232,19 @@ def test_solver_iterations_are_checked(world):
     world.set_solver_iterations(50)
     with pytest.raises(BulletSimError, match="expected 1 to 1000"):
         world.set_solver_iterations(0)
+
+
+def test_each_world_looks_ahead_as_far_as_it_was_told():
+    """Two drums of 1 m, 10 mm apart, in worlds that take turns."""
+    drum = """<robot name="drum"><link name="drum">
+      <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial><collision><geometry><cylinder radius="0.5" length="1"/></geometry></collision></link></robot>"""
+    worlds = [World(gravity=(0.0, 0.0, 0.0)), World(gravity=(0.0, 0.0, 0.0), contact_ahead_m=0.02)]
+    for world in worlds:
+        world.spawn(parse_urdf(drum), "here", static=True)
+        world.spawn(parse_urdf(drum), "there", Pose((1.01, 0.0, 0.0)))
+    for look in (World.step, World.detect_contacts):
+        for world in worlds * 2:
+            look(world)
+            assert bool(world.contacts()) == (world is worlds[1])
+    for world in worlds:
+        world.close()
