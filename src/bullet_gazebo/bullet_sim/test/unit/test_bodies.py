@@ -237,7 +237,8 @@ def test_solver_iterations_are_checked(world):
 def test_each_world_looks_ahead_as_far_as_it_was_told():
     """Two drums of 1 m, 10 mm apart, in worlds that take turns."""
     drum = """<robot name="drum"><link name="drum">
-      <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial><collision><geometry><cylinder radius="0.5" length="1"/></geometry></collision></link></robot>"""
+      <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
+      <collision><geometry><cylinder radius="0.5" length="1"/></geometry></collision></link></robot>"""
     worlds = [World(gravity=(0.0, 0.0, 0.0)), World(gravity=(0.0, 0.0, 0.0), contact_ahead_m=0.02)]
     for world in worlds:
         world.spawn(parse_urdf(drum), "here", static=True)
