@@ -3,7 +3,6 @@
 """Services on links, joints, wrenches and lights, and models in SDF, in a world file and spawned."""
 import math
 import subprocess
-import time
 import unittest
 
 import rospy
@@ -15,6 +14,8 @@ from geometry_msgs.msg import Point, Pose, Quaternion, Vector3, Wrench
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty
+
+from lab_testing.waiting import wait_until
 
 BOX = """<sdf version="1.6"><model name="box"><pose>0 0 0.1 0 0 0</pose><link name="body">
   <pose>0 0 0.1 0 0 0</pose>
@@ -36,17 +37,6 @@ SERVICES = {
 WORLD = ["ground_plane", "cafe_table", "can", "pendulum", "door"]
 DEADLINE_S = 15.0
 NOW, ALWAYS = rospy.Time(0), rospy.Duration(-1)
-
-
-def wait_for(condition, what):
-    """Poll until ``condition()`` is true; an error that says what was awaited otherwise."""
-    end = time.monotonic() + DEADLINE_S
-    while time.monotonic() < end:
-        found = condition()
-        if found:
-            return found
-        time.sleep(0.01)
-    raise AssertionError("waited %.0f s in vain for %s" % (DEADLINE_S, what))
 
 
 class GazeboBodies(unittest.TestCase):
@@ -157,13 +147,13 @@ class GazeboBodies(unittest.TestCase):
     def test_missing_meshes_and_unknown_elements_are_one_warning_each(self):
         lines = []
         subscriber = rospy.Subscriber("/rosout", Log, lambda message: lines.append(message.msg))
-        wait_for(lambda: subscriber.get_num_connections() >= 2, "connections to /rosout")
+        wait_until(lambda: subscriber.get_num_connections() >= 2, "connections to /rosout")
         mesh = """<link name="ghost">
           <visual name="v"><geometry><mesh><uri>model://gone/a.stl</uri></mesh></geometry></visual></link><frobnicator/>
           <joint name="g" type="fixed"><parent>body</parent><child>ghost</child></joint>"""
         self.spawn_box(mesh)
-        wait_for(lambda: any("a.stl cannot be found" in line for line in lines), "the warning of the mesh")
-        wait_for(lambda: any("frobnicator" in line for line in lines), "the warning of the element")
+        wait_until(lambda: any("a.stl cannot be found" in line for line in lines), "the warning of the mesh")
+        wait_until(lambda: any("frobnicator" in line for line in lines), "the warning of the element")
         found = [line for line in lines if "a.stl" in line or "frobnicator" in line]
         self.assertEqual(len(found), 2, found)
         subscriber.unregister()
@@ -179,7 +169,7 @@ class GazeboBodies(unittest.TestCase):
         states = []
         subscriber = rospy.Subscriber("/gazebo/link_states", LinkStates, states.append)
         self.unpause_physics()
-        names = wait_for(lambda: states and states[-1].name, "link states")
+        names = wait_until(lambda: states and states[-1].name, "link states")
         subscriber.unregister()
         self.assertEqual([name for name in names if name.startswith("door")], ["door::frame", "door::door"])
 
@@ -193,10 +183,10 @@ class GazeboBodies(unittest.TestCase):
         state.link_name = "door::door"
         self.refused(self.set_link_state(state), "set_model_configuration")
         publisher = rospy.Publisher("/gazebo/set_link_state", LinkState, queue_size=1)
-        wait_for(lambda: publisher.get_num_connections() > 0, "a connection to /gazebo/set_link_state")
+        wait_until(lambda: publisher.get_num_connections() > 0, "a connection to /gazebo/set_link_state")
         state.link_name, state.pose.position.x = "box::body", -7
         publisher.publish(state)
-        wait_for(lambda: abs(self.position("box::body")[0] + 7) < 1e-3, "the box at x = -7")
+        wait_until(lambda: abs(self.position("box::body")[0] + 7) < 1e-3, "the box at x = -7")
 
     def test_link_properties_can_be_read_and_set(self):
         self.spawn_box()
