@@ -167,6 +167,20 @@ def test_holds_what_is_between_its_fingers_and_notices_when_it_is_gone(lab, stat
     assert free.position == pytest.approx(0.0, abs=1.0)
 
 
+def test_holds_from_inside_what_stands_around_its_fingers(lab):
+    tell(lab, "go", '{"position": 0}', seconds=1.0)
+    tip = lab.model.link_pose("left_gripper").matrix()
+    wall = parse_urdf(BOX % (0.03, 0.02, 0.04), source="wall")
+    for name, sign in (("here", 1.0), ("there", -1.0)):
+        place = tip[:3, 3] + sign * 0.045 * tip[:3, 1]  # its near face 35 mm from the middle
+        lab.world.spawn(wall, name, Pose(tuple(place), lab.model.link_pose("left_gripper").quaternion), static=True)
+    tell(lab, "go", '{"position": 100}', seconds=1.0)
+    held = state(lab)
+    assert (held.gripping, held.moving) == (1, 0)
+    assert 20.0 < held.position < 95.0
+    assert held.force == pytest.approx(30.0, abs=2.0)
+
+
 def test_flags_stay_while_something_is_held(lab):
     hold_box(lab)
     seen = lab.outboxes["end_effector/left_gripper/state"].messages
