@@ -15,6 +15,7 @@ import unittest
 import urllib.error
 import urllib.request
 import uuid
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cv2
@@ -33,8 +34,10 @@ PICTURES = ROOT / ".baxter" / "pictures"
 CELL_TIMEOUT_S = 150
 # Set for one server and all that it starts.
 MARKER = "LAB_NOTEBOOK_TEST"
-# Notebooks that find no robot of theirs on the test's master: the launch argument, so that no window opens.
-OWN_LABS = ("joint_states_and_trajectories", "ros_control")
+# Those that leave Baxter's arms alone, those that move them, and those whose robot is another one.
+WATCHING = ("1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro")
+MOVING = ("5_moving_baxter", "6_rotating_the_gripper", "7_waving")
+OWN_LAB = ("joint_states_and_trajectories", "ros_control")
 # What docs/labs.md shows, drawn by a cell after the last one: notebook -> (file, expression for a matplotlib figure).
 DRAWN = {
     "1_transforms_and_tf": ("labs_tree.svg", "show.tf_tree(below='left_arm_mount').figure('left arm')"),
@@ -105,20 +108,24 @@ class LabNotebooksTest(unittest.TestCase):
         # nbclient looks for kernels by this process's environment.
         os.environ.update(tool.environment(tool.STATE))
 
-    def run_all(self, paths, environment):
-        faults = [fault for path in paths for fault in Run(path, environment(path)).twice()]
+    def run_all(self, *rows, environment=lambda: dict(os.environ)):
+        """Run rows of notebooks beside each other, those of a row one after the other."""
+        def run(names):
+            return [fault for name in names for fault in Run(tool.find(name), environment()).twice()]
+
+        with ThreadPoolExecutor(len(rows)) as pool:
+            faults = [fault for found in pool.map(run, rows) for fault in found]
         self.assertEqual(faults, [], "\n".join(faults))
 
     def test_notebooks_that_share_the_simulated_baxter(self):
-        paths = [path for path in tool.notebooks() if path.stem not in OWN_LABS]
-        self.assertEqual([path.stem[0] for path in paths], list("1234567"))
-        self.run_all(paths, lambda path: dict(os.environ))
+        self.run_all(WATCHING, MOVING)
 
     def test_notebooks_with_a_simulator_of_their_own(self):
-        paths = [path for path in tool.notebooks() if path.stem in OWN_LABS]
-        self.assertEqual(len(paths), len(OWN_LABS))
-        self.run_all(paths, lambda path: {**os.environ, "ROS_MASTER_URI": "http://localhost:%d" % free_port(),
-                                          "ROS_HOSTNAME": "localhost"})
+        self.run_all(*([name] for name in OWN_LAB), environment=lambda: {
+            **os.environ, "ROS_MASTER_URI": "http://localhost:%d" % free_port(), "ROS_HOSTNAME": "localhost"})
+
+    def test_no_notebook_is_left_out(self):
+        self.assertEqual(sorted(path.stem for path in tool.notebooks()), sorted([*WATCHING, *MOVING, *OWN_LAB]))
 
     def test_jupyter_starts_a_kernel_and_ctrl_c_leaves_nothing(self):
         run_id = uuid.uuid4().hex

@@ -73,7 +73,7 @@ class Tree:
         """Return a matplotlib figure: root on the left, frames that move in red, fixed ones in grey."""
         places, leaves = self._places()
         depth = max((x for x, _ in places.values()), default=0)
-        figure = new_figure(2.6 + 1.55 * depth, 1.0 + 0.24 * max(leaves, 2))
+        figure = new_figure(2.6 + 1.3 * depth, 1.0 + 0.24 * max(leaves, 2))
         axes = figure.add_subplot()
         for child, (parent, _, moves) in self.edges.items():
             (x0, y0), (x1, y1) = places[parent], places[child]

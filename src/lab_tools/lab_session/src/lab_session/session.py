@@ -22,7 +22,7 @@ from . import keeper
 from .labs import LABS
 
 # A simulator that somebody else has started may still be coming up; after this its robot is another one [s].
-FOUND_TIMEOUT_S = 10.0
+FOUND_TIMEOUT_S = 20.0
 # A simulator of ours has this long, on a machine that has much else to do [s].
 START_TIMEOUT_S = 120.0
 # Ports of further labs beside the first one.
@@ -134,7 +134,7 @@ class Lab:
         if ours and ours.poll() is not None:
             lines = Path(self._log).read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:]
             self.close()
-            raise LabError("%s ended at once. Its output (%s) ends with:\n%s"
+            raise LabError("roslaunch %s has ended. Its output (%s) ends with:\n%s"
                            % (" ".join(self._command), self._log, "\n".join("  | " + line for line in lines)))
 
 
@@ -160,8 +160,8 @@ def connect(name, *arguments):
             _find_or_start(lab)
         _become_node("notebook")
         startup.wait_for_start([], START_TIMEOUT_S)
-    except OSError as error:
-        raise LabError(error.strerror or str(error)) from error
+    except (OSError, rosgraph.MasterException) as error:
+        raise LabError(getattr(error, "strerror", None) or str(error)) from error
     print(lab)
     return lab
 
@@ -170,7 +170,7 @@ def _find_or_start(lab):
     if lab.is_ours:
         lab._wait(START_TIMEOUT_S)
         return
-    port = urlparse(rosgraph.get_master_uri()).port
+    port = _master_port()
     is_local = rosgraph.get_master_uri().split("://")[-1].startswith(("localhost:", "127."))
     state = _state_folder() / ("lab_session-%d" % port)
     # What another notebook's kernel has left behind is on its way out, or still on its way up.
@@ -201,7 +201,7 @@ def _holds(state, lab):
 def _become_node(name):
     """rospy.init_node, once in a process; its master has to stay the same."""
     global _run_id
-    run_id = rosgraph.Master("/lab_session").getParam("/run_id")
+    run_id = rosgraph.Master("/lab_session").getParam("/run_id")  # roslaunch and roscore set it
     if not rospy.core.is_initialized():
         rospy.init_node(name, anonymous=True, disable_signals=True)
         _run_id = run_id
@@ -243,9 +243,20 @@ def _state_folder():
 @contextlib.contextmanager
 def _only_one():
     """Two notebooks that connect to the same master at the same time do so one after the other."""
-    with open(_state_folder() / ("lab_session-%s.lock" % urlparse(rosgraph.get_master_uri()).port), "a") as file:
+    with open(_state_folder() / ("lab_session-%d.lock" % _master_port()), "a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
+
+
+def _master_port():
+    uri = rosgraph.get_master_uri()
+    try:
+        port = urlparse(uri).port
+    except ValueError:
+        port = None
+    if port is None:
+        raise LabError("ROS_MASTER_URI is %r; it should look like http://localhost:11311" % uri)
+    return port
 
 
 def _free_port():

@@ -92,6 +92,23 @@ class MoveBaxterTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1)
         self.assertIn("failed to enable the robot", result.stderr)
 
+    def test_wave_asks_for_a_mirrored_sine_and_ends_where_it_began(self):
+        result = run("wave.py", "--seconds", "1.5", "--amplitude", "0.1")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        asked = {side: [pose.pose.position.y for name, pose in self.requests if name == side] for side in SIDES}
+        shift = {side: [y - values[0] for y in values] for side, values in asked.items()}
+        self.assertAlmostEqual(max(shift["left"]), 0.1, delta=0.001)
+        for left, right in zip(shift["left"], shift["right"], strict=True):
+            self.assertAlmostEqual(left, -right, delta=1e-6)
+        for side in SIDES:
+            for joint, angle in LAB_ANGLES.items():
+                self.assertAlmostEqual(Limb(side).joint_angle("%s_%s" % (side, joint)), angle, delta=0.002)
+
+    def test_wave_refuses_a_period_that_no_arm_follows(self):
+        result = run("wave.py", "--period", "0.2")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("a period is at least 1 s", result.stderr)
+
     def test_quaternion_of_nothing_is_a_wrong_option(self):
         result = run("move_baxter.py", "--quaternion", "0", "0", "0", "0")
         self.assertEqual(result.returncode, 2)
