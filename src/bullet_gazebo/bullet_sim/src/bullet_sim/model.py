@@ -71,7 +71,7 @@ class Model:
         self.max_effort = _column(joints, "effort", math.inf)
         count = len(joints)
         self._all = list(range(count))
-        self._effort_driven = np.zeros(count, dtype=bool)
+        self._effort_driven, self._any_effort_driven = np.zeros(count, dtype=bool), False
         self._commanded_effort = np.zeros(count)
         self._zeros = [0.0] * count
         self._pairs = ()
@@ -110,7 +110,7 @@ class Model:
         states = pybullet.getJointStates(self.body, self._all, physicsClientId=self._client)
         position, velocity, _, effort = zip(*states, strict=True)
         effort = np.array(effort)
-        if self._effort_driven.any():
+        if self._any_effort_driven:
             # Bullet's reading does not know of explicit torques.
             effort[self._effort_driven] = self._commanded_effort[self._effort_driven]
         return np.array(position), np.array(velocity), effort
@@ -123,7 +123,7 @@ class Model:
         ``position`` is where the joint shall be after the step. ``velocity`` (k,) is the set-point's own velocity:
         given, a moving set-point is followed without lag.
         """
-        self._effort_driven[index] = False
+        self._drive_otherwise(index)
         gains = len(index)
         if velocity is not None:
             # The motor adds the velocity to what closes the gap, so the gap is the one at the beginning of the step.
@@ -142,7 +142,7 @@ class Model:
 
     def drive_velocity(self, index, velocity, max_effort):
         """Keep joints ``index`` (k,) at ``velocity`` (k,) with at most ``max_effort`` (k,)."""
-        self._effort_driven[index] = False
+        self._drive_otherwise(index)
         pybullet.setJointMotorControlArray(
             self.body,
             index.tolist(),
@@ -156,7 +156,7 @@ class Model:
         """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; say it again for every step."""
         if not self._effort_driven[index].all():
             self.release(index)
-            self._effort_driven[index] = True
+            self._effort_driven[index] = self._any_effort_driven = True
         self._commanded_effort[index] = effort
         pybullet.setJointMotorControlArray(
             self.body, index.tolist(), pybullet.TORQUE_CONTROL, forces=effort.tolist(), physicsClientId=self._client
@@ -199,7 +199,7 @@ class Model:
 
     def release(self, index):
         """Switch the motors of joints ``index`` (k,) off."""
-        self._effort_driven[index] = False
+        self._drive_otherwise(index)
         self.drive_velocity(index, np.zeros(len(index)), np.zeros(len(index)))
 
     def set_joint_positions(self, index, position):
@@ -533,6 +533,12 @@ class Model:
             self._turned_gravity = None if np.allclose(turned, self._world.gravity, atol=1e-9) else turned.tolist()
             self._gravity_key = key
         return self._turned_gravity
+
+    def _drive_otherwise(self, index):
+        """Note that joints ``index`` (k,) are no longer driven by efforts."""
+        if self._any_effort_driven:
+            self._effort_driven[index] = False
+            self._any_effort_driven = bool(self._effort_driven.any())
 
     def _set_damping(self, joints):
         self.damping = np.zeros(len(joints))  # (n,) as it acts, [Nm s/rad] or [N s/m]
