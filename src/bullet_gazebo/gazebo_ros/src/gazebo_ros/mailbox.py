@@ -36,12 +36,13 @@ class Mailbox:
 class Queue:
     """Each message counts: oldest first, up to ``depth`` unread ones; beyond that the oldest are lost and counted."""
 
-    def __init__(self, depth):
-        """``depth``: how many unread messages are kept."""
+    def __init__(self, depth, notice=lambda: None):
+        """``depth``: how many unread messages are kept; ``notice()`` is called when one has come in."""
         if depth < 1:
             raise ValueError("queue depth is %r, expected at least 1" % (depth,))
         self.delivered = 0
         self.lost = 0
+        self._notice = notice
         self._messages = collections.deque(maxlen=depth)
 
     def put(self, message):
@@ -50,6 +51,7 @@ class Queue:
             self.lost += 1
         self._messages.append(message)
         self.delivered += 1
+        self._notice()
 
     def drain(self):
         """Loop thread: all unread messages, oldest first."""

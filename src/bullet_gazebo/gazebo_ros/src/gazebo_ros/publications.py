@@ -63,12 +63,13 @@ class Publications:
         """Publish what is due at this tick."""
         simulation = self._simulation
         tick = simulation.tick
-        self._set_rospy_time()
         now = time.perf_counter()
         paused = simulation.paused
         in_real_time = simulation.real_time_factor == 1.0 and not paused
-        if (tick % self._clock_divisor == 0 or paused) and (
-                in_real_time or now - self._clock_sent_at >= 1.0 / MAX_WALL_CLOCK_RATE):
+        clock_may_go = in_real_time or now - self._clock_sent_at >= 1.0 / MAX_WALL_CLOCK_RATE
+        if clock_may_go or paused:
+            self._set_rospy_time()
+        if clock_may_go and (tick % self._clock_divisor == 0 or paused):
             self._clock_sent_at = now
             self.publish_clock()
         if tick % self._states_divisor == 0:

@@ -43,9 +43,9 @@ class RosObjects:
         """A :class:`Mailbox` that messages on ``topic`` fall into."""
         return self._subscribe(_Inbox(Mailbox(), topic, self), msg_class)
 
-    def queue(self, topic, msg_class, depth):
-        """A :class:`Queue` that messages on ``topic`` fall into."""
-        return self._subscribe(_Inbox(Queue(depth), topic, self), msg_class)
+    def queue(self, topic, msg_class, depth, notice=lambda: None):
+        """A :class:`Queue` that messages on ``topic`` fall into; ``notice()`` is called after each, in any thread."""
+        return self._subscribe(_Inbox(Queue(depth, notice), topic, self), msg_class)
 
     def service(self, name, srv_class, handler):
         """Advertise ``name``; ``handler(request)`` runs in the loop thread."""

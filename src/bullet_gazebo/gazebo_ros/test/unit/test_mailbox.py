@@ -2,10 +2,12 @@
 """Commands and requests on their way into the loop."""
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue, RequestBoard
+from gazebo_ros.model_plugin import PluginContext
 from lab_testing.waiting import wait_until
 
 
@@ -26,6 +28,25 @@ def test_a_queue_keeps_order_and_counts_what_it_lost():
     assert queue.drain() == [2, 3, 4]
     assert queue.drain() == []
     assert (queue.delivered, queue.lost) == (5, 2)
+
+
+def test_a_plugin_is_told_once_that_there_is_mail_in_any_of_its_queues():
+    queues = {}
+
+    def make(topic, msg_class, depth, notice):
+        return queues.setdefault(topic, Queue(depth, notice))
+
+    ros = SimpleNamespace(queue=make)
+    context = PluginContext(None, None, None, None, "/robot", "", None, ros, {})
+    first, second = context.queue("first", None, 10), context.queue("second", None, 10)
+    assert not context.has_mail()
+    second.put("a")
+    second.put("b")
+    assert context.has_mail() and not context.has_mail()
+    # What comes in before the queues are read is told again: better twice than not at all.
+    first.put("c")
+    assert (first.drain(), second.drain(), context.has_mail()) == (["c"], ["a", "b"], True)
+    assert not context.branch().has_mail()
 
 
 def test_a_queue_without_room_is_refused():
