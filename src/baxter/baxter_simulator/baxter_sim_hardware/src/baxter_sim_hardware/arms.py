@@ -158,6 +158,11 @@ class Arms:
         return self._mode[self._limbs[side].index]
 
     @property
+    def in_torque(self):
+        """Whether any joint is in torque mode."""
+        return self._any_in_torque
+
+    @property
     def commanded_position(self):
         """(n,) [rad] where the set-points are now."""
         return self._output

@@ -40,8 +40,13 @@ class Baxter:
             raise CommandRefused(ENABLE_HINT)
         return self.arms.command(side, mode, names, values, time_s, position, velocity)
 
+    @property
+    def moves_by_gravity(self):
+        """Whether drives follow from the torque that balances gravity, so that `update` needs it as it is now."""
+        return self.arms.in_torque or (self._sinks and not self.state.enabled)
+
     def update(self, time_s, position, velocity, gravity):
-        """Drives of the arms for this tick, as `Arms.update`."""
+        """Drives of the arms for this tick, as `Arms.update`; gravity may be ticks old unless `moves_by_gravity`."""
         if self._sinks and not self.state.enabled:
             return self.arms.sink(position, velocity, gravity)
         return self.arms.update(time_s, position, velocity, gravity)

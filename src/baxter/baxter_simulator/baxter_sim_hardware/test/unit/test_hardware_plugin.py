@@ -24,6 +24,24 @@ def intervals(lab, topic):
     return np.diff([time_s for time_s, _ in lab.outboxes[topic].messages])
 
 
+@pytest.mark.parametrize("mode, parameters, most_ticks", [
+    (1, {"enable": True}, 5), (3, {"enable": True}, 1), (None, {"disabled": "sink"}, 1)])
+def test_what_balances_gravity_is_as_new_as_the_drives_need_it(make_lab, monkeypatch, mode, parameters, most_ticks):
+    lab = make_lab(parameters=parameters)
+    asked, real = [], lab.model.gravity_efforts
+    monkeypatch.setattr(lab.model, "gravity_efforts", lambda q: asked.append(lab.world.tick) or real(q))
+    if mode:
+        lab.command(mode, lab.position if mode == 1 else np.zeros(14))
+    lab.run(0.1)
+    assert np.diff(asked).max() == most_ticks
+    # Joints that were put elsewhere are no reason to go by what balanced them where they were.
+    while asked[-1] == lab.world.tick - 1 and most_ticks > 1:
+        lab.run(0.002)
+    lab.plugin.joints_set()
+    lab.run(0.002)
+    assert asked[-1] == lab.world.tick - 1
+
+
 def test_rates_are_exact(make_lab):
     lab = make_lab()
     lab.run(2.0)
