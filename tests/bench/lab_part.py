@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Processes that a bench sets beside a lab: lab_part.py swing | press | client | boxes N | empty | latency N.
+"""Processes that a bench sets beside a lab: lab_part.py swing | press | client | boxes N | empty | posture | latency N.
 
 Each prints "up" when it is at work.
 """
@@ -90,6 +90,20 @@ def empty():
     rospy.spin()
 
 
+def posture():
+    """The joint states of a robot that stands in its neutral posture, at the robot's own rate."""
+    names = ["%s_%s" % (side, joint) for side in SIDES for joint in JOINTS]
+    publisher = rospy.Publisher("/robot/joint_states", JointState, queue_size=1)
+    while not publisher.get_num_connections():
+        time.sleep(0.01)
+    up()
+    while not rospy.is_shutdown():
+        message = JointState(name=names, position=2 * NEUTRAL)
+        message.header.stamp = rospy.Time.now()
+        publisher.publish(message)
+        time.sleep(0.02)
+
+
 def latency(count):
     """Lock-step: how many ticks after the one that takes a command in has the joint moved? Prints them as JSON."""
     rospy.Publisher("/robot/set_super_enable", Bool, latch=True, queue_size=1).publish(True)
@@ -136,7 +150,8 @@ def latency(count):
 def main():
     name, *arguments = rospy.myargv(sys.argv)[1:]  # without what roslaunch adds
     rospy.init_node("bench_" + name, anonymous=True, disable_rostime=name not in ("client",))
-    {function.__name__: function for function in (swing, press, client, boxes, empty, latency)}[name](*arguments)
+    parts = (swing, press, client, boxes, empty, posture, latency)
+    {function.__name__: function for function in parts}[name](*arguments)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ def measure(report, quick, number):
     with Lab(("baxter_sim_kinematics", "baxter_sim_kinematics.launch"),
              "/ExternalTools/left/PositionKinematicsNode/IKService", load_robot_description="true") as lab:
         lab.part("empty")
+        lab.part("posture")
         # rospy reads where its master is when it is first used, so only now.
         os.environ.update(ROS_MASTER_URI=lab.environment["ROS_MASTER_URI"], ROS_HOSTNAME="localhost")
         times = calls(CALLS // 10 if quick else CALLS)
