@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The project's pages: every link to a file leads somewhere, and the tests that docs/pains.md names exist."""
+"""The project's pages: links lead to files and headings that exist, marked commands run, named tests exist."""
 
 import re
 import subprocess
@@ -7,27 +7,132 @@ from pathlib import Path
 
 import pytest
 
+from lab_tests import page_blocks
+
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+LIMIT_S = {"quick": 60, "long": 1800}
 
 
 def tracked(pattern):
     listed = subprocess.run(["git", "-C", ROOT, "ls-files", pattern], capture_output=True, text=True, check=True)
-    return sorted(listed.stdout.split())
+    return sorted(path for path in listed.stdout.split() if (ROOT / path).exists())
+
+
+def prose(path):
+    """A page without its fenced and indented blocks, and without code in a line."""
+    text = re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    return re.sub(r"^(?:    .*\n)+", "\n", text, flags=re.MULTILINE)
+
+
+def anchors(path):
+    """The names that a page's headings can be linked by, as the usual web views of a repository make them."""
+    found, seen = [], []
+    for heading in re.findall(r"^#+ +(.*?) *$", prose(path), flags=re.MULTILINE):
+        heading = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading)
+        name = re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+        found.append(f"{name}-{seen.count(name)}" if name in seen else name)
+        seen.append(name)
+    return found
 
 
 @pytest.mark.parametrize("page", tracked("*.md"))
-def test_links_lead_to_files(page):
-    text = (ROOT / page).read_text(encoding="utf-8")
-    text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+def test_links_lead_to_files_and_headings(page):
     broken = []
-    for target in LINK.findall(text):
-        path = target.partition("#")[0]
-        if "://" in target or not path or target.startswith("mailto:"):
+    for target in LINK.findall(re.sub(r"`[^`\n]*`", "", prose(ROOT / page))):
+        if "://" in target or target.startswith("mailto:"):
             continue
-        if not (ROOT / page).parent.joinpath(path).exists():
+        path, _, anchor = target.partition("#")
+        leads_to = (ROOT / page).parent / path if path else ROOT / page
+        if not leads_to.exists() or (anchor and anchor not in anchors(leads_to)):
             broken.append(target)
     assert broken == []
+
+
+def test_headings_become_anchors(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# A `name`, and more\n\n## Twice\n\n    # not one\n\n```bash\n# nor this\n```\n\n## Twice\n"
+                    "## [B](b.md)!\n### Twice\n")
+    assert anchors(page) == ["a-name-and-more", "twice", "twice-1", "b", "twice-2"]
+
+
+def blocks_of(page):
+    return page_blocks.marked_blocks(page, (ROOT / page).read_text(encoding="utf-8"))
+
+
+def run_page(page, kind, folder):
+    page_blocks.make_workspace(folder, ROOT)
+    for block in blocks_of(page):
+        if block.kind == "file":
+            page_blocks.write_file(block, folder)
+        elif block.kind == kind:
+            # No master: what needs one is marked `lab`.
+            page_blocks.run(block, folder, LIMIT_S[kind], ROS_MASTER_URI="http://localhost:1")
+
+
+@pytest.mark.build  # once is enough, whatever the locale
+@pytest.mark.parametrize("page", [page for page in tracked("*.md") if any(b.kind == "quick" for b in blocks_of(page))])
+def test_commands_run(page, tmp_path):
+    run_page(page, "quick", tmp_path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("page", [page for page in tracked("*.md") if any(b.kind == "long" for b in blocks_of(page))])
+def test_long_commands_run(page, tmp_path):
+    run_page(page, "long", tmp_path)
+
+
+PAGE = """Text.
+
+```bash run
+echo here >one
+```
+
+```text
+not run
+```
+
+```python file=src/mine/src/mine.py
+VALUE = 3
+```
+
+```bash run
+test "$(cat one)" = here
+python3 -c 'import mine; assert mine.VALUE == 3'
+```
+
+```bash run lab
+false
+```
+"""
+
+
+def test_blocks_are_found_with_their_lines_and_run_in_order(tmp_path):
+    page_blocks.make_workspace(tmp_path, ROOT)
+    blocks = page_blocks.marked_blocks("page.md", PAGE)
+    assert [(block.kind, block.line) for block in blocks] == [("quick", 3), ("file", 11), ("quick", 15), ("lab", 20)]
+    for block in blocks[:3]:
+        if block.kind == "file":
+            page_blocks.write_file(block, tmp_path)
+        else:
+            page_blocks.run(block, tmp_path, 30)
+    with pytest.raises(AssertionError, match=r"page\.md:20 ends with 1"):
+        page_blocks.run(blocks[3], tmp_path, 30)
+    assert not (ROOT / "one").exists() and not (ROOT / "src" / "mine").exists()
+
+
+@pytest.mark.parametrize("mark", ["python run", "bash run fast", "bash runs", "bash file=a run"])
+def test_a_mark_that_means_nothing_is_refused(mark):
+    with pytest.raises(page_blocks.PageError, match="page.md:2: found"):
+        page_blocks.marked_blocks("page.md", f"\n```{mark}\n```\n")
+
+
+def test_a_command_that_fails_before_its_end_or_takes_too_long_is_noticed(tmp_path):
+    failing, slow = page_blocks.marked_blocks("p.md", "```bash run\nfalse\ntrue\n```\n```bash run\nsleep 30\n```\n")
+    with pytest.raises(AssertionError, match="ends with 1"):
+        page_blocks.run(failing, tmp_path, 30)
+    with pytest.raises(AssertionError, match="not through"):
+        page_blocks.run(slow, tmp_path, 0.2)
 
 
 def test_pains_page_names_forty_rows_and_tests_that_exist():

@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commands that the project's pages mark with `run lab`, on Baxter's lab or on the one that the page starts."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import xmlrpc.client
+from pathlib import Path
+
+import rostest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from lab_tests import page_blocks  # noqa: E402
+
+LIMIT_S = 90
+END_LIMIT_S = 30
+
+
+def wait_for_service(master_uri, name, process=None):
+    """Until a service is registered; ``process``: what is to bring it, which must not end before."""
+    master = xmlrpc.client.ServerProxy(master_uri)
+    deadline = time.monotonic() + LIMIT_S
+    while time.monotonic() < deadline:
+        with contextlib.suppress(OSError):
+            if master.lookupService("/pages", name)[0] == 1:
+                return
+        if process is not None and process.poll() is not None:
+            raise AssertionError("the lab ended with %d before %s was there" % (process.returncode, name))
+        time.sleep(0.1)
+    raise AssertionError("%s was not there after %d s" % (name, LIMIT_S))
+
+
+@contextlib.contextmanager
+def started(block, folder):
+    """The lab that a page starts itself, on a master of its own, whose address this yields."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        uri = "http://localhost:%d" % free.getsockname()[1]
+    environment = page_blocks.environment(folder, ROS_MASTER_URI=uri)
+    with open(folder / "lab.txt", "w+") as said:
+        process = subprocess.Popen(page_blocks.command(block), cwd=folder, env=environment, stdin=subprocess.DEVNULL,
+                                   stdout=said, stderr=subprocess.STDOUT, start_new_session=True)
+        try:
+            try:
+                wait_for_service(uri, "/gazebo/get_world_properties", process)
+                yield uri
+            except AssertionError as error:
+                said.seek(0)
+                raise AssertionError("%s\n%s:%d said:\n%s" % (error, block.page, block.line, said.read())) from None
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGINT)
+            try:
+                process.wait(END_LIMIT_S)
+            finally:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
+
+
+def run_page(blocks, folder, master_uri):
+    page_blocks.make_workspace(folder, ROOT)
+    with contextlib.ExitStack() as labs:
+        for block in blocks:
+            if block.kind == "file":
+                page_blocks.write_file(block, folder)
+            elif block.kind == "start":
+                labs.close()
+                master_uri = labs.enter_context(started(block, folder))
+            elif block.kind == "lab":
+                page_blocks.run(block, folder, LIMIT_S, ROS_MASTER_URI=master_uri)
+
+
+class PagesTest(unittest.TestCase):
+    def test_marked_commands_run(self):
+        command = ["git", "-C", str(ROOT), "ls-files", "*.md"]
+        listed = subprocess.run(command, capture_output=True, text=True, check=True)
+        baxters = os.environ["ROS_MASTER_URI"]
+        wait_for_service(baxters, "/ExternalTools/left/PositionKinematicsNode/IKService")
+        ran, wrong = 0, []
+        for page in sorted(listed.stdout.split()):
+            if not (ROOT / page).exists():
+                continue
+            blocks = page_blocks.marked_blocks(page, (ROOT / page).read_text(encoding="utf-8"))
+            if any(block.kind == "lab" for block in blocks):
+                ran += 1
+                with tempfile.TemporaryDirectory() as folder:
+                    try:
+                        run_page(blocks, Path(folder), baxters)
+                    except AssertionError as error:
+                        wrong.append(str(error))
+        self.assertEqual("\n".join(wrong), "")
+        self.assertGreater(ran, 0)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("workspace_tests", "pages", PagesTest)
