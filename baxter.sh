@@ -22,6 +22,7 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
   setup --with FILE     also fetch the packages of a rosinstall file, and prefer them to ours: rosinstall/README.md
   test [NAMES] [--long] lint, unit tests and rostests. NAMES: packages, test files, or pytest arguments such as -k
   notebook [NAME]       the labs' notebooks in a browser: starts Jupyter on this machine alone and prints the address
+  check LAB PROGRAM     run a student's program in a lab of its own and say how well it does its exercise; --list, --help
   bench [NAMES]         measure where the stack stands, beside its peers; --list says which suites there are
   doctor [HOST]         look for what is wrong with master, network, clock, build, Python and robot, and say the fix
   help                  this text
@@ -68,6 +69,12 @@ main() {
             use_loopback
             use_build || exit
             exec python3 "$LAB_ROOT/tools/run_tests.py" "$@"
+            ;;
+        check)
+            bring_up_to_date || exit
+            use_loopback
+            use_build || exit
+            exec python3 "$LAB_ROOT/src/rf_labs/rf_checks/scripts/check" "$@"
             ;;
         bench)
             bring_up_to_date || exit

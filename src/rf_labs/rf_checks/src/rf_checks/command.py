@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line of `./baxter.sh check`."""
+import argparse
+import shutil
+import signal
+import sys
+from pathlib import Path
+
+import rospkg
+
+from rf_checks import report
+from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
+from rf_checks.judge import Judge
+from rf_checks.lab import LabFailed
+
+PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED = 0, 1, 2, 3
+
+
+def _listing():
+    width = max(len(exercise.name) for exercise in EXERCISES)
+    lines = ["  %-5s %-*s  %s\n  %s  runs as: %s" % (exercise.lab, width, exercise.name, exercise.title,
+                                                    " " * (5 + 1 + width), exercise.usage) for exercise in EXERCISES]
+    return "\n".join(lines)
+
+
+def _parser():
+    parser = argparse.ArgumentParser(
+        prog="./baxter.sh check", formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Run your program in a lab of its own and say how well it does the exercise. The lab that you may "
+                    "have running is not touched.",
+        epilog="exercises:\n%s\n\nWithout EXERCISE the program's name or a line `# exercise: NAME` in it decides.\n"
+               "exit status: 0 passed, 1 not passed, 2 wrong words, 3 the check itself failed" % _listing())
+    parser.add_argument("lab", nargs="?", metavar="LAB", help=" or ".join(LABS))
+    parser.add_argument("words", nargs="*", metavar="[EXERCISE] PROGRAM", help="a Python file")
+    parser.add_argument("--list", action="store_true", help="list the exercises and end")
+    parser.add_argument("--start", metavar="EXERCISE",
+                        help="copy this exercise's skeleton into the current folder and end")
+    parser.add_argument("--seed", type=int, default=0, help="seed of start postures and goals (default: %(default)s)")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
+    parser.add_argument("--junit", type=Path, metavar="FILE", help="write the result as JUnit XML")
+    return parser
+
+
+def _program_and_exercise(parser, options):
+    words = options.words
+    if not options.lab:
+        parser.error("say which lab and which program: ./baxter.sh check lab2 my_node.py (--list shows what there is)")
+    if options.lab.endswith(".py") or len(words) not in (1, 2):
+        parser.error("expected LAB [EXERCISE] PROGRAM, as in ./baxter.sh check lab2 my_node.py, got: %s"
+                     % " ".join([options.lab, *words]))
+    name, program = ("", words[0]) if len(words) == 1 else words
+    path = Path(program)
+    if not path.is_file():
+        where = "is a folder" if path.is_dir() else "is not there"
+        parser.error("%s %s; give the path of your Python file" % (program, where))
+    if options.seed < 0:
+        parser.error("the seed is %d, expected 0 or more" % options.seed)
+    try:
+        return path, choose(options.lab, name, path.name, path.read_bytes().decode("utf-8", errors="replace"))
+    except UnknownExercise as error:
+        parser.error(str(error))
+
+
+def start(name):
+    """Copy a skeleton into the current folder; returns the exit status."""
+    folder = Path(rospkg.RosPack().get_path("rf_checks")) / "exercises" / "skeletons"
+    source, target = folder / (name + ".py"), Path(name + ".py")
+    if name not in [exercise.name for exercise in EXERCISES]:
+        print("there is no exercise '%s'; --list shows them" % name, file=sys.stderr)
+        return WRONG_WORDS
+    if target.exists():
+        print("%s is there already; it stays as it is" % target, file=sys.stderr)
+        return WRONG_WORDS
+    shutil.copy(source, target)
+    target.chmod(0o755)
+    lab = next(exercise.lab for exercise in EXERCISES if exercise.name == name)
+    print("%s is yours now. When it runs: ./baxter.sh check %s %s" % (target, lab, target))
+    return PASSED
+
+
+def main(argv=None):
+    """Returns the exit status."""
+    parser = _parser()
+    options = parser.parse_intermixed_args(argv)
+    if options.list:
+        print(_listing())
+        return PASSED
+    if options.start:
+        return start(options.start)
+    program, exercise = _program_and_exercise(parser, options)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: sys.exit(130))
+    print("Checking %s as %s %s; this takes up to a minute." % (program, exercise.lab, exercise.name), flush=True)
+    try:
+        with Judge() as judge:
+            result = judge.check(exercise, program, options.seed)
+    except (LabFailed, OSError) as error:
+        print("the check itself failed, which is not your program's fault: %s" % error, file=sys.stderr)
+        return JUDGE_FAILED
+    except KeyboardInterrupt:
+        return 130
+    print(report.text(result))
+    for path, write in ((options.json, report.as_json), (options.junit, report.as_junit)):
+        if path is not None:
+            path.write_text(write(result) + "\n", encoding="utf-8")
+    return PASSED if report.has_passed(result) else NOT_PASSED

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is wrong with a program, told from one run of it: the first fault that explains the others. Free of ROS."""
+import re
+
+import numpy as np
+
+from rf_checks import slips
+from rf_checks.measures import JUMP_RAD, largest_jump, moving_rows, path_length
+from rf_checks.recording import RECORD_S, SIDES, Fault
+
+#: More joint commands than this in FLOOD_WINDOW_S [sim s] are a flood; the robot's own limit is some 800 a second.
+FLOOD_COMMANDS = 1000
+FLOOD_WINDOW_S = 1.0
+# An arm that goes on moving this long before the end of a recording was left on its way [s].
+_ON_ITS_WAY_S = 0.15
+
+PYTHON2 = ("print statement", "Missing parentheses in call to 'print'",
+           "multiple exception types must be parenthesized")
+_FRAME = re.compile(r'File "([^"]+)", line (\d+)')
+
+
+def check_syntax(text, name):
+    """A Fault for a program that Python cannot read, or None."""
+    try:
+        compile(text, name, "exec", dont_inherit=True)
+    except SyntaxError as error:
+        hint = ""
+        if any(word in str(error.msg) for word in PYTHON2):
+            hint = ("; this is Python 2, as in the sheet's listings: in Python 3 print(...) has brackets, and it is "
+                    "`except Error as e`")
+        return Fault("syntax", "line %s cannot be read by Python: %s%s" % (error.lineno or "?", error.msg, hint), 0.0)
+    except ValueError as error:  # null bytes
+        return Fault("syntax", "the file is no Python program: %s" % error, 0.0)
+    return None
+
+
+def line_of(program, traceback):
+    """The line of `program` that a traceback names last, or None."""
+    lines = [int(number) for path, number in _FRAME.findall(traceback) if path.endswith(program)]
+    return lines[-1] if lines else None
+
+
+def line_of_dump(program, dump):
+    """The line of `program` in a dump of Python's fault handler, innermost first, or None."""
+    lines = [int(number) for path, number in _FRAME.findall(dump) if path.endswith(program)]
+    return lines[0] if lines else None
+
+
+def is_flood(counts):
+    """Whether joint commands (n, 2), counted at each record, came faster than any robot reads them."""
+    total = counts.sum(axis=1) if len(counts) else np.zeros(0)
+    width = round(FLOOD_WINDOW_S / RECORD_S)
+    if len(total) <= width:
+        return len(total) > 0 and total[-1] > FLOOD_COMMANDS
+    return bool((total[width:] - total[:-width]).max() > FLOOD_COMMANDS)
+
+
+def meddling(run):
+    """A Fault for a program that touched the world around the robot rather than the robot, or None."""
+    if run.ended == "simulator gone":
+        return Fault("killed_simulator", "the simulator ended while the program ran: it was shut down or killed "
+                     "(rosnode kill, os.kill, a second node named /gazebo, the robot deleted); a program must "
+                     "leave it running", 0.0)
+    if run.missing_nodes:
+        return Fault("killed_nodes", "the node %s was shut down or unregistered by the program; leave the lab's nodes "
+                     "alone, and give your own node a name of its own" % ", ".join(run.missing_nodes), 0.0)
+    if run.intruders:
+        topic, nodes = next(iter(sorted(run.intruders.items())))
+        return Fault("intruder", "%s publishes on %s, which belongs to the simulator; the check measures the robot "
+                     "itself, so this gains nothing" % (" and ".join(sorted(nodes)), topic), 0.0)
+    jump = max((largest_jump(run.recording.arm(side)) for side in SIDES), default=0.0) if run.recording.records else 0.0
+    if jump > JUMP_RAD:
+        return Fault("teleport", "an arm jumped by %.1f rad within 10 ms: /gazebo/set_model_configuration or a reset "
+                     "puts it there, which no robot can; command its joints instead" % jump, 0.0)
+    return None
+
+
+def behaviour(run, sides, limit_s):
+    """A Fault for how the program ran, whatever its exercise was, or None. sides: the arms that were to move."""
+    if run.ended == "output":
+        return Fault("output", "the program printed megabytes and was stopped; print what is asked for, and not in a "
+                     "loop without a pause", 0.4)
+    if run.ended == "processes":
+        return Fault("processes", "the program started more and more processes and was stopped", 0.0)
+    if run.ended == "flood" or is_flood(run.recording.command_counts()):
+        return Fault("flood", "joint commands came faster than %d a second: the robot reads some 100; end the loop "
+                     "with rate.sleep() of a rospy.Rate(100)" % FLOOD_COMMANDS, 0.4)
+    if run.ended == "busy":
+        return Fault("busy", "the program computes without end%s: a loop that neither waits nor ends; give it a rate."
+                     "sleep() and a condition such as `not rospy.is_shutdown()`" % _at_line(run), 0.4)
+    crash = crashed(run)
+    if crash:
+        return crash
+    return _about_motion(run, sides) or _about_end(run, sides, limit_s)
+
+
+def crashed(run):
+    """A Fault for a program that ended with an exception, or None."""
+    if run.exit_code in (None, 0) or "Traceback (most recent call last)" not in run.errors:
+        return None
+    last = [line for line in run.errors.strip().splitlines() if line and not line[0].isspace()]
+    line = line_of(run.program, run.errors)
+    where = " in line %d" % line if line else ""
+    return Fault("crashed", "the program ended with an error%s: %s" % (where, last[-1][:300] if last else "unknown"))
+
+
+def _at_line(run):
+    return " at line %d" % run.stuck_at if run.stuck_at else ""
+
+
+def _about_motion(run, sides):
+    recording = run.recording
+    if not sides or not recording.records:
+        return None
+    slip = slips.command_slip(recording.commands())
+    if slip:
+        return Fault(*slip)
+    moved = {side: path_length(recording.arm(side)) > 0.1 for side in SIDES}
+    counts = dict(zip(SIDES, recording.command_counts()[-1], strict=True))
+    if not any(moved.values()):
+        has_tried = any(counts.values()) or recording.ik_requests() or run.exit_code is not None
+        if has_tried and not recording.was_enabled():
+            return Fault("not_enabled", "the robot was never enabled, so no arm moved: baxter_interface.RobotEnable()."
+                         "enable() before the first command")
+        return None
+    others = [side for side in SIDES if side not in sides and moved[side]]
+    if others and not any(moved[side] for side in sides):
+        return Fault("wrong_arm", "the %s arm moved, and the %s arm is the one that was to move"
+                     % (others[0], sides[0]))
+    return None
+
+
+def _about_end(run, sides, limit_s):
+    recording = run.recording
+    if run.ended == "exited" and sides and recording.records:
+        if not any(path_length(recording.arm(side)) > 0.02 for side in SIDES):
+            return Fault("early_exit", "the program ended (exit status %s) before any arm moved%s" % (
+                run.exit_code, _last_words(run)))
+    if run.ended in ("sim time", "wall time"):
+        return Fault("no_end", "the program was still running after %.0f s of simulation%s, and was ended" % (
+            limit_s, _at_line(run)))
+    if run.exit_code not in (None, 0):
+        return Fault("exit_status", "the program ended with exit status %s%s" % (run.exit_code, _last_words(run)))
+    return None
+
+
+def left_on_its_way(run, sides):
+    """A Fault for a program that ended while an arm was on its way to something it had been told, or None."""
+    recording = run.recording
+    end = recording.records[-1].get("exited") if recording.records else None
+    if run.ended != "exited" or end is None or not sides:
+        return None
+    for side in sides:
+        rows = moving_rows(recording.times, recording.arm(side))
+        if rows and recording.times[rows[1]] > end + _ON_ITS_WAY_S:
+            return Fault("early_exit", "the program ended while the %s arm was on its way: wait until the arm is there "
+                         "(move_to_joint_positions does) before you leave" % side)
+        counts = recording.command_counts()[:, SIDES.index(side)]
+        if 0 < counts[-1] <= 3:
+            return Fault("early_exit", "the program sent %d joint command%s to the %s arm and ended: a command is good "
+                         "for 0.2 s, so go on sending until the arm is there (move_to_joint_positions does)"
+                         % (counts[-1], "" if counts[-1] == 1 else "s", side))
+    return None
+
+
+def _last_words(run):
+    words = (run.errors.strip() or run.output.strip()).splitlines()
+    return "; its last line was: %s" % words[-1][:200] if words else ""
+
+
+def diagnose(run, exercise, call, robot, share):
+    """The fault of one run, or None when all is well. share: what its criteria gave, 0 to 1."""
+    fault = meddling(run) or behaviour_that_hides(run, exercise.sides, call.limit_s)
+    if fault:
+        return fault
+    if share < 0.995:
+        fault = (left_on_its_way(run, exercise.sides)
+                 or (exercise.task.slip(call, run, robot) if run.recording.records else None)
+                 or behaviour(run, exercise.sides, call.limit_s))
+    if fault is None and run.survivors:
+        fault = Fault("survivors", "%d process%s of the program went on after it had ended, and had to be killed: end "
+                      "what you start" % (run.survivors, "" if run.survivors == 1 else "es"), 0.9)
+    return fault
+
+
+def behaviour_that_hides(run, sides, limit_s):
+    """Faults of behaviour that make every measurement meaningless: they come before the exercise's own."""
+    fault = behaviour(run, sides, limit_s)
+    first = ("output", "processes", "flood", "busy", "crashed", "not_enabled", "wrong_arm", "repeated_names", "lengths",
+             "degrees")
+    return fault if fault and fault.key in first else None

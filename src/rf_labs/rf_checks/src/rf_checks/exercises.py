@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The table of exercises, and which one a file is meant for. Free of ROS."""
+import re
+from dataclasses import dataclass
+
+from rf_checks import tasks, tasks_printed
+
+#: Points of 100 from which an exercise counts as done.
+PASS_MARK = 80.0
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """lab, name: as on the command line. words: what in a file's name speaks for it. sides: arms that are to move."""
+
+    lab: str
+    name: str
+    title: str
+    usage: str
+    task: object
+    words: tuple
+    sides: tuple = ()
+
+
+class UnknownExercise(Exception):
+    """Nothing tells which exercise is meant; the text says what can be said instead."""
+
+
+EXERCISES = (
+    Exercise("lab2", "tf_listener", "where one frame is in another, as a 4 by 4 matrix",
+             "tf_listener.py [TARGET SOURCE]", tasks_printed.TfListener(), ("tf", "listener", "transform")),
+    Exercise("lab2", "rotate_gripper", "turn the left gripper about its own x, y or z axis",
+             "rotate_gripper.py AXIS DEGREES", tasks.RotateGripper(), ("rotate", "gripper", "rotation"), ("left",)),
+    Exercise("lab2", "wave", "wave with both arms along a sine path", "wave.py", tasks.Wave(),
+             ("wave", "waving", "sine"), ("left", "right")),
+    Exercise("lab2", "unreachable", "say why a pose has no solution", "unreachable.py X Y Z QX QY QZ QW",
+             tasks_printed.Unreachable(), ("unreachable", "reach", "report")),
+    Exercise("lab2", "ik_frame", "find the frames of the IK service", "ik_frame.py", tasks_printed.IkFrame(),
+             ("ik", "frame")),
+    Exercise("cwru", "joint_command", "bring the right arm to seven angles by joint commands",
+             "joint_command.py Q0 ... Q6", tasks.JointCommand(), ("joint", "command", "stream"), ("right",)),
+)
+LABS = tuple(dict.fromkeys(exercise.lab for exercise in EXERCISES))
+_MARK = re.compile(r"^\s*#\s*exercise\s*:\s*(\w+)", re.MULTILINE | re.IGNORECASE)
+
+
+def choose(lab, name, file_name, text):
+    """The Exercise for a lab, the name of an exercise or "", and the program. Raises UnknownExercise.
+
+    Without a name: what a line `# exercise: NAME` in the text says; else what the file's name says.
+    """
+    if lab not in LABS:
+        raise UnknownExercise("there is no lab '%s'; labs are %s" % (lab, ", ".join(LABS)))
+    of_lab = {exercise.name: exercise for exercise in EXERCISES if exercise.lab == lab}
+    mark = _MARK.search(text)
+    for asked, source in ((name, "on the command line"),
+                          (mark and mark.group(1), "in the program's `# exercise:` line")):
+        if asked:
+            if asked not in of_lab:
+                raise UnknownExercise("%s has no exercise '%s' (%s); its exercises are %s"
+                                      % (lab, asked, source, ", ".join(of_lab)))
+            return of_lab[asked]
+    if len(of_lab) == 1:
+        return next(iter(of_lab.values()))
+    words = set(re.split(r"[\W_]+", file_name.removesuffix(".py").lower()))
+    scores = {exercise.name: sum(word in words for word in exercise.words) for exercise in of_lab.values()}
+    best = max(scores.values())
+    winners = [name for name, score in scores.items() if score == best]
+    if best and len(winners) == 1:
+        return of_lab[winners[0]]
+    raise UnknownExercise("%s: which exercise of %s is this? Say so:\n%s\n"
+                          "or write a line `# exercise: NAME` into the file"
+                          % (file_name, lab, "\n".join("  ./baxter.sh check %s %s %s" % (lab, name, file_name)
+                                                       for name in of_lab)))

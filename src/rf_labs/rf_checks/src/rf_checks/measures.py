@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Numbers that say how well a motion was made. Free of ROS; SI units, radians."""
+import math
+
+import numpy as np
+
+# Below this speed of its fastest joint an arm stands [rad/s].
+STANDS_RAD_S = 0.02
+# No joint of the robot turns faster than 4 rad/s: more than this between two records [rad] is no motion.
+JUMP_RAD = 0.15
+
+
+def ramp(value, full, none):
+    """1 up to `full`, 0 from `none` on, linear between; either may be the larger one."""
+    return float(np.clip((none - value) / (none - full), 0.0, 1.0))
+
+
+def pose_error(pose, target):
+    """(distance [m], angle [rad]) between two (4, 4) poses."""
+    return float(np.linalg.norm(pose[:3, 3] - target[:3, 3])), rotation_angle(pose[:3, :3].T @ target[:3, :3])
+
+
+def rotation_angle(rotation):
+    """Angle of a (3, 3) rotation, 0 to pi [rad]."""
+    sine = np.linalg.norm((rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0],
+                           rotation[1, 0] - rotation[0, 1]))
+    return math.atan2(sine, np.trace(rotation) - 1.0)
+
+
+def speeds(times, positions):
+    """(n - 1,) speed of the fastest joint between two records [rad/s]. times (n,), positions (n, joints)."""
+    return np.abs(np.diff(positions, axis=0)).max(axis=1) / np.maximum(np.diff(times), 1e-6)
+
+
+def moving_rows(times, positions):
+    """(first, last) row of a motion, or None if nothing moved."""
+    if len(times) < 2:
+        return None
+    moving = np.flatnonzero(speeds(times, positions) > STANDS_RAD_S)
+    return (int(moving[0]), int(moving[-1]) + 1) if len(moving) else None
+
+
+def halts(times, positions, window_s=0.05):
+    """How often an arm came to a stand between the beginning and the end of its motion."""
+    rows = moving_rows(times, positions)
+    if rows is None:
+        return 0
+    speed = speeds(times, positions)[rows[0]:rows[1]]
+    width = max(1, round(window_s / max(float(np.median(np.diff(times))), 1e-6)))
+    smooth = np.convolve(speed, np.ones(width) / width, mode="valid") if len(speed) >= width else speed
+    stands = smooth < STANDS_RAD_S
+    return int(np.count_nonzero(stands[1:] & ~stands[:-1]))
+
+
+def largest_jump(positions):
+    """The largest change of one joint between two records [rad]."""
+    return float(np.abs(np.diff(positions, axis=0)).max()) if len(positions) > 1 else 0.0
+
+
+def path_length(positions):
+    """How far the joints went, the one that went farthest [rad]."""
+    return float(np.abs(np.diff(positions, axis=0)).sum(axis=0).max()) if len(positions) > 1 else 0.0
+
+
+class SineFit:
+    """amplitude [m], frequency [Hz], periods, r_squared (1: a perfect sine), start, end [s]."""
+
+    def __init__(self, amplitude, frequency, periods, r_squared, start, end):
+        self.amplitude, self.frequency, self.periods = amplitude, frequency, periods
+        self.r_squared, self.start, self.end = r_squared, start, end
+
+
+NO_SINE = SineFit(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def fit_sine(times, points, min_periods=1.5):
+    """The best sine in a path: times (n,), points (n, 3) [m]. The way to its start and from its end is left out.
+
+    Fits offset + sine along the main direction of motion, in windows that leave out some of either end.
+    """
+    speed = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.maximum(np.diff(times), 1e-6)
+    moving = np.flatnonzero(speed > 0.005)
+    if len(moving) < 50:
+        return NO_SINE
+    first, last = int(moving[0]), int(moving[-1]) + 1
+    best = NO_SINE
+    for head in np.arange(0.0, 0.75, 0.05):
+        for tail in (0.0, 0.05, 0.1, 0.2, 0.3):
+            if head + tail > 0.8:
+                continue
+            a, b = first + round(head * (last - first)), last - round(tail * (last - first))
+            found = _fit_window(times[a:b:2], points[a:b:2])
+            # A longer stretch is worth a little unevenness.
+            if found.periods >= min_periods and _worth(found) > _worth(best):
+                best = found
+    return best
+
+
+def _worth(fit):
+    return fit.r_squared + 0.02 * min(fit.periods, 3.0)
+
+
+def _fit_window(times, points):
+    if len(times) < 25:
+        return NO_SINE
+    centred = points - points.mean(axis=0)
+    values = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+    power = float(values @ values)
+    span = float(times[-1] - times[0])
+    if power / len(values) < 1e-6 or span <= 0.0:
+        return NO_SINE
+
+    def residual(frequency):
+        phase = 2.0 * math.pi * frequency * (times - times[0])
+        columns = np.stack((np.sin(phase), np.cos(phase), np.ones_like(phase)), axis=1)
+        weights = np.linalg.lstsq(columns, values, rcond=None)[0]
+        rest = values - columns @ weights
+        return float(rest @ rest), float(np.hypot(weights[0], weights[1]))
+
+    spectrum = np.abs(np.fft.rfft(values * np.hanning(len(values)), 4 * len(values)))
+    peak = max(1, int(np.argmax(spectrum[1:])) + 1) / (4.0 * span)
+    grid = peak * np.linspace(0.85, 1.15, 31)
+    frequency = min(grid, key=lambda f: residual(f)[0])
+    rest, amplitude = residual(frequency)
+    return SineFit(amplitude, frequency, frequency * span, 1.0 - rest / power, float(times[0]), float(times[-1]))

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a program did while it was watched, as plain data. Free of ROS."""
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+RECORD_S = 0.01
+SIDES = ("left", "right")
+JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+
+
+def arm_joints(side):
+    """The seven joint names of one arm, from shoulder to wrist."""
+    return tuple("%s_%s" % (side, joint) for joint in JOINTS)
+
+
+class Recording:
+    """What the robot did: one record (a dict as recorder.py writes it) each RECORD_S of simulation."""
+
+    def __init__(self, joint_names, records=()):
+        self.joint_names = tuple(joint_names)
+        self.records = list(records)
+
+    @cached_property
+    def times(self):
+        """(n,) [s]."""
+        return np.array([record["t"] for record in self.records])
+
+    @cached_property
+    def positions(self):
+        """(n, joints) [rad, m], columns in the order of joint_names."""
+        return np.array([record["q"] for record in self.records]).reshape(len(self.records), len(self.joint_names))
+
+    def arm(self, side):
+        """(n, 7) [rad]: one arm's joints from shoulder to wrist."""
+        return self.positions[:, [self.joint_names.index(name) for name in arm_joints(side)]]
+
+    def joints_at(self, row):
+        """Joint values of one record: dict of name to rad or m. Negative rows count from the end."""
+        return dict(zip(self.joint_names, self.records[row]["q"], strict=True))
+
+    def was_enabled(self):
+        """Whether the robot was ever enabled."""
+        return any(record["enabled"] for record in self.records)
+
+    def contacts(self):
+        """Pairs of links that came to touch: those of the first record do not count."""
+        first = {tuple(pair) for pair in self.records[0]["contacts"]} if self.records else set()
+        return sorted({tuple(pair) for record in self.records for pair in record["contacts"]} - first)
+
+    def commands(self):
+        """Joint commands that were written out: list of (side, mode, names, values)."""
+        return [tuple(command) for record in self.records for command in record["commands"]]
+
+    def command_counts(self):
+        """(n, 2): how many joint commands had come by then, left and right, since the start."""
+        counts = np.array([[record["counts"][side] for side in SIDES] for record in self.records]).reshape(-1, 2)
+        return counts - counts[0] if len(counts) else counts
+
+    def ik_requests(self):
+        """Poses that the IK service was asked for: list of (side, frame, xyz, xyzw, verdict)."""
+        return [tuple(request) for record in self.records for request in record["ik"]]
+
+
+@dataclass
+class Run:
+    """One run of a program.
+
+    ended: how the run came to its end: "exited", "satisfied" (the judge had seen enough), "sim time", "wall time",
+    "busy", "flood", "output", "processes", "simulator gone". stuck_at: line of the program where it was when the judge
+    ended it.
+    """
+
+    arguments: list
+    recording: Recording
+    output: str = ""
+    errors: str = ""
+    exit_code: int | None = None
+    ended: str = "exited"
+    stuck_at: int | None = None
+    survivors: int = 0
+    missing_nodes: list = field(default_factory=list)
+    intruders: dict = field(default_factory=dict)
+    program: str = ""
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One thing that counts: share of what it is worth (0 to 1), weight (points of 100), and what was found."""
+
+    name: str
+    share: float
+    weight: float
+    found: str
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong: a short key, and the sentence for the author. cap: no more than this share of all points."""
+
+    key: str
+    sentence: str
+    cap: float = 1.0

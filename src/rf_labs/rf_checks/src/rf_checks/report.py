@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a check came to: for people, as JSON, as JUnit XML. Free of ROS."""
+import json
+from xml.etree import ElementTree
+
+from rf_checks.exercises import PASS_MARK
+
+
+def has_passed(result):
+    return result.points >= PASS_MARK
+
+
+def text(result):
+    """For people: a table of each run, then the sentence that helps."""
+    exercise = result.exercise
+    lines = ["%s %s: %s" % (exercise.lab, exercise.name, exercise.title)]
+    for run in result.runs:
+        lines.append("  %s %s" % (exercise.usage.split()[0], " ".join(run.arguments)))
+        for one in run.criteria:
+            lines.append("    %-22s %5.1f of %4.1f   %s" % (one.name, one.share * one.weight, one.weight, one.found))
+        if run.fault and run.fault.cap * 100.0 < sum(one.share * one.weight for one in run.criteria):
+            lines.append("    %-22s no more than %.0f, for the fault below" % ("", 100.0 * run.fault.cap))
+    lines.append("%s: %.0f of 100 points (%s; seed %d, %.0f s)" % (
+        "passed" if has_passed(result) else "not passed", result.points,
+        "%g are due" % PASS_MARK, result.seed, result.lasted_s))
+    if result.fault:
+        lines.append("Hint: %s." % result.fault.sentence.rstrip("."))
+    return "\n".join(lines)
+
+
+def as_json(result):
+    """The same as a JSON text."""
+    return json.dumps({
+        "lab": result.exercise.lab, "exercise": result.exercise.name, "program": result.program, "seed": result.seed,
+        "points": round(result.points, 2), "pass_mark": PASS_MARK, "passed": has_passed(result),
+        "fault": result.fault.key if result.fault else None, "hint": result.fault.sentence if result.fault else None,
+        "isolation": result.isolation, "wall_s": round(result.lasted_s, 2),
+        "runs": [{"arguments": list(run.arguments), "points": round(run.points, 2),
+                  "fault": run.fault.key if run.fault else None,
+                  "criteria": [{"name": one.name, "points": round(one.share * one.weight, 2), "of": one.weight,
+                                "found": one.found} for one in run.criteria]} for run in result.runs],
+    }, indent=1)
+
+
+def as_junit(result):
+    """The same as JUnit XML: one case for each run; a failure says points and hint."""
+    failed = sum(run.points < PASS_MARK for run in result.runs)
+    suite = ElementTree.Element("testsuite", name="%s.%s" % (result.exercise.lab, result.exercise.name),
+                                tests=str(len(result.runs)), failures=str(failed), errors="0",
+                                time="%.2f" % result.lasted_s)
+    for run in result.runs:
+        name = " ".join((result.exercise.name, *run.arguments))
+        case = ElementTree.SubElement(suite, "testcase", name=name,
+                                      classname="%s.%s" % (result.exercise.lab, result.exercise.name))
+        lines = ["%s: %.1f of %.1f (%s)" % (one.name, one.share * one.weight, one.weight, one.found)
+                 for one in run.criteria]
+        if run.points < PASS_MARK:
+            hint = run.fault.sentence if run.fault else "see the points"
+            failure = ElementTree.SubElement(case, "failure",
+                                             message="%.0f of 100 points: %s" % (run.points, _clean(hint)))
+            failure.text = _clean("\n".join(lines))
+        else:
+            ElementTree.SubElement(case, "system-out").text = _clean("\n".join(lines))
+    return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True)
+
+
+def _clean(words):
+    """Without characters that XML cannot carry."""
+    return "".join(c if c in "\t\n" or " " <= c < "\ud800" or "\ue000" <= c <= "\ufffd" else "?" for c in words)

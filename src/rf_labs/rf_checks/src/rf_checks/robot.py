@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the robot's frames are for given joint values. Free of ROS."""
+import numpy as np
+
+from baxter_sim_kinematics import Chain, ChainError, NoSolution, pose_from_quaternion, solve
+from rf_checks.recording import arm_joints
+from urdf_model import parse_urdf
+
+# Where an inverse kinematics search starts: the middle of what the arm can do well.
+_SEED = np.array((0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0))
+
+
+class Robot:
+    """The robot's kinematics, from its description."""
+
+    def __init__(self, description_xml):
+        self._robot = parse_urdf(description_xml)
+        self._chains = {}
+
+    def frame(self, name, joints):
+        """(4, 4) pose of a frame in `base` [m]. `joints`: dict of name to rad."""
+        if name in ("base", "world"):
+            return np.eye(4)
+        if name not in self._chains:
+            try:
+                self._chains[name] = Chain.from_robot(self._robot, base="base", tip=name)
+            except ChainError:
+                self._chains[name] = None
+        chain = self._chains[name]
+        if chain is None:
+            return self._fixed(name)
+        return chain.fk(np.array([joints[joint] for joint in chain.joint_names]))
+
+    def _fixed(self, name):
+        """Pose of a frame that no joint moves."""
+        matrix = np.eye(4)
+        for joint in self._robot.chain("base", name):
+            matrix = matrix @ joint.origin @ joint.child_offset
+        return matrix
+
+    def between(self, target, source, joints):
+        """(4, 4) pose of `source` in `target`."""
+        return np.linalg.inv(self.frame(target, joints)) @ self.frame(source, joints)
+
+    def gripper_path(self, side, recording):
+        """(n, 3) positions of one gripper in `base` [m]."""
+        chain = self._chain(side)
+        return np.array([chain.fk(q)[:3, 3] for q in recording.arm(side)])
+
+    def gripper(self, side, recording, row=-1):
+        """(4, 4) pose of one gripper in `base` at a row of the recording."""
+        return self._chain(side).fk(recording.arm(side)[row])
+
+    def solve(self, side, xyz, xyzw):
+        """What becomes of an IK request: joint values (7,) or the NoSolution, returned."""
+        try:
+            return solve(self._chain(side), pose_from_quaternion(xyz, xyzw), seed=_SEED).q
+        except NoSolution as failure:
+            return failure
+
+    def _chain(self, side):
+        self.frame("%s_gripper" % side, dict.fromkeys(arm_joints(side), 0.0))
+        return self._chains["%s_gripper" % side]

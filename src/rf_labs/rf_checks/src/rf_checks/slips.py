@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Slips that can be told from their effect, and where a lab sheet's own listing has them. Free of ROS."""
+import math
+
+import numpy as np
+
+from rf_checks.measures import pose_error, rotation_angle
+from rf_checks.recording import arm_joints
+
+# Near enough to say that a wrong answer is that wrong answer [m], [rad].
+NEAR_M, NEAR_RAD = 0.02, 0.06
+
+SHEET_TF_LISTENER = "the sheet's own tf_listener listing has this slip, in the line that begins `quat = (q.x`"
+SHEET_NAMES = ("Case Western's notes have this slip in the lines `right_cmd.names.push_back(...)`: right_e1 and "
+               "right_w1 stand there twice, two joints are missing")
+SHEET_ROTATE = ("the sheet's listing of rotate_pose puts w first in the line that begins `quat_t3d =` and takes a "
+                "list; compare yours")
+
+
+def rotation_of(w, x, y, z):
+    """(3, 3) rotation of four numbers that are taken as a quaternion w x y z, of any length."""
+    w, x, y, z = np.array((w, x, y, z)) / np.linalg.norm((w, x, y, z))
+    return np.array(((1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+                     (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+                     (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y))))
+
+
+def quaternion_of(rotation):
+    """x, y, z, w with w >= 0 of a (3, 3) rotation."""
+    # The eigenvector of Bar-Itzhack's matrix, which has no case that divides by nearly zero.
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    matrix = np.array(((xx - yy - zz, xy + yx, xz + zx, zy - yz),
+                       (xy + yx, yy - xx - zz, yz + zy, xz - zx),
+                       (xz + zx, yz + zy, zz - xx - yy, yx - xy),
+                       (zy - yz, xz - zx, yx - xy, xx + yy + zz))) / 3.0
+    x, y, z, w = np.linalg.eigh(matrix)[1][:, 3]
+    return np.array((x, y, z, w)) * (1.0 if w >= 0.0 else -1.0)
+
+
+def about(axis, angle_rad):
+    """(3, 3) rotation about "x", "y" or "z"."""
+    k = "xyz".index(axis)
+    i, j = (k + 1) % 3, (k + 2) % 3
+    matrix = np.eye(3)
+    matrix[i, i] = matrix[j, j] = math.cos(angle_rad)
+    matrix[j, i], matrix[i, j] = math.sin(angle_rad), -math.sin(angle_rad)
+    return matrix
+
+
+def is_near(rotation, other):
+    """Whether two (3, 3) rotations are the same within NEAR_RAD."""
+    return rotation_angle(rotation.T @ other) < NEAR_RAD
+
+
+def is_xyzw_taken_as_wxyz(found, true):
+    """Whether a (3, 3) rotation is what comes of x y z w read as w x y z, once or on the way in and out."""
+    x, y, z, w = quaternion_of(true)
+    return is_near(found, rotation_of(x, y, z, w))
+
+
+def wrong_rotations(start, axis, angle_rad):
+    """What slips make of "turn `start` (3, 3) about its own axis": list of (key, what was done, rotation)."""
+    x, y, z, w = quaternion_of(start)
+    scrambled = rotation_of(x, y, z, w)
+    turn = about(axis, angle_rad)
+    degrees = math.degrees(angle_rad)
+
+    def read_back(rotation):
+        """The rotation when its quaternion w x y z is sent as if it were x y z w."""
+        qx, qy, qz, qw = quaternion_of(rotation)
+        return rotation_of(qz, qw, qx, qy)
+
+    order = "the quaternion's numbers are in the wrong order: ROS has x y z w, transforms3d w x y z"
+    return [
+        ("quaternion_order", order + ", and it was passed on unchanged", scrambled @ turn),
+        ("quaternion_order", order + ", and it was passed on unchanged both ways", read_back(scrambled @ turn)),
+        ("quaternion_order", order + ", and what came out was sent unchanged", read_back(start @ turn)),
+        ("degrees", "the angle was %g radians: degrees where radians are meant (numpy.deg2rad turns them)" % degrees,
+         start @ about(axis, degrees)),
+        ("degrees", "the angle was converted to radians twice", start @ about(axis, math.radians(angle_rad))),
+        ("wrong_axis", "the turn was about the axis %s of `base`, not of the gripper: multiply the other way round"
+         % axis, turn @ start),
+        ("wrong_direction", "the turn went the other way", start @ about(axis, -angle_rad)),
+        *(("wrong_axis", "the turn was about the gripper's axis %s, not %s" % (other, axis),
+           start @ about(other, angle_rad)) for other in "xyz" if other != axis),
+        ("not_turned", "the gripper is where it was to be, but it was not turned", start),
+    ]
+
+
+def matrix_slip(found, robot, joints, target, source, frames):
+    """What is wrong with a (4, 4) matrix that was to be the pose of `source` in `target`: (key, sentence) or None."""
+    true = robot.between(target, source, joints)
+    name = "%s -> %s" % (target, source)
+    if np.allclose(found, np.eye(4)):
+        return "identity", "%s: the matrix printed is the identity: rotation and translation were not filled in" % name
+    if np.linalg.norm(found[:3, 3] - true[:3, 3]) < NEAR_M and not is_near(found[:3, :3], true[:3, :3]):
+        if is_xyzw_taken_as_wxyz(found[:3, :3], true[:3, :3]):
+            return "quaternion_order", ("%s: the rotation is that of a quaternion in the wrong order: tf gives x y z "
+                                        "w, quat2mat wants w x y z (%s)" % (name, SHEET_TF_LISTENER))
+        if is_near(found[:3, :3], true[:3, :3].T):
+            return "transposed", "%s: the rotation part is transposed, the translation is right" % name
+        return "rotation", "%s: the translation is right, the rotation part is not" % name
+    if _same(found, np.linalg.inv(true)):
+        return "wrong_frame", ("%s: this is the inverse, %s -> %s: lookup_transform takes the target frame first, then "
+                               "the source" % (name, source, target))
+    for other_target, other_source in ((a, b) for a in frames for b in frames if a != b):
+        if _same(found, robot.between(other_target, other_source, joints)):
+            return "wrong_frame", ("%s: the matrix is that of %s -> %s: another frame than the exercise's"
+                                   % (name, other_target, other_source))
+    return None
+
+
+def _same(matrix, other):
+    distance, angle = pose_error(matrix, other)
+    return distance < 0.005 and angle < 0.02
+
+
+def command_slip(commands):
+    """What is wrong with joint commands, as a (key, sentence) or None. commands: (side, mode, names, values) each."""
+    for _, _, names, values in commands:
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            side = repeated[0].split("_")[0]
+            missing = [name for name in arm_joints(side) if name not in names]
+            return "repeated_names", ("the joint command names %s more than once and misses %s; %s"
+                                      % (" and ".join(repeated), " and ".join(missing) or "none", SHEET_NAMES))
+        if len(names) != len(values):
+            return "lengths", ("the joint command has %d names and %d values; each joint needs one of each"
+                               % (len(names), len(values)))
+        # No joint of the arm turns farther than 3.1 rad.
+        if values and max(abs(value) for value in values) > 6.3:
+            worst = max(range(len(values)), key=lambda k: abs(values[k]))
+            return "degrees", ("%s was commanded to %.1f: angles are in radians, and this looks like degrees "
+                               "(numpy.deg2rad turns them)" % (names[worst], values[worst]))
+    return None

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How each kind of exercise is graded: what counts, and what its own slips look like. Free of ROS.
+
+A task has `calls(rng)`, the runs that make the check; `criteria(call, run, robot)`, what one run is worth;
+`slip(call, run, robot)`, a Fault or None; and `is_satisfied(call, run)`, whether the judge has seen enough of a program
+that goes on.
+"""
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rf_checks import measures, slips
+from rf_checks.measures import ramp
+from rf_checks.recording import SIDES, Criterion, Fault, arm_joints
+
+NEUTRAL = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0)
+# The lab's pose of the left gripper in `base`.
+LAB_POINT = (0.644, 0.0, 0.066)
+LAB_QUATERNION = (-0.381, 0.923, -0.015, 0.052)
+
+
+@dataclass(frozen=True)
+class Call:
+    """One run of the program: its words, the arms' posture before, what is due [sim s], and what the answer is."""
+
+    arguments: tuple
+    posture: dict
+    limit_s: float
+    expected: object = None
+    lasts_s: float = field(default=0.0)
+
+
+def postures(rng, spread=0.12):
+    """Both arms about neutral, each joint up to `spread` [rad] beside it."""
+    return {name: round(float(angle + rng.uniform(-spread, spread)), 4)
+            for side in SIDES for name, angle in zip(arm_joints(side), NEUTRAL, strict=True)}
+
+
+def pose_matrix(point, quaternion_xyzw):
+    """(4, 4) of a position [m] and a quaternion x y z w of any length."""
+    matrix = np.eye(4)
+    x, y, z, w = quaternion_xyzw
+    matrix[:3, :3], matrix[:3, 3] = slips.rotation_of(w, x, y, z), point
+    return matrix
+
+
+def motion_criteria(run, sides, done_share, call, weights, halts_allowed):
+    """Smoothness, collisions, time: worth something in the measure in which the task was done (`done_share`)."""
+    smooth, clear, quick = weights
+    recording = run.recording
+    stops = max(measures.halts(recording.times, recording.arm(side)) for side in sides) if len(recording.times) else 0
+    touched = recording.contacts()
+    lasted = _duration(recording)
+    text = "; ".join("%s - %s" % pair for pair in touched[:3])
+    if done_share == 0.0:
+        return [Criterion(name, 0.0, weight, "counts as far as the exercise is done")
+                for name, weight in (("smoothness", smooth), ("collisions", clear), ("time", quick))]
+    return [
+        Criterion("smoothness", done_share * ramp(stops, halts_allowed, halts_allowed + 12), smooth,
+                  "the arm stood still %d times on its way" % stops),
+        Criterion("collisions", done_share * (0.0 if touched else 1.0), clear,
+                  "touched: " + text if touched else "none"),
+        Criterion("time", done_share * ramp(lasted, call.lasts_s, 2.0 * call.lasts_s), quick,
+                  "%.1f s of %.0f s" % (lasted, call.lasts_s)),
+    ]
+
+
+def _duration(recording):
+    arms = np.hstack([recording.arm(side) for side in SIDES]) if len(recording.times) else np.empty((0, 14))
+    rows = measures.moving_rows(recording.times, arms)
+    return float(recording.times[rows[1]] - recording.times[0]) if rows else 0.0
+
+
+class RotateGripper:
+    """`rotate_gripper.py AXIS DEGREES`: the left gripper to the lab's pose, then turned about its own axis."""
+
+    def calls(self, rng):
+        return [Call((axis, "%d" % degrees), postures(rng), 45.0, (axis, math.radians(degrees)), 22.0)
+                for axis, degrees in (("z", 90), ("x", 90), ("y", -90))]
+
+    def is_satisfied(self, call, run):
+        return False
+
+    def _target(self, call):
+        axis, angle = call.expected
+        start = pose_matrix(LAB_POINT, LAB_QUATERNION)
+        target = start.copy()
+        target[:3, :3] = start[:3, :3] @ slips.about(axis, angle)
+        return start, target
+
+    def criteria(self, call, run, robot):
+        position = orientation = 0.0
+        distance, angle = math.inf, math.inf
+        recording = run.recording
+        if recording.records and measures.path_length(recording.arm("left")) > 0.1:
+            distance, angle = measures.pose_error(robot.gripper("left", recording), self._target(call)[1])
+            position = ramp(distance, 0.01, 0.1)
+            orientation = position * ramp(angle, math.radians(2), math.radians(30))
+        reached = "%.1f cm off" % (100 * distance) if position or math.isfinite(distance) else "the arm did not move"
+        turned = "%.0f degrees off" % math.degrees(angle) if math.isfinite(angle) else "the arm did not move"
+        return [Criterion("position", position, 20.0, reached), Criterion("orientation", orientation, 40.0, turned),
+                *motion_criteria(run, ("left",), min(position, orientation), call, (10.0, 15.0, 15.0), 4)]
+
+    def slip(self, call, run, robot):
+        axis, angle = call.expected
+        start, target = self._target(call)
+        requests = run.recording.ik_requests()
+        for _, frame, xyz, xyzw, _ in requests:
+            if frame.lstrip("/") not in ("base", "world", ""):
+                return Fault("wrong_frame", "the IK service was asked for a pose in the frame `%s`; the pose of this "
+                             "exercise is given in `base` (header.frame_id)" % frame)
+            pose = pose_matrix(xyz, xyzw)
+            if measures.pose_error(pose, start)[0] < slips.NEAR_M:
+                fault = self._rotation_fault(pose, start, target, axis, angle)
+                if fault and fault.key != "not_turned":
+                    return fault
+        return (self._reached_fault(run, robot, start, target, axis, angle)
+                or self._missed(run, robot, start, bool(requests)))
+
+    @staticmethod
+    def _missed(run, robot, start, has_asked):
+        """What to say of an arm that is simply elsewhere."""
+        distance = measures.pose_error(robot.gripper("left", run.recording), start)[0]
+        if distance < 0.05 or measures.path_length(run.recording.arm("left")) < 0.1:
+            return None
+        text = "the left gripper ended %.0f cm from the lab's pose, where it is to be turned" % (100.0 * distance)
+        if not has_asked:
+            text += "; the IK service was never asked for joint angles"
+        return Fault("far_off", text)
+
+    def _rotation_fault(self, pose, start, target, axis, angle):
+        rotation = pose[:3, :3]
+        if slips.is_near(rotation, target[:3, :3]) or slips.is_near(rotation, start[:3, :3]):
+            return None
+        for key, sentence, wrong in slips.wrong_rotations(start[:3, :3], axis, angle):
+            if slips.is_near(rotation, wrong):
+                if key == "quaternion_order":
+                    sentence += "; " + slips.SHEET_ROTATE
+                return Fault(key, sentence)
+        return None
+
+    def _reached_fault(self, run, robot, start, target, axis, angle):
+        if not run.recording.records:
+            return None
+        reached = robot.gripper("left", run.recording)
+        distance, turned = measures.pose_error(reached, target)
+        if distance < slips.NEAR_M and turned < slips.NEAR_RAD:
+            return None
+        joints = run.recording.joints_at(-1)
+        for frame in ("left_hand", "left_wrist", "left_gripper_base"):
+            if measures.pose_error(robot.frame(frame, joints), target)[0] < slips.NEAR_M:
+                return Fault("wrong_frame", "at the end `%s` is where `left_gripper` was to be: the IK service "
+                             "commands `left_gripper`, and so must the pose be one of that frame" % frame)
+        if distance < slips.NEAR_M:
+            fault = self._rotation_fault(reached, start, target, axis, angle)
+            if fault:
+                return fault
+            if slips.is_near(reached[:3, :3], start[:3, :3]):
+                return Fault("not_turned", "the gripper is at the lab's pose, but it was not turned about its %s axis "
+                             "by %.0f degrees" % (axis, math.degrees(angle)))
+        return None
+
+
+class JointCommand:
+    """`joint_command.py Q0 ... Q6`: the right arm to seven angles, s0 to w2, by a stream of joint commands."""
+
+    def calls(self, rng):
+        goal = [round(float(angle), 3) for angle in np.array((-0.4, -0.3, 0.5, 1.1, 0.3, 0.8, 0.7))
+                + rng.uniform(-0.15, 0.15, 7)]
+        return [Call(tuple(map(str, goal)), postures(rng), 30.0, tuple(goal), 12.0)]
+
+    def is_satisfied(self, call, run):
+        return False
+
+    def criteria(self, call, run, robot):
+        share, found = 0.0, "the arm did not move"
+        recording = run.recording
+        if recording.records and measures.path_length(recording.arm("right")) > 0.1:
+            off = np.abs(recording.arm("right")[-1] - np.array(call.expected))
+            share = float(np.mean([ramp(value, 0.02, 0.25) for value in off]))
+            found = "farthest off is %s, by %.3f rad" % (arm_joints("right")[int(off.argmax())], off.max())
+            share = share if off.max() < 0.25 else 0.6 * share
+        return [Criterion("joint angles", share, 55.0, found),
+                *motion_criteria(run, ("right",), share, call, (15.0, 15.0, 15.0), 1)]
+
+    def slip(self, call, run, robot):
+        recording = run.recording
+        if recording.records and measures.path_length(recording.arm("right")) > 0.1:
+            off = np.abs(recording.arm("right")[-1] - np.array(call.expected))
+            if off.max() > 0.02 and run.exit_code == 0:
+                return Fault("far_off", "%s ended %.2f rad from its goal: go on sending the goal until "
+                             "/robot/joint_states says that the arm is there"
+                             % (arm_joints("right")[int(off.argmax())], off.max()))
+        return None
+
+
+class Wave:
+    """`wave.py`: both grippers to and fro along a sine path at the same time, three periods or more, then an end."""
+
+    def calls(self, rng):
+        return [Call((), postures(rng), 60.0, None, 40.0)]
+
+    def is_satisfied(self, call, run):
+        return False
+
+    def fits(self, run, robot):
+        """The sine of each gripper's path: dict of side to SineFit."""
+        recording = run.recording
+        return {side: measures.fit_sine(recording.times, robot.gripper_path(side, recording)) for side in SIDES}
+
+    def criteria(self, call, run, robot):
+        fits = self.fits(run, robot) if len(run.recording.times) > 50 else dict.fromkeys(SIDES, measures.NO_SINE)
+        found, shares = [], []
+        for side, fit in fits.items():
+            share = (ramp(fit.r_squared, 0.95, 0.6) * ramp(fit.amplitude, 0.05, 0.01) * min(1.0, fit.periods / 2.9))
+            shares.append(share)
+            moved = "%s: %.1f periods of %.0f cm to either side, %.0f %% a sine" % (
+                side, fit.periods, 100 * fit.amplitude, 100 * max(0.0, fit.r_squared))
+            found.append(moved if fit.periods else "%s: no wave" % side)
+        together = self._together(fits)
+        done = min(shares)
+        return [Criterion("left wave", shares[0], 22.5, found[0]), Criterion("right wave", shares[1], 22.5, found[1]),
+                Criterion("at the same time", done * together, 15.0, "%.0f %% of the time" % (100 * together)),
+                # A hand that waves stands at both ends of its path.
+                *motion_criteria(run, SIDES, done, call, (15.0, 15.0, 10.0),
+                                 4 + round(3 * max(fit.periods for fit in fits.values())))]
+
+    @staticmethod
+    def _together(fits):
+        left, right = (fits[side] for side in SIDES)
+        if not (left.periods and right.periods):
+            return 0.0
+        both = min(left.end, right.end) - max(left.start, right.start)
+        return float(np.clip(both / min(left.end - left.start, right.end - right.start), 0.0, 1.0))
+
+    def slip(self, call, run, robot):
+        if len(run.recording.times) < 50:
+            return None
+        fits = self.fits(run, robot)
+        still = [side for side in SIDES if measures.path_length(run.recording.arm(side)) < 0.1]
+        if len(still) == 1:
+            return Fault("one_arm", "only one arm moved; the %s arm stood still, and both are to wave" % still[0])
+        none = [side for side, fit in fits.items() if not fit.periods]
+        if none and not still:
+            return Fault("no_wave", "the %s gripper moved, but nothing in its path is a sine of more than one period"
+                         % " and the ".join(none))
+        if all(fit.periods and fit.periods < 2.9 for fit in fits.values()):
+            return Fault("too_short", "both arms wave, but for fewer than three periods (%.1f)"
+                         % min(fit.periods for fit in fits.values()))
+        small = [side for side, fit in fits.items() if fit.periods and fit.amplitude < 0.04]
+        if small:
+            return Fault("too_small", "the %s gripper's wave goes %.0f mm to either side; 5 cm are due"
+                         % (small[0], 1000 * fits[small[0]].amplitude))
+        return None

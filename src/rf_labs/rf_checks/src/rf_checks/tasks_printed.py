@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Exercises whose answer is printed. The truth comes from the simulated robot itself, not from topics. Free of ROS.
+
+The methods of a task are described in tasks.py.
+"""
+import re
+
+import numpy as np
+
+from rf_checks import measures, slips
+from rf_checks.measures import ramp
+from rf_checks.recording import SIDES, Criterion, Fault
+from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, Call, pose_matrix, postures
+
+SHEET_PAIRS = (("base", "left_hand"), ("left_hand", "right_hand"), ("head_camera", "left_gripper_base"))
+# Frames among which a wrong answer is looked for.
+FRAMES = ("base", "head", "head_camera", "left_hand", "right_hand", "left_gripper", "right_gripper",
+          "left_gripper_base", "right_gripper_base", "torso", "left_wrist", "right_wrist")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_NOT_ROW = re.compile(r"[^\s\d.,;\[\]()eE+-]")
+
+
+def matrices(text):
+    """Every 4 by 4 matrix in a text, as numpy, lists or plain rows write it: list of (4, 4) arrays."""
+    found, rows = [], []
+    for line in text.splitlines():
+        if "[[" in line:
+            line, rows = line[line.rindex("[["):] if "]]" not in line else line[line.index("[["):], []
+        if "]]" in line:
+            line = line[:line.rindex("]]")]
+        numbers = [float(word) for word in _NUMBER.findall(line)]
+        if _NOT_ROW.search(line) or len(numbers) not in (4, 16):
+            rows = []
+            continue
+        rows += [numbers[k:k + 4] for k in range(0, len(numbers), 4)]
+        if len(rows) >= 4 and np.allclose(rows[-1], (0, 0, 0, 1), atol=1e-6):
+            found.append(np.array(rows[-4:]))
+            rows = []
+    return found
+
+
+class TfListener:
+    """`tf_listener.py [TARGET SOURCE]`: prints the matrix of that pair, or of the sheet's three."""
+
+    def calls(self, rng):
+        pairs = [(a, b) for a, b in (("head", "right_hand"), ("right_hand", "head_camera"), ("left_gripper", "torso"))]
+        pair = pairs[int(rng.integers(len(pairs)))]
+        return [Call((), postures(rng, 0.3), 15.0, SHEET_PAIRS), Call(pair, postures(rng, 0.3), 15.0, (pair,))]
+
+    def is_satisfied(self, call, run):
+        return len(matrices(run.output)) >= len(call.expected)
+
+    def criteria(self, call, run, robot):
+        found = matrices(run.output)
+        result = []
+        for target, source in call.expected:
+            distance, angle = np.inf, np.inf
+            if run.recording.records:
+                true = robot.between(target, source, run.recording.joints_at(-1))
+                distance, angle = min((measures.pose_error(matrix, true) for matrix in found), key=sum,
+                                      default=(np.inf, np.inf))
+            share = min(ramp(distance, 0.003, 0.02), ramp(angle, 0.01, 0.05))
+            text = "none of the %d printed is this" % len(found) if share == 0.0 else "%.1f mm off" % (1000 * distance)
+            result.append(Criterion("%s -> %s" % (target, source), share, 100.0 / len(call.expected), text))
+        return result
+
+    def slip(self, call, run, robot):
+        found = matrices(run.output)
+        if not run.recording.records:
+            return None
+        joints = run.recording.joints_at(-1)
+        unused = [matrix for matrix in found
+                  if not any(_near(matrix, robot.between(*pair, joints)) for pair in call.expected)]
+        missing = [pair for pair in call.expected
+                   if not any(_near(matrix, robot.between(*pair, joints)) for matrix in found)]
+        for target, source in missing:
+            for matrix in unused:
+                slip = slips.matrix_slip(matrix, robot, joints, target, source, FRAMES)
+                if slip:
+                    return Fault(*slip)
+        if missing and unused:
+            return Fault("wrong_numbers", "a matrix was printed that is no pose of this robot's frames as its arms "
+                         "stand now: the arms stand elsewhere in each check, so numbers from another run do not fit")
+        if missing and not found:
+            return Fault("no_matrix", "no 4 by 4 matrix was printed for %s -> %s: print the whole matrix, row by row, "
+                         "the last row 0 0 0 1" % missing[0])
+        return None
+
+
+def _near(matrix, true):
+    distance, angle = measures.pose_error(matrix, true)
+    return distance < 0.01 and angle < 0.03
+
+
+VERDICTS = ("SOLVED", "OUT_OF_REACH", "JOINT_LIMIT", "NOT_CONVERGED", "SELF_COLLISION", "WORLD_COLLISION")
+_VERDICT = re.compile("|".join(VERDICTS))
+
+
+class Unreachable:
+    """`unreachable.py X Y Z QX QY QZ QW`: prints the IK report's verdict of that pose, and why."""
+
+    def calls(self, rng):
+        down = pose_matrix((0, 0, 0), (0.0, 1.0, 0.0, 0.0))[:3, :3]
+        turned = slips.quaternion_of(down @ slips.about("y", -np.pi / 2))
+        kinds = ((LAB_POINT, LAB_QUATERNION), ((1.5, 0.6, 0.2), (0.0, 1.0, 0.0, 0.0)), ((0.6, 0.3, 0.3), turned))
+        calls = []
+        for point, quaternion in kinds:
+            point = np.array(point) + rng.uniform(-0.004, 0.004, 3)
+            words = tuple("%.4f" % value for value in (*point, *quaternion))
+            calls.append(Call(words, postures(rng), 12.0, tuple(float(word) for word in words)))
+        return calls
+
+    def is_satisfied(self, call, run):
+        return False
+
+    def _truth(self, call, robot):
+        answer = robot.solve("left", call.expected[:3], call.expected[3:])
+        return answer if hasattr(answer, "reason") else None
+
+    def criteria(self, call, run, robot):
+        failure = self._truth(call, robot)
+        verdict = failure.reason.name if failure else "SOLVED"
+        lines = [line for line in run.output.splitlines() if _VERDICT.search(line)]
+        said = sorted(set(_VERDICT.findall(lines[-1]))) if lines else []
+        is_right = said == [verdict]
+        asked = any(np.allclose(request[2], call.expected[:3], atol=1e-3) for request in run.recording.ik_requests())
+        reason = is_right and asked and self._says_why(failure, run.output)
+        return [Criterion("verdict", float(is_right and asked), 70.0,
+                          "said %s, it is %s" % (" and ".join(said) or "nothing", verdict) if asked else
+                          "the IK service was not asked for this pose"),
+                Criterion("reason", float(reason), 30.0,
+                          "given" if reason else "the joint, or how far short, is missing")]
+
+    @staticmethod
+    def _says_why(failure, text):
+        if failure is None:
+            return True
+        if failure.joints:
+            return any(joint in text for joint in failure.joints)
+        numbers = [float(word) for word in _NUMBER.findall(text)]
+        return any(abs(number - failure.residual_m) < max(0.01, 0.1 * failure.residual_m) for number in numbers)
+
+    def slip(self, call, run, robot):
+        requests = run.recording.ik_requests()
+        for _, frame, xyz, xyzw, _ in requests:
+            if frame.lstrip("/") not in ("base", "world", ""):
+                return Fault("wrong_frame", "the IK service was asked for a pose in the frame `%s`; these poses are in "
+                             "`base`" % frame)
+            wanted = np.array(call.expected[3:])
+            if np.allclose(xyz, call.expected[:3], atol=1e-3) and not slips.is_near(
+                    pose_matrix(xyz, xyzw)[:3, :3], pose_matrix(xyz, wanted)[:3, :3]):
+                return Fault("quaternion_order", "the IK service was asked for another orientation than the one given: "
+                             "the arguments are x y z w, as in ROS")
+        if not any(np.allclose(request[2], call.expected[:3], atol=1e-3) for request in requests):
+            if _VERDICT.search(run.output):
+                return Fault("made_up", "a verdict was printed although the IK service was never asked for this pose")
+            return Fault("not_asked", "the IK service of the left arm was never asked for the pose on the command line")
+        if not _VERDICT.search(run.output):
+            return Fault("no_verdict", "the IK service was asked, but no verdict was printed: one of %s, from the "
+                         "topic /ExternalTools/left/PositionKinematicsNode/IKReport" % ", ".join(VERDICTS[:3]))
+        return None
+
+
+class IkFrame:
+    """`ik_frame.py`: finds out by an experiment which frame poses are given in and which is put there; prints both."""
+
+    def calls(self, rng):
+        return [Call((), postures(rng), 40.0, None, 20.0)]
+
+    def is_satisfied(self, call, run):
+        return False
+
+    @staticmethod
+    def answers(text):
+        """(reference frame, commanded frame) as printed last, "" where not printed."""
+        found = []
+        for name in ("reference frame", "commanded frame"):
+            said = re.findall(name + r"\s*[:=]\s*/?([A-Za-z]\w*)", text, re.IGNORECASE)
+            found.append(said[-1] if said else "")
+        return tuple(found)
+
+    def criteria(self, call, run, robot):
+        reference, commanded = self.answers(run.output)
+        asked, arrived, found = self._experiment(run, robot)
+        return [
+            Criterion("reference frame", float(reference in ("base", "world")), 20.0,
+                      "said %s" % (reference or "nothing")),
+            Criterion("commanded frame", float(commanded in ("left_gripper", "right_gripper")), 25.0,
+                      "said %s" % (commanded or "nothing")),
+            Criterion("asked the service", float(asked), 15.0,
+                      "yes" if asked else "no pose with a solution was asked for"),
+            Criterion("went to look", arrived, 40.0, found),
+        ]
+
+    @staticmethod
+    def _experiment(run, robot):
+        recording = run.recording
+        solved = [request for request in recording.ik_requests() if request[4] == 0]
+        best = 0.0, "no arm moved to a pose that the service had solved"
+        for side, _, xyz, xyzw, _ in solved:
+            if measures.path_length(recording.arm(side)) < 0.1:
+                continue
+            target = pose_matrix(xyz, xyzw)
+            # Wherever the arm rested on its way.
+            poses = [robot.gripper(side, recording, row) for row in range(0, len(recording.times), 10)]
+            distance = min(measures.pose_error(pose, target)[0] for pose in poses)
+            found = "%.1f cm from the pose that was asked for" % (100 * distance)
+            best = max(best, (ramp(distance, 0.01, 0.05), found))
+        return bool(solved), *best
+
+    def slip(self, call, run, robot):
+        reference, commanded = self.answers(run.output)
+        if not reference or not commanded:
+            return Fault("no_answer", "the answers are missing: print two lines, `reference frame: NAME` and "
+                         "`commanded frame: NAME`")
+        if reference not in ("base", "world"):
+            return Fault("wrong_frame", "the reference frame is not `%s`: it is the one that a pose's numbers are "
+                         "measured from; ask for one pose with two values of header.frame_id and compare" % reference)
+        if commanded not in ["%s_gripper" % side for side in SIDES]:
+            return Fault("wrong_frame", "the commanded frame is not `%s`: move to a solution and look in tf which "
+                         "frame then stands at the pose that was asked for" % commanded)
+        if not self._experiment(run, robot)[1]:
+            return Fault("made_up", "the answers were printed, but no arm moved to a pose that the service had solved: "
+                         "an answer without its experiment")
+        return None

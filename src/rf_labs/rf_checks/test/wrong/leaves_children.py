@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# exercise: joint_command
+"""Ends, but a child in a session of its own, with another environment, goes on."""
+import os
+import subprocess
+import sys
+
+import rospy
+
+rospy.init_node("student")
+if os.fork() == 0:
+    os.setsid()
+    subprocess.Popen([sys.executable, "-c", "import time; time.sleep(1000)"], env={}, close_fds=True,
+                     stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    os._exit(0)
