@@ -7,6 +7,8 @@ import numpy as np
 import pybullet
 
 from gazebo_ros.drawing import DrawingError
+from gazebo_ros.snapshot import SnapshotError
+from gazebo_ros.window_screen import WindowScreen
 from urdf_model import Box, Cylinder, Mesh, Sphere, merge_fixed, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix
 
@@ -48,6 +50,7 @@ class Window:
             pybullet.configureDebugVisualizer(flag, 0, physicsClientId=self._client)
         pybullet.resetDebugVisualizerCamera(**_CAMERA, physicsClientId=self._client)
         self._bodies = {}
+        self._screens = {}
         self._order = []
         self._shown = {}
 
@@ -66,6 +69,7 @@ class Window:
         for name in [name for name, (body, _) in self._bodies.items() if wanted.get(name) != body]:
             for number in self._bodies.pop(name)[1]:
                 pybullet.removeBody(number, physicsClientId=self._client)
+                self._screens.pop(number, None)
         for name, body in wanted.items():
             if name not in self._bodies:
                 self._bodies[name] = (body, self._floor() if body["urdf"] is None else [self._robot(body)])
@@ -99,6 +103,9 @@ class Window:
                     pybullet.resetJointStatesMultiDof(number, list(range(len(position))),
                                                       [[value] for value in position], physicsClientId=self._client)
             start = end
+        for screens in self._screens.values():
+            for screen in screens:
+                screen.refresh()
 
     def _robot(self, body):
         merged = merge_fixed(parse_urdf(body["urdf"], source=body["name"]))
@@ -109,9 +116,11 @@ class Window:
         # PyBullet gives all primitives of a link one colour. A link's first colour is drawn on itself, each further one
         # on a link of its own that is fixed to it; these come last, so that joints keep their numbers.
         more = [(link, parts) for link, groups in enumerate(by_colour) for parts in groups[1:]]
-        count, extra = len(joints) + len(more), len(more)
+        screens = self._screens_of(body)
+        extra = len(more) + len(screens)
+        count = len(joints) + extra
         parts = [groups[0] if groups else [] for groups in by_colour] + [parts for _, parts in more]
-        shapes = [self._shapes(of_link) for of_link in parts]
+        shapes = [self._shapes(of_link) for of_link in parts] + [screen.shape for screen in screens]
         zeros, upright = [[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.0, 1.0]]
         number = pybullet.createMultiBody(
             baseMass=0.0, baseVisualShapeIndex=shapes[0], baseCollisionShapeIndex=-1,
@@ -119,7 +128,8 @@ class Window:
             linkPositions=[joint.origin[:3, 3].tolist() for joint in joints] + zeros * extra,
             linkOrientations=[quaternion_from_matrix(joint.origin).tolist() for joint in joints] + upright * extra,
             linkInertialFramePositions=zeros * count, linkInertialFrameOrientations=upright * count,
-            linkParentIndices=[order[joint.parent] for joint in joints] + [link for link, _ in more],
+            linkParentIndices=[order[joint.parent] for joint in joints] + [link for link, _ in more]
+            + [order[screen.link] for screen in screens],
             linkJointTypes=[pybullet.JOINT_PRISMATIC if joint.type == "prismatic" else pybullet.JOINT_REVOLUTE
                             for joint in joints] + [pybullet.JOINT_FIXED] * extra,
             linkJointAxis=[joint.axis.tolist() for joint in joints] + [[0.0, 0.0, 1.0]] * extra,
@@ -129,7 +139,19 @@ class Window:
             for index, (_, _, colour, _) in enumerate(of_link):
                 pybullet.changeVisualShape(number, link, shapeIndex=index, rgbaColor=list(colour),
                                            physicsClientId=self._client)
+        for link, screen in enumerate(screens, len(joints) + len(more)):
+            screen.put_on(number, link)
+        self._screens[number] = screens
         return number
+
+    def _screens_of(self, body):
+        found = []
+        for listed in body.get("screens", ()):
+            try:
+                found.append(WindowScreen(listed, self._client))
+            except SnapshotError as error:
+                self._warn(str(error))
+        return found
 
     def _by_colour(self, link):
         """What is drawn of a link: a list of lists, each of one colour."""
