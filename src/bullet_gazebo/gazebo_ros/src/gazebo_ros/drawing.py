@@ -9,10 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-#: Triangles that a mesh keeps; a robot of thirty links then draws in some 20 ms without a graphics card.
+#: Triangles that a mesh of :data:`USUAL_M` [m, its longest side] keeps; a robot of thirty links then draws in some 15 ms
+#: without a graphics card. Larger and smaller ones keep more and less, within bounds: a finger covers few pixels.
 TRIANGLES = 800
+USUAL_M = 0.35
+_LEAST, _MOST = 0.5, 2.5
 # Part of the name of cached files: raise it when the same mesh would come out differently.
-_VERSION = 2
+_VERSION = 3
 _FINEST_GRID = 512
 
 
@@ -86,6 +89,8 @@ class DrawingCache:
     def _make(self, path, key):
         pieces = _read(path)
         total = sum(len(faces) for _, faces, _ in pieces)
+        size = float(np.ptp(np.concatenate([vertices for vertices, _, _ in pieces]), axis=0).max())
+        kept = self._triangles * min(max(size / USUAL_M, _LEAST), _MOST)
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError:
@@ -93,7 +98,7 @@ class DrawingCache:
         draft = Path(tempfile.mkdtemp(dir=self._folder))
         listed = []
         for number, (vertices, faces, colour) in enumerate(pieces):
-            vertices, faces = thin_out(vertices, faces, max(20, round(self._triangles * len(faces) / total)))
+            vertices, faces = thin_out(vertices, faces, max(20, round(kept * len(faces) / total)))
             if len(faces):
                 name = "part%d.obj" % number
                 (draft / name).write_text(_wavefront(vertices, faces), encoding="ascii")
