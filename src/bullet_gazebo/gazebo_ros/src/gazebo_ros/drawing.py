@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-#: Triangles that a mesh of :data:`USUAL_M` [m, its longest side] keeps; a robot of thirty links then draws in some 15 ms
-#: without a graphics card. Larger and smaller ones keep more and less, within bounds: a finger covers few pixels.
+#: Triangles that a mesh of :data:`USUAL_M` [m, its longest side] keeps; a robot of thirty links then draws in some
+#: 15 ms without a graphics card. Larger and smaller ones keep more and less, within bounds: a finger covers few pixels.
 TRIANGLES = 800
 USUAL_M = 0.35
 _LEAST, _MOST = 0.5, 2.5

@@ -141,14 +141,17 @@ def test_a_small_mesh_is_left_as_it_is():
     assert drawing.thin_out(vertices, faces, 1000)[1] is faces
 
 
-def test_a_mesh_is_thinned_once_and_then_found_again(tmp_path):
+@pytest.mark.parametrize(("size_m", "least", "most"), [
+    (0.05, 100, 250), (drawing.USUAL_M, 250, 500), (3.0, 750, 1250)])
+def test_a_mesh_is_thinned_by_its_size_once_and_then_found_again(tmp_path, size_m, least, most):
     trimesh = pytest.importorskip("trimesh")
     path = tmp_path / "ball.stl"
-    trimesh.Trimesh(*sphere(60)).export(str(path))
+    vertices, faces = sphere(60)
+    trimesh.Trimesh(vertices * size_m / 2.0, faces).export(str(path))
     cache = drawing.DrawingCache(tmp_path / "cache", triangles=500)
     part, = cache.parts(path)
     written = Path(part.path).stat().st_mtime_ns
-    assert Path(part.path).read_text(encoding="ascii").count("\nf ") <= 500
+    assert least < Path(part.path).read_text(encoding="ascii").count("\nf ") <= most
     assert cache.parts(path) == [part] and Path(part.path).stat().st_mtime_ns == written
 
 

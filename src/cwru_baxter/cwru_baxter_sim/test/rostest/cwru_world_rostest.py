@@ -53,8 +53,8 @@ class CwruWorldTest(unittest.TestCase):
         cls.listener = tf2_ros.TransformListener(cls.buffer)
         wait_for("/robot/joint_states", JointState)
 
-    def put_cube(self):
-        place = Pose(Point(*AT), Quaternion(0, 0, 0, 1))
+    def put_cube(self, at=AT):
+        place = Pose(Point(*at), Quaternion(0, 0, 0, 1))
         answer = service("/gazebo/spawn_sdf_model", SpawnModel)("cube", CUBE, "", place, "world")
         self.assertTrue(answer.success, answer.status_message)
         self.addCleanup(service("/gazebo/delete_model", DeleteModel), "cube")
@@ -62,10 +62,20 @@ class CwruWorldTest(unittest.TestCase):
     def base_in(self, frame):
         return matrix_of(self.buffer.lookup_transform(frame, "base", rospy.Time(), rospy.Duration(30.0)))
 
-    def corners(self):
+    def corners(self, at=AT):
         """(8, 4) of the cube, in base."""
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 2)]) * SIDE_M / 2.0
-        return np.hstack([signs + AT - [0.0, 0.0, BASE_Z], np.ones((8, 1))])
+        return np.hstack([signs + at - [0.0, 0.0, BASE_Z], np.ones((8, 1))])
+
+    def assert_seen_where_it_projects(self, red, info, frame, at=AT):
+        """red: (height, width), where the cube is in the picture of the camera of sensor_msgs/CameraInfo `info`."""
+        optical = (self.corners(at) @ self.base_in(frame).T)[:, :3]
+        pixels = optical @ np.array(info.K).reshape(3, 3).T
+        pixels = pixels[:, :2] / pixels[:, 2:]
+        rows, columns = np.nonzero(red)
+        seen = [columns.min(), columns.max(), rows.min(), rows.max()]
+        expected = [pixels[:, 0].min(), pixels[:, 0].max(), pixels[:, 1].min(), pixels[:, 1].max()]
+        self.assertLess(np.abs(np.array(seen) - expected).max(), 2.0, "%s is not %s" % (seen, expected))
 
     def test_a_cube_is_where_it_projects_and_where_it_is(self):
         self.put_cube()
@@ -73,13 +83,7 @@ class CwruWorldTest(unittest.TestCase):
         self.assertEqual((image.width, image.height, image.encoding, image.header.frame_id),
                          (640, 480, "rgb8", "kinect_pc_frame"))
         info = wait_for("/kinect/rgb/camera_info", CameraInfo)
-        optical = (self.corners() @ self.base_in("kinect_pc_frame").T)[:, :3]
-        pixels = optical @ np.array(info.K).reshape(3, 3).T
-        pixels = pixels[:, :2] / pixels[:, 2:]
-        rows, columns = np.nonzero(red_rows(image))
-        seen = [columns.min(), columns.max(), rows.min(), rows.max()]
-        expected = [pixels[:, 0].min(), pixels[:, 0].max(), pixels[:, 1].min(), pixels[:, 1].max()]
-        self.assertLess(np.abs(np.array(seen) - expected).max(), 2.0, "%s is not %s" % (seen, expected))
+        self.assert_seen_where_it_projects(red_rows(image), info, "kinect_pc_frame")
 
         cloud = wait_for("/kinect/depth/points", PointCloud2)
         xyz, colours = points_of(cloud)
@@ -103,6 +107,18 @@ class CwruWorldTest(unittest.TestCase):
         self.assertEqual(CvBridge().imgmsg_to_cv2(image, "bgr8").shape, (480, 640, 3))
         compressed = wait_for("/kinect/rgb/image_raw/compressed", CompressedImage)
         self.assertEqual(CvBridge().compressed_imgmsg_to_cv2(compressed).shape, (480, 640, 3))
+
+    def test_the_robots_cameras_see_a_cube_where_it_projects(self):
+        for camera in ("head_camera", "left_hand_camera", "right_hand_camera"):
+            # Ahead, a little to the right and up in the camera's own optical frame.
+            at = (np.linalg.inv(self.base_in(camera)) @ [0.07, -0.05, 0.6, 1.0])[:3] + [0.0, 0.0, BASE_Z]
+            self.put_cube(at)
+            topic = "/cameras/%s/" % camera
+            image = wait_for(topic + "image", Image, lambda message: is_red(picture_of(message)).sum() > 1000)
+            info = wait_for(topic + "camera_info", CameraInfo)
+            self.assertEqual(image.header.frame_id, camera)
+            self.assert_seen_where_it_projects(is_red(picture_of(image)), info, camera, at)
+            self.doCleanups()
 
     def test_the_can_stands_on_the_table(self):
         cloud = wait_for("/kinect/depth/points", PointCloud2)
