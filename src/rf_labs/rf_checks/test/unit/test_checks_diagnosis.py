@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is told from a recorded run, without a robot: the first fault that explains the others; points and reports."""
+import json
+import subprocess
+import sys
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from rf_checks import diagnosis, report
+from rf_checks.exercises import EXERCISES, UnknownExercise, choose
+from rf_checks.judge import Result, RunResult
+from rf_checks.recording import Criterion, Fault, Recording, Run, arm_joints
+from rf_checks.tasks_printed import IkFrame, matrices
+
+JOINTS = (*arm_joints("left"), *arm_joints("right"))
+TRACEBACK = ('Traceback (most recent call last):\n  File "/x/me.py", line 12, in <module>\n    f()\n'
+             'NameError: name "f"')
+ROTATE = next(exercise for exercise in EXERCISES if exercise.name == "rotate_gripper")
+
+
+def records(seconds=2.0, left=0.0, right=0.0, enabled=True, commands=0, names=JOINTS[:1], values=(0.1,), exited=None):
+    """A trace: `left`, `right`: how far those arms' first joints go [rad]; `commands`: how many a record, left."""
+    count = round(seconds / 0.01)
+    result = []
+    for k in range(count):
+        q = np.zeros(14)
+        q[0], q[7] = left * k / count, right * k / count
+        result.append({"t": 0.01 * k, "q": q.tolist(), "enabled": enabled, "contacts": [], "ik": [],
+                       "commands": [["left", 1, list(names), list(values)]] if commands else [],
+                       "counts": {"left": commands * k, "right": 0}})
+    if exited is not None:
+        result[-1]["exited"] = exited
+    return Recording(JOINTS, result)
+
+
+def run(recording, **fields):
+    return Run([], recording, program="me.py", **{"exit_code": 0, **fields})
+
+
+@pytest.mark.parametrize(("case", "key", "words"), [
+    (run(records(), ended="simulator gone"), "killed_simulator", ["rosnode kill"]),
+    (run(records(), missing_nodes=["/rosout"]), "killed_nodes", ["/rosout"]),
+    (run(records(), intruders={"/clock": ["/me"]}), "intruder", ["/me", "/clock"]),
+    (run(records(seconds=0.05, left=3.0)), "teleport", ["set_model_configuration"]),
+])
+def test_meddling_is_told(case, key, words):
+    fault = diagnosis.meddling(case)
+    assert fault.key == key
+    assert fault.cap == 0.0
+    assert all(word in fault.sentence for word in words)
+
+
+def test_an_honest_run_meddles_with_nothing():
+    assert diagnosis.meddling(run(records(left=1.0))) is None
+
+
+@pytest.mark.parametrize(("case", "key", "words"), [
+    (run(records(), ended="output"), "output", ["megabytes"]),
+    (run(records(), ended="processes"), "processes", []),
+    (run(records(left=1.0, commands=20)), "flood", ["rospy.Rate"]),
+    (run(records(), ended="busy", stuck_at=9, exit_code=None), "busy", ["line 9"]),
+    (run(records(), exit_code=1, errors=TRACEBACK), "crashed", ["line 12", "NameError"]),
+    (run(records(enabled=False, commands=1)), "not_enabled", ["RobotEnable"]),
+    (run(records(right=1.0)), "wrong_arm", ["right arm moved", "left arm"]),
+    (run(records(left=1.0, commands=1, values=(57.0,))), "degrees", ["57.0"]),
+    (run(records(left=1.0, commands=1, names=("left_s0", "left_s0"), values=(0.1, 0.1))), "repeated_names",
+     ["left_s0"]),
+    (run(records()), "early_exit", ["before any arm moved"]),
+    (run(records(left=1.0), ended="sim time", exit_code=None), "no_end", ["45 s"]),
+    (run(records(left=1.0), exit_code=3, errors="no angles"), "exit_status", ["3", "no angles"]),
+])
+def test_behaviour_is_told(case, key, words):
+    fault = diagnosis.behaviour(case, ("left",), 45.0)
+    assert fault.key == key
+    assert all(word in fault.sentence for word in words), fault.sentence
+
+
+def test_nothing_is_wrong_with_what_is_right():
+    case = run(records(left=1.0, commands=1))
+    assert diagnosis.behaviour(case, ("left",), 45.0) is None
+    # Ten messages a record are 1000 a second, which is not more than that.
+    assert not diagnosis.is_flood(records(commands=10).command_counts())
+
+
+def test_an_arm_left_on_its_way_is_told():
+    early = run(records(left=1.0, commands=1, exited=0.5))
+    assert diagnosis.left_on_its_way(early, ("left",)).key == "early_exit"
+    single = records(exited=1.99)
+    for record in single.records[100:]:
+        record["counts"] = {"left": 1, "right": 0}
+    assert "1 joint command " in diagnosis.left_on_its_way(run(single), ("left",)).sentence
+    assert diagnosis.left_on_its_way(run(records(left=1.0, commands=1, exited=1.99)), ("left",)) is None
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("import rospy\nprint 'hello'\n", ["line 2", "Python 2"]),
+    ("try:\n    pass\nexcept OSError, e:\n    pass\n", ["line 3", "except Error as e"]),
+    ("def f(:\n", ["line 1"]),
+    ("x = '\0'", ["Python"]),
+])
+def test_what_python_cannot_read_is_told(text, words):
+    fault = diagnosis.check_syntax(text, "me.py")
+    assert fault.key == "syntax"
+    assert all(word in fault.sentence for word in words), fault.sentence
+
+
+def test_the_line_of_the_program_is_found():
+    assert diagnosis.line_of("me.py", TRACEBACK) == 12
+    dump = 'Current thread (most recent call first):\n  File "/usr/lib/x.py", line 1\n' \
+           '  File "/x/me.py", line 7 in run\n  File "/x/me.py", line 30 in <module>\n'
+    assert diagnosis.line_of_dump("me.py", dump) == 7
+    assert diagnosis.line_of_dump("other.py", dump) is None
+
+
+MATRIX = np.array([[0.0, -1.0, 0.0, 0.64], [1.0, 0.0, 0.0, -0.83], [0.0, 0.0, 1.0, 1e-3], [0.0, 0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("text", [
+    str(MATRIX), repr(MATRIX), str(MATRIX.tolist()), "H =\n%s\ndone" % MATRIX,
+    "[INFO] [17.5, 3.2]: Homogenous matrix: \n" + str(MATRIX), "[INFO] [17.5, 3.2]: " + str(MATRIX),
+    "\n".join(" ".join(map(str, row)) for row in MATRIX), "Matrix(%s)" % MATRIX.tolist(),
+], ids=["str", "repr", "list", "text around", "logged", "logged on the line", "plain", "sympy"])
+def test_matrices_are_read_however_they_are_printed(text):
+    found = matrices(text)
+    assert len(found) == 1
+    assert np.allclose(found[0], MATRIX)
+
+
+@pytest.mark.parametrize("text", ["", "1 2 3", str(MATRIX[:3]), "[[nan 1", "seq: 4\nstamp: 1 2 3 4\n" * 5])
+def test_what_is_no_matrix_is_none(text):
+    assert matrices(text) == []
+
+
+def test_answers_are_read():
+    assert IkFrame.answers("x\nReference frame: /base\ncommanded frame = left_gripper\n") == ("base", "left_gripper")
+    assert IkFrame.answers("nothing") == ("", "")
+
+
+@pytest.mark.parametrize(("name", "file_name", "text", "expected"), [
+    ("", "tf_listener.py", "", "tf_listener"), ("", "my_wave.py", "", "wave"), ("wave", "x.py", "", "wave"),
+    ("", "x.py", "# exercise: ik_frame\n", "ik_frame"), ("wave", "tf_listener.py", "# exercise: ik_frame", "wave"),
+    ("", "rotate_gripper_2.py", "", "rotate_gripper"),
+])
+def test_the_exercise_is_found(name, file_name, text, expected):
+    assert choose("lab2", name, file_name, text).name == expected
+
+
+@pytest.mark.parametrize(("lab", "name", "file_name", "words"), [
+    ("lab9", "", "x.py", ["lab9", "lab2", "cwru"]),
+    ("lab2", "", "my_node.py", ["./baxter.sh check lab2 wave my_node.py"]),
+    ("lab2", "waves", "x.py", ["waves", "wave"]), ("lab2", "", "wave_tf.py", ["which exercise"]),
+])
+def test_an_unknown_exercise_says_what_to_type(lab, name, file_name, words):
+    with pytest.raises(UnknownExercise) as error:
+        choose(lab, name, file_name, "")
+    assert all(word in str(error.value) for word in words)
+
+
+def result(share, fault=None):
+    criteria = (Criterion("position", share, 60.0, "0.1 cm off"), Criterion("time", share, 40.0, "1 s <&> \x1b"))
+    runs = (RunResult(("z", "90"), criteria, fault), RunResult(("x", "90"), criteria, None))
+    return Result(ROTATE, "/x/me.py", 3, runs, "session", 1.5)
+
+
+def test_points_are_the_mean_of_the_runs_and_a_fault_caps_them():
+    assert result(1.0).points == pytest.approx(100.0)
+    assert result(0.5).points == pytest.approx(50.0)
+    assert result(1.0, Fault("flood", "too fast", 0.4)).points == pytest.approx(70.0)
+
+
+def test_reports_say_the_same_in_three_ways():
+    bad = result(1.0, Fault("flood", "too fast", 0.4))
+    text = report.text(bad)
+    assert "not passed: 70 of 100" in text
+    assert text.splitlines()[-1] == "Hint: too fast."
+    data = json.loads(report.as_json(bad))
+    assert (data["points"], data["passed"], data["fault"], data["hint"]) == (70.0, False, "flood", "too fast")
+    suite = ElementTree.fromstring(report.as_junit(bad))
+    assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
+    assert "too fast" in suite.find("testcase/failure").get("message")
+    assert ElementTree.fromstring(report.as_junit(result(1.0))).get("failures") == "0"
+
+
+def test_the_core_loads_without_ros():
+    block = ("import sys; sys.modules.update(dict.fromkeys(('rospy', 'rosgraph', 'tf2_ros', 'baxter_core_msgs', "
+             "'geometry_msgs', 'gazebo_ros')))\nfrom rf_checks import diagnosis, exercises, measures, pacing, report, "
+             "robot, sandbox, slips")
+    subprocess.run([sys.executable, "-c", block], check=True)
