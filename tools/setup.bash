@@ -111,13 +111,17 @@ venv_is_ours() {
 }
 
 step_venv() {
-    if ! was_cut_off venv && ! was_cut_off pip && venv_is_ours 2>/dev/null; then
+    if was_cut_off venv || was_cut_off pip || ! venv_is_ours 2>/dev/null; then
+        make_venv
+    else
         note="all there"
-        return
     fi
+}
+
+make_venv() {
     require_python
-    # Always Debian's Python: rospy is installed for that one, whatever comes first in PATH.
     rm -f "$STATE/pip.stamp"
+    # Always Debian's Python: rospy is installed for that one, whatever comes first in PATH.
     run /usr/bin/python3 -m venv --clear --system-site-packages "$VENV"
     # Packages that pip was killed over are gone with it.
     mended pip
@@ -126,6 +130,7 @@ step_venv() {
 step_pip() {
     local key
     key=$(hash_of requirements.txt requirements-nodeps.txt)
+    if [[ $cut_off_step == pip ]]; then make_venv; fi
     # Comes in with somebody's own `pip install`, and hides Debian's: requirements-nodeps.txt says what breaks.
     if compgen -G "$VENV/lib/python3*/site-packages/rospkg" >/dev/null; then
         run "$VENV/bin/python3" -m pip uninstall -y rospkg
