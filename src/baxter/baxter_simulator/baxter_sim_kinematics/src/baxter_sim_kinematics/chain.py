@@ -118,7 +118,8 @@ class Chain:
         if q.shape != (len(self),):
             raise InvalidPosture("expected %d joint values (%s), got an array of shape %s"
                                  % (len(self), ", ".join(self.joint_names), q.shape), values)
-        if not all(map(math.isfinite, q.tolist())):
+        # The sum of the squares is finite for all but what is not, and for values that no joint has.
+        if not math.isfinite(q.dot(q)) and not all(map(math.isfinite, q.tolist())):
             bad = ["%s = %s" % pair for pair in zip(self.joint_names, q, strict=True) if not math.isfinite(pair[1])]
             raise InvalidPosture("joint values must be finite, got %s" % ", ".join(bad), values)
         return q

@@ -11,6 +11,8 @@ from baxter_sim_kinematics.errors import InvalidTarget
 ROUNDED = 1e-2
 # How much one radian of turning counts, in metres of moving, where poses are compared: about the length of a forearm.
 METRES_PER_RADIAN = 0.3
+# In place of a basis where no axis is free: nothing looks at it.
+_NO_AXIS = np.eye(3)
 
 
 def pose_from_quaternion(position, quaternion_xyzw):
@@ -55,12 +57,12 @@ class Target:
             matrix = np.empty(0)
         if matrix.shape != (4, 4):
             raise InvalidTarget("the target must be a 4 x 4 pose matrix, got %r" % (pose,), pose)
-        self.rotation, self.position, self.basis = np.empty((3, 3)), np.empty(3), np.eye(3)
+        self.rotation, self.position, self.basis = np.empty((3, 3)), np.empty(3), _NO_AXIS
         if not kernels.split_pose(matrix, ROUNDED, self.rotation, self.position):
             raise InvalidTarget("the target must hold a finite position and a rotation, got\n%s" % matrix, pose)
         self.rows = 6
         if free_axis is not None:
-            self.rows = 5
+            self.rows, self.basis = 5, np.empty((3, 3))
             kernels.fill_basis(self.rotation, _direction(free_axis), self.basis)
         if position_only:
             self.rows = 3
