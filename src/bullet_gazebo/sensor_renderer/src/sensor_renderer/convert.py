@@ -2,6 +2,7 @@
 """From pictures to messages."""
 import sys
 
+import numpy as np
 import rospy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, PointField
 
@@ -37,7 +38,8 @@ def compressed_image(picture, quality=JPEG_QUALITY):
     """sensor_msgs/CompressedImage, JPEG of ``quality`` (1 to 100), of a colour picture (height, width, 3)."""
     import cv2
 
-    _, data = cv2.imencode(".jpg", picture[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    blue_first = cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2BGR)
+    _, data = cv2.imencode(".jpg", blue_first, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return CompressedImage(format="rgb8; jpeg compressed bgr8", data=data.tobytes())
 
 

@@ -62,5 +62,6 @@ class Screen:
         rows = np.frombuffer(data, dtype=np.uint8, count=step * height).reshape(height, step)
         picture = rows[:, :width * channels].reshape(height, width, channels)
         self.pixels = np.zeros_like(self.pixels)
-        self.pixels[:height, :width] = picture[:, :, colours]
+        for k, channel in enumerate(colours):  # at once it would take eight times as long, and the loop waits
+            self.pixels[:height, :width, k] = picture[:, :, channel]
         self.pictures += 1
