@@ -231,9 +231,10 @@ class World:
     def contacts(self, model=None, other=None):
         """Return the contacts of the last step as a list of Contact; all, or those of one Model, or between two."""
         body = {key: value.body for key, value in (("bodyA", model), ("bodyB", other)) if value is not None}
-        names = {other.body: other for other in self.models.values()}
+        points = pybullet.getContactPoints(physicsClientId=self._client, **body)
+        names = {other.body: other for other in self.models.values()} if points else {}
         found = []
-        for point in pybullet.getContactPoints(physicsClientId=self._client, **body) or ():
+        for point in points or ():
             a, b = names[point[1]], names[point[2]]
             found.append(
                 Contact(

@@ -21,6 +21,7 @@ No set-point runs away from its joint: one that is pushed or blocked keeps its s
 back at the speed its mode allows, never with a snap.
 """
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -66,8 +67,7 @@ class LimbModel:
     joint_names: tuple
 
 
-@dataclass(frozen=True)
-class Drives:
+class Drives(NamedTuple):
     """What the joint drives shall do in this tick; indices count the joints of the limits.
 
     servo: indices of joints that follow servo_position [rad] and servo_velocity [rad/s] with up to servo_effort [Nm];
@@ -93,6 +93,7 @@ class _Limb:
         self.speed_ratio = 1.0
         self.timeout_s = COMMAND_TIMEOUT_S
         self.floats = False
+        self.yields = False
 
 
 class Arms:
@@ -235,8 +236,11 @@ class Arms:
 
     def set_yielding(self, side, yields):
         """Whether a limb, in position and velocity mode, pushes with no more than YIELD_FACTOR of its effort limits."""
-        self._yielding[self._limbs[side].index] = yields
-        self._any_yields = bool(self._yielding.any())
+        limb = self._limbs[side]
+        if yields != limb.yields:
+            limb.yields = yields
+            self._yielding[limb.index] = yields
+            self._any_yields = bool(self._yielding.any())
 
     def set_gravity_compensation(self, side, on):
         """Whether a limb's torque mode adds the torque that balances gravity."""
