@@ -259,6 +259,21 @@ def _back_substitute(factor, size, vector):
 
 
 @_compiled
+def _damp(jacobian, rows, damping, normal, step):
+    """Turn ``step`` (n,), the slope J^T e on entry, into (J^T J + damping I)^-1 J^T e; ``normal`` (n, n) is space."""
+    n = step.shape[0]
+    for i in range(n):
+        for j in range(i + 1):
+            value = 0.0
+            for row in range(rows):
+                value += jacobian[row, i] * jacobian[row, j]
+            normal[i, j] = value
+        normal[i, i] += damping
+    _factorise(normal, n)
+    _back_substitute(normal, n, step)
+
+
+@_compiled
 def _reach(rotations, offsets, prismatic, lower, upper, target_rotation, target_position, rows, basis, tolerance_m,
            tolerance_rad, max_iterations, q, best):
     """Levenberg-Marquardt from ``q`` (changed in place) towards the target, inside the limits.
@@ -301,15 +316,7 @@ def _reach(rotations, offsets, prismatic, lower, upper, target_rotation, target_
                     jacobian[row, i] = 0.0
                 slope = 0.0
             step[i] = slope
-        for i in range(n):
-            for j in range(i + 1):
-                value = 0.0
-                for row in range(rows):
-                    value += jacobian[row, i] * jacobian[row, j]
-                normal[i, j] = value
-            normal[i, i] += damping
-        _factorise(normal, n)
-        _back_substitute(normal, n, step)
+        _damp(jacobian, rows, damping, normal, step)
         for i in range(n):
             q[i] = min(max(q[i] + step[i], lower[i]), upper[i])
     return False, max_iterations, least
@@ -643,7 +650,6 @@ def nearest(rotations, offsets, prismatic, lower, upper, target_rotation, target
     rotation, position = np.empty((3, 3)), np.empty(3)
     jacobian, error = np.empty((6, n)), np.empty(6)
     normal, step, slope, q, tried = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    held = np.empty(n, dtype=np.bool_)
     seed = _clamped(seed, lower, upper)
     solution[:] = seed
     state = _stir(_stir(_stir(np.uint64(n), target_position), target_rotation.ravel()), seed)
@@ -672,22 +678,14 @@ def nearest(rotations, offsets, prismatic, lower, upper, target_rotation, target
                     slope[i] = 0.0
                     for row in range(rows):
                         slope[i] += jacobian[row, i] * error[row]
-                    held[i] = (q[i] <= lower[i] and slope[i] < 0.0) or (q[i] >= upper[i] and slope[i] > 0.0)
+                    if (q[i] <= lower[i] and slope[i] < 0.0) or (q[i] >= upper[i] and slope[i] > 0.0):
+                        jacobian[:, i], slope[i] = 0.0, 0.0
             else:
                 damping, growth = damping * growth, growth * 2.0
                 if damping > 1e6:
                     break
-            for i in range(n):
-                step[i] = 0.0 if held[i] else slope[i]
-                for j in range(i + 1):
-                    value = 0.0
-                    if not (held[i] or held[j]):
-                        for row in range(rows):
-                            value += jacobian[row, i] * jacobian[row, j]
-                    normal[i, j] = value
-                normal[i, i] += damping
-            _factorise(normal, n)
-            _back_substitute(normal, n, step)
+            step[:] = slope
+            _damp(jacobian, rows, damping, normal, step)
             for i in range(n):
                 tried[i] = min(max(q[i] + step[i], lower[i]), upper[i])
         if cost < least:
