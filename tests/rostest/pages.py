@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 
 from lab_tests import page_blocks  # noqa: E402
 
-LIMIT_S = 90
+LIMIT_S = 240
 END_LIMIT_S = 30
 
 
