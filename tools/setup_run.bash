@@ -110,7 +110,7 @@ fail() {
         echo "Mend the cause and run ./baxter.sh setup again; what is done is not done again."
     } >&2
     # A command that ran to its own end has tidied up; one that was killed or found no room may not have.
-    if [[ -z $cut_off_step && $1 -le 128 && $cause != "the disk is full"* ]]; then rm -f "$STATE/at_work"; fi
+    if [[ $1 -le 128 && $cause != "the disk is full"* ]]; then nothing_half_done; fi
     exit "$1"
 }
 
@@ -122,7 +122,12 @@ refuse() {
         echo "  log:     $step_log"
     } >&2
     echo "$1" 2>/dev/null >>"$step_log"
+    if [[ $1 != *"the disk is full"* ]]; then nothing_half_done; fi
     exit 1
+}
+
+nothing_half_done() {
+    if [[ -z $cut_off_step ]]; then rm -f "$STATE/at_work"; fi
 }
 
 interrupted() {

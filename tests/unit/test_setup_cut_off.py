@@ -179,6 +179,16 @@ def test_a_failure_names_step_cause_command_and_log(workspace, step):
     assert_whole(root)
 
 
+def test_a_step_that_refuses_to_start_is_not_cut_off(workspace):
+    root, _ = workspace
+    (root / "theirs.rosinstall").rename(root / "elsewhere")
+    status, said = finish(start(root))
+    assert status == 1 and "cannot go on in step 'other people's packages': there is no file" in said
+    (root / "elsewhere").rename(root / "theirs.rosinstall")
+    status, said = finish(start(root))
+    assert status == 0 and "cut off" not in said, said
+
+
 def test_a_full_disk_counts_as_cut_off(workspace):
     root, fakes = workspace
     (fakes / "fail").write_text(COMMANDS["build"])
