@@ -4,6 +4,7 @@
 Everything here belongs to the thread that made the renderer.
 """
 import os
+import weakref
 from typing import NamedTuple
 
 import numpy as np
@@ -180,6 +181,7 @@ class GlRenderer:
         self._shadow_map.repeat_x = self._shadow_map.repeat_y = False
         self._shadow_buffer = context.framebuffer(depth_attachment=self._shadow_map)
         self._links = {}
+        self._links_of = weakref.WeakKeyDictionary()
         self._buffers = {}
         self._shadow_of = None
         self._lit_by = self._shadow_matrix = self._program = self._floor_program = None
@@ -254,6 +256,7 @@ class GlRenderer:
             if drawn is not None:
                 drawn.release()
         self._links = {}
+        self._links_of.clear()
         corners = _VERTEX.replace("LAMPLIGHT", "lamplight(there.xyz, n)")
         self._program = self._context.program(vertex_shader=lamps + corners, fragment_shader=_FRAGMENT)
         corners = _NO_LAMPS + _VERTEX.replace("LAMPLIGHT", "0.0")
@@ -267,7 +270,7 @@ class GlRenderer:
                 matrix = body.link_matrix(screen.link) @ screen.offset
                 face = _Link((), np.zeros(3), float(np.hypot(*screen.size)) / 2.0, False)
                 local = view @ matrix
-                if local[:3, 2] @ local[:3, 3] < 0.0 and _visible([(face, matrix)], pinhole, view):
+                if local[:3, 2] @ local[:3, 3] < 0.0 and _visible([(face, matrix, None)], pinhole, view):
                     found.append((self._texture(mirror, screen.picture), matrix @ np.diag([*screen.size, 1.0, 1.0])))
         return found
 
@@ -295,20 +298,27 @@ class GlRenderer:
         if not mirror.light.shadows:
             return
         self._shadow_program["to_clip"].write(_bytes(self._shadow_matrix))
-        casting = [(link, matrix) for link, matrix in self._everything(mirror) if not link.is_floor]
+        casting = [entry for entry in self._everything(mirror) if not entry[0].is_floor]
         self._draw(self._shadow_program, casting, 1)
 
     @staticmethod
     def _draw(program, links, which):
         body = program["body"]
-        for link, matrix in links:
-            body.write(_bytes(matrix))
+        for link, _, packed in links:
+            body.write(packed)
             link.arrays[which].render()
 
     def _everything(self, mirror):
-        """What there is to draw: (:class:`_Link`, matrix), one for each link that has shapes."""
-        return [(self._link(parts), matrix) for body in mirror.bodies.values()
-                for parts, matrix in zip(body.parts, body.matrices, strict=True) if parts]
+        """What there is to draw: (:class:`_Link`, matrix, the same as OpenGL reads it), one for each link that has
+        shapes."""
+        found = []
+        for body in mirror.bodies.values():
+            links = self._links_of.get(body)
+            if links is None:
+                links = self._links_of[body] = [self._link(parts) if parts else None for parts in body.parts]
+            packed = np.ascontiguousarray(body.matrices.transpose(0, 2, 1), dtype=np.float32)
+            found += [entry for entry in zip(links, body.matrices, packed, strict=True) if entry[0] is not None]
+        return found
 
     def _link(self, parts):
         key = tuple((part.key, part.colour) for part in parts)
@@ -343,7 +353,8 @@ class GlRenderer:
 
 
 def _visible(listed, pinhole, view):
-    """Those of ``listed``, (:class:`_Link`, matrix), whose spheres reach into the camera's pyramid, near ones first."""
+    """Those of ``listed``, (:class:`_Link`, matrix, anything), whose spheres reach into the camera's pyramid, near ones
+    first."""
     # Outward normals of the four sides, in the optical frame; all go through the eye.
     left, right = -(pinhole.cx + 0.5) / pinhole.fx, (pinhole.width - 0.5 - pinhole.cx) / pinhole.fx
     top, bottom = -(pinhole.cy + 0.5) / pinhole.fy, (pinhole.height - 0.5 - pinhole.cy) / pinhole.fy
@@ -351,9 +362,9 @@ def _visible(listed, pinhole, view):
     sides /= np.linalg.norm(sides, axis=1)[:, None]
     if not listed:
         return []
-    matrices = np.array([matrix for _, matrix in listed])
-    centres = np.array([link.centre for link, _ in listed])
-    radii = np.array([link.radius for link, _ in listed])
+    matrices = np.array([matrix for _, matrix, _ in listed])
+    centres = np.array([link.centre for link, _, _ in listed])
+    radii = np.array([link.radius for link, _, _ in listed])
     world = np.einsum("nij,nj->ni", matrices[:, :3, :3], centres) + matrices[:, :3, 3]
     local = world @ view[:3, :3].T + view[:3, 3]
     inside = (local @ sides.T < radii[:, None]).all(axis=1)
