@@ -23,12 +23,20 @@ def _listing():
     return "\n".join(lines)
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong, without the list of options in front of it."""
+
+    def error(self, message):
+        self.exit(WRONG_WORDS, "check: %s\n" % message)
+
+
 def _parser():
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="./baxter.sh check", formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Run your program in a lab of its own and say how well it does the exercise. The lab that you may "
                     "have running is not touched.",
         epilog="exercises:\n%s\n\nWithout EXERCISE the program's name or a line `# exercise: NAME` in it decides.\n"
+               "Else it is guessed from what the program does; the answer's first line says as what it was taken.\n"
                "exit status: 0 passed, 1 not passed, 2 wrong words, 3 the check itself failed" % _listing())
     parser.add_argument("lab", nargs="?", metavar="LAB", help=" or ".join(LABS))
     parser.add_argument("words", nargs="*", metavar="[EXERCISE] PROGRAM", help="a Python file")
@@ -53,6 +61,9 @@ def _program_and_exercise(parser, options):
     if not path.is_file():
         where = "is a folder" if path.is_dir() else "is not there"
         parser.error("%s %s; give the path of your Python file" % (program, where))
+    for report_file in (options.json, options.junit):
+        if report_file is not None and not report_file.absolute().parent.is_dir():
+            parser.error("there is no folder %s to write %s into" % (report_file.absolute().parent, report_file.name))
     if options.seed < 0:
         parser.error("the seed is %d, expected 0 or more" % options.seed)
     try:

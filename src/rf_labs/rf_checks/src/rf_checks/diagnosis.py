@@ -61,6 +61,9 @@ def meddling(run):
         return Fault("killed_simulator", "the simulator ended while the program ran: it was shut down or killed "
                      "(rosnode kill, os.kill, a second node named /gazebo, the robot deleted); a program must "
                      "leave it running", 0.0)
+    if run.ended == "paused":
+        return Fault("paused", "the simulation stood still: the program called /gazebo/pause_physics, and without time "
+                     "nothing moves", 0.0)
     if run.missing_nodes:
         return Fault("killed_nodes", "the node %s was shut down or unregistered by the program; leave the lab's nodes "
                      "alone, and give your own node a name of its own" % ", ".join(run.missing_nodes), 0.0)
@@ -137,8 +140,8 @@ def _about_end(run, sides, limit_s):
             return Fault("early_exit", "the program ended (exit status %s) before any arm moved%s" % (
                 run.exit_code, _last_words(run)))
     if run.ended in ("sim time", "wall time"):
-        return Fault("no_end", "the program was still running after %.0f s of simulation%s, and was ended" % (
-            limit_s, _at_line(run)))
+        time = "%.0f s of simulation" % limit_s if run.ended == "sim time" else "a long time"
+        return Fault("no_end", "the program was still running after %s%s, and was ended" % (time, _at_line(run)))
     if run.exit_code not in (None, 0):
         return Fault("exit_status", "the program ended with exit status %s%s" % (run.exit_code, _last_words(run)))
     return None
@@ -157,8 +160,8 @@ def left_on_its_way(run, sides):
                          "(move_to_joint_positions does) before you leave" % side)
         counts = recording.command_counts()[:, SIDES.index(side)]
         if 0 < counts[-1] <= 3:
-            return Fault("early_exit", "the program sent %d joint command%s to the %s arm and ended: a command is good "
-                         "for 0.2 s, so go on sending until the arm is there (move_to_joint_positions does)"
+            return Fault("early_exit", "the program sent %d joint command%s to the %s arm and ended without waiting for "
+                         "the arm: send commands until it is there, as move_to_joint_positions does, and then go on"
                          % (counts[-1], "" if counts[-1] == 1 else "s", side))
     return None
 

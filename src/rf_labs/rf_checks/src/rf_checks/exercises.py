@@ -41,13 +41,18 @@ EXERCISES = (
              "joint_command.py Q0 ... Q6", tasks.JointCommand(), ("joint", "command", "stream"), ("right",)),
 )
 LABS = tuple(dict.fromkeys(exercise.lab for exercise in EXERCISES))
+# What only programs of one exercise say, the most telling first.
+_TELLS = tuple((name, re.compile(pattern, re.IGNORECASE)) for name, pattern in (
+    ("unreachable", "IKReport"), ("ik_frame", "commanded frame"), ("wave", r"\bsin\("),
+    ("rotate_gripper", r"rotate_pose|axangle|[xyz]_rotation"), ("tf_listener", "lookup_transform")))
 _MARK = re.compile(r"^\s*#\s*exercise\s*:\s*(\w+)", re.MULTILINE | re.IGNORECASE)
 
 
 def choose(lab, name, file_name, text):
     """The Exercise for a lab, the name of an exercise or "", and the program. Raises UnknownExercise.
 
-    Without a name: what a line `# exercise: NAME` in the text says; else what the file's name says.
+    Without a name: what a line `# exercise: NAME` in the text says; else what the file's name says; else what only
+    programs of one exercise have in them.
     """
     if lab not in LABS:
         raise UnknownExercise("there is no lab '%s'; labs are %s" % (lab, ", ".join(LABS)))
@@ -68,6 +73,9 @@ def choose(lab, name, file_name, text):
     winners = [name for name, score in scores.items() if score == best]
     if best and len(winners) == 1:
         return of_lab[winners[0]]
+    for name, tell in _TELLS:
+        if best == 0 and name in of_lab and tell.search(text):
+            return of_lab[name]
     raise UnknownExercise("%s: which exercise of %s is this? Say so:\n%s\n"
                           "or write a line `# exercise: NAME` into the file"
                           % (file_name, lab, "\n".join("  ./baxter.sh check %s %s %s" % (lab, name, file_name)

@@ -22,6 +22,8 @@ BUSY_S, BUSY_SHARE = 8.0, 0.3
 #: Faults that the next run of the same program would only show again.
 REPEATED = ("not_enabled", "wrong_arm", "wrong_frame", "early_exit", "no_end", "quaternion_order", "degrees",
             "not_asked", "made_up")
+#: A world from which nothing is heard for so long [s] was paused.
+PAUSED_S = 10.0
 # After a program's end the robot is watched until it stands, and at most so long [sim s].
 SETTLE_S = 1.5
 _LOOK_S = 0.02
@@ -165,6 +167,7 @@ class Judge:
         give_up = time.monotonic() + WALL_LIMIT_S
         look_at_graph = 0.0
         since, cpu_then = 0, 0.0
+        heard, heard_at = 0, time.monotonic()
         lab.is_hurried = True
         while True:
             time.sleep(_LOOK_S)
@@ -175,6 +178,10 @@ class Judge:
                 self._look_at_graph(lab, run)
             if not lab.is_alive:
                 return "simulator gone"
+            if count > heard:
+                heard, heard_at = count, time.monotonic()
+            elif time.monotonic() > heard_at + PAUSED_S:
+                return "paused"
             if run.missing_nodes or run.intruders or ended:
                 return "exited" if ended else "satisfied"
             if student.wrote_too_much:

@@ -14,6 +14,16 @@ _LOOK_AGAIN_S = 0.0002
 _RENEW_THREADS_S = 0.02
 
 
+def direct_children(pid):
+    """Process ids of the children of one process."""
+    found = set()
+    with contextlib.suppress(OSError):
+        for thread in os.listdir("/proc/%d/task" % pid):
+            with contextlib.suppress(OSError), open("/proc/%d/task/%s/children" % (pid, thread), "rb") as file:
+                found.update(map(int, file.read().split()))
+    return found
+
+
 def children_of(parents):
     """All living descendants of the process ids `parents`, with these."""
     found, to_visit = set(), list(parents)
@@ -21,14 +31,9 @@ def children_of(parents):
         pid = to_visit.pop()
         if pid in found:
             continue
-        try:
-            threads = os.listdir("/proc/%d/task" % pid)
-        except OSError:
-            continue
-        found.add(pid)
-        for thread in threads:
-            with contextlib.suppress(OSError), open("/proc/%d/task/%s/children" % (pid, thread), "rb") as file:
-                to_visit.extend(map(int, file.read().split()))
+        if os.path.exists("/proc/%d" % pid):
+            found.add(pid)
+            to_visit.extend(direct_children(pid))
     return found
 
 

@@ -108,7 +108,12 @@ class Recorder(ModelPlugin):
         try:
             self._socket.sendall(json.dumps(record).encode() + b"\n")
         except OSError:
-            self.close()
+            self._judge_has_gone()
+
+    def _judge_has_gone(self):
+        """Nobody is left to end this lab."""
+        self.close()
+        rospy.signal_shutdown("the judge has gone")
 
     def _hear(self):
         try:
@@ -116,7 +121,7 @@ class Recorder(ModelPlugin):
         except OSError:
             line = ""
         if not line:
-            self.close()
+            self._judge_has_gone()
         return json.loads(line) if line.strip() else None
 
     def _obey(self, order):

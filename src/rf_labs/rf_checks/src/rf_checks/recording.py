@@ -68,8 +68,8 @@ class Run:
     """One run of a program.
 
     ended: how the run came to its end: "exited", "satisfied" (the judge had seen enough), "sim time", "wall time",
-    "busy", "flood", "output", "processes", "simulator gone". stuck_at: line of the program where it was when the judge
-    ended it.
+    "busy", "flood", "output", "processes", "paused", "simulator gone". stuck_at: line of the program where it was when
+    the judge ended it.
     """
 
     arguments: list

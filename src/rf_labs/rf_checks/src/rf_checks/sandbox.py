@@ -18,7 +18,7 @@ import tempfile
 import threading
 import time
 
-from rf_checks.pacing import children_of
+from rf_checks.pacing import children_of, direct_children
 
 CPU_S = 120
 MEMORY_BYTES = 8 << 30
@@ -67,7 +67,7 @@ class Student:
         """Start `command` (list). `workspace`: made read-only; `hidden`: folder that is not shown."""
         self.folder = tempfile.mkdtemp(prefix="lab-student-")
         self.survivors = 0
-        self._before = children_of([os.getpid()])
+        self._before = direct_children(os.getpid())
         limits = ["prlimit", "--cpu=%d" % CPU_S, "--as=%d" % MEMORY_BYTES, "--fsize=%d" % FILE_BYTES, "--core=0", "--"]
         if namespaces is None:
             namespaces = has_namespaces()
@@ -104,8 +104,8 @@ class Student:
 
     def family(self):
         """Process ids of the program and of all that it started, orphans included."""
-        orphans = children_of([os.getpid()]) - self._before
-        return (children_of([self.pid]) | orphans) - {os.getpid()}
+        orphans = direct_children(os.getpid()) - self._before
+        return children_of({self.pid} | orphans)
 
     def dump(self):
         """Have Python say where it is, which also ends it; what it says is in `errors` afterwards."""

@@ -32,6 +32,7 @@ ADVERSARIES = {
     "prints_made_up_matrices": ("wrong_numbers", "elsewhere"),
     "teleports": ("teleport", "set_model_configuration"),
     "fakes_clock": ("intruder", "/clock"),
+    "pauses": ("paused", "pause_physics"),
     "unregisters_node": ("killed_nodes", "/baxter_sim_kinematics_left"),
     "leaves_children": ("early_exit", "before any arm moved"),
     "reads_the_judge": ("made_up", "experiment"),

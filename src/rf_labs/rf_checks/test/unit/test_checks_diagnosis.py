@@ -41,6 +41,7 @@ def run(recording, **fields):
 
 @pytest.mark.parametrize(("case", "key", "words"), [
     (run(records(), ended="simulator gone"), "killed_simulator", ["rosnode kill"]),
+    (run(records(), ended="paused"), "paused", ["pause_physics"]),
     (run(records(), missing_nodes=["/rosout"]), "killed_nodes", ["/rosout"]),
     (run(records(), intruders={"/clock": ["/me"]}), "intruder", ["/me", "/clock"]),
     (run(records(seconds=0.05, left=3.0)), "teleport", ["set_model_configuration"]),
@@ -141,7 +142,9 @@ def test_answers_are_read():
 @pytest.mark.parametrize(("name", "file_name", "text", "expected"), [
     ("", "tf_listener.py", "", "tf_listener"), ("", "my_wave.py", "", "wave"), ("wave", "x.py", "", "wave"),
     ("", "x.py", "# exercise: ik_frame\n", "ik_frame"), ("wave", "tf_listener.py", "# exercise: ik_frame", "wave"),
-    ("", "rotate_gripper_2.py", "", "rotate_gripper"),
+    ("", "rotate_gripper_2.py", "", "rotate_gripper"), ("", "my_node.py", "y = 0.1 * math.sin(t)", "wave"),
+    ("", "my_node.py", "buffer.lookup_transform(a, b)", "tf_listener"),
+    ("", "my_node.py", "from baxter_kinematics_msgs.msg import IKReport\nlookup_transform", "unreachable"),
 ])
 def test_the_exercise_is_found(name, file_name, text, expected):
     assert choose("lab2", name, file_name, text).name == expected
