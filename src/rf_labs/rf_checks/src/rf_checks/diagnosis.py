@@ -160,8 +160,8 @@ def left_on_its_way(run, sides):
                          "(move_to_joint_positions does) before you leave" % side)
         counts = recording.command_counts()[:, SIDES.index(side)]
         if 0 < counts[-1] <= 3:
-            return Fault("early_exit", "the program sent %d joint command%s to the %s arm and ended without waiting for "
-                         "the arm: send commands until it is there, as move_to_joint_positions does, and then go on"
+            return Fault("early_exit", "the program sent %d joint command%s to the %s arm and ended without waiting "
+                         "for the arm: send commands until it is there, as move_to_joint_positions does, and then go on"
                          % (counts[-1], "" if counts[-1] == 1 else "s", side))
     return None
 

@@ -143,7 +143,10 @@ class Judge:
             lab.watch.roots = ()
         run.output, run.errors, run.survivors = student.output, student.errors, student.survivors
         run.recording = Recording(lab.joint_names, _with_exit(records))
-        lab.forget_strangers()
+        if run.ended == "paused":
+            self.close()
+        else:
+            lab.forget_strangers()
         return run
 
     def _fresh_lab(self, posture):

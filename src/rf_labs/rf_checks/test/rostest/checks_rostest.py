@@ -34,7 +34,7 @@ ADVERSARIES = {
     "fakes_clock": ("intruder", "/clock"),
     "pauses": ("paused", "pause_physics"),
     "unregisters_node": ("killed_nodes", "/baxter_sim_kinematics_left"),
-    "leaves_children": ("early_exit", "before any arm moved"),
+    "leaves_children": ("not_enabled", "RobotEnable"),
     "reads_the_judge": ("made_up", "experiment"),
     "fills_output": ("output", "megabytes"),
     "fork_bomb": ("processes", "processes"),
