@@ -202,7 +202,8 @@ class IkFrame:
                 continue
             target = pose_matrix(xyz, xyzw)
             # Wherever the arm rested on its way.
-            poses = [robot.gripper(side, recording, row) for row in range(0, len(recording.times), 10)]
+            rows = [*range(0, len(recording.times), 10), -1]
+            poses = [robot.gripper(side, recording, row) for row in rows]
             distance = min(measures.pose_error(pose, target)[0] for pose in poses)
             found = "%.1f cm from the pose that was asked for" % (100 * distance)
             best = max(best, (ramp(distance, 0.01, 0.05), found))

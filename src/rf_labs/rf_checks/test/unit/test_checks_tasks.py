@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Grading of each kind of exercise, from traces that are made here: no simulator."""
+import math
+
+import numpy as np
+import pytest
+
+from rf_checks import slips, tasks, tasks_printed
+from rf_checks.lab import robot_description
+from rf_checks.recording import SIDES, Recording, Run, arm_joints
+from rf_checks.robot import Robot
+
+JOINTS = ("head_pan", *arm_joints("left"), *arm_joints("right"))
+POINT, QUATERNION = tasks.LAB_POINT, tasks.LAB_QUATERNION
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return Robot(robot_description())
+
+
+def trace(left=((tasks.NEUTRAL,)), right=((tasks.NEUTRAL,)), seconds=2.0, ik=(), contacts=()):
+    """A Recording in which each arm goes smoothly from posture to posture; requests and contacts come at the end."""
+    count = round(seconds / 0.01)
+    columns = [np.zeros((count, 1))]
+    for postures in (left, right):
+        postures = np.array(postures, dtype=float)
+        place = np.linspace(0.0, len(postures) - 1.0, count)
+        columns.append(np.stack([np.interp(place, range(len(postures)), postures[:, k]) for k in range(7)], axis=1))
+    rows = np.hstack(columns)
+    records = [{"t": 0.01 * k, "q": row.tolist(), "enabled": True, "contacts": [], "commands": [], "ik": [],
+                "counts": dict.fromkeys(SIDES, k)} for k, row in enumerate(rows)]
+    records[-1]["ik"], records[-1]["contacts"] = list(ik), list(contacts)
+    return Recording(JOINTS, records)
+
+
+def graded(task, call, run, robot):
+    criteria = task.criteria(call, run, robot)
+    assert sum(one.weight for one in criteria) == pytest.approx(100.0)
+    fault = task.slip(call, run, robot)
+    return sum(one.share * one.weight for one in criteria), fault.key if fault else None
+
+
+def rotated(robot, rotation):
+    """Postures that lead from neutral to the lab's point in an orientation (3, 3)."""
+    return tasks.NEUTRAL, robot.solve("left", POINT, slips.quaternion_of(rotation))
+
+
+def calls(task, seed=3):
+    return task.calls(np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("index", range(3))
+def test_a_gripper_that_is_turned_gets_all_points(robot, index):
+    task = tasks.RotateGripper()
+    call = calls(task)[index]
+    axis, angle = call.expected
+    target = tasks.pose_matrix(POINT, QUATERNION)[:3, :3] @ slips.about(axis, angle)
+    run = Run(list(call.arguments), trace(left=rotated(robot, target)), exit_code=0)
+    assert graded(task, call, run, robot) == (pytest.approx(100.0), None)
+
+
+def test_a_gripper_that_stays_gets_nothing(robot):
+    task = tasks.RotateGripper()
+    assert graded(task, calls(task)[0], Run([], trace(), exit_code=0), robot)[0] == 0.0
+
+
+def test_a_gripper_at_its_place_but_not_turned_gets_the_place(robot):
+    task = tasks.RotateGripper()
+    start = tasks.pose_matrix(POINT, QUATERNION)[:3, :3]
+    run = Run([], trace(left=rotated(robot, start)), exit_code=0)
+    assert graded(task, calls(task)[0], run, robot) == (pytest.approx(20.0), "not_turned")
+
+
+@pytest.mark.parametrize("key", ["quaternion_order", "degrees", "wrong_axis", "wrong_direction"])
+def test_a_request_for_a_wrong_rotation_is_told_though_the_arm_cannot_follow(robot, key):
+    task = tasks.RotateGripper()
+    call = calls(task)[0]
+    start = tasks.pose_matrix(POINT, QUATERNION)[:3, :3]
+    wrong = next(rotation for found, _, rotation in slips.wrong_rotations(start, *call.expected) if found == key)
+    ik = [["left", "base", list(POINT), slips.quaternion_of(wrong).tolist(), 1]]
+    run = Run([], trace(left=rotated(robot, start), ik=ik), exit_code=0)
+    assert graded(task, call, run, robot)[1] == key
+
+
+def test_a_pose_in_another_frame_is_told(robot):
+    task = tasks.RotateGripper()
+    ik = [["left", "left_hand", list(POINT), list(QUATERNION), 0]]
+    assert task.slip(calls(task)[0], Run([], trace(ik=ik)), robot).key == "wrong_frame"
+
+
+def test_collisions_cost_their_points_and_no_others(robot):
+    task = tasks.JointCommand()
+    call = calls(task)[0]
+    run = Run([], trace(right=(tasks.NEUTRAL, call.expected), contacts=[["right_hand", "torso"]]), exit_code=0)
+    assert graded(task, call, run, robot)[0] == pytest.approx(85.0)
+
+
+def waving(robot, side, periods=3, amplitude=0.08):
+    sign = 1.0 if side == "left" else -1.0
+    offsets = amplitude * np.sin(np.linspace(0.0, 2.0 * math.pi * periods, 24 * periods + 1))
+    postures = []
+    for offset in offsets:
+        # Solved for the left arm and mirrored: both arms of this robot are each other's image.
+        left = robot.solve("left", (0.6, 0.35 + sign * offset, 0.3), (0.0, 1.0, 0.0, 0.0))
+        postures.append(np.array(left) * ((1, 1, 1, 1, 1, 1, 1) if side == "left" else (-1, 1, -1, 1, -1, 1, -1)))
+    return postures
+
+
+@pytest.mark.parametrize(("sides", "periods", "amplitude", "key"), [
+    (SIDES, 3, 0.08, None), (("left",), 3, 0.08, "one_arm"), (SIDES, 2, 0.08, "too_short"),
+    (SIDES, 3, 0.02, "too_small"),
+])
+def test_waves_are_graded(robot, sides, periods, amplitude, key):
+    task = tasks.Wave()
+    arms = {side: waving(robot, side, periods, amplitude) if side in sides else [tasks.NEUTRAL] for side in SIDES}
+    points, found = graded(task, calls(task)[0], Run([], trace(**arms, seconds=4.0 * periods), exit_code=0), robot)
+    assert found == key
+    assert points == pytest.approx(100.0, abs=1.0) if key is None else points < 95.0
+
+
+PAIR = tasks.Call(("base", "left_hand"), {}, 10.0, (("base", "left_hand"),))
+
+
+@pytest.mark.parametrize(("change", "points", "key"), [
+    (lambda true: true, 100.0, None),
+    (np.linalg.inv, 0.0, "wrong_frame"),
+    (lambda true: np.eye(4), 0.0, "identity"),
+    (lambda true: np.block([[true[:3, :3].T, true[:3, 3:]], [true[3:]]]), 0.0, "transposed"),
+    (lambda true: np.block([[slips.rotation_of(*slips.quaternion_of(true[:3, :3])), true[:3, 3:]], [true[3:]]]), 0.0,
+     "quaternion_order"),
+    (lambda true: true + np.array([[0, 0, 0, 0.2], *np.zeros((3, 4))]), 0.0, "wrong_numbers"),
+])
+def test_printed_matrices_are_graded(robot, change, points, key):
+    task = tasks_printed.TfListener()
+    recording = trace(left=((0.2, -0.4, 0.3, 0.8, -0.5, 1.1, 0.4),))
+    true = robot.between("base", "left_hand", recording.joints_at(-1))
+    run = Run([], recording, output=str(change(true).tolist()))
+    assert graded(task, PAIR, run, robot) == (pytest.approx(points), key)
+
+
+def test_another_pairs_matrix_is_named(robot):
+    task = tasks_printed.TfListener()
+    recording = trace()
+    other = robot.between("base", "left_gripper", recording.joints_at(-1))
+    assert "base -> left_gripper" in task.slip(PAIR, Run([], recording, output=str(other.tolist())), robot).sentence
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_poses_of_the_unreachable_are_what_they_are_for(robot, seed):
+    found = []
+    for call in calls(tasks_printed.Unreachable(), seed):
+        answer = robot.solve("left", call.expected[:3], call.expected[3:])
+        found.append(answer.reason.name if hasattr(answer, "reason") else "SOLVED")
+    assert found == ["SOLVED", "OUT_OF_REACH", "JOINT_LIMIT"]
+
+
+@pytest.mark.parametrize(("output", "asked", "points", "key"), [
+    ("JOINT_LIMIT: left_e1 by 0.1 rad", True, 100.0, None), ("JOINT_LIMIT", True, 70.0, None),
+    ("JOINT_LIMIT: left_e1", False, 0.0, "made_up"), ("", False, 0.0, "not_asked"), ("no", True, 0.0, "no_verdict"),
+    ("SOLVED OUT_OF_REACH JOINT_LIMIT left_e1", True, 0.0, None),
+])
+def test_verdicts_are_graded(robot, output, asked, points, key):
+    task = tasks_printed.Unreachable()
+    call = calls(task)[2]
+    ik = [["left", "base", list(call.expected[:3]), list(call.expected[3:]), 2]] if asked else []
+    run = Run([], trace(ik=ik), output=output)
+    assert graded(task, call, run, robot) == (pytest.approx(points), key)
+
+
+@pytest.mark.parametrize(("output", "moves", "points", "key"), [
+    ("reference frame: base\ncommanded frame: left_gripper", True, 100.0, None),
+    ("reference frame: base\ncommanded frame: left_gripper", False, 60.0, "made_up"),
+    ("reference frame: torso\ncommanded frame: left_gripper", True, 80.0, "wrong_frame"),
+    ("reference frame: base\ncommanded frame: left_hand", True, 75.0, "wrong_frame"),
+    ("", True, 55.0, "no_answer"),
+])
+def test_answers_about_frames_need_their_experiment(robot, output, moves, points, key):
+    task = tasks_printed.IkFrame()
+    there = robot.solve("left", POINT, QUATERNION)
+    left = (tasks.NEUTRAL, there) if moves else (tasks.NEUTRAL,)
+    run = Run([], trace(left=left, ik=[["left", "base", list(POINT), list(QUATERNION), 0]]), output=output)
+    assert graded(task, calls(task)[0], run, robot) == (pytest.approx(points, abs=1.0), key)
