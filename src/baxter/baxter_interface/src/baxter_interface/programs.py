@@ -65,7 +65,8 @@ def expect(done, text):
 class EnabledRobot:
     """The robot, enabled as long as a `with` lasts; disabled at its end if it was so before.
 
-    Raises as RobotEnable and its enable().
+    Raises as RobotEnable and its enable(), and RobotLost in place of an OSError in the `with` that came after the robot
+    was disabled by others.
     """
 
     def __init__(self, versioned=CHECK_VERSION):
@@ -78,7 +79,11 @@ class EnabledRobot:
         return self
 
     def __exit__(self, kind, error, traceback):
-        if self._was_enabled or rospy.is_shutdown() or isinstance(error, RobotLost):
+        if rospy.is_shutdown() or isinstance(error, RobotLost):
+            return
+        if isinstance(error, OSError) and not self.is_enabled():
+            raise self._loss() from error  # whatever was not reached, that is why
+        if self._was_enabled:
             return
         failures = []
 
@@ -122,6 +127,9 @@ class EnabledRobot:
         elif self._disabled_since_s is None or now_s < self._disabled_since_s:
             self._disabled_since_s = now_s
         elif now_s - self._disabled_since_s >= DISABLED_GRACE_S:
-            what = "stopped" if self.switch.state().stopped else "disabled, or restarted"
-            raise RobotLost("lost the robot: it was %s. Enable it, and start this program again (rosrun baxter_tools "
-                            "enable_robot.py -e)" % what)
+            raise self._loss()
+
+    def _loss(self):
+        what = "stopped" if self.switch.state().stopped else "disabled, or restarted"
+        return RobotLost("lost the robot: it was %s. Enable it, and start this program again (rosrun baxter_tools "
+                         "enable_robot.py -e)" % what)
