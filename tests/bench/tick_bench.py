@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A whole tick of /gazebo with Baxter in it, beside the physics step in it: CPU time of the loop's thread, nobody
+connected, both arms swinging in free space with self-collision. Without a master, and the least of many turns, so that
+it says the same on a busy machine; "physics" measures the same with everything that a lab adds to it."""
+import contextlib
+import time
+from types import SimpleNamespace
+
+import numpy as np
+from arms import expanded
+from baxter_core_msgs.msg import JointCommand
+
+from baxter_sim_hardware.plugin import BaxterPlugin
+from bullet_sim import Pose, World
+from gazebo_ros.loop_publisher import LoopPublisher, PublisherHub
+from gazebo_ros.mailbox import Queue, RequestBoard
+from gazebo_ros.model_plugin import PluginContext
+from gazebo_ros.publications import Publications
+from gazebo_ros.resources import ResourceFinder
+from gazebo_ros.simulation import HostedPlugin, Simulation
+from gazebo_ros.snapshot import SnapshotWriter
+from urdf_model import Box, Inertial, Link, Robot, Shape, parse_urdf
+
+NEUTRAL = dict(zip(("s0", "s1", "e0", "e1", "w0", "w1", "w2"), (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True))
+NAMES = {side: ["%s_%s" % (side, joint) for joint in NEUTRAL] for side in ("left", "right")}
+TICKS = 50  # of a turn; a command for each arm comes before it, as at ten times real time and 100 Hz
+TURNS = 100
+ASLEEP_TICKS = 2500
+SLEEPERS = 100
+
+
+class _Ros:
+    """Topics that nobody has connected to."""
+
+    def __init__(self):
+        self.hub, self.queues = PublisherHub(), {}
+
+    def publisher(self, topic, msg_class, latch=False, greet=False):
+        return LoopPublisher(self.hub, topic, msg_class, latch=latch, greet=greet)
+
+    def queue(self, topic, msg_class, depth, notice=lambda: None):
+        return self.queues.setdefault(topic, Queue(depth, notice))
+
+    def service(self, name, srv_class, handler):
+        return SimpleNamespace(close=lambda: None)
+
+
+class Loop:
+    """What the node builds, without the node; as a context."""
+
+    def __enter__(self):
+        with contextlib.ExitStack() as stack:
+            self.world = World(find_mesh=ResourceFinder())
+            stack.callback(self.world.close)
+            writer = SnapshotWriter()
+            stack.callback(writer.close)
+            self.world.add_ground_plane()
+            robot = parse_urdf(expanded("baxter_description", "baxter.urdf.xacro"), source="baxter")
+            model = self.world.spawn(robot, "baxter", Pose((0, 0, 0.93)), **BaxterPlugin.spawn_options(robot, None))
+            for names in NAMES.values():
+                model.set_joint_positions(model.index(names), np.array(list(NEUTRAL.values())))
+            ros, log = _Ros(), SimpleNamespace(info=lambda text: None, warn=print, error=print)
+            context = PluginContext(self.world, model, robot, None, "/robot", "", log, ros,
+                                    {"baxter_sim_hardware": {"enable": True}}, add_screen=lambda *_: None)
+            self._queues = ros.queues
+            self._simulation = Simulation(self.world, RequestBoard(), log, real_time_factor=0.0)
+            publications = Publications(self._simulation, ros, writer, log, clock_rate=500.0)
+            self._simulation.on_turn, self._simulation.on_tick = publications.on_turn, publications.on_tick
+            self._simulation.host(HostedPlugin(BaxterPlugin(context), context, model.name, "Baxter"))
+            self._step, self._stepping_s = self.world.step, 0.0
+            self.world.step = self._timed_step
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *_):
+        self._stack.close()
+
+    def turn(self):
+        """Let both arms follow a new command for TICKS ticks; return (CPU of a tick, of the step in it) [us]."""
+        swing = 0.3 * np.sin(0.0004 * self._simulation.tick)
+        for side, names in NAMES.items():
+            self._queues["/robot/limb/%s/joint_command" % side].put(
+                JointCommand(JointCommand.POSITION_MODE, [angle + swing for angle in NEUTRAL.values()], names))
+        self._stepping_s, end = 0.0, self._simulation.tick + TICKS
+        begin = time.thread_time()
+        self._simulation.run(lambda: self._simulation.tick >= end)
+        return 1e6 * (time.thread_time() - begin) / TICKS, 1e6 * self._stepping_s / TICKS
+
+    def add_sleepers(self):
+        """Put boxes on the floor behind the robot and wait until they sleep."""
+        inertial = Inertial(0.5, np.zeros(3), 0.001 * np.eye(3))
+        shape = Shape(Box((0.1, 0.1, 0.1)), np.eye(4), "collision", None, "link")
+        box = Robot("box", {"link": Link("link", inertial, collisions=[shape])}, {}, "link")
+        for number in range(SLEEPERS):
+            self.world.spawn(box, "box_%d" % number,
+                             Pose((-2.0 - 0.3 * (number // 10), -1.5 + 0.3 * (number % 10), 0.05)))
+        for _ in range(ASLEEP_TICKS // TICKS):
+            self.turn()
+
+    def _timed_step(self):
+        begin = time.thread_time()
+        self._step()
+        self._stepping_s += time.thread_time() - begin
+
+
+def measure(report, quick, number):
+    turns = TURNS // 10 if quick else TURNS
+    with Loop() as loop:
+        for _ in range(20):
+            loop.turn()
+        tick, step = map(min, zip(*(loop.turn() for _ in range(turns)), strict=True))
+        report.add("tick with arms moving: CPU", tick, "us", ("its physics step", step), ratio_most=1.6)
+        loop.add_sleepers()
+        more, _ = map(min, zip(*(loop.turn() for _ in range(turns)), strict=True))
+        report.add("tick with %d sleeping objects: CPU" % SLEEPERS, more, "us", ("without them", tick), ratio_most=2.2)
