@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What `./baxter.sh check` answers to the words it gets, before any program runs."""
+import ast
+import os
+from pathlib import Path
+
+import pytest
+
+from rf_checks import command
+from rf_checks.exercises import EXERCISES
+
+EXERCISE_FOLDERS = Path(__file__).resolve().parents[2] / "exercises"
+NAMES = [exercise.name for exercise in EXERCISES]
+
+
+@pytest.fixture(autouse=True)
+def somewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_node.py").write_text("print('hello')\n")
+
+
+def test_the_list_has_every_exercise_and_how_it_is_called(capsys):
+    assert command.main(["--list"]) == command.PASSED
+    listing = capsys.readouterr().out
+    assert all(exercise.name in listing and exercise.usage in listing for exercise in EXERCISES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_skeleton_is_copied_once_and_knows_its_exercise(name, capsys):
+    assert command.main(["--start", name]) == command.PASSED
+    assert "./baxter.sh check" in capsys.readouterr().out
+    copy = Path(name + ".py")
+    assert "# exercise: %s\n" % name in copy.read_text()
+    assert os.access(copy, os.X_OK)
+    copy.write_text("mine")
+    assert command.main(["--start", name]) == command.WRONG_WORDS
+    assert copy.read_text() == "mine"
+
+
+@pytest.mark.parametrize(("words", "expected"), [
+    ([], "which lab and which program"), (["lab2"], "expected LAB [EXERCISE] PROGRAM"),
+    (["my_node.py"], "expected LAB [EXERCISE] PROGRAM"), (["lab2", "gone.py"], "gone.py is not there"),
+    (["lab2", "."], "is a folder"), (["lab7", "my_node.py"], "no lab 'lab7'"),
+    (["lab2", "wav", "my_node.py"], "no exercise 'wav'"), (["lab2", "my_node.py"], "lab2 wave my_node.py"),
+    (["lab2", "wave", "my_node.py", "--seed", "-1"], "the seed is -1"),
+    (["lab2", "wave", "my_node.py", "--json", "nowhere/x.json"], "there is no folder"),
+    (["--start", "waves"], "no exercise 'waves'"),
+])
+def test_wrong_words_are_answered_in_a_sentence(words, expected, capsys):
+    try:
+        status = command.main(words)
+    except SystemExit as end:
+        status = end.code
+    assert status == command.WRONG_WORDS
+    said = capsys.readouterr().err
+    assert expected in said
+    assert "usage:" not in said
+
+
+@pytest.mark.parametrize("kind", ["skeletons", "solutions"])
+def test_every_exercise_has_both_programs(kind):
+    files = {path.stem: path.read_text(encoding="utf-8") for path in (EXERCISE_FOLDERS / kind).glob("*.py")}
+    assert set(files) == set(NAMES)
+    for name, text in files.items():
+        ast.parse(text)
+        assert ("TODO" in text) == (kind == "skeletons"), name
