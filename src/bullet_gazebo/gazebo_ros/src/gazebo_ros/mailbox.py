@@ -50,8 +50,9 @@ class Queue:
         if len(self._messages) == self._messages.maxlen:
             self.lost += 1
         self._messages.append(message)
-        self.delivered += 1
+        # Before it counts as delivered: a lock-step request that waited for it goes on from there.
         self._notice()
+        self.delivered += 1
 
     def drain(self):
         """Loop thread: all unread messages, oldest first."""

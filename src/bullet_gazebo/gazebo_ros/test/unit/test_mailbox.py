@@ -49,6 +49,13 @@ def test_a_plugin_is_told_once_that_there_is_mail_in_any_of_its_queues():
     assert not context.branch().has_mail()
 
 
+def test_what_counts_as_delivered_has_been_announced():
+    seen = []
+    queue = Queue(3, lambda: seen.append((queue.delivered, list(queue._messages))))
+    queue.put("a")
+    assert seen == [(0, ["a"])] and queue.delivered == 1
+
+
 def test_a_queue_without_room_is_refused():
     with pytest.raises(ValueError, match="at least 1"):
         Queue(0)
