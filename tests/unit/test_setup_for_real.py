@@ -22,7 +22,7 @@ pytestmark = [
 LIMIT_S = 1200
 # How long each step may work before it is killed [s]: into the middle of those that take long.
 KILL_AFTER_S = {"venv": 1.0, "pip": 12.0, "meshes": 0.0, "overlay": 0.0, "build": 12.0, "urdf": 0.5, "kernels": 4.0}
-# Free disk at the start [kB], too little for the step. (What baxter.urdf needs is no more than set-up needs for its logs.)
+# Free disk at the start [kB], too little for the step. (baxter.urdf needs no more than the logs of set-up do.)
 FREE_KB = {"venv": 6000, "pip": 200000, "meshes": 6000, "build": 12000, "kernels": 200}
 TITLES = {
     "venv": "virtual environment", "pip": "Python packages", "meshes": "Baxter's meshes", "build": "catkin_make",
