@@ -5,9 +5,7 @@ import functools
 import os
 import pty
 import signal
-import struct
 import subprocess
-import tempfile
 import threading
 
 from lab_testing import waiting
@@ -71,47 +69,3 @@ class Program:
         with contextlib.suppress(OSError):
             while chunk := os.read(self._keys, 4096):
                 self._text += chunk.decode(errors="replace")
-
-
-class FakeJoystick:
-    """A named pipe that says what a joystick's device would. Attribute `path`: of it, where there is none until then.
-
-    sticks, buttons: what each reads at rest, -1..1 and 0 or 1, left and up positive.
-    """
-
-    _BUTTON, _AXIS, _INITIAL = 1, 2, 0x80  # linux/joystick.h
-
-    def __init__(self, sticks, buttons):
-        self._folder = tempfile.TemporaryDirectory()
-        self.path = self._folder.name + "/js0"
-        self._at_rest = [(self._AXIS, number, value) for number, value in enumerate(sticks)]
-        self._at_rest += [(self._BUTTON, number, value) for number, value in enumerate(buttons)]
-        self._file = None
-
-    def plug_in(self):
-        """Returns when somebody reads it."""
-        os.mkfifo(self.path)
-        self._file = os.open(self.path, os.O_WRONLY)
-        self._write(self._INITIAL)
-
-    def release(self):
-        """Let go of everything."""
-        self._write(0)
-
-    def push(self, stick, value):
-        os.write(self._file, self._event(self._AXIS, stick, value))
-
-    def press(self, button):
-        os.write(self._file, self._event(self._BUTTON, button, 1))
-
-    def close(self):
-        if self._file is not None:
-            os.close(self._file)
-        self._folder.cleanup()
-
-    def _write(self, flag):
-        os.write(self._file, b"".join(self._event(kind | flag, *where) for kind, *where in self._at_rest))
-
-    def _event(self, kind, number, value):
-        reading = round(-32767 * value) if kind & self._AXIS else value
-        return struct.pack("=IhBB", 0, reading, kind, number)

@@ -14,9 +14,10 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_examples import recording
 from baxter_interface import Limb, RobotEnable
 from baxter_interface.joint_checks import SIDES
+from lab_testing.fake_joystick import FakeJoystick
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from example_program import FakeJoystick, Program, wait_until  # noqa: E402
+from example_program import Program, wait_until  # noqa: E402
 
 STEP_RAD = 0.1
 NEAR_RAD = 0.02

@@ -15,9 +15,10 @@ from sensor_msgs.msg import Image
 
 from baxter_interface import Gripper, RobotEnable
 from baxter_interface.joint_checks import SIDES
+from lab_testing.fake_joystick import FakeJoystick
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from example_program import FakeJoystick, Program, wait_until  # noqa: E402
+from example_program import Program, wait_until  # noqa: E402
 
 FAN, LIGHT = "torso_fan", "torso_left_outer_light"
 
