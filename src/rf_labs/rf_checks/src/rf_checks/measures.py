@@ -6,6 +6,8 @@ import numpy as np
 
 # Below this speed of its fastest joint an arm stands [rad/s].
 STANDS_RAD_S = 0.02
+# Only from here on it moves again: at a turning point the speed wavers about the bound above [rad/s].
+MOVES_RAD_S = 0.06
 # No joint of the robot turns faster than 4 rad/s: more than this between two records [rad] is no motion.
 JUMP_RAD = 0.15
 
@@ -48,7 +50,9 @@ def halts(times, positions, window_s=0.05):
     speed = speeds(times, positions)[rows[0]:rows[1]]
     width = max(1, round(window_s / max(float(np.median(np.diff(times))), 1e-6)))
     smooth = np.convolve(speed, np.ones(width) / width, mode="valid") if len(speed) >= width else speed
-    stands = smooth < STANDS_RAD_S
+    # What lies between both bounds goes on with what was before.
+    clear = smooth[(smooth < STANDS_RAD_S) | (smooth > MOVES_RAD_S)]
+    stands = clear < STANDS_RAD_S
     return int(np.count_nonzero(stands[1:] & ~stands[:-1]))
 
 

@@ -41,6 +41,12 @@ def test_halts_are_counted_between_beginning_and_end():
     assert measures.halts(times, np.zeros((len(times), 1))) == 0
 
 
+def test_a_speed_that_wavers_at_a_turning_point_is_one_halt():
+    speed = np.concatenate((np.full(100, 0.2), np.tile(np.repeat((0.01, 0.04), 10), 8), np.full(100, 0.2)))
+    position = np.cumsum(0.01 * speed)[:, None]
+    assert measures.halts(0.01 * np.arange(len(position)), position) == 1
+
+
 def test_a_jump_is_no_motion():
     assert measures.largest_jump(np.array([[0.0], [0.04], [0.9]])) == pytest.approx(0.86)
     assert measures.largest_jump(np.zeros((1, 7))) == 0.0
