@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The kernel's joystick events, when messages are due, and devices that are not there."""
+import errno
 import math
 import os
 import struct
@@ -98,7 +99,9 @@ def test_rates_out_of_range(values):
 
 
 def test_a_device_that_is_not_there_says_what_to_do(tmp_path):
-    with pytest.raises(DeviceLost, match="no joystick at .*js7: No such file or directory; plug one in, or set ~dev"):
+    # In the user's language, as the system says it.
+    missing = os.strerror(errno.ENOENT)
+    with pytest.raises(DeviceLost, match="no joystick at .*js7: %s; plug one in, or set ~dev" % missing):
         Device(str(tmp_path / "js7"))
 
 
