@@ -82,13 +82,14 @@ use_robot() {
 # Everything whose change makes an earlier set-up stale, as one hash. The workspace's own path counts too:
 # virtual environments and catkin build folders cannot be moved.
 fingerprint() {
+    # The order of the files must not depend on the language of whoever asks.
     {
         echo "$LAB_ROOT"
         cd "$LAB_ROOT" && find requirements*.txt tools/*.txt tools/setup.bash src $([[ -d src_overlay ]] && echo src_overlay) \
             \( -name meshes -o -name __pycache__ -o -name .git \) -prune -o \
             -type f \( -name package.xml -o -name CMakeLists.txt -o -name setup.py -o -name '*.msg' -o -name '*.srv' \
                 -o -name '*.action' -o -name '*.cfg' -o -name '*.xacro' -o -path '*/env-hooks/*' \
-                -o -name 'requirements*.txt' -o -path 'tools/*' \) -print0 | sort -z | xargs -0 sha256sum
+                -o -name 'requirements*.txt' -o -path 'tools/*' \) -print0 | LC_ALL=C sort -z | xargs -0 sha256sum
     } | sha256sum
 }
 

@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import functools
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -134,6 +135,8 @@ def main() -> int:
     parser.add_argument("--long", action="store_true")
     options, arguments = parser.parse_known_args()
     WORK.mkdir(parents=True, exist_ok=True)
+    # Started in the background of a script, Ctrl-C is ignored, by every child too; the tests press it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         selection = select(take_inventory(ROOT), arguments, options.long)
     except SelectionError as error:

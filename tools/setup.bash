@@ -51,7 +51,7 @@ missing_packages() {
     mapfile -t wanted < <(sed 's/#.*//' tools/apt_packages.txt |
         awk -v noetic="$([[ -f $NOETIC ]] && echo 1)" 'NF && !(noetic && $2 == "ros") { print $1 }')
     have=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}\n' "${wanted[@]}" 2>/dev/null | sed -n 's/^ii *//p')
-    comm -23 <(printf '%s\n' "${wanted[@]}" | sort) <(sort <<<"$have")
+    LC_ALL=C comm -23 <(printf '%s\n' "${wanted[@]}" | LC_ALL=C sort) <(LC_ALL=C sort <<<"$have")
 }
 
 # Before a gigabyte is fetched for nothing.
@@ -202,9 +202,10 @@ step_overlay() {
 
 step_build() {
     local key
-    key="$LAB_ROOT $(cd src && find -L . \( -name meshes -o -name .git \) -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
+    # Without the workspace's own CMakeLists.txt, which catkin_make puts there.
+    key="$LAB_ROOT $(cd src && find -L . -mindepth 2 \( -name meshes -o -name .git \) -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
         -o -name setup.py -o -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name '*.cfg' \
-        -o -name CATKIN_IGNORE -o -path '*/env-hooks/*' \) -print0 | sort -z | xargs -0 sha256sum | sha256sum)"
+        -o -name CATKIN_IGNORE -o -path '*/env-hooks/*' \) -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)"
     # What a killed compiler has half written looks finished to make.
     if was_cut_off build; then
         run rm -rf build devel
@@ -231,7 +232,7 @@ step_urdf() {
         note="skipped: no baxter.urdf.xacro or compat/xacro in src/"
         return
     fi
-    key=$(find src -name '*.xacro' -type f -print0 | sort -z | xargs -0 sha256sum | sha256sum)
+    key=$(find src -name '*.xacro' -type f -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)
     if stamp_is "$key" && [[ -s ${targets[0]} && -s ${targets[1]} ]]; then
         note="up to date"
         return

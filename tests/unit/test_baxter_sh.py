@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from lab_tests import comma_locale
+
 ROOT = Path(__file__).resolve().parents[2]
 ROS_VARIABLES = ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_IP")
 # Stand-ins for the resolver and the routing table, so that the tests need no network.
@@ -32,6 +34,16 @@ def variables_after(tmp_path):
         return {name: value for name, value in pairs if name in ROS_VARIABLES}
 
     return call
+
+
+def test_whether_set_up_is_due_does_not_depend_on_the_language(tmp_path):
+    script = f'LAB_ROOT="{ROOT}"; source "{ROOT}/tools/environment.bash"; fingerprint'
+    german = {**comma_locale.environment(tmp_path), "PATH": "/usr/bin:/bin"}
+    seen = {
+        subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=True).stdout
+        for environment in ({"PATH": "/usr/bin:/bin", "LC_ALL": "C"}, german)
+    }
+    assert len(seen) == 1 and len(seen.pop()) > 64
 
 
 LOCAL = {"ROS_MASTER_URI": "http://localhost:11311", "ROS_HOSTNAME": "localhost"}
