@@ -3,12 +3,14 @@
 """`./baxter.sh test`: lint, unit tests, unit tests under a comma-decimal locale, rostests; one line of counts last."""
 
 import argparse
+import concurrent.futures
 import contextlib
 import functools
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -108,13 +110,49 @@ def layers(selection, long: bool, ending: contextlib.ExitStack):
             runs[f"unit tests under {comma_locale.NAME}, meanwhile"] = again
         for title, run in runs.items():
             yield title, run.tally
-    for test in selection.rostests:
-        folder = WORK / f"{test.package}-{test.path.stem}"
-        yield f"{test.package} {test.path.name}", functools.partial(rostests.run, test, folder)
+    alone = [test for test in selection.rostests if not test.is_beside_others]
+    beside = Beside([test for test in selection.rostests if test.is_beside_others])
+    ending.callback(beside.end)
+    for test in alone:
+        yield title_of(test), functools.partial(rostests.run, test, folder_of(test))
+    for test in beside.tests:
+        yield f"{title_of(test)}, meanwhile", functools.partial(beside.tally, test)
+
+
+def title_of(test: rostests.Rostest) -> str:
+    return f"{test.package} {test.path.name}"
+
+
+def folder_of(test: rostests.Rostest) -> Path:
+    return WORK / f"{test.package}-{test.path.stem}"
+
+
+class Beside:
+    """Runs rostests that start no simulator, one after the other, while others run."""
+
+    def __init__(self, tests):
+        self.tests = tests
+        self._ending = threading.Event()
+        self._executor = concurrent.futures.ThreadPoolExecutor(max_workers=1)
+        self._tallies = {test: self._executor.submit(self._run, test) for test in tests}
+
+    def _run(self, test):
+        if self._ending.is_set():
+            raise rostests.Ended
+        return rostests.run(test, folder_of(test), ending=self._ending)
+
+    def tally(self, test) -> Tally:
+        """Wait for its end."""
+        return self._tallies[test].result()
+
+    def end(self):
+        """Stop what runs, and run no more."""
+        self._ending.set()
+        self._executor.shutdown(cancel_futures=True)
 
 
 def run_layers(selection, long: bool) -> Tally:
-    """Run everything chosen, one after the other, and tell of each."""
+    """Run everything chosen and tell of each."""
     total = Tally()
     with contextlib.ExitStack() as ending:
         for title, run in layers(selection, long, ending):

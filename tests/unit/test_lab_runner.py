@@ -4,6 +4,7 @@
 import os
 import subprocess
 import sys
+import threading
 import uuid
 from pathlib import Path
 
@@ -55,6 +56,13 @@ def test_everything_runs_without_names(workspace):
     assert selection.linters == ["ruff", "catkin_lint"]
     assert units == ["test_alpha.py", "test_beta.py", "test_whole.py"]
     assert rostest_names == ["alpha.test", "whole.test"]
+
+
+def test_marks_of_a_rostest(workspace):
+    marked = "<!-- long -->\n<!-- beside others -->\n<launch/>"
+    (workspace / "tests/rostest/whole.test").write_text(marked)
+    (plain, *_), last = take_inventory(workspace).rostests[:1], take_inventory(workspace).rostests[-1]
+    assert (plain.is_long, plain.is_beside_others, last.is_long, last.is_beside_others) == (False, False, True, True)
 
 
 def test_long_brings_in_long_rostests(workspace):
@@ -165,6 +173,17 @@ def test_every_fate_of_a_rostest_is_counted(tmp_path, monkeypatch, name, passed,
     tally = rostests.run(test, tmp_path / "work", time_limit_s=1.0)
     assert (tally.passed, tally.failed) == (passed, failed)
     assert detail is None or detail in tally.details[0]
+
+
+def test_a_rostest_beside_others_ends_with_them(tmp_path, monkeypatch):
+    fake = tmp_path / "rostest"
+    fake.write_text(FAKE_ROSTEST)
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    ending = threading.Event()
+    ending.set()
+    with pytest.raises(rostests.Ended):
+        rostests.run(Rostest(tmp_path / "hangs.test", "alpha", False, True), tmp_path / "work", 60.0, ending)
 
 
 def test_comma_locale_is_in_force(tmp_path):

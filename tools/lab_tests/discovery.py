@@ -18,11 +18,12 @@ class SelectionError(Exception):
 
 @dataclass(frozen=True)
 class Rostest:
-    """One .test file: its package, and whether it says `<!-- long -->`."""
+    """One .test file: its package, and whether it says `<!-- long -->` and `<!-- beside others -->`."""
 
     path: Path
     package: str
     is_long: bool
+    is_beside_others: bool = False
 
 
 @dataclass
@@ -73,8 +74,9 @@ def _add_folder(inventory, root, folder, names):
         for name in names:
             if name.endswith(".test"):
                 path = folder / name
-                is_long = "<!-- long -->" in path.read_text(encoding="utf-8")
-                inventory.rostests.append(Rostest(path, _package_of(folder, root), is_long))
+                text = path.read_text(encoding="utf-8")
+                marks = (f"<!-- {mark} -->" in text for mark in ("long", "beside others"))
+                inventory.rostests.append(Rostest(path, _package_of(folder, root), *marks))
 
 
 def _package_of(folder, root):

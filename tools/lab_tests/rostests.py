@@ -9,6 +9,8 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
+import time
 import uuid
 from pathlib import Path
 
@@ -21,6 +23,7 @@ LONG_TIME_LIMIT_S = 1200.0
 # roslaunch gives a node 15 s after SIGINT and 2 s after SIGTERM before it kills it.
 STOP_TIMEOUT_S = 20.0
 LEFTOVER_GRACE_S = 2.0
+ENDING_POLL_S = 0.5
 OUTPUT_LINES_SHOWN = 80
 
 
@@ -33,8 +36,15 @@ def free_port() -> int:
             return port
 
 
-def run(test: Rostest, work_folder: Path, time_limit_s: float | None = None) -> Tally:
-    """Run it and count. work_folder is emptied first; logs and results stay in it for who wants to look."""
+class Ended(Exception):
+    """The run was told to end before the test did."""
+
+
+def run(test: Rostest, work_folder: Path, time_limit_s: float | None = None, ending: threading.Event | None = None):
+    """Run it and return a Tally. work_folder is emptied first; logs and results stay in it for who wants to look.
+
+    Where `ending` is given and becomes set, the test is stopped and Ended is raised.
+    """
     if time_limit_s is None:
         time_limit_s = LONG_TIME_LIMIT_S if test.is_long else TIME_LIMIT_S
     shutil.rmtree(work_folder, ignore_errors=True)
@@ -63,7 +73,7 @@ def run(test: Rostest, work_folder: Path, time_limit_s: float | None = None) -> 
             start_new_session=True,
         )
         try:
-            child.wait(time_limit_s)
+            _wait(child, time_limit_s, ending)
         except subprocess.TimeoutExpired:
             timed_out = True
             _stop(child)
@@ -88,6 +98,21 @@ def run(test: Rostest, work_folder: Path, time_limit_s: float | None = None) -> 
         tail = "\n".join(lines[-OUTPUT_LINES_SHOWN:])
         tally.details.append(f"output of {test.path.name} (logs in {work_folder}):\n{tail}")
     return tally
+
+
+def _wait(child, time_limit_s, ending):
+    """Wait for the child's end. Raises subprocess.TimeoutExpired, or Ended."""
+    deadline = time.monotonic() + time_limit_s
+    while True:
+        remaining = deadline - time.monotonic()
+        try:
+            child.wait(max(0.0, min(remaining, ENDING_POLL_S)))
+            return
+        except subprocess.TimeoutExpired:
+            if ending is not None and ending.is_set():
+                raise Ended from None
+            if remaining <= 0.0:
+                raise
 
 
 def _stop(child):
