@@ -96,8 +96,9 @@ class RecordingTest(ArmsTest):
         self.assertAlmostEqual(record.rows[0]["left_w1"], 1.26, delta=0.1)
 
         self.go_neutral()
-        for program in (self.start("joint_position_file_playback.py", "-f", path),
-                        self.start("joint_trajectory_file_playback.launch", "file_path:=" + path)):
+        for command in (("joint_position_file_playback.py", "-f", path),
+                        ("joint_trajectory_file_playback.launch", "file_path:=" + path)):
+            program = self.start(*command)
             self.assertEqual(program.wait(), 0, program.output)
             self.wait_for_angle("left_w1", record.rows[-1]["left_w1"])
             self.wait_for_angle("left_s0", record.rows[-1]["left_s0"])
