@@ -62,6 +62,7 @@ class ArmProcedureTest(ToolsTest):
 
     def set_gripper(self, **knobs):
         set_knobs("/fake_gripper", **knobs)
+        rospy.wait_for_service("/fake_gripper/reload", DEADLINE_S)
         rospy.ServiceProxy("/fake_gripper/reload", Trigger)()
 
     def assert_disabled(self):
