@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import threading
-import time
 import unittest
 
 import numpy as np
@@ -15,6 +14,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from sensor_msgs.msg import Image, PointCloud2
 
 from lab_testing.virtual_screen import VirtualScreen
+from lab_testing.waiting import wait_until
 
 RIG = """<sdf version="1.6"><model name="rig"><static>true</static><link name="post"><pose>0 0 1 0 0.3 0</pose>
 <sensor type="depth" name="depth"><update_rate>10</update_rate><camera><horizontal_fov>1.0</horizontal_fov>
@@ -97,12 +97,13 @@ class CameraConsumersTest(unittest.TestCase):
         viewer = subprocess.Popen(command, env=screen.environment, start_new_session=True)
         self.addCleanup(viewer.wait, 20.0)
         self.addCleanup(os.killpg, viewer.pid, signal.SIGTERM)
-        deadline, shown = time.monotonic() + TIMEOUT_S, (0, 0, 0)
-        while time.monotonic() < deadline and shown != sent:
+
+        def shown():
             self.assertIsNone(viewer.poll(), "image_view has ended")
-            shown = red_box(screen.picture())
-            time.sleep(0.2)
-        self.assertEqual(shown, sent, "width, height and pixels of what is red")
+            return red_box(screen.picture())
+
+        wait_until(lambda: shown() == sent, lambda: "width, height, pixels %s, not %s" % (sent, shown()), TIMEOUT_S,
+                   interval_s=0.2)
 
     @staticmethod
     def picture():

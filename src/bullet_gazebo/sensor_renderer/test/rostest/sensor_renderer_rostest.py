@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Cameras of SDF and URDF models come and go with their models, and with the simulator."""
+import functools
 import os
 import signal
-import threading
-import time
 import unittest
 import xmlrpc.client
 
@@ -15,6 +14,9 @@ from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, Image
+
+from lab_testing import waiting
+from lab_testing.waiting import wait_for_message
 
 CAMERA = """<camera%s><horizontal_fov>1.0</horizontal_fov><image><width>160</width><height>120</height></image>
 <clip><near>0.05</near><far>20</far></clip></camera>"""
@@ -38,23 +40,8 @@ MESH = BLOCK.replace("<box>\n<size>0.1 0.1 0.1</size></box>", "<mesh><uri>file:/
 WALL = """<robot name="wall"><link name="l"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0"
 iyz="0"/></inertial><visual><geometry><box size="0.1 4 4"/></geometry><material name="g"><color rgba="0 0.8 0 1"/>
 </material></visual></link><gazebo><static>true</static></gazebo></robot>"""
+wait_until = functools.partial(waiting.wait_until, timeout_s=60.0)
 LEFT, RIGHT, DEEP = "/eyes/left/image_raw", "/eyes/right/image_raw", "/deep/depth/image_raw"
-
-
-def wait_for(topic, message_class, wanted=lambda message: True, timeout_s=60.0):
-    found, done = [], threading.Event()
-
-    def take(message):
-        if not done.is_set() and wanted(message):
-            found.append(message)
-            done.set()
-
-    subscriber = rospy.Subscriber(topic, message_class, take, queue_size=1, buff_size=1 << 22)
-    try:
-        assert done.wait(timeout_s), "no message that fits on %s within %g s" % (topic, timeout_s)
-    finally:
-        subscriber.unregister()
-    return found[0]
 
 
 def is_green(image):
@@ -106,20 +93,20 @@ class SensorRendererTest(unittest.TestCase):
     def test_2_models_and_simulators_come_and_go(self):
         spawn("sdf", "rig", RIG, 0.0)
         # One sensor of this model has no <camera>: the others see.
-        first = wait_for(LEFT, Image)
+        first = wait_for_message(LEFT, Image)
         self.assertEqual((first.width, first.height, first.encoding, first.header.frame_id), (160, 120, "rgb8", "eyes"))
         self.assertFalse(is_green(first))
-        self.assertAlmostEqual(wait_for("/eyes/left/camera_info", CameraInfo).K[0], 80.0 / np.tan(0.5), 3)
+        self.assertAlmostEqual(wait_for_message("/eyes/left/camera_info", CameraInfo).K[0], 80.0 / np.tan(0.5), 3)
         rendered_by = api_of("/sensor_renderer")
 
         spawn("urdf", "wall", WALL, 2.0)
         for topic in (LEFT, RIGHT):
-            wait_for(topic, Image, is_green)
-        deep = wait_for(DEEP, Image, lambda image: image.encoding == "16UC1")
+            wait_for_message(topic, Image, is_green)
+        deep = wait_for_message(DEEP, Image, lambda image: image.encoding == "16UC1")
         depth = np.frombuffer(deep.data, np.uint16)
         self.assertTrue(np.all(np.abs(depth.astype(int) - 1950) < 5), "the wall's face is at 1.95 m")
         rospy.ServiceProxy("/gazebo/delete_model", DeleteModel)("wall")
-        wait_for(LEFT, Image, lambda image: not is_green(image))
+        wait_for_message(LEFT, Image, lambda image: not is_green(image))
 
         # The simulator dies without a word and comes back empty; a new world is seen by the same renderer.
         old = api_of("/gazebo")
@@ -127,7 +114,7 @@ class SensorRendererTest(unittest.TestCase):
         wait_until(lambda: api_of("/gazebo") not in (None, old))
         spawn("urdf", "wall", WALL, 2.0)
         spawn("sdf", "rig", RIG, 0.0)
-        wait_for(LEFT, Image, is_green)
+        wait_for_message(LEFT, Image, is_green)
         self.assertEqual(api_of("/sensor_renderer"), rendered_by)
 
 
@@ -137,13 +124,6 @@ def api_of(node):
         return rosgraph.Master("/test").lookupNode(node)
     except rosgraph.MasterError:
         return None
-
-
-def wait_until(condition, timeout_s=60.0):
-    deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, "not within %g s" % timeout_s
-        time.sleep(0.05)
 
 
 if __name__ == "__main__":

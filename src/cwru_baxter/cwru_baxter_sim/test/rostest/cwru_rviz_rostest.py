@@ -4,16 +4,28 @@
 import os
 import signal
 import subprocess
-import time
 import unittest
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import rospy
 
 from lab_testing.virtual_screen import VirtualScreen
+from lab_testing.waiting import wait_until
 
 SCENE_COLUMNS = slice(380, 1150)  # right of the panels
+
+
+class Seen(NamedTuple):
+    """How many pixels of the picture show what."""
+
+    table: int
+    can: int
+    robot: int
+
+    def is_full(self):
+        return self.table > 5000 and self.can > 50 and self.robot > 2000
 
 
 class CwruRvizTest(unittest.TestCase):
@@ -30,20 +42,18 @@ class CwruRvizTest(unittest.TestCase):
             self.lab.wait(20.0)
 
     def test_table_and_can_are_in_front_of_the_robot(self):
-        deadline = time.monotonic() + 200.0
-        counts = {}
-        while time.monotonic() < deadline:
-            picture = self.screen.picture()
-            red, green, blue = (picture[:, SCENE_COLUMNS, k].astype(int) for k in range(3))
-            counts = {"table": np.count_nonzero((red > 120) & (abs(red - 1.45 * green) < 25) & (blue < 0.75 * green)),
-                      "can": np.count_nonzero((green > 2 * red) & (green > 1.5 * blue) & (green > 25)),
-                      "robot": np.count_nonzero((red > 100) & (green < 40) & (blue < 40))}
-            if counts["table"] > 5000 and counts["can"] > 50 and counts["robot"] > 2000:
-                self.keep(picture)
-                return
-            time.sleep(0.5)
-        self.keep(picture)
-        self.fail("the picture does not fill; pixels of each: %s" % counts)
+        try:
+            wait_until(lambda: self.counts().is_full(), lambda: "a full picture; pixels of each: %s" % self.counts(),
+                       timeout_s=200.0, interval_s=0.5)
+        finally:
+            self.keep(self.screen.picture())
+
+    def counts(self):
+        """Pixels by what they show."""
+        red, green, blue = (self.screen.picture()[:, SCENE_COLUMNS, k].astype(int) for k in range(3))
+        return Seen(table=np.count_nonzero((red > 120) & (abs(red - 1.45 * green) < 25) & (blue < 0.75 * green)),
+                    can=np.count_nonzero((green > 2 * red) & (green > 1.5 * blue) & (green > 25)),
+                    robot=np.count_nonzero((red > 100) & (green < 40) & (blue < 40)))
 
     def keep(self, picture):
         """Leave the picture beside the test's other results, for whoever wants to look."""

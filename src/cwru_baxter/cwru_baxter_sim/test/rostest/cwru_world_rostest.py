@@ -13,9 +13,11 @@ from cv_bridge import CvBridge
 from dynamic_reconfigure.client import Client
 from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
-from seen import is_red, matrix_of, picture_of, points_of, wait_for
+from seen import is_red, matrix_of, picture_of, points_of
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, LaserScan, PointCloud2
 from std_srvs.srv import Empty
+
+from lab_testing.waiting import wait_for_message
 
 SIDE_M, AT = 0.06, (0.72, 0.15, 0.775)  # on the table; physics world
 BASE_Z = 0.93  # of the robot's base in the physics world
@@ -51,7 +53,7 @@ class CwruWorldTest(unittest.TestCase):
     def setUpClass(cls):
         cls.buffer = tf2_ros.Buffer(rospy.Duration(100.0))
         cls.listener = tf2_ros.TransformListener(cls.buffer)
-        wait_for("/robot/joint_states", JointState)
+        wait_for_message("/robot/joint_states", JointState)
 
     def put_cube(self, at=AT):
         place = Pose(Point(*at), Quaternion(0, 0, 0, 1))
@@ -79,13 +81,13 @@ class CwruWorldTest(unittest.TestCase):
 
     def test_a_cube_is_where_it_projects_and_where_it_is(self):
         self.put_cube()
-        image = wait_for("/kinect/rgb/image_raw", Image, lambda message: red_rows(message).sum() > 300)
+        image = wait_for_message("/kinect/rgb/image_raw", Image, lambda message: red_rows(message).sum() > 300)
         self.assertEqual((image.width, image.height, image.encoding, image.header.frame_id),
                          (640, 480, "rgb8", "kinect_pc_frame"))
-        info = wait_for("/kinect/rgb/camera_info", CameraInfo)
+        info = wait_for_message("/kinect/rgb/camera_info", CameraInfo)
         self.assert_seen_where_it_projects(red_rows(image), info, "kinect_pc_frame")
 
-        cloud = wait_for("/kinect/depth/points", PointCloud2)
+        cloud = wait_for_message("/kinect/depth/points", PointCloud2)
         xyz, colours = points_of(cloud)
         self.assertEqual(cloud.header.frame_id, "kinect_pc_frame")
         red = is_red(colours)[:ROBOT_FREE_ROWS] & np.isfinite(xyz[:ROBOT_FREE_ROWS, :, 2])
@@ -99,13 +101,13 @@ class CwruWorldTest(unittest.TestCase):
         self.assertLess(abs(points[:, 1].max() - high[1]), 0.005)
 
         # Depth is the same third coordinate; cv_bridge reads both.
-        depth_message = wait_for("/kinect/depth/image_raw", Image)
+        depth_message = wait_for_message("/kinect/depth/image_raw", Image)
         depth = CvBridge().imgmsg_to_cv2(depth_message, "32FC1")
         both = np.isfinite(depth) & np.isfinite(xyz[:, :, 2])
         self.assertGreater(both.mean(), 0.5)
         self.assertLess(np.median(np.abs(depth[both] - xyz[:, :, 2][both])), 1e-4)
         self.assertEqual(CvBridge().imgmsg_to_cv2(image, "bgr8").shape, (480, 640, 3))
-        compressed = wait_for("/kinect/rgb/image_raw/compressed", CompressedImage)
+        compressed = wait_for_message("/kinect/rgb/image_raw/compressed", CompressedImage)
         self.assertEqual(CvBridge().compressed_imgmsg_to_cv2(compressed).shape, (480, 640, 3))
 
     def test_the_robots_cameras_see_a_cube_where_it_projects(self):
@@ -114,14 +116,14 @@ class CwruWorldTest(unittest.TestCase):
             at = (np.linalg.inv(self.base_in(camera)) @ [0.07, -0.05, 0.6, 1.0])[:3] + [0.0, 0.0, BASE_Z]
             self.put_cube(at)
             topic = "/cameras/%s/" % camera
-            image = wait_for(topic + "image", Image, lambda message: is_red(picture_of(message)).sum() > 1000)
-            info = wait_for(topic + "camera_info", CameraInfo)
+            image = wait_for_message(topic + "image", Image, lambda message: is_red(picture_of(message)).sum() > 1000)
+            info = wait_for_message(topic + "camera_info", CameraInfo)
             self.assertEqual(image.header.frame_id, camera)
             self.assert_seen_where_it_projects(is_red(picture_of(image)), info, camera, at)
             self.doCleanups()
 
     def test_the_can_stands_on_the_table(self):
-        cloud = wait_for("/kinect/depth/points", PointCloud2)
+        cloud = wait_for_message("/kinect/depth/points", PointCloud2)
         xyz, _ = points_of(cloud)
         points = xyz[np.isfinite(xyz[:, :, 2])]
         points = np.hstack([points, np.ones((len(points), 1))]) @ np.linalg.inv(self.base_in("kinect_pc_frame")).T
@@ -135,24 +137,24 @@ class CwruWorldTest(unittest.TestCase):
 
     def test_what_is_deleted_is_no_longer_seen_and_a_reset_blinds_nobody(self):
         self.put_cube()
-        wait_for("/kinect/rgb/image_raw", Image, lambda message: red_rows(message).sum() > 300)
+        wait_for_message("/kinect/rgb/image_raw", Image, lambda message: red_rows(message).sum() > 300)
         service("/gazebo/delete_model", DeleteModel)("cube")
-        wait_for("/kinect/rgb/image_raw", Image, lambda message: not red_rows(message).any())
+        wait_for_message("/kinect/rgb/image_raw", Image, lambda message: not red_rows(message).any())
         before = rospy.get_time()
         service("/gazebo/reset_simulation", Empty)()
-        image = wait_for("/kinect/rgb/image_raw", Image, lambda message: message.header.stamp.to_sec() < before)
-        later = wait_for("/kinect/rgb/image_raw", Image,
+        image = wait_for_message("/kinect/rgb/image_raw", Image, lambda message: message.header.stamp.to_sec() < before)
+        later = wait_for_message("/kinect/rgb/image_raw", Image,
                          lambda message: message.header.stamp.to_sec() > image.header.stamp.to_sec() + 0.5)
         self.assertGreater(picture_of(later).std(), 10.0)
 
     def test_settings_that_can_be_changed_are_felt(self):
         topic = "/kinect/rgb/image_raw/compressed"
-        size = len(wait_for(topic, CompressedImage).data)
+        size = len(wait_for_message(topic, CompressedImage).data)
         quality, rate = (Client(name, timeout=60.0) for name in (topic, "/kinect"))
         self.assertEqual((quality.get_configuration()["jpeg_quality"], rate.get_configuration()["imager_rate"]),
                          (80, 10.0))
         self.assertEqual(quality.update_configuration({"jpeg_quality": 5})["jpeg_quality"], 5)
-        wait_for(topic, CompressedImage, lambda message: len(message.data) < 0.5 * size)
+        wait_for_message(topic, CompressedImage, lambda message: len(message.data) < 0.5 * size)
         rate.update_configuration({"imager_rate": 2.0})
         stamps = []
 
@@ -160,7 +162,7 @@ class CwruWorldTest(unittest.TestCase):
             stamps.append(message.header.stamp.to_sec())
             return len(stamps) > 1 and abs(stamps[-1] - stamps[-2] - 0.5) < 0.1
 
-        wait_for(topic, CompressedImage, are_half_a_second_apart)
+        wait_for_message(topic, CompressedImage, are_half_a_second_apart)
         quality.update_configuration({"jpeg_quality": 80})
         rate.update_configuration({"imager_rate": 10.0})
 
@@ -170,13 +172,14 @@ class CwruWorldTest(unittest.TestCase):
         self.assertEqual(set(cameras), {"head_camera", "left_hand_camera", "right_hand_camera"})
         for camera in cameras:
             topic = "/cameras/%s/image" % camera
-            first = wait_for(topic, Image)
+            first = wait_for_message(topic, Image)
             self.assertEqual((first.width, first.height, first.header.frame_id), (800, 800, camera))
             controls = [CameraControl(107, 1), CameraControl(108, 1)]
             self.assertEqual(opening(camera, CameraSettings(320, 200, 20.0, controls)).err, 0)
-            small = wait_for(topic, Image, lambda message: message.width == 320)
+            small = wait_for_message(topic, Image, lambda message: message.width == 320)
             self.assertEqual(small.height, 200)
-            info = wait_for("/cameras/%s/camera_info_std" % camera, CameraInfo, lambda message: message.width == 320)
+            info = wait_for_message("/cameras/%s/camera_info_std" % camera, CameraInfo,
+                                    lambda message: message.width == 320)
             self.assertLess(info.K[0], 0.0)  # turned by flip and mirror
             self.assertEqual(opening(camera, CameraSettings(123, 456, 20.0, [])).err, errno.EINVAL)
             self.assertEqual(closing(camera).err, 0)
@@ -185,7 +188,7 @@ class CwruWorldTest(unittest.TestCase):
         self.assertEqual(opening("nose_camera", CameraSettings(320, 200, 20.0, [])).err, errno.ENODEV)
         service("/cameras/reset", Empty)()
         for camera in cameras:
-            self.assertEqual(wait_for("/cameras/%s/image" % camera, Image).width, 800)
+            self.assertEqual(wait_for_message("/cameras/%s/image" % camera, Image).width, 800)
 
     def test_the_screen_shows_its_picture_to_who_looks_at_the_robot(self):
         # 0.5 m before the glass and looking straight at it; where that is says tf, base stands upright in the world.
@@ -211,20 +214,20 @@ class CwruWorldTest(unittest.TestCase):
             dark = found[125:140, 130:145]
             return (upper_left == (0, 255, 0)).all() and (lower_right == (255, 0, 0)).all() and (dark == 0).all()
 
-        wait_for("/onlooker/image_raw", Image, is_shown)
+        wait_for_message("/onlooker/image_raw", Image, is_shown)
         show.publish(CvBridge().cv2_to_imgmsg(np.zeros((600, 1024, 3), dtype=np.uint8), "bgr8"))
-        wait_for("/onlooker/image_raw", Image, lambda message: not picture_of(message)[100:140, 130:190].any())
+        wait_for_message("/onlooker/image_raw", Image, lambda message: not picture_of(message)[100:140, 130:190].any())
 
     def test_lasers_and_the_names_of_topics(self):
         for side in ("left", "right"):
-            scan = wait_for("/sim/laserscan/%s_hand_range/state" % side, LaserScan)
+            scan = wait_for_message("/sim/laserscan/%s_hand_range/state" % side, LaserScan)
             self.assertEqual((scan.header.frame_id, len(scan.ranges)), ("%s_hand_range" % side, 1))
             self.assertAlmostEqual(scan.range_max, 0.4, 6)
             self.assertTrue(np.isinf(scan.ranges[0]), "nothing is before the hands of outstretched arms")
         self.assertEqual({name for name, _ in rospy.get_published_topics() if name.startswith("/kinect/")}, KINECT)
 
     def test_the_robot_stands_as_the_notes_have_it(self):
-        states = wait_for("/robot/joint_states", JointState)
+        states = wait_for_message("/robot/joint_states", JointState)
         self.assertEqual(len(states.name), 15)
         self.assertLess(max(map(abs, states.position)), 0.02)
         place = matrix_of(self.buffer.lookup_transform("head", "kinect_link", rospy.Time(), rospy.Duration(30.0)))

@@ -1,29 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages that show something: waiting for them, and arrays out of them."""
-import threading
-
+"""Messages that show something: arrays out of them."""
 import numpy as np
-import rospy
 
 from urdf_model.transforms import matrix_from_quaternion, rigid
-
-
-def wait_for(topic, message_class, wanted=lambda message: True, timeout_s=60.0):
-    """The first message for which ``wanted(message)`` is true; ``AssertionError`` after ``timeout_s`` of wall time."""
-    found, done = [], threading.Event()
-
-    def take(message):
-        if not done.is_set() and wanted(message):
-            found.append(message)
-            done.set()
-
-    subscriber = rospy.Subscriber(topic, message_class, take, queue_size=1, buff_size=1 << 24)
-    try:
-        if not done.wait(timeout_s):
-            raise AssertionError("no message that fits on %s within %g s" % (topic, timeout_s))
-    finally:
-        subscriber.unregister()
-    return found[0]
 
 
 def picture_of(image):
