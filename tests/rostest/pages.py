@@ -9,12 +9,13 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 import xmlrpc.client
 from pathlib import Path
 
 import rostest
+
+from lab_testing.waiting import wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
@@ -28,15 +29,14 @@ END_LIMIT_S = 30
 def wait_for_service(master_uri, name, process=None):
     """Until a service is registered; ``process``: what is to bring it, which must not end before."""
     master = xmlrpc.client.ServerProxy(master_uri)
-    deadline = time.monotonic() + LIMIT_S
-    while time.monotonic() < deadline:
-        with contextlib.suppress(OSError):
-            if master.lookupService("/pages", name)[0] == 1:
-                return
+
+    def is_there():
         if process is not None and process.poll() is not None:
             raise AssertionError("the lab ended with %d before %s was there" % (process.returncode, name))
-        time.sleep(0.1)
-    raise AssertionError("%s was not there after %d s" % (name, LIMIT_S))
+        with contextlib.suppress(OSError):
+            return master.lookupService("/pages", name)[0] == 1
+
+    wait_until(is_there, name, LIMIT_S, interval_s=0.1)
 
 
 @contextlib.contextmanager

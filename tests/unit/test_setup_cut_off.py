@@ -5,7 +5,6 @@ The commands of the steps are stand-ins here, which can be told to hang half-way
 the real ones.
 """
 
-import contextlib
 import os
 import signal
 import subprocess
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from lab_testing.processes import living
 from lab_testing.waiting import wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -132,17 +132,6 @@ def finish(process):
 def wait_for(path, process):
     wait_until(lambda: path.exists() or process.poll() is not None, f"set-up to make {path}", LIMIT_S)
     assert path.exists(), f"set-up ended before it made {path}: {process.communicate()[0]}"
-
-
-def living(group):
-    """Command lines of the processes of a group; the dead that nobody has buried do not count."""
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            state, _, its_group = (folder / "stat").read_text().rpartition(")")[2].split()[:3]
-            if int(its_group) == group and state not in "ZX":
-                found.append((folder / "cmdline").read_text().replace("\0", " "))
-    return found
 
 
 def assert_whole(root):

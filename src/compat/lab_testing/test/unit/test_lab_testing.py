@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import os
+import subprocess
+
 import pytest
 
 from lab_testing import waiting
+from lab_testing.processes import is_alive, living
 from lab_testing.waiting import wait_until
 
 
@@ -31,3 +35,14 @@ def test_the_condition_is_asked_once_more_after_the_deadline(monkeypatch):
     assert wait_until(lambda: asked.append(1) or len(asked) == 2, timeout_s=1.0)
     with pytest.raises(AssertionError):
         wait_until(lambda: asked.append(1) or len(asked) == 5, timeout_s=1.0)
+
+
+def test_the_dead_that_nobody_has_buried_are_not_alive():
+    child = subprocess.Popen(["sleep", "600"], start_new_session=True)
+    assert is_alive(child.pid)
+    wait_until(lambda: any("sleep 600" in line for line in living(child.pid)), "the child's command line")
+    child.kill()
+    os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)  # it is dead, and stays a zombie
+    assert not is_alive(child.pid) and living(child.pid) == []
+    child.wait()
+    assert not is_alive(child.pid)

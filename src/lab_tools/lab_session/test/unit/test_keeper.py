@@ -4,13 +4,14 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 import rospkg
 
 from lab_session import keeper
 from lab_session.labs import LABS
+from lab_testing.processes import is_alive
+from lab_testing.waiting import wait_until
 
 DEADLINE_S = 30.0
 # A child that ignores every polite signal, of a command that obeys Ctrl-C.
@@ -29,21 +30,6 @@ try:
 except KeyboardInterrupt:
     open(folder + "/ended", "w").write("ended")
 """
-
-
-def wait_until(condition, what):
-    deadline = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.02)
-
-
-def is_alive(pid):
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
 
 
 def keep(state, *command):

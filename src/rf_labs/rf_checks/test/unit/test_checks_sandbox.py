@@ -2,10 +2,10 @@
 """The process that a student's program runs in: its limits, its end, and what it cannot reach. No master."""
 import os
 import sys
-import time
 
 import pytest
 
+from lab_testing.waiting import wait_until
 from rf_checks import pacing
 from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Student, adopt_orphans, has_namespaces
 
@@ -35,15 +35,8 @@ def start(request, tmp_path):
         student.end()
 
 
-def wait(condition, what):
-    deadline = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < deadline, "waited for %s" % what
-        time.sleep(0.01)
-
-
 def finished(student):
-    wait(lambda: student.exit_code is not None, "the program's end")
+    wait_until(lambda: student.exit_code is not None, "the program's end")
     student.end()
     return student
 
@@ -69,16 +62,16 @@ def test_what_outlives_the_program_is_found_and_ended(start):
 
 def test_endless_output_neither_fills_memory_nor_stops_the_judge(start):
     student = start("while True: print('x' * 1000)")
-    wait(lambda: student.wrote_too_much, "%d bytes" % OUTPUT_BYTES)
+    wait_until(lambda: student.wrote_too_much, "%d bytes" % OUTPUT_BYTES)
     student.end()
     assert len(student.output) <= 2 * KEPT_BYTES + 8192
 
 
 def test_a_program_that_loops_says_where_it_is(start):
     student = start("print('on', flush=True)\nn = 0\nwhile True:\n    n += 1\n")
-    wait(lambda: student.output, "its first line")
+    wait_until(lambda: student.output, "its first line")
     before = pacing.cpu_time_s(student.family())
-    wait(lambda: pacing.cpu_time_s(student.family()) > before + 0.1, "it to be in its loop")
+    wait_until(lambda: pacing.cpu_time_s(student.family()) > before + 0.1, "it to be in its loop")
     student.dump()
     assert "line 4" in student.errors or "line 3" in student.errors
     student.end()
@@ -102,14 +95,14 @@ def test_files_have_a_limit(start):
 
 def test_a_watch_tells_work_from_rest(start):
     student = start("import time\nprint('on', flush=True)\ntime.sleep(1000)")
-    wait(lambda: student.output, "its first line")
+    wait_until(lambda: student.output, "its first line")
     watch = pacing.Watch()
     watch.roots = [student.pid]
-    wait(lambda: watch.wait_until_idle(0.5), "a program that sleeps to rest")
+    wait_until(lambda: watch.wait_until_idle(0.5), "a program that sleeps to rest")
     busy = start("print('on', flush=True)\nwhile True: pass")
-    wait(lambda: busy.output, "its first line")
+    wait_until(lambda: busy.output, "its first line")
     watch.roots = [busy.pid]
-    wait(lambda: not watch.wait_until_idle(0.05), "a loop to be seen")
+    wait_until(lambda: not watch.wait_until_idle(0.05), "a loop to be seen")
     before = pacing.cpu_time_s(busy.family())
-    wait(lambda: pacing.cpu_time_s(busy.family()) > before + 0.05, "its processor time to grow")
+    wait_until(lambda: pacing.cpu_time_s(busy.family()) > before + 0.05, "its processor time to grow")
     watch.close()
