@@ -41,6 +41,7 @@ site=$venv/lib/python3.11/site-packages
 data=$site/cmeel.prefix/share/example-robot-data/robots/baxter_description/meshes
 half_work() {
     case $line in
+        "apt-get install"*) touch "$root/half_unpacked" ;;
         "python3 -m venv"*) whole_work; touch "$site/half" ;;
         "python3 -m pip install"*) touch "$site/half" ;;
         "cp -r"*) mkdir -p "${!#}/torso"; touch "${!#}/torso/half" ;;
@@ -51,6 +52,14 @@ half_work() {
 }
 whole_work() {
     case $line in
+        "apt-get"*)
+            # As the real one does after dpkg was killed.
+            if [[ -e $root/half_unpacked ]]; then
+                echo "E: dpkg was interrupted, you must manually run 'dpkg --configure -a' to correct the problem." >&2
+                exit 100
+            fi
+            ;;
+        "dpkg --configure -a") rm -f "$root/half_unpacked" ;;
         "python3 -m venv"*)
             rm -rf "$venv"
             mkdir -p "$venv/bin" "$site"
@@ -81,6 +90,8 @@ if [[ $line == $(cat "$here/hang" 2>/dev/null) ]]; then
 fi
 if [[ $line == $(cat "$here/fail" 2>/dev/null) ]]; then
     cat "$here/words" >&2
+    # A command that ran to its end has tidied up; on a full disk it stopped half-way.
+    if grep -q "No space left" "$here/words"; then half_work; fi
     exit 9
 fi
 whole_work "$@"
@@ -188,17 +199,17 @@ def test_a_step_that_refuses_to_start_is_not_cut_off(workspace):
     assert status == 0 and "cut off" not in said, said
 
 
-def test_a_full_disk_counts_as_cut_off(workspace):
+@pytest.mark.parametrize("step", COMMANDS)
+def test_a_full_disk_counts_as_cut_off(workspace, step):
     root, fakes = workspace
-    (fakes / "fail").write_text(COMMANDS["build"])
-    (fakes / "words").write_text("cc1plus: fatal error: writing: No space left on device\n")
-    (root / "build").mkdir()
-    (root / "build" / "half.o").touch()
+    (fakes / "fail").write_text(COMMANDS[step])
+    (fakes / "words").write_text("fatal error: writing: No space left on device\n")
     status, said = finish(start(root))
-    assert status == 9 and "cause:   the disk is full" in said
+    assert status == 9 and "cause:   the disk is full" in said, said
+    assert f"failed in step '{TITLES[step]}'" in said and f"log:     {root}/.baxter/logs/{step}.log" in said
     (fakes / "fail").unlink()
     status, said = finish(start(root))
-    assert status == 0 and "cut off in step 'catkin_make'" in said
+    assert status == 0 and f"cut off in step '{TITLES[step]}'" in said, said
     assert_whole(root)
 
 
