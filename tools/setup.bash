@@ -192,7 +192,8 @@ step_overlay() {
     fi
     hidden=$(leave_out_overlaid "$LAB_ROOT" 2>>"$step_log") || refuse "$(tail -n 1 "$step_log")"
     note="none"
-    if [[ -n $hidden ]]; then note="instead of ours: ${hidden//$'\n'/ }"; fi
+    if [[ -d src_overlay ]]; then note="$(manifests src_overlay | wc -l) in src_overlay"; fi
+    if [[ -n $hidden ]]; then note+=", instead of ours: ${hidden//$'\n'/ }"; fi
     # What a package of the same name has left in the build would still be found.
     if ! stamp_is "$hidden"; then
         [[ -f $STATE/overlay.stamp || -n $hidden ]] && run rm -rf build devel

@@ -12,7 +12,7 @@ cut_off_step=""
 # start_run: one set-up at a time; learn whether the one before came to an end.
 start_run() {
     if ! { mkdir -p "$LOGS" && exec 9>>"$STATE/lock"; } 2>/dev/null; then
-        echo "Set-up cannot start: it cannot write to $STATE. $(disk_note "a file there is not writable for $(id -un)")" >&2
+        echo "Set-up cannot start: it cannot write to $STATE: $(disk_note "a file there is not writable for $(id -un)")" >&2
         exit 1
     fi
     # A launch and a node started together on a fresh clone must not both build. The lock passes on to the commands of the
@@ -55,7 +55,7 @@ mended() {
 # write FILE TEXT: all of it or none.
 write() {
     if ! { printf '%s\n' "$2" >"$1.part" && mv "$1.part" "$1"; } 2>/dev/null; then
-        refuse "cannot write $1. $(disk_note "it is not writable for $(id -un)")"
+        refuse "cannot write $1: $(disk_note "it is not writable for $(id -un)")"
     fi
 }
 

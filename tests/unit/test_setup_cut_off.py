@@ -290,4 +290,4 @@ def test_nothing_can_be_written_at_all(workspace):
     root, _ = workspace
     (root / ".baxter").touch()  # in the way of the folder
     status, said = finish(start(root))
-    assert status == 1 and f"cannot write to {root}/.baxter" in said
+    assert status == 1 and f"cannot write to {root}/.baxter: a file there is not writable" in said
