@@ -22,8 +22,10 @@ pytestmark = [
 LIMIT_S = 1200
 # How long each step may work before it is killed [s]: into the middle of those that take long.
 KILL_AFTER_S = {"venv": 1.0, "pip": 12.0, "meshes": 0.0, "overlay": 0.0, "build": 12.0, "urdf": 0.5, "kernels": 4.0}
-# Free disk at the start [kB], too little for the step. (baxter.urdf needs no more than the logs of set-up do.)
-FREE_KB = {"venv": 6000, "pip": 200000, "meshes": 6000, "build": 12000, "kernels": 200}
+# Free disk at the start [kB], too little for the step; baxter.urdf needs hardly more than the logs of set-up do.
+FREE_KB = {"venv": 6000, "pip": 200000, "meshes": 6000, "overlay": 6000, "build": 12000, "urdf": 32, "kernels": 200}
+# Of the overlay's package; it is fetched packed, and then laid out.
+OVERLAY_BYTES = 10_000_000
 TITLES = {
     "venv": "virtual environment", "pip": "Python packages", "meshes": "Baxter's meshes", "build": "catkin_make",
     "overlay": "other people's packages", "urdf": "baxter.urdf", "kernels": "compiled inner loops",
@@ -83,6 +85,7 @@ def make_overlay(folder):
     (package / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.0.2)\nproject(robot_extras)\n"
         "find_package(catkin REQUIRED)\ncatkin_package()\n")
+    (package / "mesh.stl").write_bytes(os.urandom(OVERLAY_BYTES))
     git = ["git", "-C", folder / "theirs", "-c", "user.name=A", "-c", "user.email=a@example.org"]
     for command in (["init", "-q", "-b", "main"], ["add", "."], ["commit", "-q", "-m", "first"]):
         subprocess.run([*git, *command], check=True)
@@ -128,17 +131,20 @@ def test_out_of_disk_at_every_step(tmp_path):
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=4G", "tmpfs", disk], check=True)
     try:
         folder = clone(disk / "ws")
+        overlay = ["--with", str(make_overlay(tmp_path))]
         steps = ["apt", "venv", "pip", "meshes", "overlay", "build", "urdf", "kernels"]
         for step, free_kb in FREE_KB.items():
+            words = overlay if step == "overlay" else []
             used = subprocess.run(["df", "-k", "--output=used", disk], capture_output=True, text=True, check=True)
             used_kb = int(used.stdout.split()[1])
             subprocess.run(["mount", "-o", f"remount,size={used_kb + free_kb}k", disk], check=True)
-            status, said = set_up(folder)
+            status, said = set_up(folder, *words)
             assert status != 0, f"{free_kb} kB were enough for {step}: {said}"
             assert_failed(said, folder, step, "the disk is full")
             subprocess.run(["mount", "-o", "remount,size=4G", disk], check=True)
-            status, said = set_up(folder, *steps[:steps.index(step) + 1])
+            status, said = set_up(folder, *words, *steps[:steps.index(step) + 1])
             assert status == 0, said
+        assert (folder / "src_overlay/theirs/robot_extras/mesh.stl").stat().st_size == OVERLAY_BYTES
         status, said = set_up(folder)
         assert status == 0, said
         assert_lab_works(folder)
