@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arms that the kinematics benches run on, ours and as KDL has them."""
+"""The arms that the kinematics benches run on, ours and as KDL has them, and who says what they touch."""
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,7 +7,10 @@ import PyKDL
 import rospkg
 
 import xacro
+from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics import Chain
+from baxter_sim_kinematics.bullet_checker import BulletChecker
+from gazebo_ros.resources import ResourceFinder
 from urdf_model import Robot, parse_urdf
 
 
@@ -30,6 +33,14 @@ def arms():
         robot = parse_urdf(text, source=name)
         found.append(Arm(name, Chain.from_robot(robot, base, tip), robot, text))
     return found
+
+
+def checker_of(arm):
+    """Return a BulletChecker of an Arm's robot: for Baxter with its own table of what must not touch. Close it."""
+    pairs = self_collision_pairs(arm.robot.links)
+    if not pairs:
+        return BulletChecker.of_robot(arm.robot, find_mesh=ResourceFinder())
+    return BulletChecker.of_robot(arm.robot, pairs, find_mesh=ResourceFinder(), mesh_cuts=MESH_CUTS)
 
 
 def expanded(package, file):

@@ -27,6 +27,7 @@ PEERS = ROOT / ".baxter/bench/python"
 # Name: (module with a function `measure(report, quick, number)`, what it is about). Each round has its own process.
 SUITES = {
     "ik": ("ik_bench", "inverse kinematics beside TRAC-IK and KDL: solved, time; batches; clear of collisions"),
+    "verdict": ("verdict_bench", "poses without a solution, their cause known: verdicts that name it"),
     "fk": ("fk_bench", "forward kinematics and Jacobian beside PyKDL and PyBullet"),
     "load": ("physics_bench", "loading and stepping Baxter beside PyBullet's own loaders"),
     "control": ("control_tick_bench", "the controllers of 18 joints beside a physics step"),

@@ -90,9 +90,10 @@ class Search:
                                  METRES_PER_RADIAN, _NEAREST_ITERATIONS, _NEAREST_STARTS, q)
         return (q, *errors)
 
-    def free_limits(self, joint=None):
-        """Return (lower, upper) with no limit on ``joint`` (index), or on any joint."""
+    def free_limits(self, joint=None, by=math.inf):
+        """Return (lower, upper) with the limits of ``joint`` (index), or of all, moved outwards ``by`` [rad or m]."""
         lower, upper = (limit.copy() for limit in self.chain.limit_arrays)
         which = slice(None) if joint is None else joint
-        lower[which], upper[which] = -math.inf, math.inf
+        lower[which] -= by
+        upper[which] += by
         return lower, upper

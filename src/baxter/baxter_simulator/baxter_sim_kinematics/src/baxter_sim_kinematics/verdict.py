@@ -12,6 +12,8 @@ from baxter_sim_kinematics.search import MAX_ITERATIONS, MAX_STARTS
 _CLEARLY_OFF = 1e-4
 # Starts for finding out why: the questions are easier than the search was.
 _STARTS_TO_EXPLAIN = 60
+# A joint that goes less far than another has to be found with this share of the other's way.
+_SHORTER = 0.95
 # Walks towards the limit that a joint has broken; each gets about half of what is left to get.
 _PULLS = 5
 # Solutions without limits among which the one that breaks the limits least is looked for.
@@ -89,26 +91,42 @@ def _least_excess(search, start, lifted):
     a solution without limits.
     """
     chain = search.chain
-    alone = []
+    least, bound = {}, math.inf
     for joint in range(len(chain)):
-        limits = search.free_limits(joint)
-        found = search.run(8, _STARTS_TO_EXPLAIN, limits=limits, seed=start, goal=start)
-        if found.arrived:
-            for _ in range(_PULLS):
-                # Along the self-motion to where this joint is least beyond.
-                wrapped = _wrapped(chain, found.q)
-                found = search.run(1, 1, limits=limits, seed=wrapped, goal=np.clip(wrapped, *chain.limit_arrays))
-            over = _excess(chain, found.q)
-            inside = None if over else _settled(search, found.q)
+        # A joint that does not get there within one bound does not within a tighter one: each fails but once.
+        while True:
+            inside, over = _alone(search, joint, bound, start)
             if inside is not None:
                 return inside, {}
-            alone.append(over)
-    if not any(alone):
+            if not over:
+                break
+            least, bound = over, _SHORTER * _sum(over)
+    if not least:
         solutions = np.empty((_UNLIMITED, len(chain)))
         solutions[0] = lifted
         count, _, _ = search.gather(solutions, 1, 0, True, max_starts=MAX_STARTS, limits=search.free_limits())
-        alone = [_excess(chain, q) for q in solutions[:count]]
-    return None, min(filter(None, alone), key=lambda over: sum(map(abs, over.values())), default={})
+        least = min(filter(None, (_excess(chain, q) for q in solutions[:count])), key=_sum, default={})
+    return None, least
+
+
+def _alone(search, joint, bound, start):
+    """Return (a solution inside the limits or None, {name of joint number ``joint``: signed excess}, empty if it does
+    not get there within ``bound`` [rad or m] beyond its limits).
+    """
+    chain, limits = search.chain, search.free_limits(joint, bound)
+    found = search.run(1, _STARTS_TO_EXPLAIN, limits=limits, seed=start, goal=start)
+    if not found.arrived:
+        return None, {}
+    for _ in range(_PULLS):
+        # Along the self-motion to where this joint is least beyond.
+        wrapped = _wrapped(chain, found.q)
+        found = search.run(1, 1, limits=limits, seed=wrapped, goal=np.clip(wrapped, *chain.limit_arrays))
+    over = _excess(chain, found.q)
+    return (None if over else _settled(search, found.q)), over
+
+
+def _sum(over):
+    return sum(map(abs, over.values()))
 
 
 def _settled(search, q):
