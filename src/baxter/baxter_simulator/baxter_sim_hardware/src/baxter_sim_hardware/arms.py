@@ -27,7 +27,7 @@ import numpy as np
 
 from .errors import CommandRefused
 from .joint_command import CommandParser, Mode
-from .setpoint import MovingAverage, advance, any_beyond, stopping_point
+from .setpoint import MovingAverage, any_beyond, follow, stopping_point
 
 COMMAND_TIMEOUT_S = 0.2  # the robot's own
 SPEED_RATIO = {"sim": 1.0, "robot": 0.3}  # at start, by profile; 0.3 is what the physical robot starts with
@@ -56,7 +56,9 @@ FEED_FORWARD_S = 0.05  # for so long a feed-forward velocity belongs to the raw 
 SINK_DAMPING = 150.0  # [Nm s/rad] an unpowered arm with `disabled:=sink` gives way to gravity against this
 SINK_FRICTION = 1.0  # [Nm] what still damps a joint whose gravity torque vanishes
 
-_POSITION, _TORQUE, _RAW_POSITION = int(Mode.POSITION), int(Mode.TORQUE), int(Mode.RAW_POSITION)  # faster in arrays
+# Comparing an array with a member of an enum takes ten times as long.
+_POSITION, _VELOCITY, _TORQUE, _RAW_POSITION = (
+    int(mode) for mode in (Mode.POSITION, Mode.VELOCITY, Mode.TORQUE, Mode.RAW_POSITION))
 
 
 @dataclass(frozen=True)
@@ -122,10 +124,11 @@ class Arms:
         self._stream_stamp = np.full(count, -np.inf)
         self._speed = np.zeros(count)
         self._braking = np.zeros(count, dtype=bool)
-        self._brakes = False
+        self._stopping = STOP_ACCELERATION_FACTOR * self._acceleration  # (n,) [rad/s^2]
         self._brake_ticks = 0  # left, of BRAKES_S
         self._yielding = np.zeros(count, dtype=bool)
         self._any_yields = False
+        self._bound = self._bound_gravity = None  # (n,) what drives may exert [Nm], and for which gravity that is
         self._balanced = np.ones(count)  # 1 where torque mode adds the torque that balances gravity, 0 where not
         self._feed_forward = np.zeros(count)  # [rad/s]
         self._feed_forward_stamp = np.full(count, -np.inf)
@@ -176,7 +179,7 @@ class Arms:
     @property
     def commanded_torque(self):
         """(n,) [Nm] what torque mode adds to gravity; zero for joints in other modes."""
-        return np.where(self._mode == Mode.TORQUE, self._value, 0.0)
+        return np.where(self._mode == _TORQUE, self._value, 0.0)
 
     # -- what clients say
 
@@ -216,7 +219,8 @@ class Arms:
             bystander[limb.index] = True
             self._hold(bystander & ~named, position, velocity)
             limb.mode = command.mode
-        self._follow_joint(named & (self._mode == Mode.TORQUE), position, velocity)
+        if self._any_in_torque:
+            self._follow_joint(named & self._in_torque, position, velocity)
         if command.mode is Mode.RAW_POSITION:
             self._stream(command, time_s)
         self._set_mode(named, command.mode)
@@ -288,7 +292,7 @@ class Arms:
 
         brakes: whether the brakes are on from now, which stop harder than the drives alone; until the next stop.
         """
-        self._brakes = brakes
+        self._stopping = (BRAKES_ACCELERATION_FACTOR if brakes else STOP_ACCELERATION_FACTOR) * self._acceleration
         self._brake_ticks = round(BRAKES_S / self._dt) if brakes else 0
         for limb in self._limbs.values():
             limb.mode = Mode.POSITION
@@ -302,20 +306,19 @@ class Arms:
 
         position, velocity: (n,) measured [rad, rad/s]; gravity: (n,) [Nm] the torque that balances gravity here.
         """
-        if not self._is_settled:
+        if self._is_settled:
+            leads = any_beyond(self._reach, self._output, self._output_rate, position, self._dt)
+        else:
             if self._may_expire:
                 expired = self._deadline <= time_s + 1e-9
                 if expired.any():
                     self._hold(expired, position, velocity)
-            self._move_reference()
-        self._keep_within_reach(position, velocity)
+            leads = self._move_reference(position)
+        if leads:
+            self._keep_within_reach(position, velocity)
 
-        bound = (BRAKES_EFFORT_FACTOR if self._brake_ticks else 1.0) * self.limits.effort + np.abs(gravity)
-        if self._brake_ticks:
-            self._brake_ticks -= 1
-        elif self._any_yields:
-            gentle = self._yielding & (self._mode != _RAW_POSITION)
-            bound = np.where(gentle, YIELD_FACTOR * self.limits.effort + np.abs(gravity), bound)
+        bound = self._effort_bound(gravity)
+        self._brake_ticks = max(self._brake_ticks - 1, 0)
         if self._is_settled or not self._any_in_torque:
             return Drives(self._all, self._output, self._output_rate, bound, self._none, self._none, self._none)
         in_torque = self._in_torque
@@ -358,7 +361,7 @@ class Arms:
         """Take a raw set-point: its target moves there at the stream's own pace, or is there at once if none runs."""
         index = command.index
         gap = np.maximum(time_s - self._stream_stamp[index], self._dt)
-        goes_on = (self._mode[index] == Mode.RAW_POSITION) & (gap <= STREAM_GAP_S)
+        goes_on = (self._mode[index] == _RAW_POSITION) & (gap <= STREAM_GAP_S)
         self._target[index] = np.where(goes_on, self._target[index], command.values)
         limit = self.limits.velocity[index]
         # With a feed-forward velocity the goal is where the next command will be, without the one that has just come.
@@ -369,34 +372,43 @@ class Arms:
         self._stream_goal[index] = goal
         self._stream_stamp[index] = time_s
 
-    def _move_reference(self):
-        acceleration = self._acceleration
-        brakes = bool(self._braking.any())
-        if brakes:
-            acceleration = np.where(self._braking, self._stopping_acceleration(), acceleration)
-        before = self._output
-        moving = advance(self._reference, self._rate, self._target, self._speed, acceleration, self._streams,
-                         self._stream_goal, self._stream_rate, self._dt)
-        if brakes or self._any_streams:
-            direct = self._streams | self._braking
-            self._smoothing.restart(direct, self._reference[direct])
-        self._output = self._smoothing.push(self._reference)
-        self._output_rate = (self._output - before) / self._dt
-        if brakes:
+    @property
+    def _reach(self):
+        return BRAKES_REACH_RAD if self._brake_ticks else REACH_RAD
+
+    def _effort_bound(self, gravity):
+        """(n,) [Nm] what drives may exert where `gravity` (n,) is what the weight takes of it."""
+        if self._brake_ticks:
+            return BRAKES_EFFORT_FACTOR * self.limits.effort + np.abs(gravity)
+        if gravity is not self._bound_gravity:
+            self._bound_gravity, self._bound = gravity, self.limits.effort + np.abs(gravity)
+        if self._any_yields:
+            gentle = self._yielding & (self._mode != _RAW_POSITION)
+            return np.where(gentle, YIELD_FACTOR * self.limits.effort + np.abs(gravity), self._bound)
+        return self._bound
+
+    def _move_reference(self, position):
+        """One tick of the set-points; returns whether any leads its joint, measured at (n,), by more than it may."""
+        smoothing = self._smoothing
+        rests, braked, leads = follow(
+            self._reference, self._rate, self._target, self._speed, self._acceleration, self._braking, self._stopping,
+            self._streams, self._stream_goal, self._stream_rate, smoothing.window, smoothing.oldest,
+            self._output, self._output_rate, position, self._reach, self._dt)
+        smoothing.turn()
+        if braked:
             # At the target and at rest: with the weaker acceleration of other motions it would overshoot.
             self._braking &= (self._reference != self._target) | (self._rate != 0.0)
             self._refresh_speed()
         # Nothing to do until the next command or push: every set-point rests on its target.
-        if not moving and (np.abs(self._output - self._target) < 1e-12).all() and (self._mode == _POSITION).all():
-            self._output = self._target.copy()
+        if rests and self._all_in_position:
+            self._output[:] = self._target
             self._is_settled = True
             self._may_expire = False
+        return leads
 
     def _keep_within_reach(self, position, velocity):
-        reach = BRAKES_REACH_RAD if self._brake_ticks else REACH_RAD
         # The joints have not made this tick's step yet.
-        if not any_beyond(reach, self._output, self._output_rate, position, self._dt):
-            return
+        reach = self._reach
         lead = self._output - self._output_rate * self._dt - position
         far = np.abs(lead) > reach
         offset = np.clip(lead[far], -reach, reach) - lead[far]
@@ -412,16 +424,13 @@ class Arms:
 
     def _resting_point(self):
         """(n,) [rad] where the set-points come to rest if they brake now."""
-        return self._clamped(stopping_point(self._reference, self._rate, self._stopping_acceleration()))
-
-    def _stopping_acceleration(self):
-        return self._acceleration * (BRAKES_ACCELERATION_FACTOR if self._brakes else STOP_ACCELERATION_FACTOR)
+        return self._clamped(stopping_point(self._reference, self._rate, self._stopping))
 
     def _hold(self, joints, position, velocity):
         """Stop the joints in the mask and keep them where they come to rest."""
         if not joints.any():
             return
-        self._follow_joint(joints & (self._mode == Mode.TORQUE), position, velocity)
+        self._follow_joint(joints & self._in_torque, position, velocity)
         # Brake from where the drives are now, not from where smoothing would still take them.
         self._reference = np.where(joints, self._output, self._reference)
         self._rate = np.where(joints, self._output_rate, self._rate)
@@ -441,7 +450,7 @@ class Arms:
         self._is_settled = False
         self._mode[joints] = mode
         self._streams, self._in_torque = self._mode == _RAW_POSITION, self._mode == _TORQUE
-        self._any_streams, self._any_in_torque = bool(self._streams.any()), bool(self._in_torque.any())
+        self._any_in_torque, self._all_in_position = bool(self._in_torque.any()), bool((self._mode == _POSITION).all())
         self._value[joints] = 0.0
         self._deadline[joints] = np.inf
         self._braking &= ~joints
@@ -451,9 +460,11 @@ class Arms:
 
     def _refresh_speed(self):
         """Cruising speed of each joint's set-point [rad/s], by mode."""
-        ratio = np.ones(len(self._mode))
+        self._speed = self.limits.velocity.copy()
         for limb in self._limbs.values():
-            ratio[limb.index] = limb.speed_ratio
-        limit = self.limits.velocity
-        self._speed = np.where(self._mode == Mode.POSITION, np.where(self._braking, 1.0, ratio) * limit, limit)
-        self._speed = np.where(self._mode == Mode.VELOCITY, np.abs(self._value), self._speed)
+            if limb.speed_ratio != 1.0:
+                profiled = limb.index[(self._mode[limb.index] == _POSITION) & ~self._braking[limb.index]]
+                self._speed[profiled] *= limb.speed_ratio
+        in_velocity = self._mode == _VELOCITY
+        if in_velocity.any():
+            self._speed[in_velocity] = np.abs(self._value[in_velocity])

@@ -47,13 +47,14 @@ class FingersHand:
     def update(self, joints):
         """One tick; joints: (position, velocity, effort) of the whole model."""
         drive = self.gripper.update(self._share(joints[0]), self._squeeze)
+        if drive is None:
+            return
         if self.gripper.hooked:
             # Bullet may keep a contact with a wrong normal where two edges were parallel, which holds what should open.
             for link in self._links:
                 self._model.renew_contacts(link)
-        if drive is not None:
-            setpoint, force = drive
-            self._model.drive_position(self._index, setpoint * self._openings, force / 100.0 * self._max_effort)
+        setpoint, force = drive
+        self._model.drive_position(self._index, setpoint * self._openings, force / 100.0 * self._max_effort)
 
     def stop(self):
         """The robot was disabled."""

@@ -51,11 +51,11 @@ class JointLimits:
         """`values` of the joints `index` brought inside what `mode` allows; same shape and unit."""
         if mode is Mode.VELOCITY:
             bound = self.velocity[index]
-            return np.clip(values, -bound, bound)
+            return np.minimum(np.maximum(values, -bound), bound)
         if mode is Mode.TORQUE:
             bound = self.effort[index]
-            return np.clip(values, -bound, bound)
-        return np.clip(values, self.lower[index], self.upper[index])
+            return np.minimum(np.maximum(values, -bound), bound)
+        return np.minimum(np.maximum(values, self.lower[index]), self.upper[index])
 
 
 # A joint that rests on its limit is measured a little beyond it, and clients that start from where the arm is say so.
@@ -96,8 +96,10 @@ class CommandParser:
         index = np.array([self._index[name] for name in names])
         wanted = np.array(values, dtype=float)
         values = self._limits.clamp(mode, index, wanted)
-        outside = np.abs(values - wanted) > WORTH_TELLING
-        clamped = tuple(name for name, told in zip(names, outside, strict=True) if told)
+        clamped = ()
+        if (values != wanted).any():
+            outside = np.abs(values - wanted) > WORTH_TELLING
+            clamped = tuple(name for name, told in zip(names, outside, strict=True) if told)
         return JointCommand(mode, index, values, clamped)
 
     def _fault(self, mode, names, values):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Set-points that move no faster and no harder than allowed, and arrive exactly."""
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,30 +45,55 @@ def approach(position, velocity, target, speed, acceleration, dt):
     return new_position, new_velocity
 
 
-@_compiled
-def advance(position, velocity, target, speed, acceleration, streams, goal, pace, dt):
-    """One tick of `approach` for set-points of which some follow a stream; all arrays (n,), those of the first three
-    are moved in place. Returns whether any of them still has a velocity.
+class Moved(NamedTuple):
+    """What :func:`follow` found."""
 
-    streams: the joints whose target is itself on the way to goal [rad], by at most pace [rad/s] (of either sign); their
-    profile runs in a frame that moves with the target, so that a smooth stream is followed without lag.
+    rests: bool  # every set-point stands on its target
+    braked: bool  # some of them were braking when the tick began
+    leads: bool  # some of them is too far from its joint
+
+
+@_compiled
+def follow(position, velocity, target, speed, acceleration, braking, stopping, streams, goal, pace, window, oldest,
+           output, output_rate, measured, reach, dt):
+    """One tick of `approach`, smoothed, for set-points of which some brake and some follow a stream.
+
+    All arrays (n,) but window, (k, n), the last k values of position, of which row `oldest` is replaced. Moved in
+    place: position [rad], velocity [rad/s], the target of streams, window, and output [rad] and output_rate [rad/s],
+    which are the mean over the window and its rate. Returns `Moved`.
+
+    braking: the joints that brake with `stopping` instead of `acceleration` [rad/s^2]. streams: the joints whose target
+    is itself on the way to goal [rad], by at most pace [rad/s] (of either sign); their profile runs in a frame that
+    moves with the target, so that a smooth stream is followed without lag. Neither is smoothed. measured: where the
+    joints are [rad], before this tick; reach [rad]: what a set-point may lead by.
     """
-    moving = False
+    rests, braked, leads = True, False, False
     for i in range(len(position)):
-        rate = 0.0
+        bound = stopping[i] if braking[i] else acceleration[i]
         if streams[i]:
             ahead = goal[i] - target[i]
             rate = math.copysign(min(abs(pace[i]), abs(ahead) / dt), ahead)
             offset, velocity[i] = _approach(
-                position[i] - target[i], velocity[i] - rate, 0.0, speed[i] - abs(rate), acceleration[i], dt)
+                position[i] - target[i], velocity[i] - rate, 0.0, speed[i] - abs(rate), bound, dt)
             target[i] += rate * dt
             position[i] = target[i] + offset
             velocity[i] += rate
         else:
-            position[i], velocity[i] = _approach(
-                position[i], velocity[i], target[i], speed[i], acceleration[i], dt)
-        moving |= velocity[i] != 0.0
-    return moving
+            position[i], velocity[i] = _approach(position[i], velocity[i], target[i], speed[i], bound, dt)
+        if streams[i] or braking[i]:
+            window[:, i] = position[i]
+        else:
+            window[oldest, i] = position[i]
+        mean = 0.0
+        for k in range(len(window)):
+            mean += window[k, i]
+        mean /= len(window)
+        output_rate[i] = (mean - output[i]) / dt
+        output[i] = mean
+        braked |= braking[i]
+        rests &= velocity[i] == 0.0 and abs(mean - target[i]) < 1e-12
+        leads |= abs(mean - output_rate[i] * dt - measured[i]) > reach
+    return Moved(rests, braked, leads)
 
 
 @_compiled
@@ -85,18 +111,8 @@ def stopping_point(position, velocity, acceleration):
     return position + velocity * np.abs(velocity) / (2.0 * acceleration)
 
 
-@_compiled
-def _push(window, oldest, values):
-    """Replace the oldest row of window (k, n) by values (n,); return (the row that is oldest now, the mean (n,))."""
-    window[oldest] = values
-    mean = np.zeros_like(values)
-    for k in range(len(window)):
-        mean += window[k]
-    return (oldest + 1) % len(window), mean / len(window)
-
-
 class MovingAverage:
-    """Mean of the last `ticks` values of n set-points.
+    """The last `ticks` values of n set-points, of which `follow` takes the mean.
 
     Clients stream positions as a staircase, typically at 100 or 50 Hz; a profile that chases each stair would shake
     the arm at that rate. A window of 20 ms spans a whole number of stairs at both rates and so removes them.
@@ -104,18 +120,18 @@ class MovingAverage:
     """
 
     def __init__(self, ticks, values):
-        self._window = np.tile(values, (ticks, 1))
-        self._oldest = 0
+        #: (ticks, n), and the row in it that `follow` replaces next.
+        self.window = np.tile(values, (ticks, 1))
+        self.oldest = 0
 
-    def push(self, values):
-        """Take the newest values, (n,); return the mean, (n,)."""
-        self._oldest, mean = _push(self._window, self._oldest, values)
-        return mean
+    def turn(self):
+        """A tick is over: another row is the oldest now."""
+        self.oldest = (self.oldest + 1) % len(self.window)
 
     def shift(self, mask, offset):
         """Move the past of the joints in `mask` by `offset`, so that their mean moves by exactly that."""
-        self._window[:, mask] += offset
+        self.window[:, mask] += offset
 
     def restart(self, mask, values):
         """Forget the past of the joints in `mask`."""
-        self._window[:, mask] = values
+        self.window[:, mask] = values

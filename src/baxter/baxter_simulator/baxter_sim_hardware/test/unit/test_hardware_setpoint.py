@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from baxter_sim_hardware.setpoint import MovingAverage, approach, stopping_point
+from baxter_sim_hardware.setpoint import MovingAverage, approach, follow, stopping_point
 
 DT = 0.002
 
@@ -49,14 +49,51 @@ def test_brakes_to_its_stopping_point_in_one_go():
     assert path.max() <= rest + 1.2 * DT
 
 
+def smoothed(stairs, ticks=10):
+    """What comes out of `follow` for set-points that jump from one of `stairs` (m, n) to the next, tick by tick."""
+    count = stairs.shape[1]
+    fast, no, zero = np.full(count, 1e9), np.zeros(count, dtype=bool), np.zeros(count)
+    average = MovingAverage(ticks, np.zeros(count))
+    position, velocity, output, output_rate = (np.zeros(count) for _ in range(4))
+    out = []
+    for stair in stairs:
+        follow(position, velocity, stair.copy(), fast, fast, no, fast, no, zero, zero, average.window, average.oldest,
+               output, output_rate, zero, 1.0, DT)
+        average.turn()
+        out.append(output.copy())
+    return np.array(out)
+
+
 def test_moving_average_of_a_staircase_is_a_ramp():
-    average = MovingAverage(10, np.zeros(1))
-    out = [average.push(np.array([0.01 * (tick // 5)]))[0] for tick in range(100)]  # a 100 Hz stream at 500 Hz
-    np.testing.assert_allclose(np.diff(out)[15:], 0.002, atol=1e-12)
+    stairs = np.array([[0.01 * (tick // 5), -0.02 * (tick // 5)] for tick in range(100)])  # a 100 Hz stream at 500 Hz
+    steps = np.diff(smoothed(stairs), axis=0)[15:]
+    np.testing.assert_allclose(steps, np.tile([0.002, -0.004], (len(steps), 1)), atol=1e-12)
 
 
 def test_moving_average_arrives_exactly():
-    average = MovingAverage(10, np.zeros(1))
-    for _ in range(10):
-        out = average.push(np.array([0.7]))
-    assert out[0] == pytest.approx(0.7, abs=1e-15)
+    assert smoothed(np.full((10, 1), 0.7))[-1, 0] == pytest.approx(0.7, abs=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["braking", "streams"])
+def test_what_brakes_or_streams_is_not_smoothed(kind):
+    now, yes, no = np.zeros(2), np.array([True, False]), np.zeros(2, dtype=bool)
+    position, velocity, output, output_rate, goal = now.copy(), now.copy(), now.copy(), now.copy(), np.full(2, 1e-3)
+    flags = {"braking": no, "streams": no, kind: yes}
+    fast = np.full(2, 1e9)
+    moved = follow(position, velocity, goal.copy(), fast, fast, flags["braking"], fast, flags["streams"], goal, now,
+                   MovingAverage(10, now).window, 0, output, output_rate, now, 1.0, DT)
+    assert output == pytest.approx([1e-3, 1e-4], rel=1e-12)
+    assert output_rate == pytest.approx(output / DT, rel=1e-12)
+    assert moved.braked == (kind == "braking")
+
+
+def test_follow_tells_rest_and_a_lead():
+    def tick(start, target, measured, reach):
+        here, still = np.array([start]), np.zeros(1)
+        limits, no = np.array([1.0]), np.zeros(1, dtype=bool)
+        return follow(here, still, np.array([target]), limits, 10.0 * limits, no, limits, no, still, still,
+                      np.full((5, 1), start), 0, here.copy(), np.zeros(1), np.array([measured]), reach, DT)
+
+    assert tick(0.5, 0.5, 0.5, 1e-3) == (True, False, False)
+    assert tick(0.5, 0.6, 0.5, 1e-3) == (False, False, False)
+    assert tick(0.5, 0.5, 0.498, 1e-3) == (True, False, True)
