@@ -21,6 +21,7 @@ from gazebo_ros.loop_log import LoopLog
 from gazebo_ros.loop_publisher import PublisherHub
 from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.model_plugin import PluginError
+from gazebo_ros.pacing import wake_on_time
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.publications import Publications
 from gazebo_ros.resources import ResourceFinder, model_folders
@@ -75,6 +76,7 @@ def main(argv=None):
         with contextlib.ExitStack() as cleanup:
             simulation = _build(log, cleanup, line)
             gc.freeze()
+            wake_on_time()
             simulation.run(lambda: ending.is_set() or rospy.is_shutdown())
             code = 0
     except (WorldFileError, PluginError, BulletSimError, ValueError) as error:

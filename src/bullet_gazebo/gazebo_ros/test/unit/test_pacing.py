@@ -1,8 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pacing against a clock that only moves when somebody sleeps or works."""
+import ctypes
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 
-from gazebo_ros.pacing import MAX_CATCH_UP, MAX_DEBT_S, YIELD_PERIOD_S, Pacer, RateMeter, SlownessWatch, ticks_between
+from gazebo_ros.pacing import (
+    MAX_CATCH_UP,
+    MAX_DEBT_S,
+    YIELD_PERIOD_S,
+    Pacer,
+    RateMeter,
+    SlownessWatch,
+    ticks_between,
+    wake_on_time,
+)
+
+PR_GET_TIMERSLACK = 30  # prctl(2)
 
 
 class FakeClock:
@@ -133,3 +147,13 @@ def test_a_rate_is_as_near_as_ticks_come(rate, tick_rate, ticks):
 def test_a_rate_that_is_not_positive_is_refused(rate):
     with pytest.raises(ValueError, match="expected a positive number, at most the tick rate of 500 Hz"):
         ticks_between(rate, 500.0)
+
+
+def test_the_kernel_wakes_the_thread_that_asked_on_time_and_no_other():
+    def slack_ns(prepare):
+        prepare()
+        return ctypes.CDLL(None).prctl(PR_GET_TIMERSLACK, 0, 0, 0, 0)
+
+    with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(1) as other:
+        assert one.submit(slack_ns, wake_on_time).result() == 1
+        assert other.submit(slack_ns, lambda: None).result() > 1
