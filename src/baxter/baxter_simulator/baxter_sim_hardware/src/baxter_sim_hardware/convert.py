@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The one place where ROS messages meet the core's types."""
+import struct
+
 import genpy
 from baxter_core_msgs.msg import AssemblyState, EndpointState, SEAJointState
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
@@ -8,6 +10,9 @@ from std_msgs.msg import Header
 
 from urdf_model.transforms import quaternion_from_matrix
 
+_UINT32 = struct.Struct("<I")
+_HEADER = struct.Struct("<IIII")  # sequence number, seconds, nanoseconds, length of an empty frame_id
+
 
 def stamp(time_s):
     """Simulation time [s] as a ROS time, to the nanosecond."""
@@ -15,9 +20,31 @@ def stamp(time_s):
     return genpy.Time(seconds, nanoseconds)
 
 
-def joint_state(time_s, names, position, velocity, effort):
-    """JointState of n joints from arrays (n,) in the order of `names`."""
-    return JointState(Header(stamp=stamp(time_s)), names, position.tolist(), velocity.tolist(), effort.tolist())
+class JointStates:
+    """Makes the JointState messages of the same n joints. Their names, most of such a message, become bytes once."""
+
+    def __init__(self, names):
+        text = [name.encode() for name in names]
+        self._names = names
+        self._count = _UINT32.pack(len(names))
+        self._prepared = self._count + b"".join(_UINT32.pack(len(name)) + name for name in text)
+
+    def message(self, time_s, position, velocity, effort):
+        """JointState from arrays (n,) in the order of the names."""
+        message = _PreparedJointState()
+        message.header.stamp = stamp(time_s)
+        message.name, message.position, message.velocity, message.effort = self._names, position, velocity, effort
+        message.count, message.prepared = self._count, self._prepared
+        return message
+
+
+class _PreparedJointState(JointState):
+    def serialize(self, buff):
+        header = self.header
+        parts = [_HEADER.pack(header.seq, header.stamp.secs, header.stamp.nsecs, 0), self.prepared]
+        for values in (self.position, self.velocity, self.effort):
+            parts += self.count, values.astype("<f8", copy=False).tobytes()
+        buff.write(b"".join(parts))
 
 
 def assembly_state(assembly):

@@ -79,7 +79,7 @@ class BaxterPlugin(ModelPlugin):
         if self._switch("enable", False):
             self._apply(Event.ENABLE)
         self._alphabetical = np.argsort(model.joint_names)
-        self._joint_state_names = [model.joint_names[i] for i in self._alphabetical]
+        self._joint_state_messages = convert.JointStates([model.joint_names[i] for i in self._alphabetical])
         self._before = model.read_joints()
         self._gravity, self._gravity_ticks = None, 0  # what balances gravity (n,), and how long that holds
         self._last_warning = {}
@@ -137,6 +137,7 @@ class BaxterPlugin(ModelPlugin):
         self._joint_state_schedule = groups[interface.JOINT_STATE_RATE][0]
         self._started = context.publisher(*started, latch=True)
         self._has_started = False
+        self._idle_since_s, self._idle_until_s = math.inf, -math.inf  # between these nothing is due to be published
 
     # -- the tick
 
@@ -161,8 +162,12 @@ class BaxterPlugin(ModelPlugin):
         self._grippers.update(self._before)
 
     def publish(self, time_s):
+        self._procedures.update(time_s, self._feel_torques)
+        if not self._idle_since_s <= time_s < self._idle_until_s:
+            self._publish_due(time_s)
+
+    def _publish_due(self, time_s):
         snapshot = None
-        self._procedures.update(time_s, lambda side: self._feel(side, self._snapshot())[0])
         for schedule, topics in self._outputs:
             if not schedule.due(time_s):
                 continue
@@ -174,6 +179,10 @@ class BaxterPlugin(ModelPlugin):
         if not self._has_started:
             self._started.publish(Empty())
             self._has_started = True
+        self._idle_since_s, self._idle_until_s = time_s, min(schedule.next_s for schedule, _ in self._outputs)
+
+    def _feel_torques(self, side):
+        return self._feel(side, self._snapshot())[0]
 
     def _snapshot(self):
         return _Snapshot(self._model, self._before, self._arm_index, self._dt)
@@ -266,6 +275,7 @@ class BaxterPlugin(ModelPlugin):
     def _set_joint_state_rate(self, hz, time_s):
         if 1 <= hz <= 1000:
             self._joint_state_schedule.set_rate(hz)
+            self._idle_until_s = -math.inf
         else:
             self._warn(time_s, "rate", "joint_state_publish_rate %d Hz refused; it must be from 1 to 1000" % hz)
 
@@ -280,8 +290,8 @@ class BaxterPlugin(ModelPlugin):
 
     def _joint_states(self, time_s, side, snapshot):
         order = self._alphabetical
-        return convert.joint_state(time_s, self._joint_state_names, snapshot.position[order],
-                                   snapshot.velocity[order], snapshot.effort[order])
+        return self._joint_state_messages.message(
+            time_s, snapshot.position[order], snapshot.velocity[order], snapshot.effort[order])
 
     def _state(self, time_s, side, snapshot):
         return convert.assembly_state(self._baxter.state.assembly)

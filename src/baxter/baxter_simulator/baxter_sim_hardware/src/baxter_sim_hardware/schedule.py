@@ -19,6 +19,12 @@ class Schedule:
         self.rate_hz = float(rate_hz)
         self._last = None
 
+    @property
+    def next_s(self):
+        """Until when nothing is due [s], if the clock does not go back."""
+        # Twice the margin of `due`, so that rounding cannot make it late.
+        return -math.inf if self._last is None else (self._last + 1 - 2e-6) / self.rate_hz
+
     def due(self, time_s):
         """Whether a new period has begun at time_s [s]; a clock that went back begins anew."""
         period = math.floor(time_s * self.rate_hz + 1e-6)

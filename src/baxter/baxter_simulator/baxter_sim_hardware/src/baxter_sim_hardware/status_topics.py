@@ -27,7 +27,7 @@ class StatusTopics:
         self._urdf = self._fragment_time = None
         names = np.array(baxter.arms.limits.names)
         self._order = np.argsort(names)
-        self._names = names[self._order].tolist()
+        self._messages = convert.JointStates(names[self._order].tolist())
         self.makers = {
             **dict.fromkeys(("assembly_state", "limb_state", "head_assembly_state"), self._assembly),
             "ref_joint_states": self._ref_joint_states,
@@ -52,8 +52,8 @@ class StatusTopics:
 
     def _ref_joint_states(self, time_s, part, snapshot):
         arms, order = self._baxter.arms, self._order
-        return convert.joint_state(time_s, self._names, arms.commanded_position[order], arms.commanded_velocity[order],
-                                   arms.commanded_torque[order])
+        return self._messages.message(
+            time_s, arms.commanded_position[order], arms.commanded_velocity[order], arms.commanded_torque[order])
 
     def _commanded_endpoint(self, time_s, side, snapshot):
         arms = self._baxter.arms
