@@ -4,46 +4,39 @@ import time
 
 import numpy as np
 import pybullet
-from arms import expanded
 from labs import Lab
-
-from baxter_sim_hardware.plugin import BaxterPlugin
-from bullet_sim import Pose, World
-from gazebo_ros.resources import ResourceFinder
-from urdf_model import parse_urdf
+from tick_bench import NAMES, NEUTRAL, Loop
 
 SECONDS = 6.0
 SETTLE_S = 5.0  # simulated
 BARE_STEPS = 4000
-NEUTRAL = dict(zip(("s0", "s1", "e0", "e1", "w0", "w1", "w2"), (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True))
 
 
 class Bare:
-    """The same robot on the same floor; its arms swing, and nothing but stepSimulation is timed."""
+    """The same robot as the plugin leaves it, on the same floor: every joint driven, fingers coupled, arms swinging.
+
+    Nothing but stepSimulation is timed.
+    """
 
     def __init__(self):
-        robot = parse_urdf(expanded("baxter_description", "baxter.urdf.xacro"), source="baxter")
-        self._world = World(find_mesh=ResourceFinder())
-        self._world.add_ground_plane()
-        self._model = self._world.spawn(robot, "baxter", Pose((0, 0, 0.93)), **BaxterPlugin.spawn_options(robot, None))
-        names = ["%s_%s" % (side, joint) for side in ("left", "right") for joint in NEUTRAL]
-        self._index = self._model.index(names)
-        self._middle = np.array([NEUTRAL[name[-2:]] for name in names])
-        self._model.set_joint_positions(self._index, self._middle)
+        self._loop = Loop().__enter__()
+        self._model = self._loop.world.models["baxter"]
+        self._index = self._model.index([name for names in NAMES.values() for name in names])
+        self._middle = np.array(list(NEUTRAL.values()) * len(NAMES))
 
     def factor(self, steps):
         """Return simulated seconds a second of stepping."""
-        spent, client = 0.0, self._world._client
+        spent, client = 0.0, self._loop.world._client
         for tick in range(steps):
             goal = self._middle + 0.3 * np.sin(0.004 * tick)
             self._model.drive_position(self._index, goal, self._model.max_effort[self._index])
             begin = time.perf_counter()
             pybullet.stepSimulation(physicsClientId=client)
             spent += time.perf_counter() - begin
-        return steps * self._world.time_step_s / spent
+        return steps * self._loop.world.time_step_s / spent
 
     def close(self):
-        self._world.close()
+        self._loop.__exit__()
 
 
 def measure(report, quick, number):
