@@ -97,6 +97,9 @@ class LoopPublisher:
         self.topic = topic
         self.msg_class = msg_class
         self.latch = latch
+        #: True while somebody is connected, as of the hub's last turn; after the last has gone, until the next message.
+        #: A robot asks a hundred topics, so that this is no property.
+        self.has_listeners = False
         self._hub = hub
         self._keep_last = latch or greet
         self._has_header = getattr(msg_class, "_has_header", False)
@@ -114,17 +117,13 @@ class LoopPublisher:
         self._impl = impl
         self._hub.attention.append(self)
 
-    @property
-    def has_listeners(self):
-        """True while somebody is connected."""
-        impl = self._impl
-        return impl is not None and bool(impl.connections)
-
     def publish(self, message):
         """Send ``message`` to everybody who is connected; costs next to nothing when nobody is."""
         impl = self._impl
         if self._keep_last or (impl is not None and impl.connections):
             self.publish_serialized(self._serialize(message))
+        else:
+            self.has_listeners = False
 
     def publish_serialized(self, data):
         """Send a message that is already framed: its length as little-endian uint32, then its bytes."""
@@ -180,6 +179,7 @@ class LoopPublisher:
         """Stop publishing and give the registration back."""
         self._impl = self._known = None
         self._peers = []
+        self.has_listeners = False
         self._hub.backlog.discard(self)
         release, self._release = self._release, None
         if release is not None:
@@ -190,6 +190,7 @@ class LoopPublisher:
         known = {id(peer.transport): peer for peer in self._peers}
         self._peers = [known.get(id(connection)) or Peer(connection) for connection in connections]
         self._known = connections
+        self.has_listeners = bool(connections)
         return [peer for peer in self._peers if id(peer.transport) not in known]
 
     def _bury(self, dead):

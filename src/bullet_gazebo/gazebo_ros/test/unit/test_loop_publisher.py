@@ -127,6 +127,28 @@ def test_before_registration_there_are_no_listeners(hub):
     publisher.close()
 
 
+@pytest.mark.parametrize("topic", [{}, {"latch": True}, {"greet": True}])
+def test_listeners_are_noticed_at_the_next_turn_and_forgotten_with_the_message_after(hub, impl, topic):
+    publisher = make(hub, impl, **topic)
+    for _ in range(2):
+        listener = impl.connect()
+        hub.attention.append(publisher)  # as rospy's listener does
+        hub.service()
+        assert publisher.has_listeners
+        publisher.publish(FakeMessage(b"x"))
+        assert publisher.has_listeners and listener.received()[-1] == b"x"
+        listener.close()
+        publisher.publish(FakeMessage(b"y"))
+        assert not publisher.has_listeners
+
+
+def test_who_was_connected_before_the_registration_is_noticed(hub, impl):
+    impl.connect()
+    publisher = make(hub, impl)
+    hub.service()
+    assert publisher.has_listeners
+
+
 def test_a_full_peer_loses_the_newest_messages_and_stays_in_frame(hub, impl):
     publisher, slow, quick = make(hub, impl), impl.connect(), impl.connect()
     quick_got = []
