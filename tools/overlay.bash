@@ -7,8 +7,7 @@ OVERLAY_MARK="made by set-up: src_overlay has this package"
 # import_overlay ROOT FILE: fetch what a .rosinstall or .repos file lists; what is there already is brought up to date.
 import_overlay() {
     local root=$1 file=$2
-    mkdir -p "$root/src_overlay" && vcs import --input "$file" "$root/src_overlay" &&
-        ln -sfn ../src_overlay "$root/src/overlay"
+    mkdir -p "$root/src_overlay" && vcs import --input "$file" "$root/src_overlay"
 }
 
 # drop_cut_off_clones ROOT: remove what git was killed over; it would take such a folder for a whole clone.
@@ -29,12 +28,14 @@ name_of() { sed -n 's/.*<name>[[:space:]]*\([^<[:space:]]*\).*/\1/p' "$1" | head
 # manifests FOLDER: the package.xml files below it, without what is left out of the build
 manifests() { find "$1" \( -name .git -o -name meshes -o -name __pycache__ \) -prune -o -name package.xml -print; }
 
-# leave_out_overlaid ROOT: hide every package of ours that the overlay has, and show again what it has no more.
-# Prints the names of the hidden ones. Fails where the overlay has one name twice.
+# leave_out_overlaid ROOT: let the build see the overlay, hide every package of ours that it has, and show again what it has
+# no more. Prints the names of the hidden ones. Fails where the overlay has one name twice.
 leave_out_overlaid() {
     local root=$1 manifest name
     local -A theirs=()
+    rm -f "$root/src/overlay"
     if [[ -d $root/src_overlay ]]; then
+        ln -s ../src_overlay "$root/src/overlay" || return
         while read -r manifest; do
             name=$(name_of "$manifest")
             [[ ! -f ${manifest%/*}/CATKIN_IGNORE ]] || continue
@@ -48,7 +49,7 @@ leave_out_overlaid() {
     while read -r manifest; do
         name=$(name_of "$manifest")
         if [[ -n ${theirs[$name]:-} ]]; then
-            echo "$OVERLAY_MARK" >"${manifest%/*}/CATKIN_IGNORE"
+            echo "$OVERLAY_MARK" >"${manifest%/*}/CATKIN_IGNORE" || return
             echo "$name"
         elif [[ $(cat "${manifest%/*}/CATKIN_IGNORE" 2>/dev/null) == "$OVERLAY_MARK" ]]; then
             rm "${manifest%/*}/CATKIN_IGNORE"

@@ -45,11 +45,15 @@ hash_of() { sha256sum "$@" 2>/dev/null | sha256sum; }
 
 # --- the steps --------------------------------------------------------------------------------------------------------
 
+# Packages of tools/apt_packages.txt that are not installed, one a line. Which of the optional ones the system has is known
+# after `apt-get update`; before, none.
 missing_packages() {
-    local have
-    # Two columns: name, and "ros" where an installed ROS provides it. Comments and blank lines drop out.
-    mapfile -t wanted < <(sed 's/#.*//' tools/apt_packages.txt |
-        awk -v noetic="$([[ -f $NOETIC ]] && echo 1)" 'NF && !(noetic && $2 == "ros") { print $1 }')
+    local have wanted name kind
+    mapfile -t wanted < <(sed 's/#.*//' tools/apt_packages.txt | while read -r name kind; do
+        if [[ -z $name || $kind == ros && -f $NOETIC ]]; then continue; fi
+        if [[ $kind == optional ]] && ! apt-cache show "$name" >/dev/null 2>&1; then continue; fi
+        echo "$name"
+    done)
     have=$(dpkg-query -W -f '${db:Status-Abbrev}${Package}\n' "${wanted[@]}" 2>/dev/null | sed -n 's/^ii *//p')
     LC_ALL=C comm -23 <(printf '%s\n' "${wanted[@]}" | LC_ALL=C sort) <(LC_ALL=C sort <<<"$have")
 }
@@ -82,6 +86,7 @@ step_apt() {
         # Where an earlier installation was killed, apt refuses to go on by itself.
         run "${as_root[@]}" sh -c 'dpkg --configure -a || echo "the rest is for --fix-broken"'
         run "${as_root[@]}" apt-get update
+        mapfile -t missing < <(missing_packages)
         run "${as_root[@]}" apt-get install -y --no-install-recommends --fix-broken
         run "${as_root[@]}" apt-get install -y --no-install-recommends "${missing[@]}"
     } 9>&-
@@ -182,14 +187,12 @@ step_overlay() {
     if was_cut_off overlay; then run drop_cut_off_clones "$LAB_ROOT"; fi
     for file in ${overlay_files[@]+"${overlay_files[@]}"}; do
         [[ -f $file ]] || refuse "there is no file $file; rosinstall/ has those that come with the workspace"
+        command -v vcs >/dev/null ||
+            refuse "this system has no vcstool, which reads $file; clone what it lists into $LAB_ROOT/src_overlay yourself"
         run import_overlay "$LAB_ROOT" "$file"
     done
     leave_out_stand_ins "$LAB_ROOT" "${NOETIC%/*}/share" /usr/share
-    if [[ -d src_overlay ]]; then
-        run /usr/bin/python3 tools/check_overlay.py src_overlay
-    else
-        rm -f src/overlay
-    fi
+    if [[ -d src_overlay ]]; then run /usr/bin/python3 tools/check_overlay.py src_overlay; fi
     hidden=$(leave_out_overlaid "$LAB_ROOT" 2>>"$step_log") || refuse "$(tail -n 1 "$step_log")"
     note="none"
     if [[ -d src_overlay ]]; then note="$(manifests src_overlay | wc -l) in src_overlay"; fi

@@ -77,6 +77,13 @@ def test_theirs_is_fetched_built_and_wins_and_ours_comes_back(workspace, tmp_pat
     subprocess.run(["rm", "-r", str(workspace / "src_overlay")], check=True)
     assert bash('leave_out_overlaid "$@"', workspace) == ""
     assert list((workspace / "src").rglob("CATKIN_IGNORE")) == []
+    assert not (workspace / "src" / "overlay").is_symlink()
+
+
+def test_a_folder_that_nobody_fetched_counts_as_well(workspace):
+    make_package(workspace / "src_overlay" / "mine" / "robot_tools", "robot_tools", 'WHOSE = "mine"\n')
+    assert bash('leave_out_overlaid "$@"', workspace) == "robot_tools\n"
+    assert (workspace / "src" / "overlay" / "mine" / "robot_tools" / "package.xml").is_file()
 
 
 def test_the_same_name_twice_is_refused(workspace):

@@ -253,6 +253,16 @@ def test_a_state_that_could_not_be_written_is_taken_for_the_worst(workspace):
     assert_whole(root)
 
 
+def test_an_optional_package_is_asked_for_where_the_system_has_it(workspace):
+    root, fakes = workspace
+    (root / "tools" / "apt_packages.txt").write_text("no-such-package\nhad-package optional\nabsent-package optional\n")
+    (fakes / "apt-cache").write_text('#!/bin/sh\n[ "$2" = had-package ]\n')
+    (fakes / "apt-cache").chmod(0o755)
+    assert finish(start(root))[0] == 0
+    asked = (root / ".baxter/logs/apt.log").read_text()
+    assert "recommends had-package no-such-package\n" in asked and "absent-package" not in asked
+
+
 SAYINGS = [
     (1, "ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device", "the disk is full"),
     (100, "E: You don't have enough free space in /var/cache/apt/archives/.", "the disk is full"),
