@@ -56,11 +56,12 @@ def solve_batch(chain, targets, seeds, tolerance_m=1e-6, tolerance_rad=1e-6, pos
             target = Target(targets[k], position_only, free_axis)
             rotations[k], positions[k], bases[k] = target.rotation, target.position, target.basis
     solutions, outcomes = np.empty((count, len(chain))), np.empty((count, 5))
+    tolerances = (float(tolerance_m), float(tolerance_rad))
 
     def work(first):
-        kernels.search_many(*chain.arrays, *chain.limit_arrays, rotations, positions, seeds, goals, rows, bases,
-                            float(tolerance_m), float(tolerance_rad), int(max_iterations), int(max_starts),
-                            int(candidates), first, min(first + _CHUNK, count), solutions, outcomes)
+        kernels.search_many(chain.arrays, chain.limit_arrays, rotations, positions, rows, bases, tolerances, seeds,
+                            goals, int(max_iterations), int(max_starts), int(candidates), first,
+                            min(first + _CHUNK, count), solutions, outcomes)
 
     with ThreadPoolExecutor(threads or len(os.sched_getaffinity(0))) as pool:
         for _ in pool.map(work, range(0, count, _CHUNK)):

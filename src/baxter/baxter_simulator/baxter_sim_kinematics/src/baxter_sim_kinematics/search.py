@@ -60,9 +60,10 @@ class Search:
         q = np.empty(len(self.chain))
         target = self.target
         outcome = kernels.search(
-            *self.chain.arrays, *(limits or self.chain.limit_arrays), target.rotation, target.position,
-            self.seed if seed is None else seed, self.goal if goal is None else goal, rows or target.rows, target.basis,
-            *self._tolerances, max_iterations, max_starts, candidates, q)
+            self.chain.arrays, limits or self.chain.limit_arrays,
+            target.arrays if rows is None else (target.rotation, target.position, rows, target.basis), self._tolerances,
+            self.seed if seed is None else seed, self.goal if goal is None else goal, max_iterations, max_starts,
+            candidates, q)
         return Found(*outcome, q)
 
     def gather(self, solutions, held, first_start, walked, max_starts=None, limits=None, apart=APART):
@@ -71,22 +72,19 @@ class Search:
 
         Returns (rows filled, starts used, iterations).
         """
-        target = self.target
         return kernels.gather(
-            *self.chain.arrays, *(limits or self.chain.limit_arrays), target.rotation, target.position, self.seed,
-            self.goal, target.rows, target.basis, *self._tolerances, self.max_iterations, first_start,
-            self.max_starts if max_starts is None else max_starts, walked, float(apart), held, solutions)
+            self.chain.arrays, limits or self.chain.limit_arrays, self.target.arrays, self._tolerances, self.seed,
+            self.goal, self.max_iterations, first_start, self.max_starts if max_starts is None else max_starts, walked,
+            float(apart), held, solutions)
 
     def residual(self, q):
         """Return the pose error of ``q`` (n,): [m], [rad]."""
-        target = self.target
-        return kernels.pose_error(*self.chain.arrays, target.rotation, target.position, target.rows, target.basis, q)
+        return kernels.pose_error(self.chain.arrays, self.target.arrays, q)
 
     def nearest(self):
         """Return (q, error [m], error [rad]): inside the limits, the tip as near the target as it gets."""
         q = np.empty(len(self.chain))
-        errors = kernels.nearest(*self.chain.arrays, *self.chain.limit_arrays, self.target.rotation,
-                                 self.target.position, self.seed, self.target.rows, self.target.basis,
+        errors = kernels.nearest(self.chain.arrays, self.chain.limit_arrays, self.target.arrays, self.seed,
                                  METRES_PER_RADIAN, _NEAREST_ITERATIONS, _NEAREST_STARTS, q)
         return (q, *errors)
 

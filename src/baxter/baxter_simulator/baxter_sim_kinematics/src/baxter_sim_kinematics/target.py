@@ -43,7 +43,7 @@ class Target:
     """A pose (4, 4) of the tip in the base frame, checked, and how much of it counts.
 
     rotation (3, 3), orthonormal; position (3,) [m]; rows: 6 all, 5 all but a turn about an axis of the tip, 3 the
-    position alone; basis (3, 3): as the kernels want it.
+    position alone; basis (3, 3): as the kernels want it; arrays: all four, as they want them.
     """
 
     def __init__(self, pose, position_only=False, free_axis=None):
@@ -66,6 +66,7 @@ class Target:
             kernels.fill_basis(self.rotation, _direction(free_axis), self.basis)
         if position_only:
             self.rows = 3
+        self.arrays = self.rotation, self.position, self.rows, self.basis
 
     @property
     def pose(self):

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From one start downhill: onto the target, along it towards a posture, or as near to it as may be."""
+import math
+
+import numpy as np
+
+from baxter_sim_kinematics.kernels.compiled import compiled
+from baxter_sim_kinematics.kernels.linear import back_substitute, damp, distance, factorise, fill_gram, length
+from baxter_sim_kinematics.kernels.motion import place_joints
+from baxter_sim_kinematics.kernels.starts import clamped, fill_start, state_of
+from baxter_sim_kinematics.kernels.task import fill_error, fill_task_jacobian, on_target, pose_error, workspace
+
+# A joint this close to its limit [rad or m] is at its limit.
+_TOUCHING = 1e-12
+
+
+@compiled
+def _fill_slope(jacobian, error, rows, lower, upper, q, slope):
+    """Fill ``slope`` (n,) with J^T e. A joint at its limit and pushed outwards sits out: its column becomes 0."""
+    for i in range(q.shape[0]):
+        value = 0.0
+        for row in range(rows):
+            value += jacobian[row, i] * error[row]
+        if (q[i] <= lower[i] and value < 0.0) or (q[i] >= upper[i] and value > 0.0):
+            for row in range(rows):
+                jacobian[row, i] = 0.0
+            value = 0.0
+        slope[i] = value
+
+
+@compiled
+def reach(arm, limits, target, tolerances, max_iterations, q, best):
+    """Levenberg-Marquardt from ``q`` (changed in place) towards the target, inside the limits.
+
+    ``best`` gets the visited posture with the least error. Returns (solved, iterations, least error). The damping is
+    the squared error itself (Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method",
+    IEEE T-RO 27(5), 2011): bold when near, careful when far.
+    """
+    n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
+    target_rotation, target_position, rows, basis = target
+    axes, origins, rotation, position, jacobian, error = workspace(n)
+    normal, step, (tolerance_m, tolerance_rad) = np.empty((n, n)), np.empty(n), tolerances
+    least, mark = math.inf, math.inf
+    best[:] = q
+    for iteration in range(max_iterations):
+        place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position)
+        fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
+        size = length(error, 0, rows)
+        if size < least:
+            least = size
+            best[:] = q
+        if on_target(error, rows, tolerance_m, tolerance_rad):
+            best[:] = q
+            return True, iteration, size
+        if iteration % 8 == 7:
+            # A start that does not pay is left early: the next one costs less than waiting.
+            if least > 0.7 * mark:
+                return False, iteration + 1, least
+            mark = least
+        fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
+        _fill_slope(jacobian, error, rows, lower, upper, q, step)
+        damp(jacobian, rows, 0.5 * size * size + 1e-12, normal, step)
+        for i in range(n):
+            q[i] = min(max(q[i] + step[i], lower[i]), upper[i])
+    return False, max_iterations, least
+
+
+@compiled
+def _fill_drift(jacobian, error, rows, lower, upper, seed, q, gram, pull, correction, drift, fix):
+    """Fill ``fix`` (n,), the minimum-norm correction of the pose error, and ``drift`` (n,), the part of (seed - q) that
+    the tip does not feel.
+
+    Joints that the drift would push through their limit are taken out, one round at a time: their columns become 0.
+    ``gram`` (6, 6), ``pull`` and ``correction`` (6,) are space.
+    """
+    n = q.shape[0]
+    for _ in range(n):
+        fill_gram(jacobian, rows, 1e-10, gram)
+        for row in range(rows):
+            correction[row] = error[row]
+            value = 0.0
+            for i in range(n):
+                value += jacobian[row, i] * (seed[i] - q[i])
+            pull[row] = value
+        factorise(gram, rows)
+        back_substitute(gram, rows, correction)
+        back_substitute(gram, rows, pull)
+        taken_out = False
+        for i in range(n):
+            moves = False
+            drift[i], fix[i] = seed[i] - q[i], 0.0
+            for row in range(rows):
+                moves = moves or jacobian[row, i] != 0.0
+                drift[i] -= jacobian[row, i] * pull[row]
+                fix[i] += jacobian[row, i] * correction[row]
+            if not moves and (q[i] <= lower[i] or q[i] >= upper[i]):
+                drift[i], fix[i] = 0.0, 0.0
+        for i in range(n):
+            if (q[i] <= lower[i] and drift[i] < -1e-9) or (q[i] >= upper[i] and drift[i] > 1e-9):
+                for row in range(rows):
+                    jacobian[row, i] = 0.0
+                taken_out = True
+        if not taken_out:
+            break
+
+
+@compiled
+def walk(arm, limits, target, tolerances, max_iterations, seed, q, best):
+    """Walk from the solution ``q`` towards ``seed`` without leaving the target: down the distance, in the null space.
+
+    ``best`` (a solution on entry) gets the nearest solution met. Returns the iterations used. Each step is what
+    :func:`_fill_drift` says, scaled by the step length that the last two steps suggest (Barzilai and Borwein, IMA J.
+    Numer. Anal. 8, 1988).
+    """
+    n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
+    target_rotation, target_position, rows, basis = target
+    axes, origins, rotation, position, jacobian, error = workspace(n)
+    gram, pull, correction = np.empty((6, 6)), np.empty(6), np.empty(6)
+    drift, last_q, last_drift, fix = np.empty(n), np.empty(n), np.zeros(n), np.empty(n)
+    closest, (tolerance_m, tolerance_rad) = distance(best, seed), tolerances
+    gain, longest, taken = 1.0, 0.4, 0.0
+    for iteration in range(max_iterations):
+        place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position)
+        fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
+        there = on_target(error, rows, tolerance_m, tolerance_rad)
+        if there:
+            gap = distance(q, seed)
+            if gap < closest:
+                closest = gap
+                best[:] = q
+        fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
+        _fill_drift(jacobian, error, rows, lower, upper, seed, q, gram, pull, correction, drift, fix)
+        size, strayed = length(drift, 0, n), length(fix, 0, n)
+        if size < 1e-5 and there:
+            if distance(q, seed) < closest + 1e-4:
+                best[:] = q
+            return iteration
+        if strayed > 0.3 * taken and taken > 1e-6:
+            # Near a singularity the way bends sharply: back, and on in shorter steps.
+            q[:] = last_q
+            longest, taken = 0.25 * taken, 0.0
+            continue
+        longest = min(1.5 * longest, 0.4)
+        if iteration > 0:
+            change, curve = 0.0, 0.0
+            for i in range(n):
+                change += (q[i] - last_q[i]) ** 2
+                curve += (q[i] - last_q[i]) * (last_drift[i] - drift[i])
+            gain = min(max(change / curve, 0.1), 4.0) if curve > 1e-16 else 1.0
+        # The tip leaves the target with the square of the step: keep steps short, and inside the limits.
+        scale = gain
+        if size * scale > longest:
+            scale = longest / size
+        for i in range(n):
+            if drift[i] > 0.0:
+                scale = min(scale, max(upper[i] - q[i] - fix[i], 0.0) / drift[i])
+            elif drift[i] < 0.0:
+                scale = min(scale, min(lower[i] - q[i] - fix[i], 0.0) / drift[i])
+        last_q[:] = q
+        last_drift[:] = drift
+        taken = scale * size
+        for i in range(n):
+            q[i] += fix[i] + scale * drift[i]
+            if q[i] < lower[i] + _TOUCHING:
+                q[i] = lower[i]
+            elif q[i] > upper[i] - _TOUCHING:
+                q[i] = upper[i]
+    return max_iterations
+
+
+@compiled
+def _approach(arm, limits, target, metres_per_radian, max_iterations, q):
+    """Take ``q`` (changed in place) downhill to where the tip is nearest the target; returns the squared error [m^2].
+
+    Levenberg-Marquardt that only ever takes steps downhill; the damping follows Nielsen, "Damping parameter in
+    Marquardt's method", IMM-REP-1999-05.
+    """
+    n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
+    target_rotation, target_position, rows, basis = target
+    axes, origins, rotation, position, jacobian, error = workspace(n)
+    normal, step, slope, tried = np.empty((n, n)), np.empty(n), np.empty(n), q.copy()
+    damping, growth, cost = 1e-2, 2.0, math.inf
+    for _ in range(max_iterations):
+        place_joints(rotations, offsets, prismatic, tried, axes, origins, rotation, position)
+        fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
+        for row in range(3, rows):
+            error[row] *= metres_per_radian
+        trial = length(error, 0, rows) ** 2
+        if trial < cost:
+            gained = cost - trial
+            cost = trial
+            q[:] = tried
+            damping, growth = max(damping * 0.3, 1e-9), 2.0
+            if gained < 1e-10 * cost or cost < 1e-14:
+                break
+            fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
+            for i in range(n):
+                for row in range(3, rows):
+                    jacobian[row, i] *= metres_per_radian
+            _fill_slope(jacobian, error, rows, lower, upper, q, slope)
+        else:
+            damping, growth = damping * growth, growth * 2.0
+            if damping > 1e6:
+                break
+        step[:] = slope
+        damp(jacobian, rows, damping, normal, step)
+        for i in range(n):
+            tried[i] = min(max(q[i] + step[i], lower[i]), upper[i])
+    return cost
+
+
+@compiled
+def nearest(arm, limits, target, seed, metres_per_radian, max_iterations, max_starts, solution):
+    """The posture inside the limits whose tip comes nearest to a target that cannot be reached.
+
+    Near means sqrt(error [m]^2 + (metres_per_radian * error [rad])^2). Looked for from the seed and from random
+    postures. Fills ``solution`` (n,); returns its pose error [m], [rad].
+    """
+    q, seed = np.empty(seed.shape[0]), clamped(seed, limits)
+    solution[:] = seed
+    state, least = state_of(target, seed), math.inf
+    for attempt in range(max_starts):
+        fill_start(attempt, state, limits, seed, q)
+        cost = _approach(arm, limits, target, metres_per_radian, max_iterations, q)
+        if cost < least:
+            least = cost
+            solution[:] = q
+    return pose_error(arm, target, solution)

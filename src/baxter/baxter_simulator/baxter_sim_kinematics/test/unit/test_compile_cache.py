@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Compiled code is kept between runs, but never longer than the sources that it was made from."""
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from baxter_sim_kinematics import compile_cache
+
+# A kernel that calls some of other files; how far its tip is from the base; how often it came from the cache.
+_POSE_ERROR = """
+import numpy as np
+from baxter_sim_kinematics import kernels
+print(kernels.__file__)
+print(kernels.pose_error._cache.cache_path)
+q = np.array([3.0])
+arm = (np.array([np.eye(3)] * 2), np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]]), np.array([True]))
+print(kernels.pose_error(arm, (np.eye(3), np.zeros(3), 6, np.eye(3)), q)[0])
+print(sum(kernels.pose_error.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the package that may be changed; run(code) -> the lines that it prints."""
+    site = tmp_path / "site"
+    package = site / "baxter_sim_kinematics"
+    shutil.copytree(Path(compile_cache.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def run(code=_POSE_ERROR, **environment):
+        # Python's own cache of byte code looks at times and lengths alone.
+        plain = {"HOME": str(tmp_path), "PYTHONPATH": str(site), "PYTHONDONTWRITEBYTECODE": "1"}
+        done = subprocess.run([sys.executable, "-c", code], env={**plain, **environment}, capture_output=True,
+                              text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+        lines = done.stdout.splitlines()
+        assert lines[0].startswith(str(site))
+        return lines[1:]
+
+    run.package = package
+    return run
+
+
+def test_change_of_a_called_kernel_compiles_the_callers_again(copy):
+    """numba itself looks at the caller's file alone."""
+    _, error, hits = copy()
+    assert (float(error), int(hits)) == (pytest.approx(13.0 ** 0.5), 0)
+    first, error, hits = copy()
+    assert (float(error), int(hits)) == (pytest.approx(13.0 ** 0.5), 1)
+    linear = copy.package / "kernels" / "linear.py"
+    state, text = os.stat(linear), linear.read_text()
+    assert text.count("return math.sqrt(total)") == 2
+    # The same length and the same time of change, as a checkout may leave it.
+    linear.write_text(text.replace("return math.sqrt(total)", "return math.fabs(total)"))
+    os.utime(linear, ns=(state.st_atime_ns, state.st_mtime_ns))
+    second, error, hits = copy()
+    assert second != first
+    assert (float(error), int(hits)) == (pytest.approx(13.0), 0)
+
+
+def test_kernels_find_a_cache_when_neither_source_nor_home_can_be_written(copy, tmp_path):
+    """As in an installed package of a user without a home directory."""
+    (copy.package / "__pycache__").write_text("a file is in the way of the cache")
+    (tmp_path / "home").write_text("so is this")
+    (tmp_path / "tmp").mkdir()
+    code = ("from baxter_sim_kinematics import kernels; print(kernels.__file__); "
+            "print(kernels.tip_and_jacobian._cache.cache_path)")
+    cache, = copy(code, HOME=str(tmp_path / "home"), TMPDIR=str(tmp_path / "tmp"))
+    assert cache.startswith(str(tmp_path / "tmp" / "baxter_sim_kinematics-"))
+    # A cache that cannot be written is as good as none.
+    cache, = copy(code, HOME=str(tmp_path), NUMBA_CACHE_DIR=str(tmp_path / "home" / "cache"))
+    assert cache.startswith(str(tmp_path / ".cache" / "numba" / "baxter_sim_kinematics-"))
+
+
+def test_folder_is_named_after_all_of_the_sources(tmp_path):
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    one, two = tmp_path / "one.py", tmp_path / "two.py"
+    names = set()
+    for first, second in (("a", "b"), ("ab", ""), ("", "ab"), ("a", "c"), ("a", "b")):
+        one.write_text(first)
+        two.write_text(second)
+        path = Path(compile_cache.folder("some", [two, one], environment))
+        assert path.is_dir() and path.parent == tmp_path / "cache"
+        assert path == Path(compile_cache.folder("some", [one, two], environment))
+        names.add(path.name)
+    assert len(names) == 4
+
+
+def test_folders_of_old_states_go_and_nothing_else(tmp_path):
+    environment, source = {"NUMBA_CACHE_DIR": str(tmp_path)}, tmp_path / "one.py"
+    (tmp_path / "some-thing").mkdir()
+    paths = []
+    for k in range(8):
+        source.write_text(str(k))
+        paths.append(Path(compile_cache.folder("some", [source], environment)))
+        os.utime(paths[-1], (k, k))
+    left = [path for path in paths if path.exists()]
+    assert left == paths[-len(left):] and 2 <= len(left) <= 5
+    assert (tmp_path / "some-thing").exists()
