@@ -10,7 +10,7 @@ platform_line() {
     case $(sed -n 's/^\(ID\|VERSION_ID\)=//p' "$1" 2>/dev/null | tr -d '"' | sort -r | paste -sd ' ') in
         "debian 12") verdict="supported and tested" ;;
         "debian 13") verdict="tried, not in the regular tests; pybullet and numpy are compiled, which takes minutes" ;;
-        "ubuntu 22.04") verdict="untested; ROS 1 has to come from Ubuntu's own packages" ;;
+        "ubuntu 22.04") verdict="tried, not in the regular tests; ROS 1 has to come from Ubuntu's own packages" ;;
         "ubuntu 24.04") verdict="untested; ROS 1 has to come from Ubuntu's own packages, and pybullet is compiled" ;;
         "ubuntu 20.04")
             verdict="not supported: its Python is 3.8, the pinned packages need $OLDEST_PYTHON"
