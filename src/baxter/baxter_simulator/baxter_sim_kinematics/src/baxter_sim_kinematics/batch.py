@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Many poses in one call, on every core."""
+import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -37,11 +38,17 @@ def solve_batch(chain, targets, seeds, tolerance_m=1e-6, tolerance_rad=1e-6, pos
     default; the answers do not depend on it. Raises InvalidTarget, with the number of the target, InvalidPosture,
     ValueError.
     """
-    targets = np.array(targets, dtype=np.float64)
+    try:
+        targets = np.array(targets, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidTarget("the targets must be an array (m, 4, 4) of numbers, got %r" % (targets,), targets) from None
+    if targets.shape == (0,):
+        targets = np.empty((0, 4, 4))
     if targets.ndim != 3 or targets.shape[1:] != (4, 4):
         raise InvalidTarget("the targets must be an array (m, 4, 4), got one of shape %s" % (targets.shape,), targets)
-    if not (tolerance_m > 0.0 and tolerance_rad > 0.0 and candidates >= 1 and max_starts >= 1 and max_iterations >= 1):
-        raise ValueError("tolerances must be positive and candidates, max_starts, max_iterations at least 1")
+    if not (tolerance_m > 0.0 and tolerance_rad > 0.0
+            and all(1 <= number < math.inf for number in (candidates, max_starts, max_iterations))):
+        raise ValueError("tolerances must be positive and candidates, max_starts, max_iterations finite and at least 1")
     count = len(targets)
     seeds = _postures(chain, seeds, count)
     goals = seeds if postures is None else _postures(chain, postures, count)
@@ -50,8 +57,8 @@ def solve_batch(chain, targets, seeds, tolerance_m=1e-6, tolerance_rad=1e-6, pos
     for k in range(count):
         if free_axis is None:
             if not kernels.split_pose(targets[k], ROUNDED, rotations[k], positions[k]):
-                raise InvalidTarget("target %d must hold a finite position and a rotation, got\n%s" % (k, targets[k]),
-                                    targets[k])
+                raise InvalidTarget("target %d must hold a finite position, a rotation, and 0 0 0 1 in its last row, "
+                                    "got\n%s" % (k, targets[k]), targets[k])
         else:
             target = Target(targets[k], position_only, free_axis)
             rotations[k], positions[k], bases[k] = target.rotation, target.position, target.basis

@@ -27,7 +27,11 @@ def _robot(path):
     path = Path(path)
     if path.suffix == ".xacro":
         import xacro
-        return parse_urdf(xacro.process_file(str(path)).toxml(), source=str(path))
+        try:
+            text = xacro.process_file(str(path)).toxml()
+        except Exception as error:  # its expressions are Python: they can raise anything
+            raise UrdfError("xacro cannot expand %s: %s" % (path, " ".join(str(error).split()))) from None
+        return parse_urdf(text, source=str(path))
     return parse_urdf(path.read_text(), source=str(path))
 
 

@@ -4,7 +4,11 @@ import enum
 
 
 class KinematicsError(Exception):
-    """Root of every error that this package raises on purpose."""
+    """Root of every error that this package raises on purpose. All of them can be sent between processes."""
+
+    def __reduce__(self):
+        # Exception would call the class with the message alone, and a pool waits for ever for what cannot be unpacked.
+        return _restored, (type(self), self.args, self.__dict__)
 
 
 class ChainError(KinematicsError):
@@ -63,6 +67,12 @@ class NoSolution(KinematicsError):
         self.joints = tuple(joints)
         self.excess = tuple(excess)
         self.pair = tuple(pair)
+
+
+def _restored(kind, args, values):
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(values)
+    return error
 
 
 def _nearest_sentence(nearest, residual_m, residual_rad):

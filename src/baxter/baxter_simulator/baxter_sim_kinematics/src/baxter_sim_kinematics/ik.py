@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Inverse kinematics: from a pose of the tip to joint values inside the limits, or to the reason why there are none."""
+import math
+
 import numpy as np
 
 from baxter_sim_kinematics import kernels
@@ -30,8 +32,8 @@ def solve(chain, target, seed, tolerance_m=1e-6, tolerance_rad=1e-6, position_on
     """
     search = _search(chain, target, seed, posture, tolerance_m, tolerance_rad, position_only, free_axis, max_starts,
                      max_iterations)
-    if not candidates >= 1:
-        raise ValueError("candidates must be at least 1")
+    if not 1 <= candidates < math.inf:
+        raise ValueError("candidates must be finite and at least 1, got %r" % (candidates,))
     starts = 1 if beyond_reach(chain, search.target) else search.max_starts
     found = search.run(int(candidates), starts, search.max_iterations)
     if not found.arrived:
@@ -54,8 +56,10 @@ def solve_all(chain, target, seed, n_solutions, tolerance_m=1e-6, tolerance_rad=
     """
     search = _search(chain, target, seed, posture, tolerance_m, tolerance_rad, position_only, free_axis, max_starts,
                      max_iterations)
-    if not n_solutions >= 1:
-        raise ValueError("n_solutions must be at least 1, got %r" % (n_solutions,))
+    if not 1 <= n_solutions < math.inf:
+        raise ValueError("n_solutions must be finite and at least 1, got %r" % (n_solutions,))
+    if not apart >= 0.0:
+        raise ValueError("apart must be 0 or more, got %r" % (apart,))
     # All that there are, so that the nearest are among those kept; a spread answer is as long as the caller asks.
     rows = np.empty((max(int(n_solutions), search.max_starts if settle or checker else 0), len(chain)))
     count, starts, iterations = (0, 1, 0) if beyond_reach(chain, search.target) else search.gather(

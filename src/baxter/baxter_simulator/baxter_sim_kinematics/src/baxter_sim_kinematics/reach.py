@@ -5,6 +5,7 @@ import math
 import multiprocessing
 import os
 import signal
+import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from baxter_sim_kinematics.errors import KinematicsError
 
 # Cells that are computed, saved and counted together: about a second's work.
 _CHUNK = 32
+# A million cells take a day; far more than that are a slip of the pen and do not fit into memory.
+_MOST_CELLS = 10_000_000
 
 
 class ReachError(KinematicsError):
@@ -39,10 +42,14 @@ class Settings:
         if not all(math.isfinite(v) for v in (*self.lower, *self.upper)) or not np.less(self.lower, self.upper).all():
             raise ReachError("the volume must have each lower bound below its upper one, got %s to %s"
                              % (self.lower, self.upper))
-        if not (self.cell_m > 0.0 and self.orientations >= 1 and self.starts >= 1):
-            raise ReachError("cell, orientations and starts must be positive, got %g m, %d and %d"
+        if not (0.0 < self.cell_m < math.inf and self.orientations >= 1 and self.starts >= 1):
+            raise ReachError("cell, orientations and starts must be positive and finite, got %g m, %d and %d"
                              % (self.cell_m, self.orientations, self.starts))
-        if self.tool is not None and np.linalg.norm(self.tool) < 1e-9:
+        cells = math.prod((high - low) / self.cell_m for low, high in zip(self.lower, self.upper, strict=True))
+        if cells > _MOST_CELLS:
+            raise ReachError("the volume has %.2g cells of %g m, more than %d; take larger cells"
+                             % (cells, self.cell_m, _MOST_CELLS))
+        if self.tool is not None and not 1e-9 < np.linalg.norm(self.tool) < math.inf:
             raise ReachError("the tool must point somewhere, e.g. 0 0 -1 for down, got %s" % (self.tool,))
 
     @property
@@ -78,18 +85,20 @@ def compute(chain, settings, folder, processes, progress=lambda done, total: Non
     """
     parts = _Parts(Path(folder), settings)
     centres = settings.centres()
-    todo = [first for first in range(0, len(centres), _CHUNK) if not parts.path(first).exists()]
-    done = len(centres) - sum(min(_CHUNK, len(centres) - first) for first in todo)
+    sizes = {first: min(_CHUNK, len(centres) - first) for first in range(0, len(centres), _CHUNK)}
+    values = parts.load(sizes)
+    todo = [first for first in sizes if first not in values]
+    done = sum(sizes[first] for first in values)
     progress(done, len(centres))
     if todo:
         context = multiprocessing.get_context("fork")
         with context.Pool(min(processes, len(todo)), _begin, (chain, settings, parts)) as pool:
             for first in pool.imap_unordered(_work, todo):
-                done += min(_CHUNK, len(centres) - first)
+                done += sizes[first]
                 progress(done, len(centres))
-    loaded = [np.load(parts.path(first)) for first in range(0, len(centres), _CHUNK)]
-    return tuple(np.concatenate([part[name] for part in loaded]).reshape(settings.shape)
-                 for name in ("share", "manipulability"))
+        values.update(parts.load({first: sizes[first] for first in todo}))
+    share, manipulability = zip(*(values[first] for first in sizes), strict=True)
+    return np.concatenate(share).reshape(settings.shape), np.concatenate(manipulability).reshape(settings.shape)
 
 
 def cell_values(chain, settings, centres):
@@ -127,22 +136,43 @@ class _Parts:
         wanted = json.loads(json.dumps(asdict(settings)))
         note = self._folder / "settings.json"
         if note.exists():
-            found = json.loads(note.read_text())
-            other = sorted(key for key in wanted if found.get(key) != wanted[key])
+            try:
+                found = json.loads(note.read_text())
+                kept = {key: found[key] for key in wanted}
+            except (ValueError, LookupError, TypeError):
+                raise ReachError("'%s' does not say what map it belongs to; choose another folder or delete '%s'"
+                                 % (note, self._folder)) from None
+            other = sorted(key for key in wanted if kept[key] != wanted[key])
             if other:
                 raise ReachError("'%s' holds parts of a map with another %s (%s there); choose another folder or "
-                                 "delete it" % (self._folder, other[0], found.get(other[0])))
+                                 "delete it" % (self._folder, other[0], kept[other[0]]))
         else:
-            note.write_text(json.dumps(wanted, indent=1) + "\n")
+            # Under another name until it is whole, like the parts: what is there counts.
+            unfinished = self._folder / (".settings.%d.json" % os.getpid())
+            unfinished.write_text(json.dumps(wanted, indent=1) + "\n")
+            unfinished.rename(note)
 
-    def path(self, first):
-        return self._folder / ("%07d.npz" % first)
+    def load(self, sizes):
+        """Return {first cell: (share, manipulability)} of those parts of ``sizes`` {first cell: cells} that are whole.
+        """
+        values = {}
+        for first, size in sizes.items():
+            try:
+                with np.load(self._path(first)) as part:
+                    value = part["share"], part["manipulability"]
+            except (OSError, ValueError, LookupError, EOFError, zipfile.BadZipFile):
+                continue  # not there, or cut off when the machine went down
+            if value[0].shape == value[1].shape == (size,):
+                values[first] = value
+        return values
 
     def save(self, first, share, manipulability):
-        # Under another name until it is whole: what is there counts as done.
         unfinished = self._folder / (".%07d.%d.npz" % (first, os.getpid()))
         np.savez(unfinished, share=share, manipulability=manipulability)
-        unfinished.rename(self.path(first))
+        unfinished.rename(self._path(first))
+
+    def _path(self, first):
+        return self._folder / ("%07d.npz" % first)
 
 
 _task = None  # of a worker process: (chain, settings, parts)

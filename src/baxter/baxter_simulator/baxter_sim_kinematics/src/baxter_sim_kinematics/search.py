@@ -47,8 +47,9 @@ class Search:
     def __init__(self, chain, target, seed, goal, tolerance_m, tolerance_rad, max_starts=MAX_STARTS,
                  max_iterations=MAX_ITERATIONS):
         """Raises ValueError for tolerances or budgets with which nothing can be found."""
-        if not (tolerance_m > 0.0 and tolerance_rad > 0.0 and max_starts >= 1 and max_iterations >= 1):
-            raise ValueError("tolerances must be positive and max_starts, max_iterations at least 1")
+        if not (tolerance_m > 0.0 and tolerance_rad > 0.0 and 1 <= max_starts < math.inf
+                and 1 <= max_iterations < math.inf):
+            raise ValueError("tolerances must be positive and max_starts, max_iterations finite and at least 1")
         self.chain, self.target, self.seed, self.goal = chain, target, seed, goal
         self.max_starts, self.max_iterations = int(max_starts), int(max_iterations)
         self._tolerances = (float(tolerance_m), float(tolerance_rad))

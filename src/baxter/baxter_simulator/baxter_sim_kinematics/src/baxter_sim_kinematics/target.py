@@ -21,10 +21,14 @@ def pose_from_quaternion(position, quaternion_xyzw):
     A quaternion whose length is off by less than 0.01 is normalised. Raises InvalidTarget for any other length and for
     numbers that are not finite.
     """
-    numbers = [float(number) for number in (*position, *quaternion_xyzw)]
+    try:
+        x, y, z = position
+        numbers = [float(number) for number in (x, y, z, *quaternion_xyzw)]
+    except (TypeError, ValueError):
+        numbers = []
     if len(numbers) != 7 or not all(map(math.isfinite, numbers)):
         raise InvalidTarget("position and orientation must be seven finite numbers, got position %s and quaternion "
-                            "(x y z w) %s" % (numbers[:3], numbers[3:]), numbers)
+                            "(x y z w) %s" % (position, quaternion_xyzw), (position, quaternion_xyzw))
     length = math.sqrt(sum(number * number for number in numbers[3:]))
     if abs(length - 1.0) > ROUNDED:
         hint = "; the identity is 0 0 0 1" if length == 0.0 else ""
@@ -59,7 +63,8 @@ class Target:
             raise InvalidTarget("the target must be a 4 x 4 pose matrix, got %r" % (pose,), pose)
         self.rotation, self.position, self.basis = np.empty((3, 3)), np.empty(3), _NO_AXIS
         if not kernels.split_pose(matrix, ROUNDED, self.rotation, self.position):
-            raise InvalidTarget("the target must hold a finite position and a rotation, got\n%s" % matrix, pose)
+            raise InvalidTarget("the target must hold a finite position, a rotation, and 0 0 0 1 in its last row, "
+                                "got\n%s" % matrix, pose)
         self.rows = 6
         if free_axis is not None:
             self.rows, self.basis = 5, np.empty((3, 3))
@@ -77,7 +82,10 @@ class Target:
 
 
 def _direction(axis):
-    vector = np.array(axis, dtype=np.float64)
+    try:
+        vector = np.array(axis, dtype=np.float64)
+    except (TypeError, ValueError):
+        vector = np.empty(0)
     length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
     if not math.isfinite(length) or length < 1e-9:
         raise ValueError("the free axis must be a direction of three numbers, e.g. (0, 0, 1), got %r" % (axis,))

@@ -13,7 +13,8 @@ from baxter_sim_kinematics.kernels.motion import fill_jacobian, place_joints
 def split_pose(pose, allowed, rotation, position):
     """Copy a pose (4, 4) into ``rotation`` (3, 3), made exactly orthonormal, and ``position`` (3,).
 
-    Returns False when a number is not finite or the rotation is off by more than ``allowed`` in any product of columns.
+    Returns False when a number is not finite, the rotation is off by more than ``allowed`` in any product of columns,
+    or the last row is not 0 0 0 1, as that of a transposed pose.
     """
     gram, rounded = np.empty((3, 3)), np.empty((3, 3))
     for a in range(3):
@@ -22,6 +23,9 @@ def split_pose(pose, allowed, rotation, position):
             rotation[a, b] = pose[a, b]
     if not math.isfinite(position[0] + position[1] + position[2]):
         return False
+    for b in range(4):
+        if not abs(pose[3, b] - (1.0 if b == 3 else 0.0)) <= 1e-9:
+            return False
     while True:
         error = 0.0
         for a in range(3):
