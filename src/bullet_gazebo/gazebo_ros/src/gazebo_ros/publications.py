@@ -16,7 +16,7 @@ _CLOCK_BYTES = 8
 # Faster than real time the clock is not published at every tick, nor is the snapshot written as often as in real time:
 # at most this often per wall second [Hz]. No viewer draws more often than that.
 MAX_WALL_CLOCK_RATE = 500.0
-MAX_WALL_SNAPSHOT_RATE = 200.0
+MAX_WALL_SNAPSHOT_RATE = 100.0
 # Model and link states and the snapshot go out at this rate, in simulation time [Hz].
 STATES_RATE = 100.0
 # How often the snapshot is written in a paused world, where services still move things [Hz, wall time].
