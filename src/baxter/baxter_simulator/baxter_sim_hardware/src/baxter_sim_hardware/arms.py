@@ -96,6 +96,7 @@ class _Limb:
         self.timeout_s = COMMAND_TIMEOUT_S
         self.floats = False
         self.yields = False
+        self.balanced = True
 
 
 class Arms:
@@ -248,7 +249,10 @@ class Arms:
 
     def set_gravity_compensation(self, side, on):
         """Whether a limb's torque mode adds the torque that balances gravity."""
-        self._balanced[self._limbs[side].index] = float(on)
+        limb = self._limbs[side]
+        if on != limb.balanced:
+            limb.balanced = on
+            self._balanced[limb.index] = float(on)
 
     def set_floating(self, side, floats, position, velocity):
         """Have a limb float without resistance, or hold where it is then; (n,) measured. It takes no commands while."""
