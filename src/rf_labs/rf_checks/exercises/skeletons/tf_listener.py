@@ -28,6 +28,7 @@ def main():
     rospy.init_node("my_tf_listener", anonymous=True)
     buffer = tf2_ros.Buffer()
     listener = tf2_ros.TransformListener(buffer)  # noqa: F841  (fills the buffer as long as it lives)
+    rospy.sleep(0.1)  # now is 0 until the first /clock comes, and a time-out that began at 0 would be over by then
     for target, source in pairs:
         found = buffer.lookup_transform(target, source, rospy.Time(0), rospy.Duration(5.0))
         print("%s -> %s %s\n%s" % (target, source, words, matrix(found.transform)))

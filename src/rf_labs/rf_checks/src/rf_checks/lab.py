@@ -27,8 +27,9 @@ START_TIMEOUT_S = 60.0
 RESET_TIMEOUT_S = 20.0
 STOP_TIMEOUT_S = 20.0
 RECORD_S = 0.01
-#: Programs on whose answers a student's program waits: time must not run away meanwhile either.
-HELPERS = ("position_kinematics",)
+#: Programs on whose answers a student's program waits, or that have yet to take in what it sent: time must not run away
+#: meanwhile either.
+HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserver")
 #: Nodes that come and go by themselves.
 TRANSIENT = frozenset(("/urdf_spawner",))
 _CALLER = "/lab_judge"
@@ -159,7 +160,7 @@ class Lab:
                         master.unregisterService(node, service, unregister_uri)
 
     def helper_pids(self):
-        """Process ids of the nodes that answer programs' questions."""
+        """Process ids of HELPERS in this lab."""
         found = []
         for entry in Path("/proc").iterdir():
             with contextlib.suppress(OSError):
