@@ -148,10 +148,17 @@ class GoalLoop:
 def start(server):
     """Start an actionlib.ActionServer whose status goes on when simulated time goes back, as at a restart.
 
-    actionlib's own timer would end then, for good.
+    actionlib's own timer would end then, for good. When it fires while Ctrl-C closes its topic, nobody need know.
     """
+
+    def publish_status(event):
+        try:
+            server.publish_status_async(event)
+        except rospy.ROSException:
+            if not rospy.is_shutdown():
+                raise
+
     server.start()
     if server.status_frequency > 0.0:
         server.status_timer.shutdown()
-        server.status_timer = rospy.Timer(rospy.Duration(1.0 / server.status_frequency), server.publish_status_async,
-                                          reset=True)
+        server.status_timer = rospy.Timer(rospy.Duration(1.0 / server.status_frequency), publish_status, reset=True)
