@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from lab_testing.waiting import wait_until
+
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [
     pytest.mark.build,
@@ -64,10 +66,13 @@ def kill_in(folder, step, words):
     log.unlink(missing_ok=True)
     process = subprocess.Popen([folder / "baxter.sh", "setup", *words], cwd=folder, env=clean_environment(),
                                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True)
-    deadline = time.monotonic() + LIMIT_S
-    while not (log.exists() and "\n$ " in log.read_text(errors="replace")):
-        assert process.poll() is None and time.monotonic() < deadline, f"set-up never began with {step}"
-        time.sleep(0.005)
+
+    def is_at_work():
+        assert process.poll() is None, f"set-up ended before it began with {step}"
+        return log.exists() and "\n$ " in log.read_text(errors="replace")
+
+    wait_until(is_at_work, f"set-up to begin with {step}", LIMIT_S, 0.005)
+    # The moment of the kill is what is tested.
     time.sleep(KILL_AFTER_S[step])
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()

@@ -7,14 +7,14 @@ import tempfile
 import unittest
 
 import rospy
-from baxter_core_msgs.msg import JointCommand
+from baxter_core_msgs.msg import DigitalIOState, JointCommand
 from bullet_sim_msgs.srv import Press, PressRequest
 
-from baxter_dataflow.ros_clock import RosClock
 from baxter_examples import recording
 from baxter_interface import Limb, RobotEnable
 from baxter_interface.joint_checks import SIDES
 from lab_testing.fake_joystick import FakeJoystick
+from lab_testing.waiting import wait_for_message
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from example_program import Program, wait_until  # noqa: E402
@@ -107,10 +107,13 @@ class RecordingTest(ArmsTest):
 class SideBySideTest(ArmsTest):
     def press(self, button):
         press = rospy.ServiceProxy("/robot/sim/press", Press)
-        for action in (PressRequest.PRESS, PressRequest.RELEASE):
-            self.assertTrue(press(component="left_button_" + button, action=action).success)
+        component = "left_button_" + button
+        for action, state in ((PressRequest.PRESS, DigitalIOState.PRESSED),
+                              (PressRequest.RELEASE, DigitalIOState.UNPRESSED)):
+            self.assertTrue(press(component=component, action=action).success)
             # A press shorter than a message would not be seen.
-            RosClock().sleep(0.1)
+            wait_for_message("/robot/digital_io/%s/state" % component, DigitalIOState,
+                             lambda message, state=state: message.state == state)
 
     def test_waypoints_of_one_arm_while_the_other_follows_a_trajectory(self):
         client = self.start("joint_trajectory_client.launch", "limb:=right")

@@ -6,13 +6,14 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 from socketserver import ThreadingMixIn
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 import yaml
+
+from lab_testing.waiting import wait_until
 
 PACKAGE = Path(__file__).resolve().parents[2]
 NODE = "/ik_node_that_ends"
@@ -61,6 +62,13 @@ def master(baxter_xml):
     master.close()
 
 
+def is_pending(pid, number):
+    """Whether a process has a signal that it has not handled yet."""
+    status = Path("/proc/%d/status" % pid).read_text()
+    waiting = [int(line.split()[1], 16) for line in status.splitlines() if line.startswith(("SigPnd:", "ShdPnd:"))]
+    return any(mask >> (number - 1) & 1 for mask in waiting)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("call, subject", [
     ("registerPublisher", "/rosout"), ("registerSubscriber", "/robot/joint_states"),
@@ -75,7 +83,7 @@ def test_a_signal_during_a_registration_ends_the_node(master, call, subject, num
         if name == call and arguments[1] == subject and not reached.is_set():
             node.send_signal(number)
             # rospy is in the middle of this call, with its lock in hand, when the signal is handled.
-            time.sleep(0.3)
+            wait_until(lambda: not is_pending(node.pid, number), "the signal to be handled")
             reached.set()
 
     master.on_call = strike
