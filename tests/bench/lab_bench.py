@@ -34,6 +34,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Empty
 
+from lab_testing.waiting import wait_until
+
 SIDES = ("left", "right")
 JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
 NEUTRAL = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0)
@@ -119,12 +121,12 @@ class Lab:
         os.environ.update(environment)
         self._start(["roscore", "-p", str(port)], environment)
         self.master = xmlrpc.client.ServerProxy(environment["ROS_MASTER_URI"])
-        self._await(self._master_answers, "the master")
+        wait_until(self._master_answers, "the master", 60.0)
         self.master.setParam("/lab_bench", "/gazebo/model_plugins", {"libbench_busy.so": "busy_plugin:BusyPlugin"})
         command = ["roslaunch", *self.launch]
         command += [f"gui:={str(self.gui).lower()}", f"rviz:={str(self.rviz).lower()}", "enable:=true"]
         self._start(command, environment)
-        self._await(lambda: self.master.hasParam("/lab_bench", "/use_sim_time")[2], "roslaunch")
+        wait_until(lambda: self.master.hasParam("/lab_bench", "/use_sim_time")[2], "roslaunch", 60.0)
         rospy.init_node("lab_bench", disable_signals=True)
         rospy.wait_for_message("/robot/sim/started", Empty, timeout=60)
         self.gazebo = Process(self._pid("/gazebo"))
@@ -159,14 +161,6 @@ class Lab:
             process.wait(15)
         except subprocess.TimeoutExpired:
             process.kill()
-
-    @staticmethod
-    def _await(condition, what, limit_s=60.0):
-        deadline = time.monotonic() + limit_s
-        while not condition():
-            if time.monotonic() > deadline:
-                raise SystemExit(f"{what} did not come up within {limit_s:g} s")
-            time.sleep(0.05)
 
     def _master_answers(self):
         try:

@@ -19,6 +19,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, UInt16
 from std_srvs.srv import Empty
 
+from lab_testing.waiting import wait_until
+
 SIDES = ("left", "right")
 JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
 NEUTRAL = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0)
@@ -94,8 +96,7 @@ def posture():
     """The joint states of a robot that stands in its neutral posture, at the robot's own rate."""
     names = ["%s_%s" % (side, joint) for side in SIDES for joint in JOINTS]
     publisher = rospy.Publisher("/robot/joint_states", JointState, queue_size=1)
-    while not publisher.get_num_connections():
-        time.sleep(0.01)
+    wait_until(publisher.get_num_connections, "somebody to listen", 60.0)
     up()
     while not rospy.is_shutdown():
         message = JointState(name=names, position=2 * NEUTRAL)
@@ -118,19 +119,14 @@ def latency(count):
     rospy.Subscriber("/robot/joint_states", JointState, note)
     advance = rospy.ServiceProxy("/gazebo/advance", AdvanceTicks, persistent=True)
     advance.wait_for_service(60)
-    while not commands.get_num_connections():
-        time.sleep(0.01)
+    wait_until(commands.get_num_connections, "the robot to listen", 60.0)
     rospy.ServiceProxy("/gazebo/pause_physics", Empty)()
 
     def position_after(ticks, await_topics=()):
         answer = advance(ticks, list(await_topics), 20.0)
         if not answer.success:
             raise SystemExit(answer.status_message)
-        deadline = time.monotonic() + 20.0
-        while answer.sim_time not in states:
-            if time.monotonic() > deadline:
-                raise SystemExit("no joint states of %s" % answer.sim_time.to_sec())
-            time.sleep(0.0005)
+        wait_until(lambda: answer.sim_time in states, "joint states of %s" % answer.sim_time.to_sec(), 20.0, 0.0005)
         return states[answer.sim_time]
 
     up()

@@ -16,6 +16,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
+from lab_testing.waiting import wait_until
+
 HERE = Path(__file__).resolve().parent
 WORLD = ("baxter_gazebo", "baxter_world.launch")
 START_LIMIT_S = 120.0
@@ -39,10 +41,10 @@ class Lab:
             self.environment = dict(os.environ, ROS_MASTER_URI=uri, ROS_HOSTNAME="localhost")
             self.master = xmlrpc.client.ServerProxy(uri)
             self.start("roscore", "-p", str(port))
-            self._await(self._answers, "the master")
+            wait_until(self._answers, "the master", START_LIMIT_S, 0.02)
             begin = time.monotonic()
             self.start("roslaunch", *self._launch, *("%s:=%s" % pair for pair in self._arguments.items()))
-            self._await(self._is_ready, "%s of %s" % (self._ready, " ".join(self._launch)))
+            wait_until(self._is_ready, "%s of %s" % (self._ready, " ".join(self._launch)), START_LIMIT_S, 0.02)
             self.started_s = time.monotonic() - begin
             self._stack = stack.pop_all()
         return self
@@ -107,14 +109,6 @@ class Lab:
         with contextlib.closing(self.sink(self._ready, Empty)) as connection:
             Sink(connection).message()
         return True
-
-    @staticmethod
-    def _await(condition, what):
-        deadline = time.monotonic() + START_LIMIT_S
-        while not condition():
-            if time.monotonic() > deadline:
-                raise SystemExit("%s did not come up within %g s" % (what, START_LIMIT_S))
-            time.sleep(0.02)
 
 
 class Sink:

@@ -7,42 +7,34 @@ import pybullet
 from labs import Lab
 from tick_bench import NAMES, NEUTRAL, Loop
 
+from lab_testing.waiting import wait_until
+
 SECONDS = 6.0
 SETTLE_S = 5.0  # simulated
 BARE_STEPS = 4000
 
 
-class Bare:
-    """The same robot as the plugin leaves it, on the same floor: every joint driven, fingers coupled, arms swinging.
+def bare_factor(steps):
+    """Return simulated seconds a second of stepSimulation, which alone is timed.
 
-    Nothing but stepSimulation is timed.
+    The robot is as the plugin leaves it, on the same floor: every joint driven, fingers coupled, arms swinging.
     """
-
-    def __init__(self):
-        self._loop = Loop().__enter__()
-        self._model = self._loop.world.models["baxter"]
-        self._index = self._model.index([name for names in NAMES.values() for name in names])
-        self._middle = np.array(list(NEUTRAL.values()) * len(NAMES))
-
-    def factor(self, steps):
-        """Return simulated seconds a second of stepping."""
-        spent, client = 0.0, self._loop.world._client
+    with Loop() as loop:
+        model, client = loop.world.models["baxter"], loop.world._client
+        index = model.index([name for names in NAMES.values() for name in names])
+        middle = np.array(list(NEUTRAL.values()) * len(NAMES))
+        spent = 0.0
         for tick in range(steps):
-            goal = self._middle + 0.3 * np.sin(0.004 * tick)
-            self._model.drive_position(self._index, goal, self._model.max_effort[self._index])
+            model.drive_position(index, middle + 0.3 * np.sin(0.004 * tick), model.max_effort[index])
             begin = time.perf_counter()
             pybullet.stepSimulation(physicsClientId=client)
             spent += time.perf_counter() - begin
-        return steps * self._loop.world.time_step_s / spent
-
-    def close(self):
-        self._loop.__exit__()
+        return steps * loop.world.time_step_s / spent
 
 
 def measure(report, quick, number):
     seconds = 1.0 if quick else SECONDS
     steps = BARE_STEPS // 10 if quick else BARE_STEPS
-    bare = Bare()
     flat_out = {"gui": "false", "real_time_factor": "0", "enable": "true"}
 
     def with_parts(*parts):
@@ -51,13 +43,11 @@ def measure(report, quick, number):
             for part in parts:
                 lab.part(*part)
             settled = lab.now() + SETTLE_S
-            while lab.now() < settled:
-                time.sleep(0.1)
+            wait_until(lambda: lab.now() >= settled, "what lies around to fall asleep", 120.0, 0.1)
             return lab.factor(seconds)
 
     # Bare steps want a core of their own, or they measure the lab's appetite: before the lab, not beside it.
-    alone_bare = bare.factor(steps)
-    bare.close()
+    alone_bare = bare_factor(steps)
     alone = with_parts(("swing",))
     report.add("arms moving, flat out: real-time factor", alone, "x", least=10.0)
     report.add("arms moving: time a tick, beside bare steps", 2.0 / alone, "ms", ("stepSimulation", 2.0 / alone_bare),
