@@ -155,7 +155,8 @@ def start(server):
         try:
             server.publish_status_async(event)
         except rospy.ROSException:
-            if not rospy.is_shutdown():
+            # rospy closes topics a little before is_shutdown() is true.
+            if not rospy.core.is_shutdown_requested():
                 raise
 
     server.start()

@@ -15,7 +15,7 @@ def test_a_status_on_a_closed_topic_is_an_error_only_while_the_node_runs(monkeyp
 
     callbacks = []
     monkeypatch.setattr(rospy, "Timer", lambda period, callback, reset: callbacks.append(callback))
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: ends)
+    monkeypatch.setattr(rospy.core, "_in_shutdown", ends)  # set before topics are closed; is_shutdown() comes after
     goal_loop.start(SimpleNamespace(start=lambda: None, status_frequency=5.0, publish_status_async=publish,
                                     status_timer=SimpleNamespace(shutdown=lambda: None)))
     if ends:
