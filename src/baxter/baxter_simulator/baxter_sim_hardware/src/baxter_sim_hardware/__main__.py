@@ -2,15 +2,14 @@
 """``python3 -m baxter_sim_hardware``: compile everything into the cache, so that no start has to wait for it."""
 import numpy as np
 
-from baxter_sim_hardware.setpoint import any_beyond, approach, follow
+from baxter_sim_hardware.setpoint import SetPoints, any_beyond, approach, follow
 
 
 def main():
     here, at_rest, bound = np.zeros(1), np.zeros(1), np.ones(1)
     approach(here, at_rest, here, bound, bound, 1.0)
-    nowhere = np.zeros(1, dtype=bool)
-    follow(here, at_rest, np.zeros(1), bound, bound, nowhere, bound, nowhere, here, at_rest, np.zeros((1, 1)), 0,
-           np.zeros(1), np.zeros(1), here, 1.0, 1.0)
+    points = SetPoints(1)
+    follow(points.numbers, points.flags, np.zeros((1, 1)), 0, here, 1.0, 1.0)
     any_beyond(1.0, here, at_rest, here, 1.0)
 
 

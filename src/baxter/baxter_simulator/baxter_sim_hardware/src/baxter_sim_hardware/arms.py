@@ -27,7 +27,7 @@ import numpy as np
 
 from .errors import CommandRefused
 from .joint_command import CommandParser, Mode
-from .setpoint import MovingAverage, any_beyond, follow, stopping_point
+from .setpoint import MovingAverage, SetPoints, any_beyond, follow, stopping_point
 
 COMMAND_TIMEOUT_S = 0.2  # the robot's own
 SPEED_RATIO = {"sim": 1.0, "robot": 0.3}  # at start, by profile; 0.3 is what the physical robot starts with
@@ -112,20 +112,20 @@ class Arms:
         for limb in self._limbs.values():
             limb.speed_ratio = speed_ratio
         self._dt = dt
-        self._acceleration = np.array([ACCELERATION[name.rsplit("_", 1)[1]] for name in limits.names])
         count = len(limits.names)
+        points = self._points = SetPoints(count)
+        self._reference, self._rate, self._target = points.position, points.velocity, points.target
+        self._output, self._output_rate = points.output, points.output_rate
+        self._braking, self._streams = points.braking, points.streams
+        points.acceleration[:] = [ACCELERATION[name.rsplit("_", 1)[1]] for name in limits.names]
+        points.stopping[:] = STOP_ACCELERATION_FACTOR * points.acceleration
         self._all = np.arange(count)
         self._none = np.zeros(0, dtype=int)
         self._mode = np.full(count, Mode.POSITION, dtype=int)
         self._value = np.zeros(count)  # last commanded velocity or torque
         self._deadline = np.full(count, np.inf)
         self._may_expire = False
-        self._stream_goal = np.zeros(count)  # raw mode: where the target is on its way to, and how fast
-        self._stream_rate = np.zeros(count)
         self._stream_stamp = np.full(count, -np.inf)
-        self._speed = np.zeros(count)
-        self._braking = np.zeros(count, dtype=bool)
-        self._stopping = STOP_ACCELERATION_FACTOR * self._acceleration  # (n,) [rad/s^2]
         self._brake_ticks = 0  # left, of BRAKES_S
         self._yielding = np.zeros(count, dtype=bool)
         self._any_yields = False
@@ -141,12 +141,10 @@ class Arms:
         everything = np.ones(len(self._mode), dtype=bool)
         for limb in self._limbs.values():
             limb.floats = False
-        self._reference = np.array(position, dtype=float)
-        self._rate = np.zeros(len(position))
-        self._output = self._reference.copy()
-        self._output_rate = np.zeros(len(position))
+        self._reference[:] = self._output[:] = position
+        self._rate[:] = self._output_rate[:] = 0.0
         self._smoothing.restart(everything, self._reference)
-        self._target = self._clamped(self._reference)
+        self._target[:] = self._clamped(self._reference)
         self._set_mode(everything, Mode.POSITION)
         self._refresh_speed()
 
@@ -296,7 +294,8 @@ class Arms:
 
         brakes: whether the brakes are on from now, which stop harder than the drives alone; until the next stop.
         """
-        self._stopping = (BRAKES_ACCELERATION_FACTOR if brakes else STOP_ACCELERATION_FACTOR) * self._acceleration
+        factor = BRAKES_ACCELERATION_FACTOR if brakes else STOP_ACCELERATION_FACTOR
+        self._points.stopping[:] = factor * self._points.acceleration
         self._brake_ticks = round(BRAKES_S / self._dt) if brakes else 0
         for limb in self._limbs.values():
             limb.mode = Mode.POSITION
@@ -372,8 +371,8 @@ class Arms:
         is_fresh = goes_on & (time_s - self._feed_forward_stamp[index] <= FEED_FORWARD_S)
         ahead = np.where(is_fresh, self._feed_forward[index] * np.minimum(gap, STREAM_GAP_S), 0.0)
         goal = np.clip(command.values + ahead, self.limits.lower[index], self.limits.upper[index])
-        self._stream_rate[index] = np.clip((goal - self._target[index]) / gap, -limit, limit)
-        self._stream_goal[index] = goal
+        self._points.pace[index] = np.clip((goal - self._target[index]) / gap, -limit, limit)
+        self._points.goal[index] = goal
         self._stream_stamp[index] = time_s
 
     @property
@@ -394,10 +393,8 @@ class Arms:
     def _move_reference(self, position):
         """One tick of the set-points; returns whether any leads its joint, measured at (n,), by more than it may."""
         smoothing = self._smoothing
-        rests, braked, leads = follow(
-            self._reference, self._rate, self._target, self._speed, self._acceleration, self._braking, self._stopping,
-            self._streams, self._stream_goal, self._stream_rate, smoothing.window, smoothing.oldest,
-            self._output, self._output_rate, position, self._reach, self._dt)
+        rests, braked, leads = follow(self._points.numbers, self._points.flags, smoothing.window, smoothing.oldest,
+                                      position, self._reach, self._dt)
         smoothing.turn()
         if braked:
             # At the target and at rest: with the weaker acceleration of other motions it would overshoot.
@@ -428,7 +425,7 @@ class Arms:
 
     def _resting_point(self):
         """(n,) [rad] where the set-points come to rest if they brake now."""
-        return self._clamped(stopping_point(self._reference, self._rate, self._stopping))
+        return self._clamped(stopping_point(self._reference, self._rate, self._points.stopping))
 
     def _hold(self, joints, position, velocity):
         """Stop the joints in the mask and keep them where they come to rest."""
@@ -436,9 +433,9 @@ class Arms:
             return
         self._follow_joint(joints & self._in_torque, position, velocity)
         # Brake from where the drives are now, not from where smoothing would still take them.
-        self._reference = np.where(joints, self._output, self._reference)
-        self._rate = np.where(joints, self._output_rate, self._rate)
-        self._target = np.where(joints, self._resting_point(), self._target)
+        self._reference[joints] = self._output[joints]
+        self._rate[joints] = self._output_rate[joints]
+        self._target[joints] = self._resting_point()[joints]
         self._set_mode(joints, Mode.POSITION)
         self._braking |= joints
         self._refresh_speed()
@@ -453,7 +450,7 @@ class Arms:
     def _set_mode(self, joints, mode):
         self._is_settled = False
         self._mode[joints] = mode
-        self._streams, self._in_torque = self._mode == _RAW_POSITION, self._mode == _TORQUE
+        self._streams[:], self._in_torque = self._mode == _RAW_POSITION, self._mode == _TORQUE
         self._any_in_torque, self._all_in_position = bool(self._in_torque.any()), bool((self._mode == _POSITION).all())
         self._value[joints] = 0.0
         self._deadline[joints] = np.inf
@@ -464,11 +461,12 @@ class Arms:
 
     def _refresh_speed(self):
         """Cruising speed of each joint's set-point [rad/s], by mode."""
-        self._speed = self.limits.velocity.copy()
+        speed = self._points.speed
+        speed[:] = self.limits.velocity
         for limb in self._limbs.values():
             if limb.speed_ratio != 1.0:
                 profiled = limb.index[(self._mode[limb.index] == _POSITION) & ~self._braking[limb.index]]
-                self._speed[profiled] *= limb.speed_ratio
+                speed[profiled] *= limb.speed_ratio
         in_velocity = self._mode == _VELOCITY
         if in_velocity.any():
-            self._speed[in_velocity] = np.abs(self._value[in_velocity])
+            speed[in_velocity] = np.abs(self._value[in_velocity])

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Set-points that move no faster and no harder than allowed, and arrive exactly."""
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -45,28 +44,41 @@ def approach(position, velocity, target, speed, acceleration, dt):
     return new_position, new_velocity
 
 
-class Moved(NamedTuple):
-    """What :func:`follow` found."""
+class SetPoints:
+    """What `follow` moves, (n,) each.
 
-    rests: bool  # every set-point stands on its target
-    braked: bool  # some of them were braking when the tick began
-    leads: bool  # some of them is too far from its joint
+    position [rad], velocity [rad/s]: where the set-points are. target [rad]: where they go, at most at speed [rad/s]
+    and with acceleration [rad/s^2], or, where `braking`, with stopping [rad/s^2]. Where `streams`, the target is itself
+    on the way to goal [rad], by at most pace [rad/s] (of either sign). output [rad], output_rate [rad/s]: what the
+    drives shall follow, position smoothed.
+
+    All are views of two arrays, `numbers` and `flags`: a compiled function takes more time to be handed fifteen arrays
+    than to move fourteen joints.
+    """
+
+    def __init__(self, count):
+        self.numbers, self.flags = np.zeros((10, count)), np.zeros((2, count), dtype=bool)
+        (self.position, self.velocity, self.target, self.speed, self.acceleration, self.stopping, self.goal, self.pace,
+         self.output, self.output_rate) = self.numbers
+        self.braking, self.streams = self.flags
 
 
 @_compiled
-def follow(position, velocity, target, speed, acceleration, braking, stopping, streams, goal, pace, window, oldest,
-           output, output_rate, measured, reach, dt):
+def follow(numbers, flags, window, oldest, measured, reach, dt):
     """One tick of `approach`, smoothed, for set-points of which some brake and some follow a stream.
 
-    All arrays (n,) but window, (k, n), the last k values of position, of which row `oldest` is replaced. Moved in
-    place: position [rad], velocity [rad/s], the target of streams, window, and output [rad] and output_rate [rad/s],
-    which are the mean over the window and its rate. Returns `Moved`.
+    numbers, flags: of `SetPoints`, moved in place; window: (k, n), the last k values of position, of which row `oldest`
+    is replaced, and whose mean is the output. measured: (n,) where the joints are [rad], before this tick; reach [rad]:
+    what a set-point may lead by. The profile of one that streams runs in a frame that moves with the target, so that a
+    smooth stream is followed without lag; neither that nor braking is smoothed.
 
-    braking: the joints that brake with `stopping` instead of `acceleration` [rad/s^2]. streams: the joints whose target
-    is itself on the way to goal [rad], by at most pace [rad/s] (of either sign); their profile runs in a frame that
-    moves with the target, so that a smooth stream is followed without lag. Neither is smoothed. measured: where the
-    joints are [rad], before this tick; reach [rad]: what a set-point may lead by.
+    Returns whether every set-point rests on its target; whether some were braking when the tick began; whether some are
+    too far from their joints.
     """
+    position, velocity, target, speed, acceleration, stopping, goal, pace, output, output_rate = (
+        numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8],
+        numbers[9])
+    braking, streams = flags[0], flags[1]
     rests, braked, leads = True, False, False
     for i in range(len(position)):
         bound = stopping[i] if braking[i] else acceleration[i]
@@ -93,7 +105,7 @@ def follow(position, velocity, target, speed, acceleration, braking, stopping, s
         braked |= braking[i]
         rests &= velocity[i] == 0.0 and abs(mean - target[i]) < 1e-12
         leads |= abs(mean - output_rate[i] * dt - measured[i]) > reach
-    return Moved(rests, braked, leads)
+    return rests, braked, leads
 
 
 @_compiled

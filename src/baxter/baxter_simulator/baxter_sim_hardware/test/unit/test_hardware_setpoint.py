@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from baxter_sim_hardware.setpoint import MovingAverage, approach, follow, stopping_point
+from baxter_sim_hardware.setpoint import MovingAverage, SetPoints, approach, follow, stopping_point
 
 DT = 0.002
 
@@ -49,18 +49,23 @@ def test_brakes_to_its_stopping_point_in_one_go():
     assert path.max() <= rest + 1.2 * DT
 
 
+def fast_points(count):
+    """Set-points at zero that may go anywhere in a tick."""
+    points = SetPoints(count)
+    points.speed[:] = points.acceleration[:] = points.stopping[:] = 1e9
+    return points
+
+
 def smoothed(stairs, ticks=10):
     """What comes out of `follow` for set-points that jump from one of `stairs` (m, n) to the next, tick by tick."""
-    count = stairs.shape[1]
-    fast, no, zero = np.full(count, 1e9), np.zeros(count, dtype=bool), np.zeros(count)
-    average = MovingAverage(ticks, np.zeros(count))
-    position, velocity, output, output_rate = (np.zeros(count) for _ in range(4))
+    points, at_zero = fast_points(stairs.shape[1]), np.zeros(stairs.shape[1])
+    average = MovingAverage(ticks, at_zero)
     out = []
     for stair in stairs:
-        follow(position, velocity, stair.copy(), fast, fast, no, fast, no, zero, zero, average.window, average.oldest,
-               output, output_rate, zero, 1.0, DT)
+        points.target[:] = stair
+        follow(points.numbers, points.flags, average.window, average.oldest, at_zero, 1.0, DT)
         average.turn()
-        out.append(output.copy())
+        out.append(points.output.copy())
     return np.array(out)
 
 
@@ -76,23 +81,21 @@ def test_moving_average_arrives_exactly():
 
 @pytest.mark.parametrize("kind", ["braking", "streams"])
 def test_what_brakes_or_streams_is_not_smoothed(kind):
-    now, yes, no = np.zeros(2), np.array([True, False]), np.zeros(2, dtype=bool)
-    position, velocity, output, output_rate, goal = now.copy(), now.copy(), now.copy(), now.copy(), np.full(2, 1e-3)
-    flags = {"braking": no, "streams": no, kind: yes}
-    fast = np.full(2, 1e9)
-    moved = follow(position, velocity, goal.copy(), fast, fast, flags["braking"], fast, flags["streams"], goal, now,
-                   MovingAverage(10, now).window, 0, output, output_rate, now, 1.0, DT)
-    assert output == pytest.approx([1e-3, 1e-4], rel=1e-12)
-    assert output_rate == pytest.approx(output / DT, rel=1e-12)
-    assert moved.braked == (kind == "braking")
+    points, now = fast_points(2), np.zeros(2)
+    points.target[:] = points.goal[:] = 1e-3
+    getattr(points, kind)[0] = True
+    _, braked, _ = follow(points.numbers, points.flags, MovingAverage(10, now).window, 0, now, 1.0, DT)
+    assert points.output == pytest.approx([1e-3, 1e-4], rel=1e-12)
+    assert points.output_rate == pytest.approx(points.output / DT, rel=1e-12)
+    assert braked == (kind == "braking")
 
 
 def test_follow_tells_rest_and_a_lead():
     def tick(start, target, measured, reach):
-        here, still = np.array([start]), np.zeros(1)
-        limits, no = np.array([1.0]), np.zeros(1, dtype=bool)
-        return follow(here, still, np.array([target]), limits, 10.0 * limits, no, limits, no, still, still,
-                      np.full((5, 1), start), 0, here.copy(), np.zeros(1), np.array([measured]), reach, DT)
+        points = SetPoints(1)
+        points.position[:] = points.output[:] = start
+        points.target[:], points.speed[:], points.acceleration[:] = target, 1.0, 10.0
+        return follow(points.numbers, points.flags, np.full((5, 1), start), 0, np.array([measured]), reach, DT)
 
     assert tick(0.5, 0.5, 0.5, 1e-3) == (True, False, False)
     assert tick(0.5, 0.6, 0.5, 1e-3) == (False, False, False)
