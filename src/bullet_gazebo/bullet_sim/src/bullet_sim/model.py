@@ -56,6 +56,7 @@ class Model(Body):
         count = len(joints)
         self._all = list(range(count))
         self._packing = struct.Struct("%dd" % count)
+        self._reading, self._read_at = None, -1  # what `read_joints` said last, and after how many steps
         self._effort_driven, self._any_effort_driven = np.zeros(count, dtype=bool), False
         self._commanded_effort = np.zeros(count)
         self._zeros = [0.0] * count
@@ -78,10 +79,16 @@ class Model(Body):
             ) from None
 
     def read_joints(self):
-        """Return positions, velocities and efforts, three (n,) arrays, as they are after the last step.
+        """Return positions, velocities and efforts, three (n,) read-only arrays, as they are after the last step.
 
         The effort is what the drive applied during the last step.
         """
+        # Asked more than once a tick: by what controls, what publishes and what draws.
+        if self._reading is None or self._read_at != self._world.steps:
+            self._reading, self._read_at = self._read(), self._world.steps
+        return self._reading
+
+    def _read(self):
         if not self._all:
             return np.empty(0), np.empty(0), np.empty(0)
         states = pybullet.getJointStates(self.body, self._all, physicsClientId=self._client)
@@ -89,7 +96,8 @@ class Model(Body):
         effort = self._array(effort)
         if self._any_effort_driven:
             # Bullet's reading does not know of explicit torques.
-            effort[self._effort_driven] = self._commanded_effort[self._effort_driven]
+            effort = np.where(self._effort_driven, self._commanded_effort, effort)
+            effort.setflags(write=False)
         return self._array(position), self._array(velocity), effort
 
     def drive_position(self, index, position, max_effort, velocity=None):
@@ -135,6 +143,7 @@ class Model(Body):
             self.release(index)
             self._effort_driven[index] = self._any_effort_driven = True
         self._commanded_effort[index] = effort
+        self._reading = None
         pybullet.setJointMotorControlArray(
             self.body, index.tolist(), pybullet.TORQUE_CONTROL, forces=effort.tolist(), physicsClientId=self._client
         )
@@ -192,6 +201,7 @@ class Model(Body):
                 np.zeros((len(index), 1)).tolist(),
                 physicsClientId=self._client,
             )
+            self._reading = None
         self._world.wake_all()
 
     def gravity_efforts(self, position=None):
@@ -252,7 +262,7 @@ class Model(Body):
 
     def _array(self, values):
         """Return the (n,) floats ``values`` as an array, in a third of the time that np.array takes for a tuple."""
-        return np.frombuffer(bytearray(self._packing.pack(*values)))
+        return np.frombuffer(self._packing.pack(*values))
 
     def _gravity_in_base(self):
         """Return gravity (3,) in the axes of a fixed root, or None where gravity is the same in both."""
@@ -269,6 +279,7 @@ class Model(Body):
         if self._any_effort_driven:
             self._effort_driven[index] = False
             self._any_effort_driven = bool(self._effort_driven.any())
+            self._reading = None
 
     def _set_damping(self, joints):
         self.damping = np.zeros(len(joints))  # (n,) as it acts, [Nm s/rad] or [N s/m]

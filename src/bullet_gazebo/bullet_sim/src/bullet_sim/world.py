@@ -61,6 +61,8 @@ class World:
         self.time_step_s = time_step_s
         self.solver_iterations = solver_iterations
         self.tick = 0
+        #: How many steps there have been, which a reset of the time does not take back.
+        self.steps = 0
         self.models = {}
         self.random = np.random.default_rng(seed)
         self._warn = warn
@@ -209,6 +211,7 @@ class World:
             model.cancel_weight()
         pybullet.stepSimulation(physicsClientId=self._client)
         self.tick += 1
+        self.steps += 1
         if self._touched:
             touched, self._touched = self._touched, []
             for model in touched:

@@ -161,6 +161,28 @@ def test_effort_with_gravity_compensation_floats_and_reports_the_command(world, 
     np.testing.assert_allclose(effort, gravity)
 
 
+def test_a_reading_is_of_now_whatever_was_read_before(world, arm):
+    arm.set_joint_positions(BOTH, np.full(2, 0.2))
+    assert arm.read_joints()[0] == pytest.approx(0.2)
+    arm.set_joint_positions(BOTH, np.full(2, 0.1))
+    assert arm.read_joints()[0] == pytest.approx(0.1)
+    arm.drive_velocity(BOTH, np.full(2, 0.5), arm.max_effort)
+    for tick in range(3):
+        before = arm.read_joints()[0]
+        world.reset_time()
+        world.step()
+        assert np.all(arm.read_joints()[0] > before), "step %d" % tick
+    arm.drive_effort(BOTH, np.full(2, 0.3))
+    assert arm.read_joints()[2] == pytest.approx(0.3)
+    arm.drive_effort(BOTH, np.full(2, 0.4))
+    assert arm.read_joints()[2] == pytest.approx(0.4)
+    arm.release(BOTH)
+    assert np.all(arm.read_joints()[2] != 0.4)
+    for values in arm.read_joints():
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 0.0
+
+
 def test_effort_accelerates_by_the_mass_matrix(world, arm):
     torque = np.array([1.0, 0.5])
     acceleration = np.linalg.solve(arm.mass_matrix(np.zeros(2)), torque)

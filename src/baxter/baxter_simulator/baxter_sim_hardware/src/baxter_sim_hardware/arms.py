@@ -211,6 +211,11 @@ class Arms:
         command = limb.parser.parse(mode, names, values)
         if limb.floats:
             raise CommandRefused("the arm floats, because its cuff is squeezed; release it first")
+        if command.mode is Mode.POSITION is limb.mode and self._all_in_position and not self._braking.any():
+            # As most commands are: nothing changes but where to.
+            self._target[command.index] = command.values
+            self._is_settled = False
+            return command
         named = np.zeros(len(self._mode), dtype=bool)
         named[command.index] = True
         if limb.mode is not command.mode:

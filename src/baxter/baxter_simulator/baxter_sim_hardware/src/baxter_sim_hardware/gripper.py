@@ -86,6 +86,11 @@ class ElectricGripper(Gripper):
         return not self._calibrating and not self.error
 
     @property
+    def resting(self):
+        """Whether the fingers are where they were told to go, and held there."""
+        return self._phase is Phase.RESTING
+
+    @property
     def moving(self):
         """Whether the fingers are on their way."""
         return self._phase is Phase.MOVING

@@ -9,6 +9,7 @@ from .suction import SuctionGripper
 
 RIM_RAYS = 8  # that look for a surface around the rim of the cup, and one in its middle
 RIM_SHARE = 0.8  # of the cup's radius, at which they do
+LOOK_TICKS = 5  # how often fingers at rest are looked at: whether somebody moves them
 INSIDE_M, LIP_M = 0.002, 0.003  # they begin so far inside the cup; its lip bridges a gap of so much
 
 
@@ -33,6 +34,7 @@ class FingersHand:
         for link in self._links:
             model.grip_firmly(link)
         self.gripper = ElectricGripper(float(np.abs(self._openings).max()), self._position(), dt)
+        self._unseen_ticks = 0
 
     def readings(self, positions):
         """(opening, force) [%] for the state message; positions: of all joints of the model."""
@@ -46,6 +48,10 @@ class FingersHand:
 
     def update(self, joints):
         """One tick; joints: (position, velocity, effort) of the whole model."""
+        self._unseen_ticks += 1
+        if self.gripper.resting and self._unseen_ticks < LOOK_TICKS:
+            return
+        self._unseen_ticks = 0
         drive = self.gripper.update(self._share(joints[0]), self._squeeze)
         if drive is None:
             return

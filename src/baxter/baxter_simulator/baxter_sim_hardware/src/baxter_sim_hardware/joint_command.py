@@ -82,6 +82,7 @@ class CommandParser:
         self._limits = limits
         self._names = tuple(names)
         self._index = {name: limits.names.index(name) for name in names}
+        self._last = [], np.zeros(0, dtype=int)  # the names that were found right last, and their indices
 
     def parse(self, mode, names, values):
         """Check one command.
@@ -92,8 +93,7 @@ class CommandParser:
         fault = self._fault(mode, names, values)
         if fault:
             raise CommandRefused("%s; this limb's joints are %s" % (fault, ", ".join(self._names)))
-        mode = Mode(mode)
-        index = np.array([self._index[name] for name in names])
+        mode, index = Mode(mode), self._last[1]
         wanted = np.array(values, dtype=float)
         values = self._limits.clamp(mode, index, wanted)
         clamped = ()
@@ -103,19 +103,26 @@ class CommandParser:
         return JointCommand(mode, index, values, clamped)
 
     def _fault(self, mode, names, values):
-        """What is wrong with a command, or None."""
+        """What is wrong with a command, or None: then `_last` tells its joints."""
         if mode not in Mode._value2member_map_:
             return "unknown mode %d; modes are %s" % (mode, ", ".join("%d %s" % (known, known.name) for known in Mode))
         if len(names) != len(values):
             return "%d names but %d values, and each name needs one value" % (len(names), len(values))
         if not names:
             return "no joints named"
+        names = list(names)
+        # Who streams says the same names each time.
+        if names != self._last[0]:
+            unknown = [name for name in names if name not in self._index]
+            if unknown:
+                return "unknown joint '%s'" % unknown[0]
+            if len(set(names)) != len(names):
+                repeated = sorted(name for name, count in Counter(names).items() if count > 1)
+                return "%s named more than once" % ", ".join(repeated)
+            index = np.array([self._index[name] for name in names])
+            index.setflags(write=False)
+            self._last = names, index
         for name, value in zip(names, values, strict=True):
-            if name not in self._index:
-                return "unknown joint '%s'" % name
             if not math.isfinite(value):
                 return "the value for %s is %s, and it must be a finite number" % (name, value)
-        if len(set(names)) != len(names):
-            repeated = sorted(name for name, count in Counter(names).items() if count > 1)
-            return "%s named more than once" % ", ".join(repeated)
         return None
