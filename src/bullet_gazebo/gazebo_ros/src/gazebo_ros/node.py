@@ -19,6 +19,7 @@ from gazebo_ros.command_line import CommandLine
 from gazebo_ros.gazebo_services import GazeboServices
 from gazebo_ros.loop_log import LoopLog
 from gazebo_ros.loop_publisher import PublisherHub
+from gazebo_ros.loop_subscriber import InletHub
 from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.model_plugin import PluginError
 from gazebo_ros.pacing import wake_on_time
@@ -114,9 +115,10 @@ def _build(log, cleanup, line):
                   warn=log.warn)
     cleanup.callback(world.close)
 
-    hub, board = PublisherHub(), RequestBoard()
+    hub, inlets, board = PublisherHub(), InletHub(), RequestBoard()
     cleanup.callback(board.close)
-    ros = RosObjects(hub, board, log)
+    cleanup.callback(inlets.close)
+    ros = RosObjects(hub, inlets, board, log)
     simulation = Simulation(world, board, log, real_time_factor=float(rospy.get_param("~real_time_factor", 1.0)),
                             paused=line.paused or bool(rospy.get_param("~paused", False)), deliveries=ros.deliveries)
     publications = Publications(simulation, ros, writer, log,
@@ -137,6 +139,7 @@ def _build(log, cleanup, line):
 
     def on_turn():
         hub.service()
+        inlets.service()
         publications.on_turn()
         services.take_commands()
 

@@ -10,15 +10,18 @@ import threading
 import rospy
 
 from gazebo_ros.loop_publisher import LoopPublisher
+from gazebo_ros.loop_subscriber import Inlet
 from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue
 
 
 class RosObjects:
     """Makes publishers, mailboxes, queues and services for the loop."""
 
-    def __init__(self, hub, board, log):
-        """``hub``: :class:`PublisherHub`; ``board``: :class:`RequestBoard`; ``log``: :class:`LoopLog`."""
+    def __init__(self, hub, inlets, board, log):
+        """``hub``: :class:`PublisherHub`; ``inlets``: :class:`InletHub`; ``board``: :class:`RequestBoard`; ``log``:
+        :class:`LoopLog`."""
         self._hub = hub
+        self._inlets = inlets
         self._board = board
         self._log = log
         self._jobs = queue.SimpleQueue()
@@ -90,6 +93,8 @@ class RosObjects:
 
         def register():
             inbox.registration = rospy.Subscriber(inbox.topic, msg_class, inbox.put, tcp_nodelay=True)
+            # A connection that rospy made before this line is read by rospy, in a thread of its own.
+            _read_in_loop(inbox.registration.impl, self._inlets, self._log)
 
         self._jobs.put(register)
         return inbox
@@ -109,6 +114,47 @@ class RosObjects:
             except Exception as error:  # noqa: BLE001  (one bad name or a lost master must not end the thread)
                 if not rospy.is_shutdown():
                     self._log.error("cannot register with the ROS master: %s" % error)
+
+
+def _read_in_loop(impl, inlets, log):
+    """Have the loop read the connections of rospy's subscription ``impl``, as soon as they are made."""
+    add = impl.add_connection
+
+    def add_connection(connection):
+        connection.receive_loop = lambda _: _receive(connection, impl, inlets, log)
+        return add(connection)
+
+    impl.add_connection = add_connection
+
+
+def _receive(connection, impl, inlets, log):
+    """What rospy's thread for a connection does, once that stands: wait for its end."""
+
+    def deliver(data):
+        connection.stat_bytes += len(data)
+        connection.stat_num_msg += 1
+        try:
+            message = impl.data_class().deserialize(data)
+            message._connection_header = connection.header
+            if connection.is_latched:
+                connection.latch = message
+            impl.receive_callback([message], connection)
+        except Exception as error:  # noqa: BLE001  (anything may be sent; the world goes on)
+            if not impl.closed:
+                log.error_throttle(5.0, "%s: a message from %s cannot be read and is left out: %s"
+                                   % (impl.resolved_name, connection.callerid_pub, error))
+
+    try:
+        inlet = Inlet(connection.socket, deliver)
+    except (AttributeError, OSError):  # it has been closed already
+        connection.close()
+        return
+    inlets.add(inlet)
+    inlet.ended.wait()
+    if inlet.fault:
+        log.error("%s: the connection to %s is closed: %s"
+                  % (impl.resolved_name, connection.callerid_pub, inlet.fault))
+    connection.close()
 
 
 class _Attention(rospy.SubscribeListener):

@@ -21,6 +21,7 @@ from controller_manager.services import ControllerManagerServices
 from controller_manager.testing import FakeHardware
 from gazebo_ros.loop_log import LoopLog
 from gazebo_ros.loop_publisher import PublisherHub
+from gazebo_ros.loop_subscriber import InletHub
 from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.model_plugin import PluginContext
 from gazebo_ros.pacing import Pacer
@@ -55,8 +56,9 @@ def main():
     text = rospy.get_param("/robot/robot_description")
     robot = parse_urdf(text, source="robot_description")
     log = LoopLog({"info": rospy.loginfo, "warn": rospy.logwarn, "error": rospy.logerr})
-    hub, board = PublisherHub(), RequestBoard()
-    context = PluginContext(None, None, robot, None, "/robot", text, log, RosObjects(hub, board, log), {})
+    hub, inlets, board = PublisherHub(), InletHub(), RequestBoard()
+    ros = RosObjects(hub, inlets, board, log)
+    context = PluginContext(None, None, robot, None, "/robot", text, log, ros, {})
     pushed = rospy.get_param("/robot/effort_joints", [])
     hardware = FakeHardware({joint.name: (EFFORT if joint.name in pushed else POSITION,)
                              for joint in robot.movable_joints()})
@@ -70,11 +72,13 @@ def main():
     while not rospy.is_shutdown():
         board.run_pending()
         hub.service()
+        inlets.service()
         manager.update(start + tick * DT, DT)
         hardware.step(DT)
         tick += 1
         pacer.wait()
     services.close()
+    inlets.close()
     board.close()
 
 

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""rospy's subscriptions, read by the loop: what rospy's thread of a connection does meanwhile."""
+import socket
+import struct
+import threading
+from io import BytesIO
+from types import SimpleNamespace
+
+import pytest
+from std_msgs.msg import String
+
+from gazebo_ros.loop_subscriber import InletHub
+from gazebo_ros.ros_objects import _read_in_loop
+from lab_testing.waiting import wait_until
+
+
+class Connection:
+    """As rospy's transport of one publisher, after its handshake."""
+
+    callerid_pub, header, is_latched, latch = "/somebody", {"callerid": "/somebody"}, True, None
+    stat_bytes = stat_num_msg = 0
+
+    def __init__(self):
+        self.socket, self.far = socket.socketpair()
+        self.closed = threading.Event()
+
+    def close(self):
+        self.socket.close()
+        self.closed.set()
+
+    def send(self, text):
+        buffer = BytesIO()
+        String(text).serialize(buffer)
+        self.send_bytes(buffer.getvalue())
+
+    def send_bytes(self, data):
+        self.far.sendall(struct.pack("<I", len(data)) + data)
+
+
+@pytest.fixture
+def scene():
+    got, errors, hub = [], [], InletHub()
+    impl = SimpleNamespace(data_class=String, resolved_name="/chatter", closed=False, connections=[],
+                           receive_callback=lambda messages, _: got.extend(messages))
+    impl.add_connection = lambda connection: impl.connections.append(connection) or True
+    log = SimpleNamespace(error=errors.append, error_throttle=lambda period_s, text: errors.append(text))
+    _read_in_loop(impl, hub, log)
+    connection = Connection()
+    assert impl.add_connection(connection)
+    assert impl.connections == [connection]
+    thread = threading.Thread(target=connection.receive_loop, args=(None,), daemon=True)
+    thread.start()
+
+    def serve_until(condition, what):
+        wait_until(lambda: (hub.service(), condition())[1], what, 10.0)
+
+    yield SimpleNamespace(connection=connection, got=got, errors=errors, impl=impl, hub=hub, serve_until=serve_until,
+                          thread=thread)
+    hub.close()
+    connection.far.close()
+    thread.join(10.0)
+    assert not thread.is_alive()
+
+
+def test_messages_reach_the_callbacks_with_their_header(scene):
+    scene.connection.send("hello")
+    scene.serve_until(lambda: scene.got, "the message")
+    assert scene.got[0].data == "hello"
+    assert scene.got[0]._connection_header["callerid"] == "/somebody"
+    assert scene.connection.latch is scene.got[0]
+    assert (scene.connection.stat_num_msg, scene.connection.stat_bytes) == (1, 9)
+
+
+def test_a_message_that_cannot_be_read_is_told_and_the_next_one_counts(scene):
+    scene.connection.send_bytes(b"\xff\xff")
+    scene.connection.send("and on")
+    scene.serve_until(lambda: scene.got, "the message after it")
+    assert [message.data for message in scene.got] == ["and on"]
+    error, = scene.errors
+    assert "/chatter: a message from /somebody cannot be read" in error
+
+
+def test_the_connection_is_closed_when_the_publisher_goes(scene):
+    scene.connection.far.close()
+    scene.serve_until(scene.connection.closed.is_set, "the end")
+    assert not scene.errors
+
+
+def test_what_is_no_message_at_all_closes_the_connection_and_is_told(scene):
+    scene.connection.far.sendall(b"\xff\xff\xff\xff")
+    scene.serve_until(scene.connection.closed.is_set, "the end")
+    error, = scene.errors
+    assert "/chatter: the connection to /somebody is closed" in error
+
+
+def test_a_connection_that_is_gone_before_it_was_read_is_closed():
+    hub, connection = InletHub(), Connection()
+    connection.socket.close()
+    impl = SimpleNamespace(add_connection=lambda _: True)
+    _read_in_loop(impl, hub, None)
+    impl.add_connection(connection)
+    connection.receive_loop(None)
+    assert connection.closed.is_set()
+    connection.far.close()
