@@ -49,13 +49,14 @@ _EMPTY = (errno.EAGAIN, errno.EWOULDBLOCK, errno.EINTR)
 class Inlet:
     """The receiving end of one publisher's connection. The loop reads; any thread may wait for ``ended``."""
 
-    def __init__(self, connection, deliver):
+    def __init__(self, connection, deliver, held=b""):
         """``connection``: a connected stream socket, of which a duplicate is read: it may be closed elsewhere at any
-        time. ``deliver(data)`` takes the bytes of each message, in the loop."""
+        time. ``deliver(data)`` takes the bytes of each message, in the loop. ``held``: bytes that have been read
+        already, as far as they are not delivered."""
         self._socket = connection.dup()
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         self._deliver = deliver
-        self._held = bytearray()
+        self._held = bytearray(held)
         #: Set when nothing more will come.
         self.ended = threading.Event()
         #: Why it ended, where the publisher did not just go; else "".
@@ -64,6 +65,10 @@ class Inlet:
     def fileno(self):
         """The descriptor that is read; -1 when it has ended."""
         return self._socket.fileno()
+
+    def begin(self):
+        """Deliver what is complete of the bytes that had been read before."""
+        self._deliver_complete()
 
     def read(self, buffer):
         """Take a portion and deliver what is complete; returns whether there may be more.
@@ -157,7 +162,10 @@ class InletHub:
     def _take_new(self):
         inlets = self._inlets
         while self._new:
-            inlets = [*inlets, self._new.popleft()]
+            inlet = self._new.popleft()
+            inlet.begin()
+            if not inlet.ended.is_set():
+                inlets = [*inlets, inlet]
         self._follow(inlets)
 
     def _follow(self, inlets):

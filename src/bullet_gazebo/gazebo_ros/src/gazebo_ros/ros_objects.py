@@ -145,7 +145,8 @@ def _receive(connection, impl, inlets, log):
                                    % (impl.resolved_name, connection.callerid_pub, error))
 
     try:
-        inlet = Inlet(connection.socket, deliver)
+        # With the end of its header a publisher may have sent its first message, the one that it latches.
+        inlet = Inlet(connection.socket, deliver, held=connection.read_buff.getvalue())
     except (AttributeError, OSError):  # it has been closed already
         connection.close()
         return

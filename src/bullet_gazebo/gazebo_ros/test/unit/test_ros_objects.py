@@ -22,6 +22,7 @@ class Connection:
 
     def __init__(self):
         self.socket, self.far = socket.socketpair()
+        self.read_buff = BytesIO()
         self.closed = threading.Event()
 
     def close(self):
@@ -29,16 +30,20 @@ class Connection:
         self.closed.set()
 
     def send(self, text):
-        buffer = BytesIO()
-        String(text).serialize(buffer)
-        self.send_bytes(buffer.getvalue())
+        self.far.sendall(framed(text))
 
     def send_bytes(self, data):
         self.far.sendall(struct.pack("<I", len(data)) + data)
 
 
+def framed(text):
+    buffer = BytesIO()
+    String(text).serialize(buffer)
+    return struct.pack("<I", len(buffer.getvalue())) + buffer.getvalue()
+
+
 @pytest.fixture
-def scene():
+def scene(request):
     got, errors, hub = [], [], InletHub()
     impl = SimpleNamespace(data_class=String, resolved_name="/chatter", closed=False, connections=[],
                            receive_callback=lambda messages, _: got.extend(messages))
@@ -46,6 +51,7 @@ def scene():
     log = SimpleNamespace(error=errors.append, error_throttle=lambda period_s, text: errors.append(text))
     _read_in_loop(impl, hub, log)
     connection = Connection()
+    connection.read_buff.write(getattr(request, "param", b""))
     assert impl.add_connection(connection)
     assert impl.connections == [connection]
     thread = threading.Thread(target=connection.receive_loop, args=(None,), daemon=True)
@@ -69,6 +75,23 @@ def test_messages_reach_the_callbacks_with_their_header(scene):
     assert scene.got[0]._connection_header["callerid"] == "/somebody"
     assert scene.connection.latch is scene.got[0]
     assert (scene.connection.stat_num_msg, scene.connection.stat_bytes) == (1, 9)
+
+
+WITH_HEADER = framed("latched") + framed("and torn")
+
+
+@pytest.mark.parametrize("scene", [WITH_HEADER[:cut] for cut in (2, 10, 15, 20, 27)], indirect=True,
+                         ids=len)
+def test_what_rospy_read_together_with_the_header_is_not_lost(scene):
+    scene.connection.far.sendall(WITH_HEADER[len(scene.connection.read_buff.getvalue()):])
+    scene.serve_until(lambda: len(scene.got) == 2, "both messages")
+    assert [message.data for message in scene.got] == ["latched", "and torn"]
+
+
+@pytest.mark.parametrize("scene", [framed("latched")], indirect=True)
+def test_a_latched_message_that_came_with_the_header_needs_no_other_to_follow(scene):
+    scene.serve_until(lambda: scene.got, "the message")
+    assert [message.data for message in scene.got] == ["latched"]
 
 
 def test_a_message_that_cannot_be_read_is_told_and_the_next_one_counts(scene):
