@@ -16,7 +16,7 @@ def random_poses(lab, count):
     """`count` postures inside the limits; the first needs more than 50 Nm at s1."""
     rng = np.random.default_rng(7)
     lower, upper = lab.model.lower[lab.arm], lab.model.upper[lab.arm]
-    full = lab.model.read_joints()[0]
+    full = lab.model.read_joints()[0].copy()
     poses, heavy = [], None
     while len(poses) < count - 1 or heavy is None:
         pose = rng.uniform(lower, upper)
