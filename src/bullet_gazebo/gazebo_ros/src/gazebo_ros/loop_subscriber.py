@@ -2,8 +2,8 @@
 """Reading what others publish in the loop, between two ticks.
 
 rospy connects and shakes hands; from there on the loop reads the sockets itself. A thread for each connection, as rospy
-has it, must take the interpreter from the loop twice for each message, and flat out that costs the loop 0.4 ms each
-time. Nothing here imports rospy, so that it can be tested with plain pairs of sockets.
+has it, must take the interpreter from the loop twice for each message (docs/decisions/0006). Nothing here imports
+rospy, so that it can be tested with plain pairs of sockets.
 """
 import collections
 import ctypes
