@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Cameras: one picture beside PyBullet's own rendering of the vendor's meshes, and a lab that delivers many."""
 import re
+import select
 import socket
 import statistics
 import time
@@ -14,6 +15,7 @@ from sensor_msgs.msg import Image, PointCloud2
 import xacro
 from gazebo_ros.drawing import DrawingCache
 from gazebo_ros.resources import ResourceFinder
+from lab_testing.waiting import wait_until
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
@@ -131,9 +133,8 @@ def count_messages(lab, watched, seconds):
         counter.wait(1)
     before, simulated, wall = [counter.messages for counter in counters], lab.now(), time.monotonic()
     while time.monotonic() < wall + seconds:
-        for counter in counters:
+        for counter in select.select(counters, [], [], max(0.0, wall + seconds - time.monotonic()))[0]:
             counter.drain()
-        time.sleep(0.001)
     factor = (lab.now() - simulated) / (time.monotonic() - wall)
     counts = [counter.messages - start for counter, start in zip(counters, before, strict=True)]
     for counter in counters:
@@ -152,6 +153,10 @@ class Counter:
         connection.setblocking(False)
         self._length, self._missing = b"", 0
         self.messages = -1  # the first block is the publisher's header
+
+    def fileno(self):
+        """For select: there is something to take in."""
+        return self._connection.fileno()
 
     def drain(self):
         """Take in what has come."""
@@ -173,12 +178,11 @@ class Counter:
 
     def wait(self, messages, timeout_s=60.0):
         """Until so many have come."""
-        deadline = time.monotonic() + timeout_s
-        while self.messages < messages:
-            if time.monotonic() > deadline:
-                raise SystemExit("no picture within %g s" % timeout_s)
+        def have_come():
             self.drain()
-            time.sleep(0.001)
+            return self.messages >= messages
+
+        wait_until(have_come, "%d pictures" % messages, timeout_s, 0.001)
 
     def close(self):
         self._connection.close()

@@ -74,7 +74,7 @@ def subscribe(master, topic, message_class, caller):
     return connection
 
 
-def drain(master_uri, plan, ending, arrivals):
+def drain(master_uri, plan, connected, ending, arrivals):
     """Child process: read from many connections; report the arrival times on the last one."""
     master = xmlrpc.client.ServerProxy(master_uri)
     selector = selectors.DefaultSelector()
@@ -84,6 +84,7 @@ def drain(master_uri, plan, ending, arrivals):
             connection = subscribe(master, topic, message_class, f"/lab_bench_{number}")
             selector.register(connection, selectors.EVENT_READ, (topic, number))
     last = (plan[-1][0], 0)
+    connected.set()
     while not ending.is_set():
         for key, _ in selector.select(0.2):
             key.fileobj.recv(65536)
@@ -174,11 +175,13 @@ class Lab:
     def measure(self, label, seconds, clocks, states):
         """Measure for ``seconds`` of wall time with so many connections; print one row."""
         fresh = multiprocessing.get_context("spawn")  # a fork would take rospy's connections along
-        ending, arrivals = fresh.Event(), fresh.Queue()
+        connected, ending, arrivals = fresh.Event(), fresh.Event(), fresh.Queue()
         plan = [("/clock", Clock, clocks), ("/robot/joint_states", JointState, states)]
-        child = fresh.Process(target=drain, args=(os.environ["ROS_MASTER_URI"], plan, ending, arrivals))
+        child = fresh.Process(target=drain, args=(os.environ["ROS_MASTER_URI"], plan, connected, ending, arrivals))
         child.start()
-        time.sleep(2.0)  # what is measured is the steady state, so the connections come first
+        # What is measured is the steady state, so the connections come first.
+        if not connected.wait(60.0):
+            raise SystemExit("the connections did not come within 60 s")
         wall, simulated, used = time.monotonic(), rospy.get_time(), self.gazebo.cpu_s()
         time.sleep(seconds)
         elapsed = time.monotonic() - wall

@@ -5,7 +5,10 @@ import time
 
 from labs import Lab, memory_mb
 
+from lab_testing.waiting import wait_until
+
 SECONDS = 6.0
+SETTLE_S = 2.0  # simulated
 
 
 def measure(report, quick, number):
@@ -28,7 +31,9 @@ def run(count, speed, seconds):
         labs = [stack.enter_context(Lab(gui="false", enable="true", real_time_factor=speed)) for _ in range(count)]
         for lab in labs:
             lab.part("swing")
-        time.sleep(2.0)
+        settled = [lab.now() + SETTLE_S for lab in labs]
+        wait_until(lambda: all(lab.now() >= time_s for lab, time_s in zip(labs, settled, strict=True)),
+                   "the arms to swing", 120.0, 0.1)
         gazebos = [lab.process("/gazebo") for lab in labs]
         begin = [(lab.now(), gazebo.cpu_s(), time.monotonic()) for lab, gazebo in zip(labs, gazebos, strict=True)]
         time.sleep(seconds)

@@ -66,10 +66,6 @@ class Inlet:
         """The descriptor that is read; -1 when it has ended."""
         return self._socket.fileno()
 
-    def begin(self):
-        """Deliver what is complete of the bytes that had been read before."""
-        self._deliver_complete()
-
     def read(self, buffer):
         """Take a portion and deliver what is complete; returns whether there may be more.
 
@@ -83,22 +79,11 @@ class Inlet:
             self.end("" if count == 0 else os.strerror(ctypes.get_errno()))
             return False
         self._held += memoryview(buffer)[:count]
-        self._deliver_complete()
+        self.deliver_complete()
         return count == portion and not self.ended.is_set()
 
-    def end(self, fault=""):
-        """Stop reading, in the loop or when the loop has ended."""
-        self.fault = fault
-        self._socket.close()
-        self.ended.set()
-
-    def _portion(self):
-        missing = 0
-        if len(self._held) >= _LENGTH.size:
-            missing = _LENGTH.unpack_from(self._held)[0] + _LENGTH.size - len(self._held)
-        return min(max(missing, PORTION_BYTES), LARGEST_PORTION_BYTES)
-
-    def _deliver_complete(self):
+    def deliver_complete(self):
+        """Deliver the messages that are complete; in the loop, as ``read`` does, and once before it."""
         held, start = self._held, 0
         while len(held) - start >= _LENGTH.size:
             length, = _LENGTH.unpack_from(held, start)
@@ -111,6 +96,18 @@ class Inlet:
             self._deliver(bytes(held[start + _LENGTH.size:end]))
             start = end
         del held[:start]
+
+    def end(self, fault=""):
+        """Stop reading, in the loop or when the loop has ended."""
+        self.fault = fault
+        self._socket.close()
+        self.ended.set()
+
+    def _portion(self):
+        missing = 0
+        if len(self._held) >= _LENGTH.size:
+            missing = _LENGTH.unpack_from(self._held)[0] + _LENGTH.size - len(self._held)
+        return min(max(missing, PORTION_BYTES), LARGEST_PORTION_BYTES)
 
 
 class InletHub:
@@ -163,7 +160,7 @@ class InletHub:
         inlets = self._inlets
         while self._new:
             inlet = self._new.popleft()
-            inlet.begin()
+            inlet.deliver_complete()
             if not inlet.ended.is_set():
                 inlets = [*inlets, inlet]
         self._follow(inlets)

@@ -9,8 +9,8 @@ from .suction import SuctionGripper
 
 RIM_RAYS = 8  # that look for a surface around the rim of the cup, and one in its middle
 RIM_SHARE = 0.8  # of the cup's radius, at which they do
-LOOK_TICKS = 5  # how often fingers at rest are looked at: whether somebody moves them
 INSIDE_M, LIP_M = 0.002, 0.003  # they begin so far inside the cup; its lip bridges a gap of so much
+LOOK_TICKS = 5  # how often fingers at rest are looked at: whether somebody moves them
 
 
 class FingersHand:
