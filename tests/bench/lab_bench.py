@@ -34,6 +34,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Empty
 
+from lab_testing.ports import free_port
 from lab_testing.waiting import wait_until
 
 SIDES = ("left", "right")
@@ -42,12 +43,6 @@ NEUTRAL = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0)
 COMMAND_HZ = 100.0
 BUSY_MODEL = """<robot name="busy"><link name="world"/>
 <gazebo><plugin name="busy" filename="libbench_busy.so"/></gazebo></robot>"""
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def subscribe(master, topic, message_class, caller):

@@ -11,11 +11,12 @@ import time
 import xmlrpc.client
 from pathlib import Path
 
-from lab_bench import Process, free_port, subscribe
+from lab_bench import Process, subscribe
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
+from lab_testing.ports import free_port
 from lab_testing.waiting import wait_until
 
 HERE = Path(__file__).resolve().parent

@@ -2,7 +2,6 @@
 """For tests in which the master and the robot come and go."""
 import os
 import pathlib
-import socket
 import subprocess
 import sys
 import tempfile
@@ -10,18 +9,13 @@ import unittest
 
 import rosgraph
 
+from lab_testing.ports import free_port
 from lab_testing.waiting import wait_until
 
 DEADLINE_S = 60.0
 # A process has so long to end before it is ended by force [s].
 END_S = 10.0
 FAKE_ROBOT = pathlib.Path(__file__).with_name("fake_robot.py")
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class OwnMasterTest(unittest.TestCase):

@@ -3,7 +3,6 @@
 """The simulator among other processes: a second one, stopped listeners, no display, and its end."""
 import os
 import signal
-import socket
 import subprocess
 import sys
 import unittest
@@ -15,6 +14,7 @@ import rostest
 from gazebo_msgs.srv import GetWorldProperties
 
 from gazebo_ros import snapshot
+from lab_testing.ports import free_port
 from lab_testing.waiting import wait_until
 
 DEADLINE_S = 20.0
@@ -36,12 +36,6 @@ def state_of(process):
 
 def snapshot_folders():
     return set(snapshot._shared_memory_folder().glob(snapshot._PREFIX + "*"))
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("localhost", 0))
-        return probe.getsockname()[1]
 
 
 class GazeboProcesses(unittest.TestCase):
