@@ -34,6 +34,9 @@ LAB_ANGLES = (-1.0051802515115758, -1.0358377913378556, -0.33102594774694544, 1.
 TOO_FAR = ((3.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
 SHELF_IN_BASE = (0.2, -0.1, 0.3)
 WAIT_S = 20.0
+# Joint states in one go, and how long the last of them may take to be used: taken one by one they would need twice that.
+BURST = 1000
+BURST_TIMEOUT_S = 10.0
 
 
 def pose(position, quaternion, frame="base"):
@@ -71,11 +74,19 @@ class PositionKinematics(unittest.TestCase):
         shelf.transform.rotation.w = 1.0
         cls.broadcaster.sendTransform(shelf)
         # Only the left arm's joints are ever published: the right arm is the robot that has not spoken yet.
-        cls.joint_states = rospy.Publisher("/robot/joint_states", JointState, queue_size=1, latch=True)
-        message = seed("left", CURRENT)
-        message.header.stamp = rospy.Time(12.5)
-        cls.joint_states.publish(message)
+        cls.joint_states = rospy.Publisher("/robot/joint_states", JointState, queue_size=BURST, latch=True)
         wait_until(lambda: cls.joint_states.get_num_connections() == 2, "both nodes to subscribe to joint states")
+        cls.say_current()
+
+    @classmethod
+    def say(cls, posture, stamp=13.0):
+        message = seed("left", posture)
+        message.header.stamp = rospy.Time(stamp)
+        cls.joint_states.publish(message)
+
+    @classmethod
+    def say_current(cls):
+        cls.say(CURRENT, 12.5)
         wait_until(lambda: cls.ask("left", [pose(*LAB_POSE)]).joints[0].header.stamp == rospy.Time(12.5),
                    "joint states to arrive at the left arm's node")
 
@@ -136,6 +147,16 @@ class PositionKinematics(unittest.TestCase):
                           SolvePositionIKRequest.SEED_NS_MAP)
         self.assertEqual(answer.result_type[0], 3)
         np.testing.assert_allclose(answer.joints[0].position, NEUTRAL, atol=1e-5)
+
+    def test_joint_states_that_come_faster_than_they_are_taken_do_not_pile_up(self):
+        last = list(CURRENT[:-1]) + [0.2]
+        for number in range(BURST):
+            self.say(list(CURRENT[:-1]) + [0.2 * (number + 1) / BURST])
+        self.addCleanup(self.say_current)
+        tip = self.chains["left"].fk(last)
+        there = pose(tip[:3, 3], quaternion_from_matrix(tip))
+        wait_until(lambda: np.allclose(self.ask("left", [there]).joints[0].position, last, atol=1e-5),
+                   "the last of the burst to be the seed", BURST_TIMEOUT_S)
 
     def test_right_arm_without_joint_states_starts_at_neutral_and_says_so(self):
         neutral = self.chains["right"].fk(NEUTRAL)
