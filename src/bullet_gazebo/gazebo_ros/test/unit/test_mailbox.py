@@ -30,7 +30,7 @@ def test_a_queue_keeps_order_and_counts_what_it_lost():
     assert (queue.delivered, queue.lost) == (5, 2)
 
 
-def test_a_plugin_is_told_once_that_there_is_mail_in_any_of_its_queues():
+def test_a_plugin_is_told_once_which_of_its_queues_have_mail():
     queues = {}
 
     def make(topic, msg_class, depth, notice):
@@ -39,14 +39,17 @@ def test_a_plugin_is_told_once_that_there_is_mail_in_any_of_its_queues():
     ros = SimpleNamespace(queue=make)
     context = PluginContext(None, None, None, None, "/robot", "", None, ros, {})
     first, second = context.queue("first", None, 10), context.queue("second", None, 10)
-    assert not context.has_mail()
+    assert not context.mail()
     second.put("a")
     second.put("b")
-    assert context.has_mail() and not context.has_mail()
+    assert context.mail() == [second] and not context.mail()
     # What comes in before the queues are read is told again: better twice than not at all.
     first.put("c")
-    assert (first.drain(), second.drain(), context.has_mail()) == (["c"], ["a", "b"], True)
-    assert not context.branch().has_mail()
+    assert (first.drain(), second.drain(), context.mail()) == (["c"], ["a", "b"], [first])
+    second.put("d")
+    first.put("e")
+    assert context.mail() == [first, second]
+    assert not context.branch().mail()
 
 
 def test_what_counts_as_delivered_has_been_announced():

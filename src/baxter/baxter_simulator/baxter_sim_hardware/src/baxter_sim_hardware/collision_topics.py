@@ -35,7 +35,7 @@ class CollisionTopics:
             return
         contacts = self._contacts()
         for side, suppressions in self._suppressions.items():
-            self._arms.set_yielding(side, bool(self._touched(contacts, side, time_s)[0]))
+            self._arms.set_yielding(side, bool(contacts and self._touched(contacts, side, time_s)[0]))
             self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
             floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
             self._arms.set_floating(side, floats, position, velocity)

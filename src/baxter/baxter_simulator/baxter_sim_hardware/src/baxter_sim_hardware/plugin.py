@@ -21,6 +21,7 @@ from baxter_sim_hardware.schedule import Schedule
 from baxter_sim_hardware.screen_topics import ScreenTopics
 from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_hardware.sensor_topics import SensorTopics
+from baxter_sim_hardware.sides import SIDES
 from baxter_sim_hardware.status_topics import StatusTopics
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
@@ -52,6 +53,7 @@ class BaxterPlugin(ModelPlugin):
 
     def _build(self, context):
         model, robot = context.model, context.robot
+        model.call_directly()
         limbs = limbs_of(robot)
         names = tuple(name for limb in limbs for name in limb.joint_names)
         self._arm_index = model.index(names)
@@ -110,8 +112,9 @@ class BaxterPlugin(ModelPlugin):
         takers = {key: take for part in self._parts for key, take in part.takers.items()}
         latched = {key: begin for part in self._parts for key, begin in getattr(part, "latched", {}).items()}
         groups = {}  # rate -> (schedule, [(function that makes a message, part, publisher)])
-        self._takers = []  # (key, part, queue, function that takes a message)
-        self._inputs = {}  # key -> [(side, queue)]
+        takers = self._with_own_takers(takers)
+        order = {key: place for place, key in enumerate(takers)}
+        self._letterboxes = {}  # queue -> (place in the order of reading, key, part, function that takes a message)
         rate = self._parameter("joint_state_rate", interface.JOINT_STATE_RATE_HZ)
         if not (isinstance(rate, int | float) and math.isfinite(rate) and 0.0 < rate <= 1.0 / self._dt):
             raise PluginError("joint_state_rate is %r; it must be a number of Hz above 0 and up to %g" % (
@@ -129,10 +132,9 @@ class BaxterPlugin(ModelPlugin):
                     make = makers.get(row.key) or getattr(self, "_" + row.key)
                     group = groups.setdefault(row.rate, (Schedule(hz), []))[1]
                     group.append((make, side, context.publisher(name, message)))
-                elif row.key in takers:
-                    self._takers.append((row.key, side, context.queue(name, message, QUEUE_DEPTH), takers[row.key]))
                 else:
-                    self._inputs.setdefault(row.key, []).append((side, context.queue(name, message, QUEUE_DEPTH)))
+                    queue = context.queue(name, message, QUEUE_DEPTH)
+                    self._letterboxes[queue] = order[row.key], row.key, side, takers[row.key]
         self._outputs = list(groups.values())
         self._joint_state_schedule = groups[interface.JOINT_STATE_RATE][0]
         self._started = context.publisher(*started, latch=True)
@@ -144,8 +146,9 @@ class BaxterPlugin(ModelPlugin):
     def update(self, time_s, dt):
         self._before = self._model.read_joints()
         position, velocity = self._before[0][self._arm_index], self._before[1][self._arm_index]
-        if self.context.has_mail():
-            self._take_messages(time_s, position, velocity)
+        mail = self.context.mail()
+        if mail:
+            self._take_messages(mail, time_s)
         arm = self._arm_index
         self._collision.update(time_s, self._baxter.state.enabled, position, velocity)
         self._gravity_ticks -= 1
@@ -213,41 +216,36 @@ class BaxterPlugin(ModelPlugin):
 
     # -- in
 
-    def _take_messages(self, time_s, position, velocity):
-        inputs, arms = self._inputs, self._baxter.arms
-        for _, queue in inputs["joint_state_publish_rate"]:
-            for msg in queue.drain():
-                self._set_joint_state_rate(msg.data, time_s)
-        for key, setter in (("set_speed_ratio", arms.set_speed_ratio), ("joint_command_timeout", arms.set_timeout)):
-            for side, queue in inputs[key]:
-                for msg in queue.drain():
-                    try:
-                        setter(side, msg.data)
-                    except CommandRefused as refusal:
-                        self._warn(time_s, (side, key), "%s limb: %s refused: %s" % (side, key, refusal))
-        for key, part, queue, take in self._takers:
+    def _with_own_takers(self, takers):
+        """{key: function (part, message, time)} of all topics that the robot listens to, in the order in which those
+        are read that came in within one tick."""
+        arms = self._baxter.arms
+        return {
+            "joint_state_publish_rate": lambda part, msg, time_s: self._set_joint_state_rate(msg.data, time_s),
+            "set_speed_ratio": lambda side, msg, time_s: arms.set_speed_ratio(side, msg.data),
+            "joint_command_timeout": lambda side, msg, time_s: arms.set_timeout(side, msg.data),
+            **takers,
+            # In the order of Event: a stop has the last word.
+            "set_super_reset": lambda part, msg, time_s: self._apply(Event.RESET, time_s),
+            "set_super_enable": lambda part, msg, time_s: self._apply(
+                Event.ENABLE if msg.data else Event.DISABLE, time_s),
+            "set_super_stop": lambda part, msg, time_s: self._apply(Event.STOP, time_s),
+            "joint_command": self._command,
+        }
+
+    def _take_messages(self, queues, time_s):
+        letterboxes = self._letterboxes
+        for queue in sorted(queues, key=lambda queue: letterboxes[queue][0]):
+            _, key, part, take = letterboxes[queue]
             for msg in queue.drain():
                 try:
                     take(part, msg, time_s)
                 except CommandRefused as refusal:
-                    self._warn(time_s, (part, key), "%s refused: %s" % (key, refusal))
-        # In the order of Event: of all that arrived within one tick, a stop has the last word.
-        for _, queue in inputs["set_super_reset"]:
-            for _ in queue.drain():
-                self._apply(Event.RESET, time_s, position, velocity)
-        for _, queue in inputs["set_super_enable"]:
-            for msg in queue.drain():
-                self._apply(Event.ENABLE if msg.data else Event.DISABLE, time_s, position, velocity)
-        for _, queue in inputs["set_super_stop"]:
-            for _ in queue.drain():
-                self._apply(Event.STOP, time_s, position, velocity)
-        for side, queue in inputs["joint_command"]:
-            for msg in queue.drain():
-                self._command(side, msg, time_s, position, velocity)
+                    limb = "%s limb: " % part if part in SIDES else ""
+                    self._warn(time_s, (part, key), "%s%s refused: %s" % (limb, key, refusal))
 
-    def _apply(self, event, time_s=0.0, position=None, velocity=None):
-        if position is None:
-            position, velocity = self._read_arms()
+    def _apply(self, event, time_s=0.0):
+        position, velocity = self._read_arms()
         before = self._baxter.state.state
         refusal = self._baxter.apply(event, position, velocity)
         if refusal:
@@ -261,7 +259,8 @@ class BaxterPlugin(ModelPlugin):
     def _press_estop(self, pressed):
         self._apply(Event.ESTOP_PRESS if pressed else Event.ESTOP_RELEASE, self.context.world.time_s)
 
-    def _command(self, side, msg, time_s, position, velocity):
+    def _command(self, side, msg, time_s):
+        position, velocity = self._read_arms()
         try:
             command = self._baxter.command(side, msg.mode, msg.names, msg.command, time_s, position, velocity)
         except CommandRefused as refusal:

@@ -97,8 +97,8 @@ class Lab:
     def queue(self, topic, msg_class, depth):
         return self.inboxes.setdefault(topic, _Inbox())
 
-    def has_mail(self):
-        return any(inbox.messages for inbox in self.inboxes.values())
+    def mail(self):
+        return [inbox for inbox in self.inboxes.values() if inbox.messages]
 
     def service(self, name, srv_class, handler):
         self.services[name] = handler
