@@ -78,8 +78,7 @@ class DirectJoints:
 
     def drive_position(self, index, position, velocity, max_effort, gain):
         """As ``Model.drive_position``; all (k,). The motor adds ``velocity`` to what closes the gap with ``gain``."""
-        numbers = np.array((position, velocity, max_effort), dtype=float)
-        _drive_position(self._handle, self._body, self._indices, index, numbers, gain)
+        _drive_position(self._handle, self._body, self._indices, index, position, velocity, max_effort, gain)
 
 
 def client_handle(client):
@@ -129,8 +128,7 @@ def _read(handle, body, values, sensor):
 
 
 @numba.njit(cache=True)
-def _drive_position(handle, body, indices, index, numbers, gain):
-    position, velocity, max_effort = numbers[0], numbers[1], numbers[2]
+def _drive_position(handle, body, indices, index, position, velocity, max_effort, gain):
     command = _control(handle, body, _POSITION_CONTROL)
     for k in range(len(index)):
         q, u = indices[0, index[k]], indices[1, index[k]]

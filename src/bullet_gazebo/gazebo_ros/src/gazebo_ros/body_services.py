@@ -40,15 +40,16 @@ _ODE_ONLY = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor", "fmax", "vel"
 class BodyServices:
     """Advertises the services. Everything here runs in the loop thread."""
 
-    def __init__(self, simulation, entities, ros, log):
-        """``entities``: :class:`gazebo_ros.entities.Entities`."""
+    def __init__(self, simulation, entities, ros, log, notice):
+        """``entities``: :class:`gazebo_ros.entities.Entities`; ``notice()`` is called when there is something for
+        :meth:`take_commands`."""
         self._simulation = simulation
         self._world = simulation.world
         self._entities = entities
         self._log = log
         self._wrenches = TimedJobs()  # of (model, link)
         self._efforts = TimedJobs()  # of (model, joint)
-        self._link_state_commands = ros.queue("/gazebo/set_link_state", LinkState, depth=10)
+        self._link_state_commands = ros.queue("/gazebo/set_link_state", LinkState, depth=10, notice=notice)
         for name, srv_class, handler in (
                 ("apply_body_wrench", ApplyBodyWrench, self._apply_body_wrench),
                 ("apply_joint_effort", ApplyJointEffort, self._apply_joint_effort),
@@ -72,6 +73,8 @@ class BodyServices:
 
     def push(self):
         """Before a physics step: apply the wrenches and efforts that are due."""
+        if not (self._wrenches or self._efforts):
+            return
         now = self._simulation.time_ns
         for (model_name, link), (force, torque) in self._wrenches.due(now):
             self._world.models[model_name].apply_wrench(link, force, torque)

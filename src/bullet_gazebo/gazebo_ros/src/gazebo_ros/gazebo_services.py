@@ -68,13 +68,14 @@ class GazeboServices:
         self._ros = ros
         self._log = log
         self._entities = Entities(simulation.world)
-        self._bodies = BodyServices(simulation, self._entities, ros, log)
+        self._has_commands = False
+        self._bodies = BodyServices(simulation, self._entities, ros, log, self._note_command)
         LightServices(lights, ros)
         #: For the loop, before each physics step.
         self.push = self._bodies.push
         self._settings = self._open_settings(ros)
         self._state_requests = {}
-        self._model_state_commands = ros.queue("/gazebo/set_model_state", ModelState, depth=10)
+        self._model_state_commands = ros.queue("/gazebo/set_model_state", ModelState, depth=10, notice=self._note_command)
         for name, srv_class, handler in (
                 ("delete_model", DeleteModel, self._delete_model),
                 ("get_model_properties", GetModelProperties, self._get_model_properties),
@@ -97,12 +98,19 @@ class GazeboServices:
 
     def take_commands(self):
         """Loop thread: do what came in on /gazebo/set_model_state and /gazebo/set_link_state."""
+        if not self._has_commands:
+            return
+        # Before the queues are read: what comes in from here on is told again.
+        self._has_commands = False
         self._bodies.take_commands()
         for command in self._model_state_commands.drain():
             try:
                 self._put_model(command)
             except (UnknownEntity, BulletSimError, ValueError) as error:
                 self._log.warn_throttle(5.0, "/gazebo/set_model_state: %s" % error)
+
+    def _note_command(self):
+        self._has_commands = True
 
     # -- services in the thread of the request ------------------------------------------------------------------
 

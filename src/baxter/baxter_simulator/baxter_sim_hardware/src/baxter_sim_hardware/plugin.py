@@ -84,6 +84,7 @@ class BaxterPlugin(ModelPlugin):
         self._joint_state_messages = convert.JointStates([model.joint_names[i] for i in self._alphabetical])
         self._before = model.read_joints()
         self._gravity, self._gravity_ticks = None, 0  # what balances gravity (n,), and how long that holds
+        self._servo = self._servo_index = None  # joints that were driven to a position last, and which those are
         self._last_warning = {}
 
     def _hold_other_joints(self, robot):
@@ -157,7 +158,9 @@ class BaxterPlugin(ModelPlugin):
             self._gravity_ticks = GRAVITY_TICKS
         drives = self._baxter.update(time_s, position, velocity, self._gravity)
         if len(drives.servo):
-            self._model.drive_position(arm[drives.servo], drives.servo_position, drives.servo_effort,
+            if drives.servo is not self._servo:
+                self._servo, self._servo_index = drives.servo, arm[drives.servo]
+            self._model.drive_position(self._servo_index, drives.servo_position, drives.servo_effort,
                                        velocity=drives.servo_velocity)
         if len(drives.motor):
             self._model.drive_velocity(arm[drives.motor], drives.motor_velocity, drives.motor_effort)
