@@ -73,7 +73,7 @@ class DirectJoints:
         """Return positions, velocities and the drives' efforts, (3, n), after the last step."""
         values = np.empty((3, self._indices.shape[1]))
         if not _read(self._handle, self._body, values, self._sensor):
-            raise BulletSimError("Bullet does not say where the joints of body %d are; has it been removed?" % self._body)
+            raise BulletSimError("Bullet knows no joints of body %d; has it been removed?" % self._body)
         return values
 
     def drive_position(self, index, position, velocity, max_effort, gain):
@@ -117,7 +117,14 @@ def _symbol_values(path, names):
     return [int(values[0]) for values in found] if all(len(values) == 1 for values in found) else None
 
 
-@numba.njit(cache=True)
+def _compiled(function):
+    try:
+        return numba.njit(cache=True)(function)
+    except RuntimeError:  # numba finds no folder that it may write to: compiled anew in each process
+        return numba.njit(function)
+
+
+@_compiled
 def _read(handle, body, values, sensor):
     status = _submit(handle, _request_state(handle, body))
     for joint in range(values.shape[1]):
@@ -127,7 +134,7 @@ def _read(handle, body, values, sensor):
     return True
 
 
-@numba.njit(cache=True)
+@_compiled
 def _drive_position(handle, body, indices, index, position, velocity, max_effort, gain):
     command = _control(handle, body, _POSITION_CONTROL)
     for k in range(len(index)):

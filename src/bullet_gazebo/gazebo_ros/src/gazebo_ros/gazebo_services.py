@@ -75,7 +75,8 @@ class GazeboServices:
         self.push = self._bodies.push
         self._settings = self._open_settings(ros)
         self._state_requests = {}
-        self._model_state_commands = ros.queue("/gazebo/set_model_state", ModelState, depth=10, notice=self._note_command)
+        self._model_state_commands = ros.queue("/gazebo/set_model_state", ModelState, depth=10,
+                                               notice=self._note_command)
         for name, srv_class, handler in (
                 ("delete_model", DeleteModel, self._delete_model),
                 ("get_model_properties", GetModelProperties, self._get_model_properties),

@@ -34,7 +34,7 @@ LAB_ANGLES = (-1.0051802515115758, -1.0358377913378556, -0.33102594774694544, 1.
 TOO_FAR = ((3.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
 SHELF_IN_BASE = (0.2, -0.1, 0.3)
 WAIT_S = 20.0
-# Joint states in one go, and how long the last of them may take to be used: taken one by one they would need twice that.
+# Joint states in one go, and how long the last of them may take to be used: one by one they would need twice that.
 BURST = 1000
 BURST_TIMEOUT_S = 10.0
 
