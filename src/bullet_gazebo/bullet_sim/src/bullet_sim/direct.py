@@ -2,7 +2,8 @@
 """Joints read and driven through Bullet's C interface, for who does so at every tick.
 
 PyBullet makes a tuple for each joint where three arrays are wanted, and takes lists where there are arrays. The same
-functions of Bullet called from compiled code take a third of the time and give the same bits (docs/decisions/0007).
+functions of Bullet called from compiled code take little more than half the time and give the same bits
+(docs/decisions/0007).
 Importing this imports numba; ``Model.call_directly`` does so for who asks.
 """
 

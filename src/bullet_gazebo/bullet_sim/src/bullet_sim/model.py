@@ -82,7 +82,8 @@ class Model(Body):
     def call_directly(self):
         """Read and drive joints through Bullet's C interface from now on, where that is to be had; returns whether.
 
-        It gives the same numbers in a third of the time. For who does so at every tick: it takes importing numba.
+        It gives the same bits in little more than half the time. For who does so at every tick: it takes importing
+        numba.
         """
         from .direct import DirectJoints
 
