@@ -26,6 +26,7 @@ _POSITION_CONTROL = pybullet.POSITION_CONTROL
 _FUNCTIONS = {
     "b3RequestActualStateCommandInit": types.intp(types.intp, types.int32),
     "b3SubmitClientCommandAndWaitStatus": types.intp(types.intp, types.intp),
+    "b3GetStatusActualState": types.int32(*[types.intp] * 8),
     "b3GetJointState": types.int32(types.intp, types.intp, types.int32, types.intp),
     "b3JointControlCommandInit2": types.intp(types.intp, types.int32, types.int32),
     "b3JointControlSetDesiredPosition": types.int32(types.intp, types.int32, types.float64),
@@ -34,9 +35,10 @@ _FUNCTIONS = {
     "b3JointControlSetKd": types.int32(types.intp, types.int32, types.float64),
     "b3JointControlSetMaximumForce": types.int32(types.intp, types.int32, types.float64),
 }
-(_request_state, _submit, _get_joint_state, _control, _set_position, _set_velocity, _set_kp, _set_kd, _set_force) = (
-    types.ExternalFunction(name, signature) for name, signature in _FUNCTIONS.items()
-)
+(
+    _request_state, _submit, _get_state, _get_joint_state, _control,
+    _set_position, _set_velocity, _set_kp, _set_kd, _set_force,
+) = (types.ExternalFunction(name, signature) for name, signature in _FUNCTIONS.items())
 
 # Where ELF files (64 bits, little-endian) keep their symbols: System V ABI, chapters "Sections" and "Symbol Table".
 _ELF64 = b"\x7fELF\x02\x01"
@@ -46,6 +48,7 @@ _TYPE, _OFFSET, _SIZE, _LINK, _SYMBOL_TABLE = 1, 4, 5, 6, 2
 _SYMBOL = np.dtype(
     [("name", "<u4"), ("info", "u1"), ("other", "u1"), ("section", "<u2"), ("value", "<u8"), ("size", "<u8")]
 )
+_KIND, _FUNCTION, _UNDEFINED = 0xF, 2, 0
 
 
 class DirectJoints:
@@ -78,8 +81,21 @@ class DirectJoints:
         return values
 
     def drive_position(self, index, position, velocity, max_effort, gain):
-        """As ``Model.drive_position``; all (k,). The motor adds ``velocity`` to what closes the gap with ``gain``."""
-        _drive_position(self._handle, self._body, self._indices, index, position, velocity, max_effort, gain)
+        """As ``Model.drive_position``; all (k,). The motor adds ``velocity`` to what closes the gap with ``gain``.
+
+        Raises BulletSimError for a joint that there is none of, and for arrays of other lengths.
+        """
+        # Another type of number, or every second one of an array, would be compiled for when it first comes.
+        index = np.ascontiguousarray(index, dtype=np.intp)
+        position, velocity, max_effort = (
+            np.ascontiguousarray(values, dtype=float) for values in (position, velocity, max_effort)
+        )
+        if not _drive_position(self._handle, self._body, self._indices, index, position, velocity, max_effort, gain):
+            raise BulletSimError(
+                "joints %s with %d positions, %d velocities and %d efforts; expected joints from 0 to %d and one of "
+                "each for each of them"
+                % (index.tolist(), len(position), len(velocity), len(max_effort), self._indices.shape[1] - 1)
+            )
 
 
 def client_handle(client):
@@ -101,7 +117,14 @@ def client_handle(client):
 
 
 def _symbol_values(path, names):
-    """Return the values of symbols of an ELF file, or None where it does not have all of them, each once."""
+    """Return where in an ELF file functions begin, by their names, or None unless it says so of each, once."""
+    try:
+        return _values_in_table(path, names)
+    except (struct.error, IndexError, ValueError):  # cut off, or made of something else
+        return None
+
+
+def _values_in_table(path, names):
     with open(path, "rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as image:
         if image[: len(_ELF64)] != _ELF64:
             return None
@@ -114,7 +137,9 @@ def _symbol_values(path, names):
         table, texts = tables[0], sections[tables[0][_LINK]]
         symbols = np.frombuffer(image[table[_OFFSET] : table[_OFFSET] + table[_SIZE]], dtype=_SYMBOL)
         text = image[texts[_OFFSET] : texts[_OFFSET] + texts[_SIZE]]
-    found = [symbols["value"][symbols["name"] == text.find(b"\0%s\0" % name.encode()) + 1] for name in names]
+    functions = symbols[(symbols["info"] & _KIND == _FUNCTION) & (symbols["section"] != _UNDEFINED)]
+    # An index that fails is a ValueError: the name is not among the texts.
+    found = [functions["value"][functions["name"] == text.index(b"\0%s\0" % name.encode()) + 1] for name in names]
     return [int(values[0]) for values in found] if all(len(values) == 1 for values in found) else None
 
 
@@ -128,6 +153,9 @@ def _compiled(function):
 @_compiled
 def _read(handle, body, values, sensor):
     status = _submit(handle, _request_state(handle, body))
+    # False for a body that is gone, of which the status still holds what was asked of another.
+    if not _get_state(status, 0, 0, 0, 0, 0, 0, 0):
+        return False
     for joint in range(values.shape[1]):
         if not _get_joint_state(handle, status, joint, sensor.ctypes.data):
             return False
@@ -137,8 +165,14 @@ def _read(handle, body, values, sensor):
 
 @_compiled
 def _drive_position(handle, body, indices, index, position, velocity, max_effort, gain):
+    count = len(index)
+    if not (len(position) == len(velocity) == len(max_effort) == count):
+        return False
+    for k in range(count):
+        if not 0 <= index[k] < indices.shape[1]:
+            return False
     command = _control(handle, body, _POSITION_CONTROL)
-    for k in range(len(index)):
+    for k in range(count):
         q, u = indices[0, index[k]], indices[1, index[k]]
         _set_position(command, q, position[k])
         _set_kp(command, u, gain)
@@ -146,3 +180,4 @@ def _drive_position(handle, body, indices, index, position, velocity, max_effort
         _set_kd(command, u, 1.0)
         _set_force(command, u, max_effort[k])
     _submit(handle, command)
+    return True

@@ -85,8 +85,10 @@ class Model(Body):
         It gives the same bits in little more than half the time. For who does so at every tick: it takes importing
         numba.
         """
-        from .direct import DirectJoints
-
+        try:
+            from .direct import DirectJoints
+        except ImportError:  # numba is not there
+            return False
         self._direct = DirectJoints.of(self._client, self.body, len(self._all)) if self._all else None
         return self._direct is not None
 

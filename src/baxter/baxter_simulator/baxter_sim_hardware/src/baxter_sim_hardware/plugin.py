@@ -113,7 +113,7 @@ class BaxterPlugin(ModelPlugin):
         takers = {key: take for part in self._parts for key, take in part.takers.items()}
         latched = {key: begin for part in self._parts for key, begin in getattr(part, "latched", {}).items()}
         groups = {}  # rate -> (schedule, [(function that makes a message, part, publisher)])
-        takers = self._with_own_takers(takers)
+        takers = self._with_own_takers({row.key: takers[row.key] for row in interface.TOPICS if row.key in takers})
         order = {key: place for place, key in enumerate(takers)}
         self._letterboxes = {}  # queue -> (place in the order of reading, key, part, function that takes a message)
         rate = self._parameter("joint_state_rate", interface.JOINT_STATE_RATE_HZ)
