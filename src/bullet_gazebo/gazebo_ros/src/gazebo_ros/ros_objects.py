@@ -6,6 +6,7 @@ once and come alive when their turn comes, so the loop never waits; :meth:`RosOb
 """
 import queue
 import threading
+import weakref
 
 import rospy
 
@@ -121,7 +122,10 @@ def _read_in_loop(impl, inlets, log):
     add = impl.add_connection
 
     def add_connection(connection):
-        connection.receive_loop = lambda _: _receive(connection, impl, inlets, log)
+        # Held weakly: a connection that rospy drops while it is being made leaves its socket to be closed with the last
+        # reference, and the publisher serves nobody else before that.
+        held = weakref.ref(connection)
+        connection.receive_loop = lambda _: _receive(held(), impl, inlets, log)
         return add(connection)
 
     impl.add_connection = add_connection

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """rospy's subscriptions, read by the loop: what rospy's thread of a connection does meanwhile."""
+import contextlib
+import gc
 import socket
 import struct
 import threading
@@ -7,6 +9,8 @@ from io import BytesIO
 from types import SimpleNamespace
 
 import pytest
+from rospy.impl.tcpros_base import TCPROSTransport
+from rospy.impl.tcpros_pubsub import TCPROSSub, robust_connect_subscriber
 from std_msgs.msg import String
 
 from gazebo_ros.loop_subscriber import InletHub
@@ -114,6 +118,30 @@ def test_what_is_no_message_at_all_closes_the_connection_and_is_told(scene):
     scene.serve_until(scene.connection.closed.is_set, "the end")
     error, = scene.errors
     assert "/chatter: the connection to /somebody is closed" in error
+
+
+def test_a_connection_that_rospy_gave_up_halfway_does_not_keep_the_publisher_waiting(monkeypatch):
+    """Two updates from the master make rospy connect twice; it drops the first while that connects, and with it a socket
+    that only the transport's end closes. A publisher serves one handshake after the other, and would wait for it."""
+    listening = socket.create_server(("localhost", 0))
+    listening.settimeout(10.0)
+    transport = TCPROSTransport(TCPROSSub("/chatter", String), "/chatter")
+    impl = SimpleNamespace(add_connection=lambda _: True)
+    _read_in_loop(impl, InletHub(), None)
+    impl.add_connection(transport)
+    # What connect() asks for just before it has a socket.
+    monkeypatch.setattr("rospy.impl.tcpros_base._is_use_tcp_keepalive", lambda close=transport.close: close())
+    gc.disable()
+    try:
+        robust_connect_subscriber(transport, *listening.getsockname(), "http://localhost:1/", print, "/chatter")
+        monkeypatch.undo()
+        del transport
+        with contextlib.closing(listening.accept()[0]) as far:
+            far.settimeout(10.0)
+            assert far.recv(1) == b""
+    finally:
+        gc.enable()
+        listening.close()
 
 
 def test_a_connection_that_is_gone_before_it_was_read_is_closed():
