@@ -121,8 +121,8 @@ def test_what_is_no_message_at_all_closes_the_connection_and_is_told(scene):
 
 
 def test_a_connection_that_rospy_gave_up_halfway_does_not_keep_the_publisher_waiting(monkeypatch):
-    """Two updates from the master make rospy connect twice; it drops the first while that connects, and with it a socket
-    that only the transport's end closes. A publisher serves one handshake after the other, and would wait for it."""
+    """Two updates from the master make rospy connect twice; it drops the first while that connects, and with it a
+    socket that only the transport's end closes. A publisher serves one handshake after the other, and would wait."""
     listening = socket.create_server(("localhost", 0))
     listening.settimeout(10.0)
     transport = TCPROSTransport(TCPROSSub("/chatter", String), "/chatter")
