@@ -12,8 +12,11 @@ _WIDTH, _LEFT, _ROW = 1000, 470, 22
 
 
 def ratios(rows, path):
-    """Draw the ratio of ours to the peer's of each row that has one, on a logarithmic axis; goals as ticks."""
-    rows = [row for row in rows if row.ratio]
+    """Draw the ratio of ours to the peer's of each row that has one, on a logarithmic axis; goals as ticks.
+
+    A row that was zero in some round, such as poses left unsolved, has no place on that axis.
+    """
+    rows = [row for row in rows if row.ratio and min(row.ratios) > 0.0]
     if not rows:
         return
     low = min(-1, math.floor(min(math.log10(min(row.ratios)) for row in rows)))
