@@ -20,6 +20,7 @@ from sensor_msgs.msg import JointState
 from baxter_traj_streamer.moves import PoseMove
 from baxter_traj_streamer.settings import SIDES, arm_joint_names
 from baxter_traj_streamer.traj_client import TrajClient
+from lab_testing.waiting import wait_until
 
 # Where the move begins [rad]: neutral, the same signs for both arms.
 NEUTRAL = [0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0]
@@ -38,6 +39,14 @@ class Recorder:
         self._subscribers = [
             rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, self._on_command, tcp_nodelay=True),
             rospy.Subscriber("/robot/joint_states", JointState, self._on_states, tcp_nodelay=True)]
+
+    def wait_until_still(self, seconds):
+        """Until joint states reach so long [s, simulated] after the last command, or after the first of them."""
+        def have_come():
+            since = self.commands[-1][0] if self.commands else self.states[0][0] if self.states else None
+            return since is not None and bool(self.states) and self.states[-1][0] >= since + seconds
+
+        wait_until(have_come, "joint states of an arm that rests for %g s" % seconds, 60.0)
 
     def _on_command(self, message):
         if message.mode == JointCommand.RAW_POSITION_MODE:
@@ -99,10 +108,10 @@ def main():
     client.wait_until_ready()
     move = PoseMove(client)
     client.move(move.trajectory(options.side, NEUTRAL, time_optimal=True))
-    rospy.sleep(REST_S)
+    Recorder(options.side).wait_until_still(REST_S)
     recorder = Recorder(options.side)
     client.move(move.trajectory(options.side, "pre_pose"))
-    rospy.sleep(SETTLED_S + REST_S)
+    recorder.wait_until_still(SETTLED_S + REST_S)
 
     commands, states = list(recorder.commands), list(recorder.states)
     simulated, wall = np.array([row[0] for row in commands]), np.array([row[1] for row in commands])

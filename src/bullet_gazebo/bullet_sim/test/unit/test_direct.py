@@ -173,7 +173,8 @@ def test_files_that_do_not_say_where_their_functions_are(tmp_path):
     assert direct._symbol_values(text, ["main"]) is None
     assert direct._symbol_values(pybullet.__file__, ["getPhysicsClient", "there_is_no_such_function"]) is None
     cut = tmp_path / "cut"
-    cut.write_bytes(open(pybullet.__file__, "rb").read(4096))
+    with open(pybullet.__file__, "rb") as library:
+        cut.write_bytes(library.read(4096))
     assert direct._symbol_values(cut, ["getPhysicsClient"]) is None
     # A table of which only the entry without a name is left, as some linkers leave it.
     lone = tmp_path / "lone"

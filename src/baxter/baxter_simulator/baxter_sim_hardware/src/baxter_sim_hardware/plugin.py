@@ -83,6 +83,7 @@ class BaxterPlugin(ModelPlugin):
         self._alphabetical = np.argsort(model.joint_names)
         self._joint_state_messages = convert.JointStates([model.joint_names[i] for i in self._alphabetical])
         self._before = model.read_joints()
+        self._measured = None  # (position, velocity) of the arms' joints when this tick began, (n,) each
         self._gravity, self._gravity_ticks = None, 0  # what balances gravity (n,), and how long that holds
         self._servo = self._servo_index = None  # joints that were driven to a position last, and which those are
         self._last_warning = {}
@@ -146,7 +147,8 @@ class BaxterPlugin(ModelPlugin):
 
     def update(self, time_s, dt):
         self._before = self._model.read_joints()
-        position, velocity = self._before[0][self._arm_index], self._before[1][self._arm_index]
+        position, velocity = self._measured = (
+            self._before[0][self._arm_index], self._before[1][self._arm_index])
         mail = self.context.mail()
         if mail:
             self._take_messages(mail, time_s)
@@ -263,7 +265,7 @@ class BaxterPlugin(ModelPlugin):
         self._apply(Event.ESTOP_PRESS if pressed else Event.ESTOP_RELEASE, self.context.world.time_s)
 
     def _command(self, side, msg, time_s):
-        position, velocity = self._read_arms()
+        position, velocity = self._measured
         try:
             command = self._baxter.command(side, msg.mode, msg.names, msg.command, time_s, position, velocity)
         except CommandRefused as refusal:
