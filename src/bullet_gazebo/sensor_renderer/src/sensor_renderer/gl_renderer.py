@@ -290,9 +290,11 @@ class GlRenderer:
         return texture
 
     def _draw_shadows(self, mirror):
-        if self._shadow_of == (id(mirror), mirror.version):
+        # Not by id(): a new world is often put where one that has gone was.
+        now = (weakref.ref(mirror), mirror.version)
+        if self._shadow_of == now:
             return
-        self._shadow_of = (id(mirror), mirror.version)
+        self._shadow_of = now
         self._shadow_buffer.use()
         self._shadow_buffer.clear(depth=1.0)
         if not mirror.light.shadows:
