@@ -24,6 +24,17 @@ def wait_until(condition, what="the condition", timeout_s=20.0, interval_s=POLL_
         time.sleep(interval_s)
 
 
+def wait_for_publishers(subscriber, *nodes, timeout_s=20.0):
+    """Until ``subscriber`` (a ``rospy.Subscriber``) hears these nodes, by their absolute names; others do not count.
+
+    Raises AssertionError after ``timeout_s`` [s] of wall time.
+    """
+    def missing():
+        return set(nodes) - {connection.callerid_pub for connection in list(subscriber.impl.connections)}
+
+    wait_until(lambda: not missing(), lambda: "%s on %s" % (", ".join(sorted(missing())), subscriber.name), timeout_s)
+
+
 def wait_for_message(topic, message_class, wanted=lambda message: True, timeout_s=60.0):
     """The first message on ``topic`` for which ``wanted(message)`` is true.
 

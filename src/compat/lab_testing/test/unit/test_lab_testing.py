@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import os
 import subprocess
+from types import SimpleNamespace
 
 import pytest
 
 from lab_testing import waiting
 from lab_testing.processes import is_alive, living
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import wait_for_publishers, wait_until
 
 
 def test_the_first_true_answer_is_returned():
@@ -35,6 +36,14 @@ def test_the_condition_is_asked_once_more_after_the_deadline(monkeypatch):
     assert wait_until(lambda: asked.append(1) or len(asked) == 2, timeout_s=1.0)
     with pytest.raises(AssertionError):
         wait_until(lambda: asked.append(1) or len(asked) == 5, timeout_s=1.0)
+
+
+def test_publishers_are_told_by_their_names():
+    subscriber = SimpleNamespace(name="/rosout", impl=SimpleNamespace(
+        connections=[SimpleNamespace(callerid_pub=node) for node in ("/rosout", "/gazebo", "/other")]))
+    wait_for_publishers(subscriber, "/gazebo", "/other")
+    with pytest.raises(AssertionError, match="waited 0.05 s for /sensor_renderer on /rosout"):
+        wait_for_publishers(subscriber, "/gazebo", "/sensor_renderer", timeout_s=0.05)
 
 
 def test_the_dead_that_nobody_has_buried_are_not_alive():
