@@ -14,6 +14,7 @@ from live_plot.recording import Recording
 from live_plot.subscriptions import Subscriptions, topic_types
 
 POLL_S = 0.2
+END_POLL_MS = 50
 
 
 def parse(name, arguments):
@@ -108,7 +109,18 @@ def save_picture(options):
 def show_window(options):
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise fields.PlotError("there is no display (DISPLAY is not set); --png FILE --seconds N needs none")
+    is_over = False
+
+    def end(*_):
+        nonlocal is_over
+        is_over = True
+
+    # An event loop that does not run yet cannot be quit: the end is only noted, and a timer of the loop looks for it.
+    for name in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(name, end)
+    rospy.on_shutdown(end)
     import pyqtgraph
+    from pyqtgraph.Qt import QtCore
 
     from live_plot.window import PlotWindow
 
@@ -121,9 +133,9 @@ def show_window(options):
     for argument in options.topics:
         window.add(argument)
     window.show()
-    rospy.on_shutdown(application.quit)
-    for name in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(name, lambda *_: application.quit())
+    end_timer = QtCore.QTimer(interval=END_POLL_MS)
+    end_timer.timeout.connect(lambda: application.quit() if is_over else None)
+    end_timer.start()
     application.exec_()
 
 
