@@ -125,25 +125,37 @@ class GazeboServices(unittest.TestCase):
 
     def test_reset_world_keeps_the_clock_monotonic(self):
         self.spawn_ok("box", BOX, z=3.0)
-        start = self.get_model_state("box", "").pose.position.z
         with Listener("/clock", Clock) as clock:
             clock.wait(100)
+            self.pause_physics()
+            self.assertLess(self.get_model_state("box", "").pose.position.z, 2.9)
+            before = self.get_world_properties().sim_time
             self.reset_world()
-            self.assertAlmostEqual(self.get_model_state("box", "").pose.position.z, 3.0, delta=0.05)
+            self.assertEqual(self.get_model_state("box", "").pose.position.z, 3.0)
+            self.assertEqual(self.get_world_properties().sim_time, before)
+            self.unpause_physics()
+            clock.wait(len(clock.messages) + 100)
+            # And while time goes on, which moves the box before anybody can ask for it.
+            self.reset_world()
             clock.wait(len(clock.messages) + 100)
             stamps = [message.clock.to_nsec() for message in clock.messages]
-        self.assertLessEqual(start, 3.0)
         self.assertEqual(stamps, sorted(stamps))
 
     def test_reset_simulation_sets_time_to_zero_and_listeners_survive(self):
         wait_until(lambda: self.get_world_properties().sim_time > 0.5, "half a second")
         with Listener("/clock", Clock) as clock:
             clock.wait(10)
+            self.pause_physics()
             self.reset_simulation()
-            self.assertLess(self.get_world_properties().sim_time, 0.5)
-            count = len(clock.messages)
-            clock.wait(count + 100)
-            self.assertLess(clock.messages[-1].clock.to_sec(), clock.messages[0].clock.to_sec() + 1.0)
+            self.assertEqual(self.get_world_properties().sim_time, 0.0)
+            self.unpause_physics()
+            clock.wait(len(clock.messages) + 100)
+            # And while time goes on.
+            self.reset_simulation()
+            clock.wait(len(clock.messages) + 100)
+            stamps = [message.clock.to_nsec() for message in clock.messages]
+        self.assertEqual([after for before, after in zip(stamps, stamps[1:], strict=False) if after < before], [0, 0])
+        self.assertGreater(stamps[-1], 0)
 
     # -- lock-step --------------------------------------------------------------------------------------------------
 
@@ -294,8 +306,10 @@ class GazeboServices(unittest.TestCase):
 
     def test_the_real_time_factor_is_published(self):
         with Listener("/gazebo/performance_metrics", PerformanceMetrics) as metrics:
-            metrics.wait(2)
-        self.assertAlmostEqual(metrics.messages[-1].real_time_factor, 1.0, delta=0.05)
+            # A stall at the edge of a window takes from that one what the next one gets.
+            wait_until(lambda: any(abs(message.real_time_factor - 1.0) < 0.05 for message in metrics.messages),
+                       lambda: "a second in real time among %s" % [message.real_time_factor
+                                                                   for message in metrics.messages], 60.0)
 
     def test_gravity_can_be_set(self):
         before = self.get_physics_properties()

@@ -118,6 +118,30 @@ def test_the_meter_reports_once_per_window(clock):
     assert factors == pytest.approx([0.5] * len(factors))
 
 
+def test_what_a_window_lost_to_a_stall_at_its_edge_the_next_one_gets(clock):
+    meter = RateMeter(1.0, clock=clock)
+    clock.now += 0.9
+    assert meter.update(0.9) is None
+    clock.now += 0.15
+    assert meter.update(1.0) == pytest.approx(1.0 / 1.05)
+    clock.now += 0.95
+    assert meter.update(2.0) is None
+    clock.now += 0.05
+    assert meter.update(2.05) == pytest.approx(1.05)
+
+
+def test_the_meter_counts_no_time_before_a_restart(clock):
+    meter = RateMeter(1.0, clock=clock)
+    clock.now += 0.5
+    assert meter.update(0.5) is None
+    clock.now += 60.0
+    meter.restart(0.0)
+    clock.now += 0.75
+    assert meter.update(0.75) is None
+    clock.now += 0.25
+    assert meter.update(1.0) == pytest.approx(1.0)
+
+
 def test_a_single_slow_second_is_no_news():
     watch = SlownessWatch(windows=3, quiet_windows=10)
     assert [watch.is_news(factor, 1.0) for factor in (0.5, 1.0, 0.9, 0.9, 1.0)] == [False] * 5
