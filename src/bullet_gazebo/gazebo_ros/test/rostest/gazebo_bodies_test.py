@@ -15,7 +15,7 @@ from rosgraph_msgs.msg import Log
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Empty
 
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import wait_for_publishers, wait_until
 
 BOX = """<sdf version="1.6"><model name="box"><pose>0 0 0.1 0 0 0</pose><link name="body">
   <pose>0 0 0.1 0 0 0</pose>
@@ -147,7 +147,7 @@ class GazeboBodies(unittest.TestCase):
     def test_missing_meshes_and_unknown_elements_are_one_warning_each(self):
         lines = []
         subscriber = rospy.Subscriber("/rosout", Log, lambda message: lines.append(message.msg))
-        wait_until(lambda: subscriber.get_num_connections() >= 2, "connections to /rosout")
+        wait_for_publishers(subscriber, "/gazebo")
         mesh = """<link name="ghost">
           <visual name="v"><geometry><mesh><uri>model://gone/a.stl</uri></mesh></geometry></visual></link><frobnicator/>
           <joint name="g" type="fixed"><parent>body</parent><child>ghost</child></joint>"""

@@ -16,7 +16,7 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, Image
 
 from lab_testing import waiting
-from lab_testing.waiting import wait_for_message
+from lab_testing.waiting import wait_for_message, wait_for_publishers
 
 CAMERA = """<camera%s><horizontal_fov>1.0</horizontal_fov><image><width>160</width><height>120</height></image>
 <clip><near>0.05</near><far>20</far></clip></camera>"""
@@ -60,7 +60,7 @@ class SensorRendererTest(unittest.TestCase):
     def test_1_what_is_of_no_use_blinds_nobody(self):
         said = []
         log = rospy.Subscriber("/rosout", Log, lambda line: said.append(line.msg), queue_size=1000)
-        wait_until(lambda: log.get_num_connections() > 1)
+        wait_for_publishers(log, "/gazebo", "/sensor_renderer", timeout_s=60.0)
         spawn("sdf", "huge", EYE % (CAMERA.replace(">160<", ">99999999<") % "", "huge"), -1.0)
         spawn("sdf", "nameless", EYE % (CAMERA % "", "no name!"), -2.0)
         spawn("sdf", "mesh", MESH, -3.0)
@@ -77,6 +77,7 @@ class SensorRendererTest(unittest.TestCase):
         counts = [len(part) for part in seen]
         wait_until(lambda: all(len(part) > count + 5 for part, count in zip(seen, counts, strict=True)))
         for text in ("a picture of 99999999 x 120 pixels is out of range", "'/no name!/image_raw' is no name in ROS"):
+            wait_until(lambda text=text: any(text in line for line in said), text)
             self.assertEqual(sum(text in line for line in said), 1, "said once: %s" % text)
 
         # The renderer is killed without a word; it comes back and goes on.
