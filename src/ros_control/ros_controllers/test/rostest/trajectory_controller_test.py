@@ -27,7 +27,8 @@ from lab_testing.waiting import wait_until
 
 JOINTS = ["shoulder", "elbow"]
 ACTION = "/robot/arm/follow_joint_trajectory"
-WAIT_S = 5.0
+START_S = 60.0  # for the joints and their controller manager to come
+WAIT_S = 20.0
 R = FollowJointTrajectoryResult
 
 
@@ -57,14 +58,17 @@ def switch(start=(), stop=()):
 class TrajectoryControllerTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
+        for name in ("load_controller", "switch_controller"):
+            rospy.wait_for_service("/robot/controller_manager/" + name, START_S)
         assert service("/robot/controller_manager/load_controller", LoadController, "arm").ok
         switch(start=["arm"])
         cls.client = actionlib.SimpleActionClient(ACTION, FollowJointTrajectoryAction)
-        assert cls.client.wait_for_server(rospy.Duration(WAIT_S)), "no action server"
+        assert cls.client.wait_for_server(rospy.Duration(START_S)), "no action server"
         cls.state = None
         cls.state_subscriber = rospy.Subscriber("/robot/arm/state", JointTrajectoryControllerState, cls._on_state)
         cls.command = rospy.Publisher("/robot/arm/command", JointTrajectory, queue_size=1)
-        wait_until(lambda: cls.state is not None and cls.command.get_num_connections(), "the controller's topics")
+        wait_until(lambda: cls.state is not None and cls.command.get_num_connections(), "the controller's topics",
+                   START_S)
 
     @classmethod
     def _on_state(cls, message):
@@ -116,13 +120,19 @@ class TrajectoryControllerTest(unittest.TestCase):
         self.wait_at(0.1, 0.3)
 
     def test_future_start_is_waited_for(self):
-        start = rospy.Time.now() + rospy.Duration(0.5)
-        self.client.send_goal(goal((0.1, [0.3, 0.3]), start=start))
+        # Later than this test can be at its next lines, and taken back then.
+        self.client.send_goal(goal((0.1, [0.3, 0.3]), start=rospy.Time.now() + rospy.Duration(60.0)))
         self.wait_active()
+        active = self.state.header.stamp
+        wait_until(lambda: self.state.header.stamp > active + rospy.Duration(0.3), "states while it waits")
         np.testing.assert_allclose(self.state.actual.positions, [0.0, 0.0], atol=1e-9)
+        self.client.cancel_goal()
         self.assertTrue(self.client.wait_for_result(rospy.Duration(WAIT_S)))
+        self.assertEqual(self.client.get_state(), GoalStatus.PREEMPTED)
+        start = rospy.Time.now() + rospy.Duration(2.0)
+        self.assert_ended(self.go(goal((0.1, [0.3, 0.3]), start=start)), GoalStatus.SUCCEEDED, R.SUCCESSFUL)
         self.assertGreaterEqual(rospy.Time.now(), start + rospy.Duration(0.09))
-        self.assertEqual(self.client.get_state(), GoalStatus.SUCCEEDED)
+        self.wait_at(0.3, 0.3)
 
     def test_no_points_stop_and_succeed(self):
         self.command.publish(trajectory((2.0, [1.0, 1.0])))
