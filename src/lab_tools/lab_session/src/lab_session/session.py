@@ -108,6 +108,14 @@ class Lab:
             stop = "The simulator is stopped: run the cell that connects again."
         return "%s\n%s\nThe same lab in a terminal: %s" % (running, stop, shell)
 
+    def _ask_for(self, command):
+        """Have the next start be of `command`; one of ours that runs goes on."""
+        if not self.is_ours:
+            self._command = command
+        elif command != self._command:
+            _say("what runs was started as: roslaunch %s; lab.stop() stops it, and the next connect starts it anew"
+                 % " ".join(self._command))
+
     def _is_up(self):
         return self._topic in {name for name, _ in _published_topics()}
 
@@ -147,14 +155,16 @@ def connect(name, *arguments):
 
     Uses the simulator on the master that ROS_MASTER_URI names; where there is none, starts one there, with further
     launch `arguments` such as "gui:=false"; where the robot there is another one, on a port of its own (ROS_MASTER_URI
-    follows). Calling it again is safe: it finds what the first call has started, or starts it again.
+    follows). Calling it again is safe: it finds what the first call has started, or starts it again, with the arguments
+    that it is called with then.
 
     Raises :class:`LabError` when there is no lab to be had.
     """
     if name not in LABS:
         raise LabError("there is no lab '%s'; there are: %s" % (name, ", ".join(LABS)))
     start = LABS[name]
-    lab = _labs.setdefault(name, Lab([*start.command, *arguments], start.topic))
+    lab = _labs.setdefault(name, Lab(start.command, start.topic))
+    lab._ask_for([*start.command, *arguments])
     try:
         with _only_one():
             _find_or_start(lab)
