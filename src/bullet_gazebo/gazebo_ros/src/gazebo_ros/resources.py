@@ -22,6 +22,7 @@ class ResourceFinder:
         self._packages = packages or rospkg.RosPack()
         self._model_folders = model_folders(self._packages)
         self._found = {}
+        self._may_look_anew = True
 
     def __call__(self, name):
         """The path of an existing file, or None."""
@@ -30,16 +31,16 @@ class ResourceFinder:
         return self._found[name]
 
     def forget_missing(self):
-        """Look again for what was not there: files appear while a lab is being written."""
+        """Look again for what was not there: files and packages appear while a lab is being written."""
         self._found = {name: path for name, path in self._found.items() if path is not None}
+        self._may_look_anew = True
 
     def _candidates(self, name):
         url = urlparse(name)
         if url.scheme == "package":
-            try:
-                yield Path(self._packages.get_path(url.netloc)) / unquote(url.path).lstrip("/")
-            except rospkg.ResourceNotFound:
-                return
+            package = self._package_folder(url.netloc)
+            if package is not None:
+                yield package / unquote(url.path).lstrip("/")
         elif url.scheme == "model":
             for folder in self._model_folders:
                 yield folder / url.netloc / unquote(url.path).lstrip("/")
@@ -47,3 +48,15 @@ class ResourceFinder:
             yield Path("/" + (url.netloc + unquote(url.path)).lstrip("/"))
         elif not url.scheme:
             yield Path(name)
+
+    def _package_folder(self, name):
+        try:
+            return Path(self._packages.get_path(name))
+        except rospkg.ResourceNotFound:
+            if not self._may_look_anew:
+                return None
+        # A RosPack keeps what it saw when it was first asked. Walking through all folders takes its time: not for each
+        # mesh of a package that there is not.
+        self._may_look_anew = False
+        self._packages = rospkg.RosPack()
+        return self._package_folder(name)

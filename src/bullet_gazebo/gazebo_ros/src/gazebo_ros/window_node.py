@@ -54,7 +54,8 @@ def _show(window, stop):
     reader = _wait_for_snapshot(stop)
     if reader is None:
         return
-    view = window.Window(DrawingCache(), ResourceFinder(), rospy.logwarn, frame_rate=_FRAME_RATE)
+    finder = ResourceFinder()
+    view = window.Window(DrawingCache(), finder, rospy.logwarn, frame_rate=_FRAME_RATE)
     shown_revision = None
     while not stop() and view.is_open and reader.is_alive:
         started = time.monotonic()
@@ -62,6 +63,7 @@ def _show(window, stop):
         if snapshot is not None and snapshot.revision != shown_revision:
             scene = reader.scene()
             if scene.revision == snapshot.revision:
+                finder.forget_missing()
                 view.set_scene(scene.bodies, snapshot.values)
                 view.set_lights(scene.light.get("lights"))
                 shown_revision = scene.revision

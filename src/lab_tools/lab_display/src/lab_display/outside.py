@@ -76,7 +76,8 @@ class Outside:
     def __init__(self, folder, warn):
         """Raises gazebo_ros.snapshot.SnapshotError where there is no snapshot."""
         self._reader = SnapshotReader(folder)
-        self._mirror = Mirror(DrawingCache(), ResourceFinder(), warn)
+        self._finder = ResourceFinder()
+        self._mirror = Mirror(DrawingCache(), self._finder, warn)
         self._revision = None
         self._renderer = None
 
@@ -94,6 +95,7 @@ class Outside:
             revision, *seen = self._reader.scene()
             if revision != snapshot.revision:
                 return False  # a state of the new scene follows
+            self._finder.forget_missing()
             self._mirror.set_scene(*seen)
             self._revision = revision
         self._mirror.set_state(snapshot.values)
