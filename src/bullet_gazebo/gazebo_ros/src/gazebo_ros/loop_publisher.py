@@ -92,8 +92,9 @@ class LoopPublisher:
     Until :meth:`attach` gave it rospy's side of the topic it has no listeners and publishing only fills the latch.
     """
 
-    def __init__(self, hub, topic, msg_class, latch=False, greet=False):
-        """``latch`` as in ROS; ``greet`` gives late joiners the last message, unannounced."""
+    def __init__(self, hub, topic, msg_class, latch=False, greet=False, release=lambda: None):
+        """``latch`` as in ROS; ``greet`` gives late joiners the last message, unannounced; ``release()`` ends the
+        registration, also one that is still under way."""
         self.topic = topic
         self.msg_class = msg_class
         self.latch = latch
@@ -109,11 +110,12 @@ class LoopPublisher:
         self._impl = None
         self._known = None
         self._peers = []
-        self._release = None
-
-    def attach(self, impl, release):
-        """Begin to serve rospy's publisher ``impl`` (its ``connections``); ``release()`` ends the registration."""
         self._release = release
+        #: True once :meth:`close` was called.
+        self.is_closed = False
+
+    def attach(self, impl):
+        """Begin to serve rospy's publisher ``impl`` (its ``connections``)."""
         self._impl = impl
         self._hub.attention.append(self)
 
@@ -177,13 +179,14 @@ class LoopPublisher:
 
     def close(self):
         """Stop publishing and give the registration back."""
+        if self.is_closed:
+            return
+        self.is_closed = True
         self._impl = self._known = None
         self._peers = []
         self.has_listeners = False
         self._hub.backlog.discard(self)
-        release, self._release = self._release, None
-        if release is not None:
-            release()
+        self._release()
 
     def _adopt(self, connections):
         """Follow rospy's list of connections (a new list at every change); return the peers that are new."""

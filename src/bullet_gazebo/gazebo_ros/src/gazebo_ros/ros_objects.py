@@ -27,19 +27,29 @@ class RosObjects:
         self._log = log
         self._jobs = queue.SimpleQueue()
         self._inboxes = {}
+        self._delivered_before = {}
         threading.Thread(target=self._work, name="ros_registrar", daemon=True).start()
 
     def publisher(self, topic, msg_class, latch=False, greet=False):
         """A :class:`LoopPublisher` for the absolute name ``topic``."""
-        publisher = LoopPublisher(self._hub, topic, msg_class, latch=latch, greet=greet)
+        registered = []
 
         def register():
+            if publisher.is_closed:
+                return
             registration = rospy.Publisher(topic, msg_class, latch=latch, queue_size=1)
+            registered.append(registration)
             # rospy would put a queue and a thread between us and each connection.
             registration.impl.set_queue_size(None)
             registration.impl.add_subscriber_listener(_Attention(self._hub, publisher))
-            publisher.attach(registration.impl, lambda: self._jobs.put(registration.unregister))
+            publisher.attach(registration.impl)
 
+        def unregister():
+            for registration in registered:
+                registration.unregister()
+
+        publisher = LoopPublisher(self._hub, topic, msg_class, latch=latch, greet=greet,
+                                  release=lambda: self._jobs.put(unregister))
         self._jobs.put(register)
         return publisher
 
@@ -76,8 +86,10 @@ class RosObjects:
             raise rospy.ServiceException(str(error)) from None
 
     def deliveries(self):
-        """How many messages the loop's subscriptions have received: {topic: count}."""
-        return {topic: sum(inbox.delivered for inbox in inboxes) for topic, inboxes in list(self._inboxes.items())}
+        """How many messages the loop's subscriptions have received: {topic: count}. Those that have been closed count
+        on, so that it never becomes less."""
+        return {topic: self._delivered_before.get(topic, 0) + sum(inbox.delivered for inbox in inboxes)
+                for topic, inboxes in list(self._inboxes.items())}
 
     def flush(self, timeout_s=10.0):
         """Any thread but the loop's: wait until all registrations asked for so far are done."""
@@ -101,6 +113,7 @@ class RosObjects:
         return inbox
 
     def _forget(self, inbox):
+        self._delivered_before[inbox.topic] = self._delivered_before.get(inbox.topic, 0) + inbox.delivered
         left = [other for other in self._inboxes.get(inbox.topic, ()) if other is not inbox]
         if left:
             self._inboxes[inbox.topic] = left

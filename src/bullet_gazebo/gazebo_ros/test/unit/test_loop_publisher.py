@@ -90,7 +90,7 @@ def hub():
 
 def make(hub, impl, msg_class=FakeMessage, **options):
     publisher = LoopPublisher(hub, "/topic", msg_class, **options)
-    publisher.attach(impl, lambda: None)
+    publisher.attach(impl)
     return publisher
 
 
@@ -227,7 +227,7 @@ def test_what_was_published_before_registration_is_latched(hub, impl):
     publisher = LoopPublisher(hub, "/topic", FakeMessage, latch=True)
     publisher.publish(FakeMessage(b"early"))
     late = impl.connect()
-    publisher.attach(impl, lambda: None)
+    publisher.attach(impl)
     hub.service()
     assert late.received() == [b"early"]
 
@@ -251,8 +251,8 @@ def test_headers_are_numbered_from_one(hub, impl):
 
 def test_close_gives_the_registration_back_once(hub, impl):
     released = []
-    publisher = LoopPublisher(hub, "/topic", FakeMessage)
-    publisher.attach(impl, lambda: released.append(1))
+    publisher = LoopPublisher(hub, "/topic", FakeMessage, release=lambda: released.append(1))
+    publisher.attach(impl)
     impl.connect()
     publisher.close()
     publisher.close()

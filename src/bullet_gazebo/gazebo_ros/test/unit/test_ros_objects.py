@@ -9,12 +9,14 @@ from io import BytesIO
 from types import SimpleNamespace
 
 import pytest
+import rospy
 from rospy.impl.tcpros_base import TCPROSTransport
 from rospy.impl.tcpros_pubsub import TCPROSSub, robust_connect_subscriber
 from std_msgs.msg import String
 
+from gazebo_ros.loop_publisher import PublisherHub
 from gazebo_ros.loop_subscriber import InletHub
-from gazebo_ros.ros_objects import _read_in_loop
+from gazebo_ros.ros_objects import RosObjects, _read_in_loop
 from lab_testing.waiting import wait_until
 
 
@@ -153,3 +155,72 @@ def test_a_connection_that_is_gone_before_it_was_read_is_closed():
     connection.receive_loop(None)
     assert connection.closed.is_set()
     connection.far.close()
+
+
+class Registrations:
+    """As rospy: registers a topic by making an object, until that is told to unregister."""
+
+    def __init__(self, monkeypatch):
+        self.open, self.made, self.on_make = [], [], lambda: None
+        monkeypatch.setattr(rospy, "Publisher", self._make)
+        monkeypatch.setattr(rospy, "Subscriber", self._make)
+
+    def _make(self, topic, *arguments, **options):
+        self.open.append(topic)
+        self.made.append(topic)
+        impl = SimpleNamespace(set_queue_size=lambda size: None, add_subscriber_listener=lambda listener: None,
+                               add_connection=lambda connection: True, connections=[])
+        self.on_make()
+        return SimpleNamespace(impl=impl, unregister=lambda: self.open.remove(topic))
+
+
+@pytest.fixture
+def registrations(monkeypatch):
+    return Registrations(monkeypatch)
+
+
+@pytest.fixture
+def objects():
+    errors = []
+    yield RosObjects(PublisherHub(), InletHub(), None, SimpleNamespace(error=errors.append))
+    assert not errors
+
+
+def test_a_publisher_is_registered_until_it_is_closed(objects, registrations):
+    publisher = objects.publisher("/states", String)
+    assert objects.flush() and registrations.open == ["/states"]
+    publisher.close()
+    assert objects.flush() and registrations.open == []
+
+
+def test_a_publisher_that_is_closed_before_its_turn_came_is_not_registered(objects, registrations):
+    turn = threading.Event()
+    objects.later(lambda: turn.wait(10.0))
+    objects.publisher("/states", String).close()
+    turn.set()
+    assert objects.flush() and registrations.made == []
+
+
+def test_a_publisher_that_is_closed_while_it_is_registered_does_not_stay(objects, registrations):
+    turn, publishers = threading.Event(), []
+    objects.later(lambda: turn.wait(10.0))
+    registrations.on_make = lambda: publishers[0].close()
+    publishers.append(objects.publisher("/states", String))
+    turn.set()
+    wait_until(lambda: publishers[0].is_closed, "its turn", 10.0)
+    assert objects.flush() and registrations.open == []
+
+
+def test_deliveries_never_become_less(objects, registrations):
+    """Who waits for the next message of a topic need not know of a model that went and one that came."""
+    first, second = (objects.queue("/commands", String, depth=10) for _ in range(2))
+    for box in (first, first, second):
+        box.put(String("go"))
+    assert objects.deliveries() == {"/commands": 3}
+    first.close()
+    assert objects.deliveries() == {"/commands": 3}
+    second.close()
+    assert objects.deliveries() == {}, "nobody listens to it"
+    objects.mailbox("/commands", String).put(String("go"))
+    assert objects.deliveries() == {"/commands": 4}
+    assert objects.flush() and registrations.open == ["/commands"]
