@@ -92,6 +92,8 @@ class Publications:
         self._meter.restart(self._simulation.time_s)
         self._set_rospy_time()
         self.publish_clock()
+        self._snapshot.resets += 1
+        self.write_snapshot()
 
     def write_snapshot(self):
         """Put the present state where viewers read it."""

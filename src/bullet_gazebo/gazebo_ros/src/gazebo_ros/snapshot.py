@@ -7,7 +7,8 @@ simulator holds a lock on ``state``, so a folder whose lock is free was left by 
 
 ``state`` begins with a header (magic, sequence number) and has two slots. The writer fills the one that is not current,
 then raises the sequence number; a slot carries its own number, zero while it is being written, so a reader that was
-overtaken notices and reads again. A slot is: number, scene revision, tick, count of values, time [s], then the values.
+overtaken notices and reads again. A slot is: number, scene revision, how many times the time was set back, tick, count
+of values, time [s], then the values.
 Of each body, in the scene's order: position x y z [m], quaternion x y z w, joint angles [rad or m].
 """
 import contextlib
@@ -22,11 +23,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAGIC = 0x42475331
+MAGIC = 0x42475332
 #: Values that a slot holds [float64]; pages that are never written cost nothing.
 CAPACITY = 65536
 _HEADER = struct.Struct("<QQ")
-_SLOT = struct.Struct("<QQQQd")
+_SLOT = struct.Struct("<QQQQQd")
 _SLOT_BYTES = _SLOT.size + 8 * CAPACITY
 _NUMBER = struct.Struct("<Q")
 _PREFIX = "bullet_gazebo-"
@@ -67,17 +68,34 @@ def _remove(folder):
         folder.rmdir()
 
 
+def _locked(path):
+    """A new file that is open and locked, as long as the simulator lives; None where another simulator has removed it:
+    until it is locked it looks like one that is left over."""
+    try:
+        file = open(path, "w+b")  # noqa: SIM115
+    except FileNotFoundError:
+        return None
+    fcntl.flock(file, fcntl.LOCK_EX)
+    if os.fstat(file.fileno()).st_nlink:
+        return file
+    file.close()
+    return None
+
+
 class SnapshotWriter:
     """The simulator's side."""
 
     def __init__(self, parent=None):
         """Makes the folder (private to the user) and takes its lock."""
         parent = _shared_memory_folder() if parent is None else Path(parent)
-        self.folder = Path(tempfile.mkdtemp(prefix="%s%d-%d-" % (_PREFIX, os.getuid(), os.getpid()), dir=parent))
+        self._file = None
+        while self._file is None:
+            self.folder = Path(tempfile.mkdtemp(prefix="%s%d-%d-" % (_PREFIX, os.getuid(), os.getpid()), dir=parent))
+            self._file = _locked(self.folder / "state")
         self.revision = 0
+        #: How many times the time was set back: what a viewer saw at the same time before was another world.
+        self.resets = 0
         self._sequence = 0
-        self._file = open(self.folder / "state", "w+b")  # noqa: SIM115  (open as long as the simulator lives)
-        fcntl.flock(self._file, fcntl.LOCK_EX)
         size = _HEADER.size + 2 * _SLOT_BYTES
         self._file.truncate(size)
         self._memory = mmap.mmap(self._file.fileno(), size)
@@ -116,7 +134,7 @@ class SnapshotWriter:
                 raise ValueError("the world has more than %d state values, the snapshot's capacity" % CAPACITY)
             values[count:end] = part
             count = end
-        _SLOT.pack_into(self._memory, offset, 0, self.revision, tick, count, time_s)
+        _SLOT.pack_into(self._memory, offset, 0, self.revision, self.resets, tick, count, time_s)
         _NUMBER.pack_into(self._memory, offset, number)
         self._sequence = number
         _NUMBER.pack_into(self._memory, 8, number)
@@ -139,12 +157,14 @@ class Scene(NamedTuple):
 
 
 class Snapshot:
-    """One state: ``tick``, ``time_s``, ``revision`` of the scene, ``values`` (float64 array, a copy)."""
+    """One state: ``tick``, ``time_s``, ``revision`` of the scene, ``resets`` of the time so far, ``values`` (float64
+    array, a copy)."""
 
-    __slots__ = ("revision", "tick", "time_s", "values")
+    __slots__ = ("revision", "resets", "tick", "time_s", "values")
 
-    def __init__(self, revision, tick, time_s, values):
+    def __init__(self, revision, resets, tick, time_s, values):
         self.revision = revision
+        self.resets = resets
         self.tick = tick
         self.time_s = time_s
         self.values = values
@@ -177,12 +197,12 @@ class SnapshotReader:
             if number == 0:
                 return None
             offset = _HEADER.size + (number & 1) * _SLOT_BYTES
-            before, revision, tick, count, time_s = _SLOT.unpack_from(self._memory, offset)
+            before, revision, resets, tick, count, time_s = _SLOT.unpack_from(self._memory, offset)
             if before != number or count > CAPACITY:
                 continue
             values = np.frombuffer(self._memory, np.float64, count, offset + _SLOT.size).copy()
             if _NUMBER.unpack_from(self._memory, offset)[0] == number:
-                return Snapshot(revision, tick, time_s, values)
+                return Snapshot(revision, resets, tick, time_s, values)
 
     def scene(self):
         """The :class:`Scene` as it is now."""

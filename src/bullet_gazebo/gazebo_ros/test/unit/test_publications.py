@@ -19,8 +19,8 @@ class World:
                                           real_time_factor=asked, world=SimpleNamespace(models={}))
         publisher = SimpleNamespace(has_listeners=False, publish_serialized=self._count)
         ros = SimpleNamespace(publisher=lambda *arguments, **options: publisher)
-        snapshot = SimpleNamespace(write=lambda tick, time_s, parts: self.snapshots.append(tick))
-        self._publications = publications.Publications(self.simulation, ros, snapshot, log=None, clock_rate=500.0)
+        self.snapshot = SimpleNamespace(write=lambda tick, time_s, parts: self.snapshots.append(tick), resets=0)
+        self.publications = publications.Publications(self.simulation, ros, self.snapshot, log=None, clock_rate=500.0)
         self.clocks = 0
 
     def _count(self, data):
@@ -32,7 +32,7 @@ class World:
             self.simulation.time_s = self.simulation.tick * STEP_S
             self.simulation.time_ns = self.simulation.tick * 2000000
             self.wall_s += STEP_S / self.factor
-            self._publications.on_tick()
+            self.publications.on_tick()
 
 
 def test_in_real_time_every_tick_that_is_due_counts(monkeypatch):
@@ -55,3 +55,13 @@ def test_in_lock_step_every_state_is_shown(monkeypatch):
     world = World(monkeypatch, factor=50.0, paused=True, asked=1.0)
     world.run(2.0)
     assert world.snapshots == list(range(5, 1001, 5))
+
+
+def test_a_reset_of_the_time_is_counted_and_shown_at_once(monkeypatch):
+    world = World(monkeypatch, factor=50.0, paused=True)
+    world.run(0.01)
+    world.simulation.tick = world.simulation.time_ns = 0
+    world.simulation.time_s = 0.0
+    world.publications.time_was_reset()
+    assert world.snapshot.resets == 1
+    assert world.snapshots == [5, 0]

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The snapshot: what one process writes, another reads whole or not at all."""
+import fcntl
 import os
 import subprocess
 import sys
+import tempfile
 import time
 
 import numpy as np
@@ -113,3 +115,37 @@ def test_a_reader_in_another_process_never_sees_half_a_state(tmp_path):
 def test_the_folder_of_a_living_simulator_stays(writer, tmp_path):
     assert snapshot.remove_stale(tmp_path) == []
     assert writer.folder.exists()
+
+
+@pytest.mark.parametrize("module, name", [(tempfile, "mkdtemp"), (fcntl, "flock")])
+def test_a_folder_that_another_simulator_takes_for_a_left_over_one_is_made_again(tmp_path, monkeypatch, module, name):
+    """Its clearing up falls between the folder and its file, or between the file and its lock."""
+    made, called = [], getattr(module, name)
+
+    def overtaken(*arguments, **options):
+        if made:
+            return called(*arguments, **options)
+        made.append(True)
+        result = called(*arguments, **options) if module is tempfile else None
+        snapshot.remove_stale(tmp_path)
+        assert os.listdir(tmp_path) == []
+        return called(*arguments, **options) if result is None else result
+
+    monkeypatch.setattr(module, name, overtaken)
+    writer = SnapshotWriter(tmp_path)
+    writer.write(1, 0.002, [[1.0]])
+    assert snapshot.remove_stale(tmp_path) == []
+    assert SnapshotReader(writer.folder).read().values.tolist() == [1.0]
+    writer.close()
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_reader_can_tell_one_time_from_the_same_after_a_reset(writer):
+    reader = SnapshotReader(writer.folder)
+    writer.write(5, 0.01, [[1.0]])
+    before = reader.read()
+    writer.resets += 1
+    writer.write(5, 0.01, [[1.0]])
+    after = reader.read()
+    assert (before.tick, before.time_s) == (after.tick, after.time_s)
+    assert (before.resets, after.resets) == (0, 1)

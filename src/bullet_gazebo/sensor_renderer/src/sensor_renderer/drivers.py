@@ -90,7 +90,6 @@ class Pace:
     def __init__(self, rate):
         """``rate`` [Hz]; 0: at every new state."""
         self.rate = rate
-        self._last_s = None
 
     @property
     def rate(self):
@@ -103,15 +102,16 @@ class Pace:
         self.period_s = 1.0 / rate if rate > 0.0 else _SMALLEST_TIME_S
         self._next_s = None
 
+    def restart(self):
+        """The next picture is due at once: the time has been set back."""
+        self._next_s = None
+
     def is_due(self, time_s):
-        """Whether a picture of the state at ``time_s`` is wanted. Time may have jumped back."""
-        if self._last_s is not None and time_s < self._last_s - _SMALLEST_TIME_S:
-            self._next_s = None
+        """Whether a picture of the state at ``time_s`` is wanted."""
         return self._next_s is None or time_s >= self._next_s - _SMALLEST_TIME_S
 
     def took(self, time_s):
         """A picture of ``time_s`` was taken. Being late does not make the pictures that follow come faster."""
-        self._last_s = time_s
         following = (self._next_s if self._next_s is not None else time_s) + self.period_s
         self._next_s = following if following > time_s else time_s + self.period_s
 
@@ -181,6 +181,10 @@ class Driver:
     def has_listeners(self):
         """Whether anybody wants anything of this sensor."""
         return any(topic.has_listeners for topic in self.topics)
+
+    def time_was_reset(self):
+        """What is seen next is another world, whatever its time."""
+        self._pace.restart()
 
     def is_due(self, time_s):
         """Whether there is anything to do for the state at ``time_s``."""

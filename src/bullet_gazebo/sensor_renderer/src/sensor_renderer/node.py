@@ -33,10 +33,12 @@ class SensorRenderer:
         self._make_renderer = make_renderer
         self._renderer = None
         self._drivers = drivers
-        self._mirror = Mirror(DrawingCache(), ResourceFinder(), rospy.logwarn)
+        self._finder = ResourceFinder()
+        self._mirror = Mirror(DrawingCache(), self._finder, rospy.logwarn)
         self._sensors = {}
         self._refused = set()
         self._revision = None
+        self._resets = None
         self._drawn_s = None
 
     def run(self, stop):
@@ -45,7 +47,7 @@ class SensorRenderer:
             reader = _find_snapshot(stop)
             if reader is None:
                 return
-            self._revision = None
+            self._revision = self._resets = None
             while not stop() and reader.is_alive:
                 began = time.monotonic()
                 try:
@@ -67,9 +69,14 @@ class SensorRenderer:
             scene = reader.scene()
             if scene.revision != snapshot.revision:
                 return  # a state of the new scene follows
+            self._finder.forget_missing()
             self._mirror.set_scene(scene.bodies, scene.light)
             self._set_sensors(scene.bodies)
             self._revision = scene.revision
+        if snapshot.resets != self._resets:
+            self._resets, self._drawn_s = snapshot.resets, None
+            for driver in self._sensors.values():
+                driver.time_was_reset()
         due = [driver for driver in list(self._sensors.values()) if driver.is_due(snapshot.time_s)]
         if not due or snapshot.time_s == self._drawn_s:
             return

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The loop of /sensor_renderer: which states of the world a sensor is shown."""
+import types
+
+import numpy as np
+import pytest
+
+from gazebo_ros.snapshot import SnapshotReader, SnapshotWriter
+from sensor_renderer.drivers import Pace
+from sensor_renderer.node import SensorRenderer
+
+STAND = """<robot name="stand"><link name="eye"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
+</robot>"""
+AT_ORIGIN = np.array([0.0, 0, 0, 0, 0, 0, 1])
+
+
+class Eye:
+    """A driver that takes note instead of pictures."""
+
+    has_listeners = True
+
+    def __init__(self, entry):
+        self.entry, self.pace, self.taken = entry, Pace(10.0), []
+        Eye.made = self
+
+    def time_was_reset(self):
+        self.pace.restart()
+
+    def is_due(self, time_s):
+        return self.pace.is_due(time_s)
+
+    def take(self, time_s, link_pose, draw):
+        self.pace.took(time_s)
+        self.taken.append(time_s)
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def simulator(tmp_path):
+    writer = SnapshotWriter(tmp_path)
+    writer.write_scene([{"name": "stand", "urdf": STAND, "joints": [], "sensors": [{
+        "link": "eye", "member": "eye", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/ns",
+        "xml": '<sensor type="camera" name="eye"><plugin name="p" filename="libeye.so"/></sensor>'}]}])
+    yield writer
+    writer.close()
+
+
+def test_the_same_time_after_a_reset_is_another_world(simulator, monkeypatch):
+    """Lock-step: advance, look, reset, advance as far, look. The renderer may miss the state in between."""
+    monkeypatch.setattr("importlib.import_module", lambda name: types.SimpleNamespace(Eye=Eye))
+    renderer = SensorRenderer(lambda: None, {"libeye.so": "eyes:Eye"})
+    reader = SnapshotReader(simulator.folder)
+    for _ in range(3):
+        simulator.write(25, 0.05, [AT_ORIGIN])
+        for _ in range(5):
+            renderer._turn(reader)
+        simulator.resets += 1
+    assert Eye.made.taken == [0.05] * 3
