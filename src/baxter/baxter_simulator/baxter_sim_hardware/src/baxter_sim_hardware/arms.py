@@ -146,6 +146,8 @@ class Arms:
         self._smoothing.restart(everything, self._reference)
         self._target[:] = self._clamped(self._reference)
         self._set_mode(everything, Mode.POSITION)
+        # With the clock set back they would seem to have come just now.
+        self._stream_stamp[:] = self._feed_forward_stamp[:] = -np.inf
         self._refresh_speed()
 
     @property

@@ -246,6 +246,26 @@ def test_feed_forward_takes_the_lag_out_of_a_raw_stream(lab):
     assert lag(True) < 1e-3
 
 
+def test_feed_forward_of_the_time_before_a_reset_moves_nothing(lab):
+    """With the clock set back its stamp lies ahead, and it is as old as it was before."""
+    lab.enable()
+    lab.run(0.5)
+    for side in SIDES:
+        lab.send("limb/%s/inverse_dynamics_command" % side, JointTrajectoryPoint(velocities=[1.0] * 7))
+    lab.run(0.01)
+    lab.world.reset_time()
+    lab.plugin.reset()
+    lab.enable()
+    start = lab.position
+
+    def stream(lab):
+        if lab.world.tick % 5 == 0:
+            lab.command(RAW, start)
+
+    lab.run(0.3, before=stream)
+    assert np.abs(lab.position - start).max() < 1e-3
+
+
 @pytest.mark.parametrize("velocities", [[0.1] * 6, [float("nan")] * 7, []])
 def test_senseless_feed_forward_is_refused(lab, velocities):
     lab.send("limb/left/inverse_dynamics_command", JointTrajectoryPoint(velocities=velocities))

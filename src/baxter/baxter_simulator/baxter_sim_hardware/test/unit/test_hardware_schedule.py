@@ -40,13 +40,17 @@ def test_a_time_that_rounding_put_just_before_the_period_counts_to_it():
     assert due_at(schedule, times) == times
 
 
-def test_nothing_is_due_before_the_time_it_tells():
-    schedule = Schedule(100.0)
-    assert schedule.next_s == -math.inf
-    for k in range(5000):
-        time_s = k / 500.0
-        early = time_s < schedule.next_s
-        assert not (schedule.due(time_s) and early)
+@pytest.mark.parametrize("tick_s", [0.001, 0.002, 0.01 / 3])
+@pytest.mark.parametrize("rate_hz", [1, 5, 50, 60, 99.9, 100, 500, 1000])
+def test_nothing_is_due_before_the_time_that_a_schedule_tells(rate_hz, tick_s):
+    asked, told = Schedule(rate_hz), Schedule(rate_hz)
+    assert told.next_s < 0.0
+    for tick in range(3000):
+        now = tick * tick_s
+        due = asked.due(now)
+        assert not due or now >= told.next_s
+        if now >= told.next_s:
+            assert told.due(now) == due
 
 
 def test_a_clock_that_went_back_begins_anew():
@@ -59,6 +63,7 @@ def test_another_rate_begins_anew():
     assert due_at(schedule, [3.0, 3.5]) == [3.0]
     schedule.set_rate(10.0)
     assert schedule.rate_hz == 10.0
+    assert schedule.next_s < 3.0
     assert due_at(schedule, [3.55, 3.56, 3.6]) == [3.55, 3.6]
 
 
