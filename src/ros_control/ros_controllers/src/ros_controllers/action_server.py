@@ -119,7 +119,7 @@ class ActionServer:
     def spin(self, time_s):
         """Handle what has come in, and publish the status when it is due. ``time_s``: now, control time [s]."""
         if time_s < self._time_s:
-            self._time_went_back(time_s)
+            self._time_went_back()
         self._time_s = time_s
         messages = self._goals.drain()
         cancels = self._cancels.drain()
@@ -203,13 +203,12 @@ class ActionServer:
         self._status.publish(message)
         self._next_status_s = self._time_s + STATUS_PERIOD_S
 
-    def _time_went_back(self, time_s):
+    def _time_went_back(self):
         self._next_status_s = None
-        # Stamps of the time before would cancel goals for a long while.
+        # Stamps of the time before would cancel goals for a long while. And actionlib makes ids of the time: a new goal
+        # may come with the id of one that has ended.
         self._last_cancel = genpy.Time()
-        for handle in self._handles:
-            if handle.ended_s is not None:
-                handle.ended_s = time_s
+        self._handles = [handle for handle in self._handles if handle.ended_s is None]
 
     def _now(self):
         return genpy.Time(*divmod(round(self._time_s * 1e9), 10**9))

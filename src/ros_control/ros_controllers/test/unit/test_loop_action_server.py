@@ -298,3 +298,14 @@ def test_time_that_goes_back_does_not_cancel_or_silence_anything(served):
     served.server.spin(0.5)
     assert len(served.topics.sent["act/status"]) > published
     assert served.statuses == {"a": GoalStatus.ACTIVE}
+
+
+def test_a_new_goal_may_have_the_id_of_one_that_ended_before_the_time_went_back(served):
+    """actionlib makes ids of the time, and a client that was started anew counts anew."""
+    for _ in range(2):
+        served.send("client-1-1.000", 1.0)
+        served.server.spin(1.0)
+        assert served.statuses == {"client-1-1.000": GoalStatus.ACTIVE}
+        served.begun[-1].succeed()
+        served.server.spin(0.5)
+    assert len(served.begun) == 2
