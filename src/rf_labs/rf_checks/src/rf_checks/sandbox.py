@@ -104,8 +104,11 @@ class Student:
 
     def family(self):
         """Process ids of the program and of all that it started, orphans included."""
-        orphans = direct_children(os.getpid()) - self._before
-        return children_of({self.pid} | orphans)
+        roots = direct_children(os.getpid()) - self._before
+        if self.exit_code is None:
+            roots.add(self.pid)
+        # From here on its number may be another process's.
+        return children_of(roots)
 
     def dump(self):
         """Have Python say where it is, which also ends it; what it says is in `errors` afterwards."""

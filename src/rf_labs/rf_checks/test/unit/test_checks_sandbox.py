@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The process that a student's program runs in: its limits, its end, and what it cannot reach. No master."""
 import os
+import subprocess
 import sys
 
 import pytest
@@ -106,3 +107,14 @@ def test_a_watch_tells_work_from_rest(start):
     before = pacing.cpu_time_s(busy.family())
     wait_until(lambda: pacing.cpu_time_s(busy.family()) > before + 0.05, "its processor time to grow")
     watch.close()
+
+
+def test_a_process_that_got_the_number_of_an_ended_program_is_a_stranger(start):
+    with subprocess.Popen(["sleep", "1000"]) as stranger:
+        student = start("")
+        wait_until(lambda: student.exit_code is not None, "the program's end")
+        student._process.pid = stranger.pid
+        student.end()
+        assert student.survivors == 0
+        assert stranger.poll() is None
+        stranger.kill()
