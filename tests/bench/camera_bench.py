@@ -4,6 +4,7 @@ import re
 import select
 import socket
 import statistics
+import tempfile
 import time
 
 import numpy as np
@@ -76,10 +77,12 @@ class Naive:
 
     def __init__(self, xml, finder):
         self._client = pybullet.connect(pybullet.DIRECT)
-        path = "/tmp/camera_bench_%d.urdf" % time.time_ns()
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(re.sub(r"package://[^\"']+", lambda found: finder(found.group()) or "", xml))
-        self._robot = pybullet.loadURDF(path, [0, 0, 0.93], useFixedBase=True, physicsClientId=self._client)
+        # PyBullet reads a thousand characters of a line at a time and puts a new line after each lot, also in words.
+        lines = xml.replace(">", ">\n")
+        with tempfile.NamedTemporaryFile("w", suffix=".urdf", encoding="utf-8") as file:
+            file.write(re.sub(r"package://[^\"']+", lambda found: finder(found.group()) or "", lines))
+            file.flush()
+            self._robot = pybullet.loadURDF(file.name, [0, 0, 0.93], useFixedBase=True, physicsClientId=self._client)
         floor = pybullet.createVisualShape(pybullet.GEOM_BOX, halfExtents=[50, 50, 0.001], physicsClientId=self._client)
         pybullet.createMultiBody(baseVisualShapeIndex=floor, physicsClientId=self._client)
         self._index = {pybullet.getJointInfo(self._robot, k, physicsClientId=self._client)[1].decode(): k
