@@ -6,6 +6,8 @@ import numpy as np
 import rospy
 from baxter_core_msgs.msg import JointCommand
 
+from baxter_dataflow.ros_clock import RosClock
+from baxter_dataflow.waiting import Ticker
 from baxter_interface import goal_loop
 
 from .action_server import TrajServer
@@ -110,11 +112,14 @@ class Interpolator:
         """Move the arms; returns how the goal ends: the handle's method, and a text."""
         now = rospy.get_time()
         motion = Motion(plan, now, self._settings.stop_deceleration)
-        rate = rospy.Rate(self._settings.rate_hz)
+        # The time of a simulator that is gone stands still.
+        ticker = Ticker(RosClock(gives_up=lambda: rospy.is_shutdown() or self._robot.is_gone()), self._settings.rate_hz)
         feedback_due = now
         settled_by = None
         while not rospy.is_shutdown():
-            now = rospy.get_time()
+            before, now = now, rospy.get_time()
+            if now < before:
+                return handle.set_aborted, "time went backwards: the simulation was reset"
             if why := self._robot.why_not_ready():
                 return handle.set_aborted, why
             left_alone = self._settings.stop_when_client_leaves and not self._server.has_client(handle)
@@ -141,12 +146,7 @@ class Interpolator:
                             handle.publish_feedback(trajFeedback(fdbk=100))
                         return handle.set_succeeded, ""
                     return handle.set_aborted, late
-            try:
-                rate.sleep()
-            except rospy.ROSTimeMovedBackwardsException:
-                return handle.set_aborted, "time went backwards: the simulation was reset"
-            except rospy.ROSInterruptException:
-                break
+            ticker.sleep()
         return handle.set_aborted, "the trajectory server was shut down"
 
     def _is_unwanted(self):

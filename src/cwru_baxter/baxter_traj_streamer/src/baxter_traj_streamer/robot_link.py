@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the streamer hears from the robot."""
 import threading
+import time
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState
 from sensor_msgs.msg import JointState
 
 from baxter_interface import startup
+from baxter_interface.presence import Presence
 
 
 class RobotLink:
@@ -19,6 +21,9 @@ class RobotLink:
         self._lock = threading.Lock()
         self._angles = {}
         self._state = None
+        self._heard_wall_s = time.monotonic()
+        self._topic = rospy.resolve_name("robot/joint_states")
+        self._presence = Presence(self._topic, lambda: time.monotonic() - self._heard_wall_s)
         # Subscribe last: from here on callbacks run on another thread.
         self._subscribers = [
             rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=1),
@@ -27,7 +32,7 @@ class RobotLink:
     def wait(self):
         """Wait for the robot as baxter_interface does. Raises OSError with errno ETIMEDOUT that says what lacks."""
         startup.wait_for_start([
-            startup.message_arrives(rospy.resolve_name("robot/joint_states"), lambda: bool(self.angles())),
+            startup.message_arrives(self._topic, lambda: bool(self.angles())),
             startup.message_arrives(rospy.resolve_name("robot/state"), lambda: self._state is not None)])
 
     def angles(self):
@@ -35,11 +40,17 @@ class RobotLink:
         with self._lock:
             return dict(self._angles)
 
+    def is_gone(self):
+        """Whether no node is there any more that publishes joint angles. A paused simulation is not gone."""
+        return self._presence.is_gone()
+
     def why_not_ready(self):
         """Why the arms will not move, in words; empty while they will."""
         state = self._state
         if state is None:
             return "the robot does not report its state (/robot/state); is it running?"
+        if self.is_gone():
+            return "the robot was lost: nobody publishes %s any more" % self._topic
         if state.stopped:
             return "the robot is stopped; release the button, then: rosrun baxter_tools enable_robot.py -r"
         if not state.enabled:
@@ -52,3 +63,4 @@ class RobotLink:
     def _on_joint_states(self, message):
         with self._lock:
             self._angles.update(zip(message.name, message.position))  # noqa: B905 (a robot may send fewer)
+            self._heard_wall_s = time.monotonic()
