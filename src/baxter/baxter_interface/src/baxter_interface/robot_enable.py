@@ -14,7 +14,7 @@ from baxter_dataflow import wait_for
 from . import settings, startup
 from .version_check import VersionMismatch, require_compatible
 
-# How long the robot may take over each request [s, ROS time].
+# How long the robot may take over each request that it hears [s, ROS time].
 ENABLE_TIMEOUT_S = 2.0
 DISABLE_TIMEOUT_S = 5.0
 RESET_TIMEOUT_S = 3.0
@@ -115,9 +115,14 @@ class RobotEnable:
 
     def _request(self, topic, message, timeout_s, is_done, verb):
         """Publish `message` at 100 Hz until `is_done(state)`. Raises OSError with errno ETIMEDOUT or ESHUTDOWN."""
+        if is_done(self.state()):
+            return
         # latch=False: a latched enable would reach the next robot that comes up.
         publisher = rospy.Publisher(topic, type(message), queue_size=10)
         try:
+            # On a busy machine the robot takes a while to connect. One listener is enough: others may be dead, and must
+            # not delay a stop.
+            startup.wait_for_subscribers(publisher, startup.PART_TIMEOUT_S, enough=1)
             wait_for(test=lambda: is_done(self.state()), timeout=timeout_s, rate=100,
                      body=lambda: publisher.publish(message))
         except OSError as failure:

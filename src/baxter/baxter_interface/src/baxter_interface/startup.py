@@ -152,16 +152,18 @@ def follow_simulated_time():
     rospy.impl.simtime.init_simtime()
 
 
-def wait_for_subscribers(publisher, timeout=1.0):
+def wait_for_subscribers(publisher, timeout=1.0, enough=None):
     """Wait until all nodes that the master lists as subscribers of `publisher` have connected to it, if there are any.
 
     The first message after a publisher was made is lost to whoever has not connected yet. Returns after `timeout` [s,
-    wall] in any case: a subscriber on the list may be dead.
+    wall] in any case: a subscriber on the list may be dead. `enough`: so many will do; None for all.
     """
     try:
         expected = len(_nodes_of(publisher.resolved_name, subscribers=True))
     except _MASTER_ERRORS:
         return
+    if enough is not None:
+        expected = min(expected, enough)
     connected = Condition("", lambda: publisher.get_num_connections() >= expected, lambda: "")
     try:
         wait_in_order([connected], timeout, say=rospy.logdebug, is_shutdown=rospy.is_shutdown)

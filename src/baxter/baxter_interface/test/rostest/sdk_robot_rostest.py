@@ -5,6 +5,7 @@ import errno
 import threading
 import time
 import unittest
+from unittest import mock
 
 import rospy
 from baxter_core_msgs.msg import JointCommand
@@ -14,6 +15,7 @@ from std_srvs.srv import Trigger
 from baxter_dataflow import wait_for
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable, VersionMismatch
 from baxter_interface.limb import NEUTRAL_POSE
+from baxter_interface.robot_enable import ENABLE_TIMEOUT_S
 
 DEADLINE_S = 5.0
 
@@ -53,6 +55,23 @@ class LogRecorder(Recorder):
                  timeout_msg="no log line with %r in %s" % (text, [message.msg for message in self.messages]))
 
 
+class LatePublisher(rospy.Publisher):
+    """One that nobody can hear at first, as on a busy machine."""
+
+    DELAY_S = ENABLE_TIMEOUT_S + 0.5
+
+    def __init__(self, *arguments, **options):
+        self._heard_from_s = time.monotonic() + self.DELAY_S
+        super().__init__(*arguments, **options)
+
+    def get_num_connections(self):
+        return super().get_num_connections() if time.monotonic() > self._heard_from_s else 0
+
+    def publish(self, *arguments):
+        if time.monotonic() > self._heard_from_s:
+            super().publish(*arguments)
+
+
 class RobotEnableTest(unittest.TestCase):
     def setUp(self):
         set_knobs()
@@ -71,6 +90,17 @@ class RobotEnableTest(unittest.TestCase):
         self.robot.enable()
         self.assertEqual(recorder.messages, [])
         recorder.close()
+
+    def test_time_to_connect_is_not_the_robots(self):
+        with mock.patch.object(rospy, "Publisher", LatePublisher):
+            self.robot.enable()
+        self.assertTrue(self.robot.state().enabled)
+
+    def test_request_that_nobody_hears_says_so(self):
+        with self.assertRaises(OSError) as caught:
+            self.robot._request("robot/elsewhere", Bool(True), 0.2, lambda state: state.enabled, "enable")
+        self.assertEqual(caught.exception.errno, errno.ETIMEDOUT)
+        self.assertIn("nobody listens to /robot/elsewhere (enabled: False", caught.exception.strerror)
 
     def test_stop_disables_and_enable_resets_first(self):
         self.robot.enable()
