@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """RobotEnable and Limb against the fake robot, fault by fault."""
 import errno
+import statistics
 import threading
 import time
 import unittest
@@ -14,7 +15,8 @@ from std_srvs.srv import Trigger
 
 from baxter_dataflow import wait_for
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable, VersionMismatch
-from baxter_interface.limb import NEUTRAL_POSE
+from baxter_interface.joint_motion import PEAK_SPEED_RAD_S
+from baxter_interface.limb import COMMAND_RATE_HZ, NEUTRAL_POSE
 from baxter_interface.robot_enable import ENABLE_TIMEOUT_S
 
 DEADLINE_S = 5.0
@@ -127,7 +129,7 @@ class RobotEnableTest(unittest.TestCase):
         self.assertEqual(caught.exception.errno, errno.ETIMEDOUT)
         self.assertIn("failed to enable", caught.exception.strerror)
         self.assertIn("enabled: False, stopped: False", caught.exception.strerror)
-        self.assertAlmostEqual(time.monotonic() - begin_s, 2.0, delta=0.5)
+        self.assertGreater(time.monotonic() - begin_s, ENABLE_TIMEOUT_S - 0.1)
 
     def test_pressed_stop_button_is_named_at_once(self):
         set_knobs(stop_button=True)
@@ -257,37 +259,51 @@ class LimbTest(unittest.TestCase):
 
         self.limbs["left"].set_joint_positions({"left_s1": 1.047})
         wait_for(lambda: self.limbs["left"].joint_angle("left_s1") > 1.0, DEADLINE_S)
-        begin_s = time.monotonic()
         threads = [threading.Thread(target=move, args=(side,)) for side in self.limbs]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join(20.0)
         self.assertEqual(results, {"left": True, "right": True})
-        self.assertLess(time.monotonic() - begin_s, 4.5)
         for side, recorder in recorders.items():
             target = {"%s_%s" % (side, joint): angle for joint, angle in NEUTRAL_POSE.items()}
             wait_for(lambda recorder=recorder, target=target:
                      dict(zip(recorder.messages[-1].names, recorder.messages[-1].command, strict=True)) == target,
                      DEADLINE_S, timeout_msg="the exact target is not the last command")
+            # As many seconds of commands; a machine that is slow leaves some out.
+            self.assertLess(sum(message.command != recorder.messages[-1].command for message in recorder.messages),
+                            3.0 * COMMAND_RATE_HZ)
             for name, angle in target.items():
                 self.assertAlmostEqual(self.limbs[side].joint_angle(name), angle, delta=0.001)
 
     def test_commands_come_at_100_hz_and_without_jumps(self):
-        recorder = self.commands_of("left")
-        self.limbs["left"].move_to_joint_positions({"left_s0": -0.5})
-        begin_s = time.monotonic()
+        limb, recorder = self.limbs["left"], self.commands_of("left")
+        self.assertTrue(limb.move_to_joint_positions({"left_s0": -0.5}))
+        commands, stamps = [limb.joint_angle("left_s0")], [rospy.get_time()]
+        set_joint_positions = limb.set_joint_positions
+
+        def command(positions):
+            commands.append(positions["left_s0"])
+            set_joint_positions(positions)
+
         recorder.messages.clear()
-        self.assertTrue(self.limbs["left"].move_to_joint_positions({"left_s0": 0.5}))
-        duration_s = time.monotonic() - begin_s
-        commands = [message.command[0] for message in recorder.messages]
-        self.assertGreater(len(commands) / duration_s, 80.0)
-        self.assertLess(max(abs(b - a) for a, b in zip(commands, commands[1:], strict=False)), 0.05)
+        with mock.patch.object(limb, "set_joint_positions", command):
+            self.assertTrue(limb.move_to_joint_positions({"left_s0": 0.5},
+                                                         test=lambda: stamps.append(rospy.get_time())))
+        self.assertEqual(len(commands), len(stamps))
+        self.assertLess(statistics.median(b - a for a, b in zip(stamps, stamps[1:], strict=False)), 0.0125)
+        # Each command was computed after the stamp before its own, however long the process stood still in between.
+        for i in range(2, len(commands)):
+            self.assertLess(abs(commands[i] - commands[i - 1]),
+                            PEAK_SPEED_RAD_S["s0"] * (stamps[i] - stamps[i - 2]) + 0.001)
+        self.assertAlmostEqual(commands[1], commands[0], delta=PEAK_SPEED_RAD_S["s0"] * (stamps[1] - stamps[0]) + 0.001)
+        recorder.wait_for_last(lambda message: message.command == (0.5,), "the target")
+        self.assertGreater(len(recorder.messages), 0.5 * len(commands))
 
     def test_no_joints_return_at_once_with_the_question(self):
-        begin_s = time.monotonic()
-        self.assertIs(self.limbs["left"].move_to_joint_positions({}), False)
-        self.assertLess(time.monotonic() - begin_s, 0.5)
+        steps = []
+        self.assertIs(self.limbs["left"].move_to_joint_positions({}, test=lambda: steps.append(1)), False)
+        self.assertEqual(steps, [])
         self.log.wait_for_text("no joints given: did IK find a solution?")
 
     def test_stuck_joint_is_reported(self):
@@ -299,22 +315,33 @@ class LimbTest(unittest.TestCase):
     def test_own_test_stops_the_move(self):
         limb, recorder = self.limbs["left"], self.commands_of("left")
         self.assertTrue(limb.move_to_joint_positions({"left_s0": 0.0}))
-        self.assertIs(limb.move_to_joint_positions({"left_s0": 1.0}, test=lambda: limb.joint_angle("left_s0") > 0.3),
-                      False)
+        seen = []
+
+        def is_far():
+            seen.append(limb.joint_angle("left_s0"))
+            return seen[-1] > 0.3
+
+        self.assertIs(limb.move_to_joint_positions({"left_s0": 1.0}, test=is_far), False)
         self.log.wait_for_text("stopped by the test")
-        stopped_at = recorder.messages[-1].command[0]
-        wait_for(lambda: abs(limb.joint_angle("left_s0") - stopped_at) < 0.01, DEADLINE_S)
-        self.assertLess(stopped_at, 0.5)
+        self.assertLessEqual(seen[-2], 0.3)
+
+        def is_stopped():
+            last = recorder.messages[-1].command[0]
+            return seen[-2] <= last <= seen[-1] and abs(limb.joint_angle("left_s0") - last) < 0.01
+
+        wait_for(is_stopped, DEADLINE_S, timeout_msg="the arm does not hold where it was when the test stopped it")
 
     def test_loss_of_enable_ends_the_move(self):
         limb = self.limbs["left"]
         self.assertTrue(limb.move_to_joint_positions({"left_s0": 0.0}))
-        stopper = threading.Timer(0.5, lambda: set_knobs(enabled=False))
-        stopper.start()
-        begin_s = time.monotonic()
-        self.assertIs(limb.move_to_joint_positions({"left_s0": 1.5}), False)
-        self.assertLess(time.monotonic() - begin_s, 2.0)
-        stopper.join()
+        disable = mock.Mock(wraps=set_knobs)
+
+        def disable_on_the_way():
+            if limb.joint_angle("left_s0") > 0.1 and not disable.called:
+                disable(enabled=False)
+
+        self.assertIs(limb.move_to_joint_positions({"left_s0": 1.5}, test=disable_on_the_way), False)
+        # And not for want of time.
         self.log.wait_for_text("the robot is not enabled")
 
     def test_move_right_after_enable_is_not_refused(self):
