@@ -4,12 +4,13 @@
 import os
 import pathlib
 import signal
-import socket
 import subprocess
 import unittest
 
 import rospy
 from std_srvs.srv import Trigger
+
+from lab_testing.ports import free_port
 
 DEADLINE_S = 60.0
 LAUNCH_FILE = pathlib.Path(__file__).with_name("enable_with_launch.launch")
@@ -79,9 +80,7 @@ class EnableRobotTest(unittest.TestCase):
 
     def test_started_at_the_same_moment_as_roslaunch(self):
         for turn in range(RACES):
-            with socket.socket() as probe:
-                probe.bind(("127.0.0.1", 0))
-                port = str(probe.getsockname()[1])
+            port = str(free_port())
             uri = "http://localhost:" + port
             launch = subprocess.Popen(["roslaunch", "-p", port, str(LAUNCH_FILE)], stdout=subprocess.DEVNULL,
                                       stderr=subprocess.DEVNULL, env=dict(os.environ, ROS_MASTER_URI=uri))
