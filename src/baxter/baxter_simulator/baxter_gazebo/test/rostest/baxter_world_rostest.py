@@ -128,10 +128,15 @@ class BaxterWorldTest(unittest.TestCase):
         robot.restart()
         robot.move(NEUTRAL)
         wanted = dict.fromkeys(NEUTRAL, 0.1)
-        robot.stream(VELOCITY, wanted, 0.6)
-        for name in NEUTRAL:
-            self.assertAlmostEqual(robot.velocities[name], 0.1, delta=0.01, msg=name)
-        robot.wait_sim(0.35)
+
+        def cruising():
+            # Again and again: after a pause of 0.2 s of simulation between two commands the arms stop.
+            robot.command(VELOCITY, wanted)
+            velocities = robot.velocities
+            return all(abs(velocities[name] - 0.1) < 0.01 for name in NEUTRAL)
+
+        wait_until(cruising, lambda: "0.1 rad/s, got %s" % robot.velocities)
+        wait_until(lambda: max(map(abs, robot.velocities.values())) < 1e-3, "the arms to stop without commands")
         rest = robot.positions
         robot.wait_sim(0.5)
         self.assertLess(robot.error(rest), 1e-4)
@@ -149,12 +154,11 @@ class BaxterWorldTest(unittest.TestCase):
         robot.move(NEUTRAL)
         for side in SIDES:
             robot.ratios[side].publish(0.1)
-        robot.wait_sim(0.1)
-        mark = len(robot.history)
+        robot.wait_setting("speed ratio", 0.1)
+        start = robot.now()
         goal = {"left_w2": 0.6, "right_w2": -0.6}
         robot.move(goal)
-        fastest = max(abs(message.velocity[message.name.index("left_w2")]) for message in list(robot.history)[mark:])
-        self.assertAlmostEqual(fastest, 0.4, delta=0.02)
+        self.assertAlmostEqual(robot.fastest("left_w2", start), 0.4, delta=0.02)
 
     def test_e_gravity_compensation_torques(self):
         for side in SIDES:

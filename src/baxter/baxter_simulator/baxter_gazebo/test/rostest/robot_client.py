@@ -4,11 +4,12 @@ import collections
 
 import rospy
 from baxter_core_msgs.msg import AssemblyState, EndpointState, JointCommand
+from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Empty, Float64
 
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import wait_for_message, wait_until
 
 SIDES = ("left", "right")
 SUFFIXES = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
@@ -123,6 +124,19 @@ class Robot:
             return self.now() >= end
 
         wait_until(step, "%g s of simulation" % seconds, 10.0 + 5.0 * seconds)
+
+    def wait_setting(self, name, value):
+        """Until the diagnostics show the value under ``name`` for both arms: a command could overtake a setting."""
+        def taken(diagnostics):
+            shown = [pair.value for status in diagnostics.status for pair in status.values if pair.key == name]
+            return shown == ["%g" % value] * len(SIDES)
+
+        wait_for_message("/diagnostics", DiagnosticArray, taken, 30.0)
+
+    def fastest(self, joint, since):
+        """Largest speed of a joint [rad/s] after the simulation time ``since`` [s]."""
+        return max(abs(message.velocity[message.name.index(joint)]) for message in list(self.history)
+                   if message.header.stamp.to_sec() > since)
 
     def error(self, goal):
         """Largest distance of a joint from {joint: angle} [rad]."""

@@ -87,12 +87,7 @@ class RobotInterfaceTest(unittest.TestCase):
         """Tell both limbs a setting, and wait until the diagnostics show it under `name`."""
         for side in SIDES:
             self.table.publish(key, (value,), side)
-
-        def taken(diagnostics):
-            shown = [pair.value for status in diagnostics.status for pair in status.values if pair.key == name]
-            return shown == ["%g" % value] * len(SIDES)
-
-        self.see("diagnostics", None, taken, "%s %g of both arms" % (name, value))
+        self.robot.wait_setting(name, value)
 
     # -- state
 
