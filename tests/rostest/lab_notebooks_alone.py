@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from notebook_runs import CELL_TIMEOUT_S, MOVING, OWN_LAB, ROOT, WATCHING, faults_of, is_blank, prepare, tool
 
+from lab_testing.waiting import wait_until
 from lab_tests import processes
 from lab_tests.rostests import free_port
 
@@ -61,10 +62,11 @@ class LabNotebooksAloneTest(unittest.TestCase):
                 self.assertEqual(json.load(answer)["name"], tool.KERNEL)
             with self.assertRaises(urllib.error.HTTPError):
                 urllib.request.urlopen(base + "/api/kernels", timeout=CELL_TIMEOUT_S)
-            self.assertGreater(len(processes.marked(run_id, MARKER)), 2)
+            # A process shows no environment for the moment in which it becomes another program.
+            wait_until(lambda: len(processes.marked(run_id, MARKER)) > 2, "Jupyter and its kernel")
             server.send_signal(signal.SIGINT)
             server.wait(CELL_TIMEOUT_S)
-            self.assertEqual(processes.marked(run_id, MARKER), {})
+            self.assertEqual(processes.wait_until_gone(run_id, tool.STOP_TIMEOUT_S, MARKER), {})
         finally:
             processes.kill_all(run_id, MARKER)
             server.wait()

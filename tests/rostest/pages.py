@@ -5,7 +5,6 @@
 import contextlib
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -15,6 +14,7 @@ from pathlib import Path
 
 import rostest
 
+from lab_testing.ports import free_port
 from lab_testing.waiting import wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,9 +42,7 @@ def wait_for_service(master_uri, name, process=None):
 @contextlib.contextmanager
 def started(block, folder):
     """The lab that a page starts itself, on a master of its own, whose address this yields."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        uri = "http://localhost:%d" % free.getsockname()[1]
+    uri = "http://localhost:%d" % free_port()
     environment = page_blocks.environment(folder, ROS_MASTER_URI=uri)
     with open(folder / "lab.txt", "w+") as said:
         process = subprocess.Popen(page_blocks.command(block), cwd=folder, env=environment, stdin=subprocess.DEVNULL,
