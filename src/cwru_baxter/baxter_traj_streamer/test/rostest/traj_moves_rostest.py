@@ -9,7 +9,7 @@ import numpy as np
 import rospy
 from baxter_traj_streamer.srv import CartMove, MoveToPose, PlayFile
 from geometry_msgs.msg import Vector3
-from traj_rostest_kit import DEADLINE_S, FakeRobotTest
+from traj_rostest_kit import DEADLINE_S, FakeRobotTest, wait_until
 
 import urdf_model
 from baxter_sim_kinematics import Chain
@@ -46,10 +46,14 @@ class TrajMovesTest(FakeRobotTest):
     def go_where_there_is_room(self, side):
         answer = self.call("move_to_pose", side=side, pose="untucked", time_optimal=True)
         self.assertTrue(answer.success, answer.message)
-        np.testing.assert_allclose(self.angles(arm_joint_names(side)), self.roomy(side), atol=0.01)
+        self.wait_until_at(arm_joint_names(side), self.roomy(side), within=0.001)
 
     def tip(self, side):
         return self.chains[side].fk(self.angles(arm_joint_names(side)))
+
+    def wait_until_tip_has_moved(self, side, before, by):
+        wait_until(lambda: np.abs(self.tip(side)[:3, 3] - before[:3, 3] - by).max() < 0.003,
+                   lambda: "the tip to be %s from %s; it is at %s" % (by, before[:3, 3], self.tip(side)[:3, 3]))
 
     def playfile(self, side, by=0.2):
         """A file that bends an elbow there and back."""
@@ -69,8 +73,7 @@ class TrajMovesTest(FakeRobotTest):
                            angles=self.streamer.settings.pose("pre_pose", "right"))
         self.assertTrue(answer.success, answer.message)
         for side in SIDES:
-            np.testing.assert_allclose(
-                self.angles(arm_joint_names(side)), self.streamer.settings.pose("pre_pose", side), atol=0.01)
+            self.wait_until_at(arm_joint_names(side), self.streamer.settings.pose("pre_pose", side))
         for request, word in (({"side": "up", "pose": "pre_pose"}, "right and left"),
                               ({"side": "left", "pose": "post_pose"}, "pre_pose"),
                               ({"side": "left", "angles": [1.0]}, "7 finite numbers")):
@@ -85,6 +88,7 @@ class TrajMovesTest(FakeRobotTest):
         answer = self.call("play_file", right=str(right), left=str(left))
         self.assertTrue(answer.success, answer.message)
         for side in SIDES:
+            self.wait_until_held("%s_e1" % side)
             way = [value for _, value in self.raw_stream("%s_e1" % side)]
             self.assertAlmostEqual(max(way), self.roomy(side)[3] + 0.2, delta=0.01)
             self.assertAlmostEqual(way[-1], self.roomy(side)[3], delta=0.01)
@@ -127,12 +131,12 @@ class TrajMovesTest(FakeRobotTest):
             before = self.tip(side)
             answer = self.call("cart_move", side=side, displacement=Vector3(0.06, 0.0, -0.04), speed=0.2)
             self.assertTrue(answer.success, answer.message)
-            np.testing.assert_allclose(self.tip(side)[:3, 3] - before[:3, 3], [0.06, 0.0, -0.04], atol=0.003)
+            self.wait_until_tip_has_moved(side, before, [0.06, 0.0, -0.04])
             np.testing.assert_allclose(self.tip(side)[:3, :3], before[:3, :3], atol=0.01)
         there = self.tip("left")
         code, text = run("cart_move", "left", "-0.06", "0", "0.04", "--speed", "0.2")
         self.assertEqual(code, 0, text)
-        np.testing.assert_allclose(self.tip("left")[:3, 3] - there[:3, 3], [-0.06, 0.0, 0.04], atol=0.003)
+        self.wait_until_tip_has_moved("left", there, [-0.06, 0.0, 0.04])
         self.forget_commands()
         code, text = run("cart_move", "left", 2, 0, 0)
         self.assertEqual(code, 1)

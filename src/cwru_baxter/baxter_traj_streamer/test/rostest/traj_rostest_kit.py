@@ -64,6 +64,7 @@ class FakeRobotTest(unittest.TestCase):
         cls.streamer = BaxterTrajStreamer()
         cls.limits = read_limits()
         cls.enable = rospy.Publisher("/robot/set_super_enable", Bool, queue_size=1)
+        cls.asker = Client()
         cls.commands = []
         cls.subscribers = [rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, cls.on_command)
                            for side in SIDES]
@@ -102,12 +103,35 @@ class FakeRobotTest(unittest.TestCase):
         self.client.feedback.clear()
 
     def set_enabled(self, enabled):
+        """Until this program and the server know of it."""
         self.enable.publish(Bool(data=enabled))
         wait_until(lambda: (self.streamer.robot.why_not_ready() == "") == enabled, "enabled to be %s" % enabled)
+        wait_until(lambda: self.server_would_move() == enabled, "the server to know that enabled is %s" % enabled)
+
+    def server_would_move(self):
+        """Ask by a goal that is refused in any case, the first time for the robot's state."""
+        self.asker.send([], [])
+        state, text, _ = self.asker.end()
+        self.assertEqual(state, GoalStatus.REJECTED, text)
+        return "no points" in text
 
     def angles(self, names):
         found = self.streamer.robot.angles()
         return np.array([found[name] for name in names])
+
+    def wait_until_at(self, names, goal, within=0.01):
+        """What this program knows of the joints may be older than what the server knows."""
+        wait_until(lambda: np.abs(self.angles(names) - goal).max() < within,
+                   lambda: "%s at %s; they are at %s" % (names, goal, self.angles(names)))
+
+    def wait_until_held(self, joint):
+        """Results overtake commands: until the last one for the joint is in the mode that holds it; returns where."""
+        def holding():
+            last = [message for _, message in list(self.commands) if joint in message.names][-1:]
+            return last if last and last[0].mode == JointCommand.POSITION_MODE else None
+
+        message, = wait_until(holding, "%s to be held" % joint)
+        return message.command[message.names.index(joint)]
 
     def raw_stream(self, joint):
         return [(stamp, message.command[message.names.index(joint)]) for stamp, message in list(self.commands)
