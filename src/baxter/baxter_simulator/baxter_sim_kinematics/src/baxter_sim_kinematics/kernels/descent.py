@@ -10,6 +10,10 @@ from baxter_sim_kinematics.kernels.motion import place_joints
 from baxter_sim_kinematics.kernels.starts import clamped, fill_start, state_of
 from baxter_sim_kinematics.kernels.task import fill_error, fill_task_jacobian, on_target, pose_error, workspace
 
+# Tried on 4,000 random poses of each of two arms. With less damping starts arrive sooner still, but more often at a
+# solution far from where they began: at a quarter of this 3 in 1,000 that began 0.05 rad away, of 1,500; at this none.
+_DAMPING = 0.2
+_LOOK_EVERY, _PAYS = 4, 0.8
 # A joint this close to its limit [rad or m] is at its limit.
 _TOUCHING = 1e-12
 
@@ -32,9 +36,9 @@ def _fill_slope(jacobian, error, rows, lower, upper, q, slope):
 def reach(arm, limits, target, tolerances, max_iterations, q, best):
     """Levenberg-Marquardt from ``q`` (changed in place) towards the target, inside the limits.
 
-    ``best`` gets the visited posture with the least error. Returns (solved, iterations, least error). The damping is
-    the squared error itself (Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method",
-    IEEE T-RO 27(5), 2011): bold when near, careful when far.
+    ``best`` gets the visited posture with the least error. Returns (solved, iterations, least error). The damping is in
+    proportion to the squared error (Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt
+    method", IEEE T-RO 27(5), 2011): bold when near, careful when far.
     """
     n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
     target_rotation, target_position, rows, basis = target
@@ -52,14 +56,14 @@ def reach(arm, limits, target, tolerances, max_iterations, q, best):
         if on_target(error, rows, tolerance_m, tolerance_rad):
             best[:] = q
             return True, iteration, size
-        if iteration % 8 == 7:
+        if iteration % _LOOK_EVERY == _LOOK_EVERY - 1:
             # A start that does not pay is left early: the next one costs less than waiting.
-            if least > 0.7 * mark:
+            if least > _PAYS * mark:
                 return False, iteration + 1, least
             mark = least
         fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
         _fill_slope(jacobian, error, rows, lower, upper, q, step)
-        damp(jacobian, rows, 0.5 * size * size + 1e-12, normal, step)
+        damp(jacobian, rows, _DAMPING * size * size + 1e-12, normal, step)
         for i in range(n):
             q[i] = min(max(q[i] + step[i], lower[i]), upper[i])
     return False, max_iterations, least
