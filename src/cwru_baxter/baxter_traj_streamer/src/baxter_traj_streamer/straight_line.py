@@ -72,43 +72,45 @@ def straight_line(chain, start, displacement):
     origin = pose[:3, 3].copy()
     distances = [0.0]
     usual = min(_STEP_M, length / 2.0)
-    # Why there was no solution at all, and where.
-    beyond, beyond_m = "", length
+    # Why a pose has no solution however the arm is held, and where that was.
+    beyond, beyond_m = "", math.inf
     step = usual
     while distances[-1] < length:
         # No stub is left for the end.
         left = length - distances[-1]
         distance = length if left <= 1.5 * step else distances[-1] + step
         pose[:3, 3] = origin + displacement * (distance / length)
-        found, why = _next(chain, pose, path[-1])
+        found, why, is_beyond = _next(chain, pose, path[-1])
         if not why:
             distances.append(distance)
             path.append(found)
             step = min(2.0 * step, usual)
             continue
-        if found is None:
+        if is_beyond:
             beyond, beyond_m = why, distance
         if step <= _SHORTEST_STEP_M:
-            # Near the end of its reach an arm turns fast before it cannot go on: the latter says more.
+            # Near the end of its reach an arm turns fast, or has to be held otherwise, before it cannot go on: the
+            # latter says more.
             raise LeavesReach(distances[-1], length, beyond if beyond_m - distances[-1] <= usual else why)
         step /= 2.0
     return StraightLine(np.array(distances), np.array(path))
 
 
 def _next(chain, pose, before):
-    """(the solution for ``pose`` or None, why it is none on the branch of the one ``before`` or "")."""
+    """(the solution for ``pose`` or None, why it is none on the branch of the one ``before`` or "", whether there is
+    none on any)."""
     try:
         found = solve(chain, pose, before, _RESIDUAL, _RESIDUAL, candidates=1, max_starts=1).q
     except NoSolution as error:
         if error.reason is not Reason.NOT_CONVERGED:
-            return None, str(error)
+            return None, str(error), True
         stuck = [name for name, angle, low, high in zip(chain.joint_names, error.best, chain.lower, chain.upper,
                                                         strict=True) if not low + _STUCK < angle < high - _STUCK]
         return None, "this way of holding the arm ends here%s; start in another posture" % (
-            ", with %s at its limit" % ", ".join(stuck) if stuck else "")
+            ", with %s at its limit" % ", ".join(stuck) if stuck else ""), False
     turn = np.abs(found - before)
     joint = int(turn.argmax())
     if turn[joint] <= _SAME_BRANCH:
-        return found, ""
+        return found, "", False
     return found, "%s would have to turn by %.3f rad at once, to another way of holding the arm; start in another " \
-        "posture" % (chain.joint_names[joint], turn[joint])
+        "posture" % (chain.joint_names[joint], turn[joint]), False
