@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The loop of /sensor_renderer: which states of the world a sensor is shown."""
+import os
 import types
 
 import numpy as np
@@ -37,12 +38,16 @@ class Eye:
         pass
 
 
+def with_sensor(urdf):
+    return {"name": "stand", "urdf": urdf, "joints": [], "sensors": [{
+        "link": "eye", "member": "eye", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/ns",
+        "xml": '<sensor type="camera" name="eye"><plugin name="p" filename="libeye.so"/></sensor>'}]}
+
+
 @pytest.fixture
 def simulator(tmp_path):
     writer = SnapshotWriter(tmp_path)
-    writer.write_scene([{"name": "stand", "urdf": STAND, "joints": [], "sensors": [{
-        "link": "eye", "member": "eye", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/ns",
-        "xml": '<sensor type="camera" name="eye"><plugin name="p" filename="libeye.so"/></sensor>'}]}])
+    writer.write_scene([with_sensor(STAND)])
     yield writer
     writer.close()
 
@@ -58,3 +63,22 @@ def test_the_same_time_after_a_reset_is_another_world(simulator, monkeypatch):
             renderer._turn(reader)
         simulator.resets += 1
     assert Eye.made.taken == [0.05] * 3
+
+
+def test_a_mesh_of_a_package_that_came_later_is_drawn(simulator, tmp_path, monkeypatch):
+    monkeypatch.setattr("importlib.import_module", lambda name: types.SimpleNamespace(Eye=Eye))
+    monkeypatch.setenv("ROS_PACKAGE_PATH", "%s:%s" % (tmp_path, os.environ["ROS_PACKAGE_PATH"]))
+    renderer, reader = SensorRenderer(lambda: None, {"libeye.so": "eyes:Eye"}), SnapshotReader(simulator.folder)
+
+    def corners(urdf):
+        simulator.write_scene([with_sensor(urdf)])
+        simulator.write(1, 0.0, [AT_ORIGIN])
+        renderer._turn(reader)
+        return sum(len(part.triangles) for parts in renderer._mirror.bodies["stand"].parts for part in parts)
+
+    box = STAND.split("<geometry>")[1].split("</geometry>")[0]
+    assert corners(STAND.replace(box, '<mesh filename="package://made_later/part.obj"/>')) == 0
+    (tmp_path / "made_later").mkdir()
+    (tmp_path / "made_later" / "package.xml").write_text("<package><name>made_later</name></package>")
+    (tmp_path / "made_later" / "part.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert corners(STAND.replace(box, '<mesh filename="package://made_later/part.obj" scale="2 2 2"/>')) == 3

@@ -105,9 +105,9 @@ class Student:
     def family(self):
         """Process ids of the program and of all that it started, orphans included."""
         roots = direct_children(os.getpid()) - self._before
+        # Once it has ended its number may be another process's.
         if self.exit_code is None:
             roots.add(self.pid)
-        # From here on its number may be another process's.
         return children_of(roots)
 
     def dump(self):
