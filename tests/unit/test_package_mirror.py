@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docker/package_mirror.pl: sources of base images, with whatever addresses, end up at the mirror that was asked for."""
+"""docker/package_mirror.pl: sources of base images, with whatever addresses, end up at the mirror asked for."""
 import os
 import shutil
 import subprocess
