@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A model plugin with a thread that never rests, for lab_bench."""
+"""A model plugin with a thread that never rests, for the suite that asks whether a lab keeps up."""
 
 import threading
 

@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Processes that a bench sets beside a lab: lab_part.py swing | press | client | boxes N | empty | posture | latency N.
+"""Processes that a bench sets beside a lab: lab_part.py swing | press | client | busy | boxes N | empty | posture |
+latency N | lockstep TICKS.
 
 Each prints "up" when it is at work.
 """
+import hashlib
 import json
 import math
 import statistics
+import struct
 import sys
 import time
 
@@ -29,7 +32,11 @@ PRESSING = {"s0": -1.7, "s1": -0.3, "e1": 2.6}
 BOX = """<sdf version="1.6"><model name="box"><link name="link"><inertial><mass>0.5</mass><inertia><ixx>0.001</ixx>
 <iyy>0.001</iyy><izz>0.001</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial><collision name="c"><geometry>
 <box><size>0.1 0.1 0.1</size></box></geometry></collision></link></model></sdf>"""
+BUSY_MODEL = """<robot name="busy"><link name="world"/>
+<gazebo><plugin name="busy" filename="libbench_busy.so"/></gazebo></robot>"""
 TICK_S = 0.002
+COMMAND_TICKS = 5
+FIRST_TICK = 500  # by then whoever listens has connected, and the robot stands
 
 
 def up():
@@ -82,6 +89,16 @@ def boxes(count):
         answer = spawn("box_%d" % number, BOX, "", place, "world")
         if not answer.success:
             raise SystemExit(answer.status_message)
+    up()
+
+
+def busy():
+    """A thread inside /gazebo that computes without pause, in Python: the plugin that the bench has made known."""
+    spawn = rospy.ServiceProxy("/gazebo/spawn_urdf_model", SpawnModel)
+    spawn.wait_for_service(60)
+    answer = spawn("busy", BUSY_MODEL, "", Pose(), "")
+    if not answer.success:
+        raise SystemExit(answer.status_message)
     up()
 
 
@@ -143,10 +160,48 @@ def latency(count):
     print(json.dumps({"ticks": found, "median": statistics.median(found)}), flush=True)
 
 
+def lockstep(ticks):
+    """Swing both arms of a world that was launched paused, for so many ticks, a command for each arm every
+    COMMAND_TICKS. Prints a digest of all joint states, and how many there were, as JSON."""
+    topics = {side: "/robot/limb/%s/joint_command" % side for side in SIDES}
+    commands = {side: rospy.Publisher(topic, JointCommand, queue_size=1) for side, topic in topics.items()}
+    states = {}
+
+    def note(message):
+        seconds, nanoseconds = struct.unpack_from("<II", message._buff, 4)
+        # Without its sequence number, which counts from whenever somebody began to listen.
+        states[1_000_000_000 * seconds + nanoseconds] = message._buff[4:]
+
+    rospy.Subscriber("/robot/joint_states", rospy.AnyMsg, note)
+    advance = rospy.ServiceProxy("/gazebo/advance", AdvanceTicks, persistent=True)
+    advance.wait_for_service(60)
+    for topic, publisher in zip(topics.values(), commands.values(), strict=True):
+        wait_until(publisher.get_num_connections, "the robot to listen on " + topic, 60.0)
+
+    def step(count, await_topics=()):
+        answer = advance(count, list(await_topics), 60.0)
+        if not answer.success:
+            raise SystemExit(answer.status_message)
+        return answer
+
+    up()
+    begin = step(FIRST_TICK - step(1).tick).sim_time.to_nsec()
+    for number in range(int(ticks) // COMMAND_TICKS):
+        swing = 0.3 * math.sin(2.0 * number * COMMAND_TICKS * TICK_S)
+        for side, publisher in commands.items():
+            publisher.publish(JointCommand(JointCommand.POSITION_MODE, [angle + swing for angle in NEUTRAL],
+                                           ["%s_%s" % (side, joint) for joint in JOINTS]))
+        end = step(COMMAND_TICKS, topics.values()).sim_time.to_nsec()
+    wait_until(lambda: end in states, "joint states of %d ns" % end, 60.0)
+    counted = sorted(stamp for stamp in states if begin < stamp <= end)
+    digest = hashlib.sha256(b"".join(states[stamp] for stamp in counted))
+    print(json.dumps({"digest": digest.hexdigest(), "states": len(counted)}), flush=True)
+
+
 def main():
     name, *arguments = rospy.myargv(sys.argv)[1:]  # without what roslaunch adds
     rospy.init_node("bench_" + name, anonymous=True, disable_rostime=name not in ("client",))
-    parts = (swing, press, client, boxes, empty, posture, latency)
+    parts = (swing, press, client, boxes, busy, empty, posture, latency, lockstep)
     {function.__name__: function for function in parts}[name](*arguments)
 
 

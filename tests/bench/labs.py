@@ -4,6 +4,7 @@ import contextlib
 import os
 import selectors
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -11,12 +12,12 @@ import time
 import xmlrpc.client
 from pathlib import Path
 
-from lab_bench import Process, subscribe
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
 from lab_testing.ports import free_port
+from lab_testing.virtual_screen import VirtualScreen
 from lab_testing.waiting import wait_until
 
 HERE = Path(__file__).resolve().parent
@@ -28,21 +29,30 @@ class Lab:
     """A launched file with a master, as a context: it ends with everything that was started in it.
 
     launch: (package, file); arguments: of the launch file. started_s: roslaunch to the first message on ``ready``, a
-    latched std_msgs/Empty, or to the service ``ready`` where it is no topic.
+    latched std_msgs/Empty, or to the service ``ready`` where it is no topic. screen: draw on a screen that nobody sees.
+    parameters: {name: value} that the master holds before the launch.
     """
 
-    def __init__(self, launch=WORLD, ready="/robot/sim/started", **arguments):
+    def __init__(self, launch=WORLD, ready="/robot/sim/started", screen=False, parameters=None, **arguments):
         self._launch, self._ready, self._arguments = launch, ready, arguments
+        self._with_screen, self._parameters = screen, parameters or {}
 
     def __enter__(self):
         with contextlib.ExitStack() as stack:
             self._stack = stack
             port = free_port()
             uri = "http://localhost:%d" % port
-            self.environment = dict(os.environ, ROS_MASTER_URI=uri, ROS_HOSTNAME="localhost")
+            surroundings = os.environ
+            if self._with_screen:
+                screen = VirtualScreen()
+                stack.callback(screen.close)
+                surroundings = screen.environment
+            self.environment = dict(surroundings, ROS_MASTER_URI=uri, ROS_HOSTNAME="localhost")
             self.master = xmlrpc.client.ServerProxy(uri)
             self.start("roscore", "-p", str(port))
             wait_until(self._answers, "the master", START_LIMIT_S, 0.02)
+            for name, value in self._parameters.items():
+                self.master.setParam("/bench", name, value)
             begin = time.monotonic()
             self.start("roslaunch", *self._launch, *("%s:=%s" % pair for pair in self._arguments.items()))
             wait_until(self._is_ready, "%s of %s" % (self._ready, " ".join(self._launch)), START_LIMIT_S, 0.02)
@@ -110,6 +120,35 @@ class Lab:
         with contextlib.closing(self.sink(self._ready, Empty)) as connection:
             Sink(connection).message()
         return True
+
+
+def subscribe(master, topic, message_class, caller):
+    """Open one TCPROS connection to the publisher of ``topic``; a rospy process would share one among all.
+
+    ``caller`` names a node that does not exist, another one each time: rospy keeps one connection for each.
+    """
+    published = dict(master.getSystemState("/bench")[2][0])
+    uri = master.lookupNode("/bench", published[topic][0])[2]
+    _, host, port = xmlrpc.client.ServerProxy(uri).requestTopic("/bench", topic, [["TCPROS"]])[2]
+    connection = socket.create_connection((host, port))
+    fields = {"callerid": caller, "topic": topic, "type": message_class._type, "md5sum": message_class._md5sum,
+              "tcp_nodelay": "1"}
+    header = b"".join(struct.pack("<I", len(field)) + field
+                      for field in (("%s=%s" % pair).encode() for pair in fields.items()))
+    connection.sendall(struct.pack("<I", len(header)) + header)
+    return connection
+
+
+class Process:
+    """CPU time of a process."""
+
+    def __init__(self, pid):
+        self.pid = pid
+
+    def cpu_s(self):
+        """Of all of its threads since it began [s]."""
+        fields = Path("/proc/%d/stat" % self.pid).read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 class Sink:

@@ -52,11 +52,13 @@ def measure(report, quick, number):
             found, ticks = gaps_ms(states), gaps_ms(clock)
             bound = 2.0 * statistics.stdev(bare) + 0.3
             report.add("joint_states at %d Hz, %d sinks: sd" % (RATE_HZ, count), statistics.stdev(found), "ms",
-                       ("twice a bare timer + 0.3", bound), ratio_most=1.0)
+                       ("twice a bare timer + 0.3", bound), samples=len(found), ratio_most=1.0)
             report.add("joint_states, %d sinks: sd" % count, statistics.stdev(found), "ms",
-                       ("a bare timer", statistics.stdev(bare)), most=1.5)
-            report.add("joint_states, %d sinks: rate" % count, 1e3 / statistics.mean(found), "Hz")
-            report.add("clock, %d sinks: p99 of the gap" % count, statistics.quantiles(ticks, n=100)[98], "ms")
+                       ("a bare timer", statistics.stdev(bare)), samples=len(found), most=1.5)
+            report.add("joint_states, %d sinks: rate" % count, 1e3 / statistics.mean(found), "Hz",
+                       samples=len(found))
+            report.add("clock, %d sinks: p99 of the gap" % count, statistics.quantiles(ticks, n=100)[98], "ms",
+                       samples=len(ticks))
             report.sample("gaps with %d sinks" % count, "ms", **{"joint_states": found, "clock": ticks,
                                                                  "bare timer": bare})
         clients = [lab.part("client") for _ in range(5)]
@@ -70,4 +72,5 @@ def measure(report, quick, number):
     with Lab(gui="false", enable="true") as lab:
         latency = lab.part("latency", 5 if quick else 20)
         found = json.loads(latency.stdout.readline())
-        report.add("command to first motion", found["median"], "ticks of 2 ms", most=2)
+        report.add("command to first motion", found["median"], "ticks of 2 ms",
+                   samples=len(found["ticks"]), most=2)

@@ -12,6 +12,7 @@ import argparse
 import math
 import sys
 import time
+from dataclasses import dataclass, field
 
 import numpy as np
 import rospkg
@@ -140,29 +141,48 @@ def run(lab_class, robot, table, trial):
         lab.close()
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=100, help="how many (default: %(default)s)")
-    parser.add_argument("--first", type=int, default=0, help="the first one (default: %(default)s)")
-    arguments = parser.parse_args()
+@dataclass
+class Outcome:
+    """What became of some seeds. misses_m: of those that succeeded, how far from its target the block ended."""
+
+    succeeded: int = 0
+    misses_m: list = field(default_factory=list)
+    simulated_s: float = 0.0
+    wall_s: float = 0.0
+    cpu_s: float = 0.0
+
+
+def run_seeds(seeds):
+    """One trial for each seed; prints why one failed."""
     robot, table = load_scene()
     lab_class = load_lab()
-    succeeded, simulated, misses = 0, 0.0, []
+    outcome = Outcome()
     begin, begin_cpu = time.monotonic(), time.process_time()
-    for seed in range(arguments.first, arguments.first + arguments.seeds):
+    for seed in seeds:
         try:
             seconds, miss = run(lab_class, robot, table, Trial.from_seed(seed))
         except (Failure, BlockLost, NoSolution) as failure:
             print("seed %d failed: %s" % (seed, failure), flush=True)
             continue
-        succeeded += 1
-        simulated += seconds
-        misses.append(miss)
-    wall, cpu = time.monotonic() - begin, time.process_time() - begin_cpu
+        outcome.succeeded += 1
+        outcome.simulated_s += seconds
+        outcome.misses_m.append(miss)
+    outcome.wall_s, outcome.cpu_s = time.monotonic() - begin, time.process_time() - begin_cpu
+    return outcome
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=100, help="how many (default: %(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="the first one (default: %(default)s)")
+    arguments = parser.parse_args()
+    outcome = run_seeds(range(arguments.first, arguments.first + arguments.seeds))
     print("%d of %d succeeded; worst distance from the target %.2f mm; %.1f simulated s a run; %.1f times real time by "
-          "the clock, %.1f by processor time" % (succeeded, arguments.seeds, 1e3 * max(misses, default=0.0),
-                                                 simulated / max(succeeded, 1), simulated / wall, simulated / cpu))
-    return 0 if succeeded >= NEEDED * arguments.seeds else 1
+          "the clock, %.1f by processor time" % (
+              outcome.succeeded, arguments.seeds, 1e3 * max(outcome.misses_m, default=0.0),
+              outcome.simulated_s / max(outcome.succeeded, 1), outcome.simulated_s / outcome.wall_s,
+              outcome.simulated_s / outcome.cpu_s))
+    return 0 if outcome.succeeded >= NEEDED * arguments.seeds else 1
 
 
 if __name__ == "__main__":

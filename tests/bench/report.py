@@ -12,7 +12,8 @@ GOALS = ("most", "least", "ratio_most", "ratio_least")
 @dataclass
 class Row:
     """One figure. ours, peer: one number a round; peer is empty where there is nothing to compare with. goal: {one of
-    GOALS: bound}, or empty."""
+    GOALS: bound}, or empty. samples: of how many measurements each round's number was made, where that is known.
+    pooled: the number is a share of its samples, and all rounds count as one: a miss in any of them is a miss."""
 
     suite: str
     what: str
@@ -21,9 +22,15 @@ class Row:
     peer_name: str = ""
     peer: list = field(default_factory=list)
     goal: dict = field(default_factory=dict)
+    samples: list = field(default_factory=list)
+    pooled: bool = False
 
     @property
-    def median(self):
+    def figure(self):
+        """What counts: the share of all rounds' samples where they are pooled, else the median of the rounds."""
+        if self.pooled:
+            shares = zip(self.ours, self.samples, strict=True)
+            return sum(share * count for share, count in shares) / sum(self.samples)
         return statistics.median(self.ours)
 
     @property
@@ -37,9 +44,9 @@ class Row:
 
     @property
     def met(self):
-        """Whether the median keeps the goal; None without a goal, or without the peer that it needs."""
+        """Whether the figure keeps the goal; None without a goal, or without the peer that it needs."""
         for kind, bound in self.goal.items():
-            value = self.ratio if kind.startswith("ratio") else self.median
+            value = self.ratio if kind.startswith("ratio") else self.figure
             if value is None:
                 return None
             return value <= bound if kind.endswith("most") else value >= bound
@@ -52,13 +59,17 @@ class Report:
     def __init__(self):
         self.rows, self.samples = [], {}
 
-    def add(self, what, ours, unit="", peer=None, **goal):
-        """Note a figure. ``peer``: (name, figure), measured in the same round. ``goal``: one of GOALS."""
+    def add(self, what, ours, unit="", peer=None, samples=None, pooled=False, **goal):
+        """Note a figure. ``peer``: (name, figure), measured in the same round. ``samples``: how many measurements it
+        was made of. ``pooled``: it is a share of them, and rounds are put together as one. ``goal``: one of GOALS."""
         if len(goal) > 1 or not set(goal) <= set(GOALS):
             raise ValueError("a goal is one of %s, got %s" % (", ".join(GOALS), goal))
+        if pooled and not samples:
+            raise ValueError("a share that is pooled needs its number of samples, got %r for %s" % (samples, what))
         name, other = peer if peer is not None else ("", None)
         self.rows.append({"what": what, "unit": unit, "ours": float(ours), "peer_name": name,
-                          "peer": None if other is None else float(other), "goal": goal})
+                          "peer": None if other is None else float(other), "goal": goal, "samples": samples,
+                          "pooled": pooled})
 
     def sample(self, title, unit, **values):
         """Note a distribution for the picture ``title``: {name: sequence of numbers}."""
@@ -75,8 +86,10 @@ def put_together(suite, rounds):
     for found in rounds:
         for entry in found["rows"]:
             row = rows.setdefault(entry["what"], Row(suite, entry["what"], entry["unit"], goal=entry["goal"],
-                                                     peer_name=entry["peer_name"]))
+                                                     peer_name=entry["peer_name"], pooled=entry["pooled"]))
             row.ours.append(entry["ours"])
+            if entry["samples"] is not None:
+                row.samples.append(entry["samples"])
             if entry["peer"] is not None:
                 row.peer.append(entry["peer"])
         for title, entry in found["samples"].items():
@@ -88,15 +101,15 @@ def put_together(suite, rounds):
 
 def table(rows):
     """Return the rows as lines of text, one figure each, its peer beside it."""
-    lines = ["%-62s %11s %21s  %-22s %11s %8s %15s  %s" % (
-        "", "median", "spread", "peer", "median", "ratio", "spread", "goal")]
+    lines = ["%-62s %11s %21s %8s  %-22s %11s %8s %15s  %s" % (
+        "", "figure", "spread", "samples", "peer", "median", "ratio", "spread", "goal")]
     suite = None
     for row in rows:
         if row.suite != suite:
             suite = row.suite
             lines.append(suite)
-        line = "  %-60s %11s %21s" % (row.what + (" [%s]" % row.unit if row.unit else ""), number(row.median),
-                                      spread(row.ours))
+        line = "  %-60s %11s %21s %8s" % (row.what + (" [%s]" % row.unit if row.unit else ""), number(row.figure),
+                                          spread(row.ours), count(row))
         line += "  %-22s %11s %8s %15s" % (
             row.peer_name, number(statistics.median(row.peer)) if row.peer else "",
             number(row.ratio) if row.ratio is not None else "", spread(row.ratios) if row.ratios else "")
@@ -106,17 +119,23 @@ def table(rows):
 
 def markdown(rows):
     """Return the rows as lines of a Markdown table, for docs/performance.md."""
-    lines = ["| figure | ours | spread | peer | peer's | ratio | spread | goal |", "|---|---|---|---|---|---|---|---|"]
+    lines = ["| figure | ours | spread | samples | peer | peer's | ratio | spread | goal |",
+             "|---|---|---|---|---|---|---|---|---|"]
     suite = None
     for row in rows:
         if row.suite != suite:
             suite = row.suite
-            lines.append("| **%s** | | | | | | | |" % suite)
-        lines.append("| %s | %s %s | %s | %s | %s | %s | %s | %s |" % (
-            row.what, number(row.median), row.unit, spread(row.ours), row.peer_name,
+            lines.append("| **%s** | | | | | | | | |" % suite)
+        lines.append("| %s | %s %s | %s | %s | %s | %s | %s | %s | %s |" % (
+            row.what, number(row.figure), row.unit, spread(row.ours), count(row), row.peer_name,
             number(statistics.median(row.peer)) if row.peer else "", number(row.ratio) if row.ratio is not None else "",
             spread(row.ratios) if row.ratios else "", goal_text(row)))
     return lines
+
+
+def count(row):
+    """Measurements of all rounds together, or nothing where they were not counted."""
+    return number(sum(row.samples)) if row.samples else ""
 
 
 def goal_text(row):
@@ -147,5 +166,5 @@ def number(value):
 
 def as_json(rows, samples, machine):
     """Return what goes into the JSON file."""
-    return json.dumps({"machine": machine, "rows": [{**asdict(row), "median": row.median, "ratio": row.ratio,
+    return json.dumps({"machine": machine, "rows": [{**asdict(row), "figure": row.figure, "ratio": row.ratio,
                                                      "met": row.met} for row in rows], "samples": samples}, indent=1)

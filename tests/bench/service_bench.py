@@ -20,9 +20,9 @@ def measure(report, quick, number):
     for name, found in times.items():
         if name != "empty":
             report.add("IK round trip, %s: mean" % name, found.mean(), "ms", ("empty service", times["empty"].mean()),
-                       **({"ratio_most": 1.5} if name == "one pose" else {}))
+                       samples=len(found), **({"ratio_most": 1.5} if name == "one pose" else {}))
             report.add("IK round trip, %s: p99" % name, np.percentile(found, 99), "ms",
-                       ("empty service", np.percentile(times["empty"], 99)))
+                       ("empty service", np.percentile(times["empty"], 99)), samples=len(found))
     report.sample("round trip", "ms", **times)
 
 

@@ -45,35 +45,46 @@ class _Ros:
         return SimpleNamespace(close=lambda: None)
 
 
-class Loop:
-    """What the node builds, without the node; as a context."""
+class BareWorld:
+    """The robot on the floor with nobody who drives it, as a context. Attributes ``world``, ``model``, ``robot``."""
 
     def __enter__(self):
         with contextlib.ExitStack() as stack:
-            self.world = World(find_mesh=ResourceFinder())
-            stack.callback(self.world.close)
-            writer = SnapshotWriter()
-            stack.callback(writer.close)
-            self.world.add_ground_plane()
-            robot = parse_urdf(expanded("baxter_description", "baxter.urdf.xacro"), source="baxter")
-            model = self.world.spawn(robot, "baxter", Pose((0, 0, 0.93)), **BaxterPlugin.spawn_options(robot, None))
-            for names in NAMES.values():
-                model.set_joint_positions(model.index(names), np.array(list(NEUTRAL.values())))
-            ros, log = _Ros(), SimpleNamespace(info=lambda text: None, warn=print, error=print)
-            context = PluginContext(self.world, model, robot, None, "/robot", "", log, ros,
-                                    {"baxter_sim_hardware": {"enable": True}}, add_screen=lambda *_: None)
-            self._queues = ros.queues
-            self._simulation = Simulation(self.world, RequestBoard(), log, real_time_factor=0.0)
-            publications = Publications(self._simulation, ros, writer, log, clock_rate=500.0)
-            self._simulation.on_turn, self._simulation.on_tick = publications.on_turn, publications.on_tick
-            self._simulation.host(HostedPlugin(BaxterPlugin(context), context, model.name, "Baxter"))
-            self._step, self._stepping_s = self.world.step, 0.0
-            self.world.step = self._timed_step
+            self._build(stack)
             self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_):
         self._stack.close()
+
+    def _build(self, stack):
+        self.world = World(find_mesh=ResourceFinder())
+        stack.callback(self.world.close)
+        self.world.add_ground_plane()
+        self.robot = parse_urdf(expanded("baxter_description", "baxter.urdf.xacro"), source="baxter")
+        self.model = self.world.spawn(self.robot, "baxter", Pose((0, 0, 0.93)),
+                                      **BaxterPlugin.spawn_options(self.robot, None))
+        for names in NAMES.values():
+            self.model.set_joint_positions(self.model.index(names), np.array(list(NEUTRAL.values())))
+
+
+class Loop(BareWorld):
+    """What the node builds, without the node."""
+
+    def _build(self, stack):
+        super()._build(stack)
+        writer = SnapshotWriter()
+        stack.callback(writer.close)
+        ros, log = _Ros(), SimpleNamespace(info=lambda text: None, warn=print, error=print)
+        context = PluginContext(self.world, self.model, self.robot, None, "/robot", "", log, ros,
+                                {"baxter_sim_hardware": {"enable": True}}, add_screen=lambda *_: None)
+        self._queues = ros.queues
+        self._simulation = Simulation(self.world, RequestBoard(), log, real_time_factor=0.0)
+        publications = Publications(self._simulation, ros, writer, log, clock_rate=500.0)
+        self._simulation.on_turn, self._simulation.on_tick = publications.on_turn, publications.on_tick
+        self._simulation.host(HostedPlugin(BaxterPlugin(context), context, self.model.name, "Baxter"))
+        self._step, self._stepping_s = self.world.step, 0.0
+        self.world.step = self._timed_step
 
     def turn(self):
         """Let both arms follow a new command for TICKS ticks; return (CPU of a tick, of the step in it) [us]."""
@@ -109,7 +120,9 @@ def measure(report, quick, number):
         for _ in range(20):
             loop.turn()
         tick, step = map(min, zip(*(loop.turn() for _ in range(turns)), strict=True))
-        report.add("tick with arms moving: CPU", tick, "us", ("its physics step", step), ratio_most=1.6)
+        report.add("tick with arms moving: CPU", tick, "us", ("its physics step", step), samples=turns * TICKS,
+                   ratio_most=1.6)
         loop.add_sleepers()
         more, _ = map(min, zip(*(loop.turn() for _ in range(turns)), strict=True))
-        report.add("tick with %d sleeping objects: CPU" % SLEEPERS, more, "us", ("without them", tick), ratio_most=2.2)
+        report.add("tick with %d sleeping objects: CPU" % SLEEPERS, more, "us", ("without them", tick),
+                   samples=turns * TICKS, ratio_most=2.2)

@@ -40,7 +40,7 @@ def rounds(report, tmp_path, *figures):
 def test_ratio_is_that_within_the_rounds(report, tmp_path):
     """The third round was disturbed: both are slow there, their ratio is not."""
     (row,), samples = report.put_together("suite", rounds(report, tmp_path, (1.0, 4.0), (1.2, 4.0), (10.0, 40.0)))
-    assert row.median == 1.2
+    assert row.figure == 1.2
     assert row.ratios == pytest.approx([0.25, 0.3, 0.25])
     assert row.ratio == pytest.approx(0.25)
     assert row.met is True
@@ -61,6 +61,39 @@ def test_goals(report, goal, ours, peer, met):
 def test_goal_of_an_unknown_kind_is_refused(report):
     with pytest.raises(ValueError, match="ratio_most"):
         report.Report().add("thing", 1.0, at_most=2.0)
+
+
+def pooled_row(report, tmp_path, *shares, least=99.99):
+    """The row that rounds of 2,000 samples make, each with this share [%]."""
+    found = []
+    for share in shares:
+        one = report.Report()
+        one.add("solved", share, "%", samples=2000, pooled=True, least=least)
+        one.save(tmp_path / "round.json")
+        found.append(json.loads((tmp_path / "round.json").read_text()))
+    (row,), _ = report.put_together("suite", found)
+    return row
+
+
+def test_a_miss_in_one_round_counts_among_all_samples(report, tmp_path):
+    """The median of these rounds is 100 %, and yet one of 6,000 was missed."""
+    row = pooled_row(report, tmp_path, 100.0, 99.95, 100.0)
+    assert row.figure == pytest.approx(100.0 - 100.0 / 6000)
+    assert row.met is False
+    assert pooled_row(report, tmp_path, 100.0, 100.0).met is True
+
+
+def test_the_table_says_how_many_samples(report, tmp_path):
+    row = pooled_row(report, tmp_path, 100.0, 99.95, 100.0)
+    assert " 6000 " in report.table([row])[-1]
+    assert "| 6000 |" in report.markdown([row])[-1]
+    assert "99.98" in report.table([row])[-1]
+
+
+@pytest.mark.parametrize("samples", [None, 0])
+def test_a_share_without_its_samples_is_refused(report, samples):
+    with pytest.raises(ValueError, match="number of samples"):
+        report.Report().add("solved", 100.0, "%", samples=samples, pooled=True)
 
 
 def test_table_and_markdown_hold_every_figure(report, tmp_path):
