@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pybullet
 
-from .body import Body
+from .body import BASE, Body
 from .errors import BulletSimError
 from .pose import Pose
 
@@ -18,6 +18,9 @@ POSITION_GAIN = 0.5
 
 # Bullet applies joint damping explicitly: beyond inertia / time step it pumps energy in. Half of that stays clear.
 _DAMPING_MARGIN = 0.5
+
+# Stands for "as strong as need be" [N m, N].
+_RIGID_EFFORT = 1e9
 
 # What keeps coupled joints together at most [N, Nm]: more than any drive of a finger.
 _GEAR_FORCE = 1000.0
@@ -63,6 +66,7 @@ class Model(Body):
         self._bounds = None
         self._gears = []
         self._direct = None
+        self._never_sleeps = static
         self._set_damping(joints)
         if count:
             self.release(np.arange(count))
@@ -129,6 +133,7 @@ class Model(Body):
         given, a moving set-point is followed without lag.
         """
         self._drive_otherwise(index)
+        self._stay_awake()
         gains = len(index)
         if velocity is not None:
             # The motor adds the velocity to what closes the gap, so the gap is the one at the beginning of the step.
@@ -152,6 +157,8 @@ class Model(Body):
     def drive_velocity(self, index, velocity, max_effort):
         """Keep joints ``index`` (k,) at ``velocity`` (k,) with at most ``max_effort`` (k,)."""
         self._drive_otherwise(index)
+        if max_effort.any():
+            self._stay_awake()
         pybullet.setJointMotorControlArray(
             self.body,
             index.tolist(),
@@ -161,10 +168,26 @@ class Model(Body):
             physicsClientId=self._client,
         )
 
+    def carry(self, index, position):
+        """Put joints ``index`` (k,) at ``position`` (k,), and hold them there during the next step, whatever it takes.
+
+        They move without inertia: what carries them does not feel it, as with Gazebo's ``Joint::SetPosition``. What
+        they carry, and what they lean on, it does feel.
+        """
+        self._stay_awake()
+        self._drive_otherwise(index)
+        pybullet.resetJointStatesMultiDof(
+            self.body, index.tolist(), position[:, None].tolist(), np.zeros((len(index), 1)).tolist(),
+            physicsClientId=self._client,
+        )
+        self._reading = None
+        self.drive_velocity(index, np.zeros(len(index)), np.full(len(index), _RIGID_EFFORT))
+
     def drive_effort(self, index, effort):
         """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; say it again for every step."""
         if not self._effort_driven[index].all():
             self.release(index)
+            self._stay_awake()
             self._effort_driven[index] = self._any_effort_driven = True
         self._commanded_effort[index] = effort
         self._reading = None
@@ -302,6 +325,17 @@ class Model(Body):
             self._turned_gravity = None if np.allclose(turned, self._world.gravity, atol=1e-9) else turned.tolist()
             self._gravity_key = key
         return self._turned_gravity
+
+    def _stay_awake(self):
+        """Once a free model's joints have been driven it does not fall asleep: Bullet's drives would not wake it."""
+        if not self._never_sleeps:
+            self._never_sleeps = True
+            pybullet.changeDynamics(
+                self.body,
+                BASE,
+                activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP,
+                physicsClientId=self._client,
+            )
 
     def _drive_otherwise(self, index):
         """Note that joints ``index`` (k,) are no longer driven by efforts."""

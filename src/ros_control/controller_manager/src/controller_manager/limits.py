@@ -24,7 +24,8 @@ class SoftLimits:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """What one joint may do; infinite where there is no limit. ``soft``: :class:`SoftLimits` or None."""
+    """What one joint may do; infinite where there is no limit, which is not enforced then. ``soft``:
+    :class:`SoftLimits` or None; they need a limit of velocity."""
 
     lower: float = -math.inf
     upper: float = math.inf
@@ -45,6 +46,13 @@ def limits_from_urdf(joint, soft=None):
         return JointLimits(velocity=value(limit.velocity), effort=value(limit.effort), soft=soft)
     return JointLimits(value(limit.lower, -math.inf), value(limit.upper), value(limit.velocity), math.inf,
                        value(limit.effort), soft)
+
+
+def without_idle_soft_limits(limits):
+    """``limits`` without soft ones that a missing limit of velocity leaves without a meaning."""
+    if limits.soft is not None and math.isinf(limits.velocity):
+        return dataclasses.replace(limits, soft=None)
+    return limits
 
 
 def with_parameters(limits, values, source):
@@ -90,7 +98,7 @@ def _number(values, key, source):
 class _Columns:
     """The limits of k joints as arrays (k,), and which joints have soft ones."""
 
-    def __init__(self, names, limits):
+    def __init__(self, limits):
         self.lower, self.upper, self.velocity, self.acceleration, self.effort = (
             np.array([getattr(limit, field) for limit in limits], dtype=float)
             for field in ("lower", "upper", "velocity", "acceleration", "effort"))
@@ -101,16 +109,6 @@ class _Columns:
             np.array([getattr(limits[k].soft, field) for k in soft])
             for field in ("lower", "upper", "k_position", "k_velocity"))
         self.soft_velocity = self.velocity[self.soft]
-        self.names = names
-
-    def require(self, field, wanted, why):
-        """Raise :class:`HardwareError` where a joint of ``wanted`` (indices) has no limit on ``field``."""
-        for k in wanted:
-            if math.isinf(getattr(self, field)[k]):
-                raise HardwareError(
-                    'joint \'%s\' has no %s limit, which %s; give %s="..." in the <limit> of the URDF, or '
-                    "joint_limits/%s/{has_%s_limits: true, max_%s: ...}"
-                    % (self.names[k], field, why, field, self.names[k], field, field))
 
     def soft_velocity_range(self, position):
         """Lowest and highest velocity of the soft joints at ``position`` (of the soft joints)."""
@@ -126,11 +124,9 @@ class PositionLimiter:
     Open loop: counts from its own last command, not from the measured position.
     """
 
-    def __init__(self, names, limits):
-        """``limits``: :class:`JointLimits` of joints ``names``. Raises :class:`HardwareError` for soft limits without
-        a velocity limit."""
-        self._columns = _Columns(names, limits)
-        self._columns.require("velocity", self._columns.soft, "soft limits (<safety_controller>) need")
+    def __init__(self, limits):
+        """``limits``: list of :class:`JointLimits`."""
+        self._columns = _Columns(limits)
         self._last = None
 
     def reset(self):
@@ -159,10 +155,8 @@ class PositionLimiter:
 class VelocityLimiter:
     """Velocity commands: within the velocity limit, and the acceleration limit where there is one."""
 
-    def __init__(self, names, limits):
-        """Raises :class:`HardwareError` for a joint without a velocity limit."""
-        self._columns = _Columns(names, limits)
-        self._columns.require("velocity", range(len(limits)), "velocity-controlled joints need")
+    def __init__(self, limits):
+        self._columns = _Columns(limits)
         self._accelerates = bool(np.isfinite(self._columns.acceleration).any())
         self._last = np.zeros(len(limits))
 
@@ -196,11 +190,8 @@ class VelocityLimiter:
 class EffortLimiter:
     """Effort commands: within the effort limit, and none that drives a joint further beyond its other limits."""
 
-    def __init__(self, names, limits):
-        """Raises :class:`HardwareError` for a joint without a velocity or effort limit."""
-        self._columns = _Columns(names, limits)
-        for field in ("velocity", "effort"):
-            self._columns.require(field, range(len(limits)), "effort-controlled joints need")
+    def __init__(self, limits):
+        self._columns = _Columns(limits)
 
     def reset(self):
         """Nothing to forget."""

@@ -14,6 +14,7 @@ from controller_manager.limits import (
     VelocityLimiter,
     limits_from_urdf,
     with_parameters,
+    without_idle_soft_limits,
 )
 from controller_manager.transmissions import read_soft_limits, read_transmissions
 from urdf_model import parse_urdf
@@ -24,7 +25,7 @@ SOFT = JointLimits(lower=-1.0, upper=1.0, velocity=2.0, effort=10.0, soft=SoftLi
 
 
 def limiter(kind, *limits):
-    return kind(["joint_%d" % k for k in range(len(limits))], list(limits))
+    return kind(list(limits))
 
 
 def enforce(limiter, command, position=0.0, velocity=0.0):
@@ -77,9 +78,10 @@ def test_hard_and_soft_joints_share_a_limiter():
     assert enforce(limiter(PositionLimiter, HARD, SOFT), [9.0, 9.0], position=0.6) == pytest.approx([0.8, 0.7])
 
 
-def test_soft_position_limits_need_a_velocity_limit():
-    with pytest.raises(HardwareError, match="'joint_0' has no velocity limit.*safety_controller.*<limit>"):
-        limiter(PositionLimiter, JointLimits(-1, 1, soft=SOFT.soft))
+def test_soft_limits_without_a_velocity_limit_are_left_out():
+    limits = JointLimits(-1, 1, soft=SOFT.soft)
+    assert without_idle_soft_limits(limits) == JointLimits(-1, 1)
+    assert without_idle_soft_limits(SOFT) is SOFT
 
 
 # -- velocity -------------------------------------------------------------------------------------------------------
@@ -107,9 +109,8 @@ def test_soft_velocity_counts_acceleration_from_the_measured_velocity():
     assert enforce(limiter(VelocityLimiter, soft), 9.0, velocity=1.0) == pytest.approx([1.5])
 
 
-def test_velocity_needs_its_limit():
-    with pytest.raises(HardwareError, match="'joint_0' has no velocity limit"):
-        limiter(VelocityLimiter, JointLimits())
+def test_a_velocity_without_a_limit_is_passed_on():
+    assert enforce(limiter(VelocityLimiter, JointLimits(), HARD), [900.0, 900.0]) == pytest.approx([900.0, 2.0])
 
 
 # -- effort ---------------------------------------------------------------------------------------------------------
@@ -136,10 +137,12 @@ def test_soft_effort_limits():
     assert enforce(effort, 99.0, position=0.9, velocity=0.0) == pytest.approx([-2.0])
 
 
-@pytest.mark.parametrize(("limits", "what"), [(JointLimits(velocity=1), "effort"), (JointLimits(effort=1), "velocity")])
-def test_effort_needs_velocity_and_effort_limits(limits, what):
-    with pytest.raises(HardwareError, match="'joint_0' has no %s limit.*max_%s" % (what, what)):
-        limiter(EffortLimiter, limits)
+@pytest.mark.parametrize(("limits", "velocity", "allowed"), [
+    (JointLimits(), 5.0, 900.0), (JointLimits(velocity=1), 0.5, 900.0), (JointLimits(velocity=1), 1.5, 0.0),
+    (JointLimits(effort=7), 5.0, 7.0),
+])
+def test_of_an_effort_only_the_limits_that_there_are_are_enforced(limits, velocity, allowed):
+    assert enforce(limiter(EffortLimiter, limits), 900.0, velocity=velocity) == pytest.approx([allowed])
 
 
 # -- where limits stand ---------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ from controller_manager.limits import (
     VelocityLimiter,
     limits_from_urdf,
     with_parameters,
+    without_idle_soft_limits,
 )
 from controller_manager.pid import Gains, Pid
 from controller_manager.transmissions import read_soft_limits, read_transmissions
@@ -30,7 +31,9 @@ class SimulatedHardware(RobotHardware):
     Commands act on the joint, as in Gazebo; mechanicalReduction and offset have no effect. Per interface:
 
     position
-        the joint is at the command after the step, whatever effort that takes
+        the joint is at the command after the step, whatever effort that takes. On a model that stands free the base
+        does not feel the motion, only the load: descriptions whose links weigh next to nothing rely on it, since in
+        Gazebo this interface is kinematic
     position with PID gains
         the effort is the PID's output of the position error, at most the effort limit
     velocity
@@ -54,7 +57,8 @@ class SimulatedHardware(RobotHardware):
         self._model = model
         self._model_index = model.index(self.joint_names)
         soft = read_soft_limits(urdf_xml)
-        limits = [self._limits_of(joint.name, robot, soft, limit_parameters, namespace) for joint in joints]
+        limits = [self._limits_of(robot.joints[joint.name], soft, limit_parameters, namespace, log)
+                  for joint in joints]
         self._groups = []
         for interface in (POSITION, VELOCITY, EFFORT):
             here = [i for i, joint in enumerate(joints) if joint.interface == interface]
@@ -70,6 +74,8 @@ class SimulatedHardware(RobotHardware):
         """Take the model's joint state, as it is after the last physics step."""
         for ours, theirs in zip((self.position, self.velocity, self.effort), self._model.read_joints(), strict=True):
             ours[:] = theirs[self._model_index]
+        for group in self._groups:
+            group.read()
 
     def write(self, dt):
         """Drive the model's joints for the next physics step of ``dt`` seconds."""
@@ -108,12 +114,17 @@ class SimulatedHardware(RobotHardware):
     # -- inside -------------------------------------------------------------------------------------------------
 
     @staticmethod
-    def _limits_of(name, robot, soft, parameters, namespace):
-        limits = limits_from_urdf(robot.joints[name], soft.get(name))
-        values = (parameters or {}).get(name) if isinstance(parameters, dict) else None
-        if values is None:
-            return limits
-        return with_parameters(limits, values, "%s/joint_limits/%s" % (namespace, name))
+    def _limits_of(joint, soft, parameters, namespace, log):
+        limits = limits_from_urdf(joint, soft.get(joint.name))
+        values = (parameters or {}).get(joint.name) if isinstance(parameters, dict) else None
+        if values is not None:
+            limits = with_parameters(limits, values, "%s/joint_limits/%s" % (namespace, joint.name))
+        kept = without_idle_soft_limits(limits)
+        if kept is not limits:
+            log.warn("joint '%s' has a <safety_controller> but no limit of velocity, so its soft limits are not "
+                     "enforced; give velocity=\"...\" in its <limit>, or %s/joint_limits/%s/{has_velocity_limits: "
+                     "true, max_velocity: ...}" % (joint.name, namespace, joint.name))
+        return kept
 
     def _gains_of(self, indices, parameters, namespace, log):
         """{index: Gains} of the joints that have PID gains; incomplete ones are reported and left out."""
@@ -137,14 +148,14 @@ class SimulatedHardware(RobotHardware):
     def _add_group(self, interface, indices, limits, gains):
         if not indices:
             return
-        names = [self.joint_names[i] for i in indices]
-        limiter = _LIMITERS[interface](names, [limits[i] for i in indices])
+        limiter = _LIMITERS[interface]([limits[i] for i in indices])
         effort = np.array([min(limits[i].effort, _UNLIMITED) for i in indices])
         index, model_index = np.array(indices), self._model_index[indices]
         if gains is not None:
             self._groups.append(_PidGroup(self, interface, index, model_index, limiter, effort, Gains.joined(gains)))
         else:
-            self._groups.append(_GROUPS[interface](self, interface, index, model_index, limiter, effort))
+            kind = _CarriedGroup if interface == POSITION and not self._model.static else _GROUPS[interface]
+            self._groups.append(kind(self, interface, index, model_index, limiter, effort))
 
 
 class _Group:
@@ -159,6 +170,9 @@ class _Group:
         self._model_index = model_index
         self._effort = effort
 
+    def read(self):
+        """Correct what the model says of these joints, where it cannot know."""
+
     def reset(self):
         self.limiter.reset()
 
@@ -171,6 +185,26 @@ class _PositionGroup(_Group):
     def drive(self, command, position, velocity, dt):
         # The velocity that ends at the command; stable at any inertia because the solver finds the effort for it.
         self._model.drive_velocity(self._model_index, (command - position) / dt, self._unlimited)
+
+
+class _CarriedGroup(_Group):
+    """Position interface on a model that stands free."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self._velocity = np.zeros(len(self.index))
+
+    def read(self):
+        # To the physics they stand still, wherever they are put.
+        self._hardware.velocity[self.index] = self._velocity
+
+    def reset(self):
+        super().reset()
+        self._velocity[:] = 0.0
+
+    def drive(self, command, position, velocity, dt):
+        self._velocity = (command - position) / dt
+        self._model.carry(self._model_index, command)
 
 
 class _VelocityGroup(_Group):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simulated joints under each interface, in a physics world, without ROS."""
+import re
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,10 @@ TRANSMISSION = """<transmission name="tran1"><type>transmission_interface/Simple
   <joint name="%(name)s"><hardwareInterface>hardware_interface/%(interface)sJointInterface</hardwareInterface></joint>
   <actuator name="m"><mechanicalReduction>%(reduction)s</mechanicalReduction></actuator></transmission>"""
 
+FREE_BASE = """<link name="l0"><inertial><mass value="%(mass)s"/>
+  <inertia ixx="%(inertia)s" iyy="%(inertia)s" izz="%(inertia)s" ixy="0" ixz="0" iyz="0"/></inertial>
+  <collision><geometry><box size="0.4 0.4 0.1"/></geometry></collision></link>"""
+
 
 def arm_urdf(interface, mass=1.0, inertia=0.02, reduction=1, count=2, limit=LIMIT, kind="revolute"):
     """A chain of horizontal pendulums."""
@@ -31,12 +37,22 @@ def arm_urdf(interface, mass=1.0, inertia=0.02, reduction=1, count=2, limit=LIMI
     return '<robot name="arm">%s</robot>' % "".join(parts)
 
 
+def with_free_base(xml):
+    """The same with a first link that stands on the floor: a box, ten times as heavy as the others."""
+    begin, end = xml.index('<link name="l0">'), xml.index("</link>") + len("</link>")
+    mass, inertia = (float(re.search(r'%s"([^"]+)"' % start, xml)[1]) for start in ("mass value=", "ixx="))
+    return xml[:begin] + FREE_BASE % {"mass": 10.0 * mass, "inertia": 10.0 * inertia} + xml[end:]
+
+
 class Arm:
-    def __init__(self, interface, limit_parameters=None, gain_parameters=None, start=0.3, **options):
+    def __init__(self, interface, limit_parameters=None, gain_parameters=None, start=0.3, free=False, **options):
         xml = arm_urdf(interface, **options)
-        robot = parse_urdf(xml)
         self.world = World(time_step_s=DT)
-        self.model = self.world.spawn(robot, "arm", Pose((0, 0, 1)), static=True)
+        if free:
+            xml = with_free_base(xml)
+            self.world.add_ground_plane()
+        robot = parse_urdf(xml)
+        self.model = self.world.spawn(robot, "arm", Pose((0, 0, 0.05 if free else 1)), static=not free)
         self.all = np.arange(len(self.model.joint_names))
         self.model.set_joint_positions(self.all, np.full(len(self.all), start))
         self.log = FakeLog()
@@ -167,9 +183,21 @@ def test_a_wrong_limit_parameter_is_named(make):
         make("Position", {"joint_1": {"has_velocity_limits": True}})
 
 
-def test_effort_joints_need_limits(make):
-    with pytest.raises(HardwareError, match="'joint_1' has no velocity limit"):
-        make("Effort", limit="", kind="continuous")
+@pytest.mark.parametrize("interface", ["Position", "Velocity", "Effort"])
+def test_joints_without_limits_are_driven_without_limits(make, interface):
+    """As of the tutorials' own robot, whose continuous joints have no <limit>."""
+    arm = make(interface, limit="", kind="continuous", count=1, start=0.0)
+    kind = {"Position": POSITION, "Velocity": VELOCITY, "Effort": EFFORT}[interface]
+    arm.run(0.5, {"Position": 2.0, "Velocity": 4.0, "Effort": 20.0}[interface], kind)
+    assert abs(arm.hardware.position[0]) > 1.5
+    assert arm.log.lines == []
+
+
+def test_soft_limits_without_a_velocity_limit_are_a_warning(make):
+    arm = make("Position", limit='<limit lower="-1.5" upper="1.5" effort="50"/><safety_controller k_velocity="1" '
+                                 'k_position="5" soft_lower_limit="-1" soft_upper_limit="1"/>', count=1)
+    assert "joint_1" in " ".join(arm.log.of("warn")) and "safety_controller" in " ".join(arm.log.of("warn"))
+    assert arm.run(0.5, 1.2, POSITION) == pytest.approx([1.2], abs=1e-3)
 
 
 def test_continuous_joints_turn_on_and_on(make):
@@ -202,3 +230,55 @@ def test_joints_that_were_put_elsewhere_stay_there(make):
     arm.model.set_joint_positions(arm.all, np.array([-1.0, 0.7]))
     arm.hardware.joints_set()
     assert arm.run(0.1) == pytest.approx([-1.0, 0.7], abs=1e-4)
+
+
+ASLEEP_AFTER_S = 6.0
+
+
+@pytest.fixture
+def standing(make):
+    """Make an arm that stands free on the floor, long enough to fall asleep where nothing keeps it awake."""
+
+    def stand(interface, mass, inertia, **options):
+        arm = make(interface, mass=mass, inertia=inertia, start=0.0, free=True, **options)
+        arm.run(ASLEEP_AFTER_S)
+        return arm
+
+    return stand
+
+
+@pytest.mark.parametrize(("interface", "command", "moved"), [
+    ("Position", [0.3, -0.2], [0.3, -0.2]), ("Velocity", [-0.5, 0.3], [-0.5, 0.3]),
+])
+def test_a_robot_that_stands_free_obeys_however_long_it_has_stood(standing, interface, command, moved):
+    arm = standing(interface, 1.0, 0.02)
+    before = arm.hardware.position.copy()
+    kind = {"Position": POSITION, "Velocity": VELOCITY}[interface]
+    goal = before + command if kind == POSITION else command
+    assert arm.run(1.0, goal, kind) - before == pytest.approx(moved, abs=0.02)
+
+
+@pytest.mark.parametrize(("mass", "inertia"), [(1e-5, 10.0), (1.0, 0.02)])
+def test_the_position_interface_leaves_a_free_base_where_it_stands(standing, mass, inertia):
+    arm = standing("Position", mass, inertia)
+    before, start, velocities = arm.model.base_pose(), arm.hardware.position.copy(), []
+    for k in range(1, 501):
+        arm.run(DT, start + 0.001 * k, POSITION)
+        velocities.append(arm.hardware.velocity.copy())
+    after = arm.model.base_pose()
+    assert arm.hardware.position - start == pytest.approx([0.5, 0.5], abs=1e-3)
+    # The command's own velocity, though the physics has not seen one.
+    assert np.array(velocities[10:]) == pytest.approx(0.5, abs=0.01)
+    assert after.position == pytest.approx(before.position, abs=1e-3)
+    assert after.quaternion == pytest.approx(before.quaternion, abs=2e-3)
+
+
+def test_a_free_robots_joints_carry_load_and_push(standing):
+    """The motion has no reaction, the load has: the arm presses itself off the floor."""
+    arm = standing("Position", 1.0, 0.02)
+    height = arm.model.base_pose().position[2]
+    heights = []
+    arm.run(0.5, None, None, watch=lambda: (arm.model.apply_wrench("l2", (0.0, 0.0, 400.0)),
+                                            heights.append(arm.model.base_pose().position[2])))
+    assert max(heights) > height + 0.2
+    assert arm.hardware.position == pytest.approx([0.0, 0.0], abs=1e-2)
