@@ -5,6 +5,7 @@ from sensor_msgs.msg import JointState
 
 from controller_manager import JOINT_STATE, Controller, ControllerError
 from ros_controllers.convert import stamp
+from ros_controllers.due import Due
 
 
 class JointStateController(Controller):
@@ -28,16 +29,15 @@ class JointStateController(Controller):
         extra = self._extra_joints()
         self._names = joints + [row[0] for row in extra]
         self._extra = np.array([row[1:] for row in extra], dtype=float).reshape(len(extra), 3).T
-        self._period_s = 1.0 / rate
-        self._last_s = None
+        self._due = Due(1.0 / rate)
         self._publisher = context.publisher(context.in_root("joint_states"), JointState)
 
     def starting(self, time_s):
         # The first update publishes at once.
-        self._last_s = None
+        self._due.restart()
 
     def update(self, time_s, dt):
-        if not self._is_due(time_s) or not self._publisher.has_listeners:
+        if not self._due.is_due(time_s) or not self._publisher.has_listeners:
             return
         hardware, index = self.hardware, self._index
         columns = [values[index].tolist() for values in (hardware.position, hardware.velocity, hardware.effort)]
@@ -46,16 +46,6 @@ class JointStateController(Controller):
         message = JointState(None, self._names, *columns)
         message.header.stamp = stamp(time_s)
         self._publisher.publish(message)
-
-    def _is_due(self, time_s):
-        if self._last_s is None or time_s < self._last_s:
-            self._last_s = time_s
-            return True
-        # Half a nanosecond: multiples of a tick and of the period meet in rounding only.
-        if self._last_s + self._period_s > time_s + 5e-10:
-            return False
-        self._last_s += self._period_s
-        return True
 
     def _extra_joints(self):
         rows = self.context.param("extra_joints", [])

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A vehicle that turns by driving its left and right wheels at different speeds."""
+import numpy as np
+from control_msgs.msg import JointTrajectoryControllerState
+
+from controller_manager import VELOCITY, ControllerError
+from ros_controllers.convert import stamp
+from ros_controllers.vehicle import VehicleController
+
+
+class DiffDriveController(VehicleController):
+    """Parameters besides those of :class:`VehicleController`: ``left_wheel``, ``right_wheel``, required: a joint, or a
+    list of them; ``wheel_radius`` and ``wheel_separation`` [m], else as the description has them (the wheels' collision
+    shapes, the joints' places); ``wheel_separation_multiplier``, ``left_wheel_radius_multiplier``,
+    ``right_wheel_radius_multiplier`` (or ``wheel_radius_multiplier`` for both), all 1;
+    ``publish_wheel_joint_controller_state`` (false).
+    """
+
+    def _configure(self):
+        context = self.context
+        sides = [self._joints(side + "_wheel", "a wheel's joint, or a list of them") for side in ("left", "right")]
+        if len(sides[0]) != len(sides[1]):
+            raise ControllerError("%s: %d left wheels and %d right ones; expected as many"
+                                  % (context.namespace, *map(len, sides)))
+        self._index = [self.claim(VELOCITY, joints) for joints in sides]
+        self._names = [*sides[0], *sides[1]]
+        radius = self._length("wheel_radius", lambda: self._wheel_radius(sides[0][0]),
+                              "a wheel's radius (its collision is no cylinder and no sphere)")
+        both = self._positive("wheel_radius_multiplier", 1.0, "times")
+        self._radii = [radius * self._positive(side + "_wheel_radius_multiplier", both, "times")
+                       for side in ("left", "right")]
+        self._separation = (self._length("wheel_separation", lambda: self._apart(sides[0][0], sides[1][0]),
+                                         "how far its wheels are apart")
+                            * self._positive("wheel_separation_multiplier", 1.0, "times"))
+        self._state_publisher = None
+        if context.flag("publish_wheel_joint_controller_state", False):
+            self._state_publisher = context.publisher("wheel_joint_controller_state", JointTrajectoryControllerState)
+        self._turned = [0.0, 0.0]
+
+    def _apart(self, left, right):
+        places = self._place(left), self._place(right)
+        if any(place is None for place in places):
+            return None
+        return float(np.linalg.norm(places[0][:2] - places[1][:2]))
+
+    def _angles(self):
+        """Mean angle of the left wheels and of the right ones [rad]."""
+        return [float(self.hardware.position[index].mean()) for index in self._index]
+
+    def _note_wheels(self):
+        self._turned = self._angles()
+
+    def _driven(self):
+        before, self._turned = self._turned, self._angles()
+        left, right = (radius * (now - then)
+                       for radius, now, then in zip(self._radii, self._turned, before, strict=True))
+        return (left + right) / 2.0, (right - left) / self._separation
+
+    def _drive(self, linear, angular):
+        half = angular * self._separation / 2.0
+        for index, speed, radius in zip(self._index, (linear - half, linear + half), self._radii, strict=True):
+            self.hardware.command[VELOCITY][index] = speed / radius
+
+    def _publish(self, time_s):
+        super()._publish(time_s)
+        if self._state_publisher is None or not self._state_publisher.has_listeners:
+            return
+        index = np.concatenate(self._index)
+        message = JointTrajectoryControllerState(joint_names=self._names)
+        message.header.stamp = stamp(time_s)
+        message.actual.positions = self.hardware.position[index].tolist()
+        message.actual.velocities = self.hardware.velocity[index].tolist()
+        wanted = self.hardware.command[VELOCITY][index]
+        message.desired.velocities = wanted.tolist()
+        message.error.velocities = (wanted - self.hardware.velocity[index]).tolist()
+        self._state_publisher.publish(message)

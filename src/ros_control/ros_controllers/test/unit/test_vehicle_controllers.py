@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Vehicles on wheels that turn as they are told: commands, limits, time-outs, odometry."""
+import math
+from pathlib import Path
+
+import pytest
+import yaml
+from geometry_msgs.msg import Twist, Vector3
+
+from controller_manager import POSITION, VELOCITY, ControllerError, ControllerTable
+from controller_manager.testing import FakeHardware, fake_context
+from ros_controllers.speed_limits import SpeedLimits
+from ros_controllers.wheel_odometry import WheelOdometry
+from urdf_model import parse_urdf
+
+DT = 0.01
+RADIUS, APART, LONG = 0.11, 0.4, 0.6
+TABLE = ControllerTable(yaml.safe_load((Path(__file__).parents[2] / "config" / "controllers.yaml").read_text()))
+WHEEL = """<link name="l_%(name)s"><collision><geometry><cylinder radius="0.11" length="0.05"/></geometry>
+</collision></link><joint name="%(name)s" type="continuous"><parent link="base_link"/><child link="l_%(name)s"/>
+<origin xyz="%(x)s %(y)s 0" rpy="-1.5708 0 0"/><axis xyz="0 0 1"/></joint>"""
+ROBOT = parse_urdf('<robot name="r"><link name="base_link"/>%s</robot>' % "".join(
+    WHEEL % {"name": name, "x": x, "y": y} for name, x, y in (
+        ("left", 0.1, 0.2), ("right", 0.1, -0.2), ("left_2", -0.1, 0.2), ("right_2", -0.1, -0.2),
+        ("rear_wheel_joint", -0.3, 0), ("front_steer_joint", 0.3, 0))))
+DIFF = {"left_wheel": "left", "right_wheel": "right"}
+
+
+class Vehicle:
+    def __init__(self, kind, joints, parameters, robot=ROBOT):
+        self.hardware = FakeHardware(joints)
+        self.context, self.ros = fake_context("base", parameters, robot=robot)
+        self.controller = TABLE.find(kind)("base", self.hardware, self.context)
+        self.time_s = 0.0
+        self.controller.starting(self.time_s)
+
+    def drive(self, seconds, linear=None, angular=0.0):
+        for _ in range(round(seconds / DT)):
+            self.time_s += DT
+            if linear is not None:
+                self.send(linear, angular)
+            self.controller.update(self.time_s, DT)
+            self.hardware.step(DT)
+        return self
+
+    def send(self, linear, angular=0.0):
+        self.ros.inboxes["/robot/base/cmd_vel"].put(Twist(linear=Vector3(linear, 0, 0), angular=Vector3(0, 0, angular)))
+
+    def command(self, joint, interface=VELOCITY):
+        return self.hardware.command[interface][self.hardware.joint_names.index(joint)]
+
+    @property
+    def odom(self):
+        return self.ros.publishers["/robot/base/odom"].messages[-1]
+
+    @property
+    def heading(self):
+        turned = self.odom.pose.pose.orientation
+        return 2.0 * math.atan2(turned.z, turned.w)
+
+
+def diff_drive(robot=ROBOT, **parameters):
+    return Vehicle("diff_drive_controller/DiffDriveController",
+                   dict.fromkeys(("left", "right", "left_2", "right_2"), (VELOCITY,)), {**DIFF, **parameters}, robot)
+
+
+def ackermann(**parameters):
+    return Vehicle("ackermann_steering_controller/AckermannSteeringController",
+                   {"rear_wheel_joint": (VELOCITY,), "front_steer_joint": (POSITION,)}, parameters)
+
+
+# -- two wheels -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("linear", "angular", "left", "right"), [
+    (0.5, 0.0, 0.5, 0.5), (0.0, 1.0, -0.2, 0.2), (-0.3, -0.5, -0.2, -0.4),
+])
+def test_wheels_turn_as_the_description_needs_it(linear, angular, left, right):
+    vehicle = diff_drive().drive(0.1, linear, angular)
+    assert vehicle.command("left") == pytest.approx(left / RADIUS)
+    assert vehicle.command("right") == pytest.approx(right / RADIUS)
+
+
+def test_odometry_of_a_straight_way_and_of_a_circle():
+    vehicle = diff_drive().drive(2.0, 0.5)
+    assert vehicle.odom.pose.pose.position.x == pytest.approx(1.0, abs=0.02)
+    assert vehicle.odom.twist.twist.linear.x == pytest.approx(0.5)
+    vehicle = diff_drive().drive(2.0 * math.pi / 0.8, 0.4, 0.8)
+    assert vehicle.odom.pose.pose.position.x == pytest.approx(0.0, abs=0.02)
+    assert vehicle.odom.pose.pose.position.y == pytest.approx(0.0, abs=0.02)
+    assert math.remainder(vehicle.heading, 2.0 * math.pi) == pytest.approx(0.0, abs=0.02)
+    assert vehicle.odom.twist.twist.angular.z == pytest.approx(0.8)
+
+
+def test_odometry_and_transform_say_the_same():
+    vehicle = diff_drive(base_frame_id="foot", odom_frame_id="/start", pose_covariance_diagonal=[1, 2, 3, 4, 5, 6])
+    vehicle.drive(1.0, 0.4, 0.3)
+    odom, transform = vehicle.odom, vehicle.ros.publishers["/tf"].messages[-1].transforms[0]
+    assert (odom.header.frame_id, odom.child_frame_id) == ("start", "foot")
+    assert (transform.header.frame_id, transform.child_frame_id) == ("start", "foot")
+    assert transform.header.stamp == odom.header.stamp
+    assert transform.transform.translation.x == odom.pose.pose.position.x > 0.3
+    assert transform.transform.rotation == odom.pose.pose.orientation
+    assert [odom.pose.covariance[7 * k] for k in range(6)] == [1, 2, 3, 4, 5, 6]
+    assert sum(odom.pose.covariance) == 21
+
+
+@pytest.mark.parametrize(("rate", "count"), [(None, 50), (10, 10)])
+def test_odometry_comes_at_its_rate(rate, count):
+    vehicle = diff_drive(**({} if rate is None else {"publish_rate": rate})).drive(1.0, 0.5)
+    assert len(vehicle.ros.publishers["/robot/base/odom"].messages) == pytest.approx(count, abs=1)
+
+
+def test_no_transform_where_none_is_wanted():
+    assert "/tf" not in diff_drive(enable_odom_tf=False).drive(0.1, 0.5).ros.publishers
+
+
+def test_an_old_command_is_a_stop():
+    vehicle = diff_drive(cmd_vel_timeout=0.2).drive(0.1, 0.5).drive(0.19)
+    assert vehicle.command("left") > 0.0
+    vehicle.drive(0.05)
+    assert vehicle.command("left") == vehicle.command("right") == 0.0
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_what_is_no_number_is_ignored_and_said(bad):
+    vehicle = diff_drive().drive(0.1, 0.5)
+    vehicle.send(bad)
+    vehicle.drive(0.01)
+    assert vehicle.command("left") == pytest.approx(0.5 / RADIUS)
+    assert "no number" in vehicle.context.log.of("warn")[0]
+
+
+def test_a_start_forgets_old_commands_and_keeps_the_pose():
+    vehicle = diff_drive().drive(1.0, 0.5)
+    x = vehicle.odom.pose.pose.position.x
+    vehicle.controller.stopping(vehicle.time_s)
+    assert vehicle.command("left") == 0.0
+    vehicle.send(0.5)
+    vehicle.controller.starting(vehicle.time_s)
+    vehicle.drive(0.1)
+    assert vehicle.command("left") == 0.0
+    assert vehicle.odom.pose.pose.position.x == pytest.approx(x, abs=0.02)
+
+
+def test_open_loop_counts_commands():
+    vehicle = diff_drive(open_loop=True)
+    vehicle.hardware.frozen = True
+    assert vehicle.drive(1.0, 0.5).odom.pose.pose.position.x == pytest.approx(0.5, abs=0.02)
+    vehicle = diff_drive()
+    vehicle.hardware.frozen = True
+    assert vehicle.drive(1.0, 0.5).odom.pose.pose.position.x == 0.0
+
+
+def test_several_wheels_a_side_turn_alike():
+    vehicle = diff_drive(left_wheel=["left", "left_2"], right_wheel=["right", "right_2"]).drive(0.1, 0.5, 1.0)
+    assert vehicle.command("left") == vehicle.command("left_2") != vehicle.command("right")
+    assert vehicle.odom.twist.twist.angular.z == pytest.approx(1.0, abs=0.2)
+
+
+def test_parameters_before_the_description():
+    vehicle = diff_drive(wheel_radius=0.2, wheel_separation=1.0, wheel_separation_multiplier=2.0,
+                         left_wheel_radius_multiplier=0.5).drive(0.1, 0.0, 1.0)
+    assert vehicle.command("left") == pytest.approx(-1.0 / 0.1)
+    assert vehicle.command("right") == pytest.approx(1.0 / 0.2)
+
+
+def test_the_limited_command_and_the_wheels_can_be_watched():
+    vehicle = diff_drive(publish_cmd=True, publish_wheel_joint_controller_state=True,
+                         linear={"x": {"has_velocity_limits": True, "max_velocity": 0.3}}).drive(0.5, 9.0)
+    assert vehicle.ros.publishers["/robot/base/cmd_vel_out"].messages[-1].twist.linear.x == pytest.approx(0.3)
+    state = vehicle.ros.publishers["/robot/base/wheel_joint_controller_state"].messages[-1]
+    assert state.joint_names == ["left", "right"]
+    assert state.actual.velocities == pytest.approx([0.3 / RADIUS] * 2)
+
+
+@pytest.mark.parametrize(("parameters", "text"), [
+    ({"left_wheel": None}, "base/left_wheel is missing"),
+    ({"left_wheel": ["left", "left_2"]}, "2 left wheels and 1 right"),
+    ({"left_wheel": "front"}, "joint 'front' cannot be used"),
+    ({"wheel_radius": -1.0}, "wheel_radius is -1, expected a number of m above 0"),
+    ({"publish_rate": 0}, "publish_rate is 0"),
+    ({"pose_covariance_diagonal": [1, 2]}, "expected six numbers"),
+    ({"linear": {"x": {"has_velocity_limits": True}}}, "linear/x/max_velocity is missing"),
+    ({"linear": {"x": {"has_velocity_limits": True, "max_velocity": 1, "min_velocity": 2}}}, "expected at most max"),
+])
+def test_wrong_parameters_are_named(parameters, text):
+    with pytest.raises(ControllerError, match=text):
+        diff_drive(**parameters)
+
+
+def test_without_a_description_radius_and_separation_are_asked_for():
+    with pytest.raises(ControllerError, match="wheel_radius is missing.*give it in m"):
+        diff_drive(robot=None)
+    assert diff_drive(robot=None, wheel_radius=0.1, wheel_separation=0.5).drive(0.1, 0.5).command("left") > 0.0
+
+
+# -- a car ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_car_is_steered_by_an_angle_and_goes_in_a_circle():
+    angle = 0.3
+    lap_s = 2.0 * math.pi * LONG / math.tan(angle) / 0.5
+    vehicle = ackermann().drive(lap_s / 2.0, 0.5, angle)
+    assert vehicle.command("rear_wheel_joint") == pytest.approx(0.5 / RADIUS)
+    assert vehicle.command("front_steer_joint", POSITION) == pytest.approx(angle)
+    assert vehicle.odom.pose.pose.position.y == pytest.approx(2.0 * LONG / math.tan(angle), rel=0.02)
+    assert vehicle.odom.twist.twist.angular.z == pytest.approx(0.5 * math.tan(angle) / LONG)
+    vehicle.drive(lap_s / 2.0, 0.5, angle)
+    assert math.hypot(vehicle.odom.pose.pose.position.x, vehicle.odom.pose.pose.position.y) < 0.05
+
+
+def test_a_car_without_commands_stops_and_straightens():
+    vehicle = ackermann().drive(0.5, 0.5, 0.3).drive(1.0)
+    assert vehicle.command("rear_wheel_joint") == vehicle.command("front_steer_joint", POSITION) == 0.0
+
+
+# -- cores ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("limits", "speeds"), [
+    (SpeedLimits(), [9.0, 9.0]),
+    (SpeedLimits(velocity=(-0.5, 1.0)), [1.0, 1.0]),
+    (SpeedLimits(acceleration=(-2.0, 2.0)), [0.2, 0.4, 0.6]),
+    (SpeedLimits(velocity=(-1.0, 0.3), acceleration=(-2.0, 2.0)), [0.2, 0.3, 0.3]),
+    (SpeedLimits(jerk=(-10.0, 10.0)), [0.1, 0.3, 0.6]),
+])
+def test_speed_limits(limits, speeds):
+    last = before = 0.0
+    found = []
+    for _ in speeds:
+        before, last = last, limits.limit(9.0, last, before, 0.1)
+        found.append(last)
+    assert found == pytest.approx(speeds)
+
+
+def test_an_arc_is_added_exactly_in_one_step_or_in_many():
+    whole, parts = WheelOdometry(), WheelOdometry()
+    whole.move(1.5, 2.0, 1.0)
+    for _ in range(1000):
+        parts.move(0.0015, 0.002, 0.001)
+    assert (parts.x, parts.y, parts.heading) == pytest.approx((whole.x, whole.y, whole.heading), abs=1e-9)
+    assert (whole.x, whole.y) == pytest.approx((0.75 * math.sin(2.0), 0.75 * (1.0 - math.cos(2.0))))
