@@ -5,3 +5,5 @@ from gazebo_ros.model_plugin import ModelPlugin
 
 class DrawnSensor(ModelPlugin):
     """A camera or depth camera. The loop does nothing for it: /sensor_renderer finds it in the scene and serves it."""
+
+    required = False

@@ -20,6 +20,9 @@ class ModelPlugin:
     A plugin that raises is reported once with its traceback and left out from then on; the world goes on.
     """
 
+    #: Whether a model whose plugin refuses it is not spawned. A sensor is left out instead, with a warning.
+    required = True
+
     @classmethod
     def spawn_options(cls, robot, element):
         """Keyword arguments that ``bullet_sim.World.spawn`` shall get for a model with this plugin.

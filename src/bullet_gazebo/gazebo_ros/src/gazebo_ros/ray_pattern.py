@@ -7,6 +7,7 @@ import numpy as np
 #: Rays that one tick casts at most [some 5 us each]: a scan of more is swept over several ticks, as a scanner's is.
 RAYS_PER_TICK = 32
 _MOST_RAYS = 100000
+_ONCE_ROUND = 2.0 * math.pi + 0.01  # [rad]; people round it up
 
 
 class RayPatternError(Exception):
@@ -45,9 +46,10 @@ class RayPattern:
     def _span(self, path, default_samples):
         samples = round(self._number(path + "/samples", default_samples) * self._number(path + "/resolution", 1.0))
         low, high = self._number(path + "/min_angle", 0.0), self._number(path + "/max_angle", 0.0)
-        if samples < 1 or not -math.pi - 1e-6 <= low <= high <= math.pi + 1e-6:
+        # Scanners that turn on and on are described from 0 to 2 pi as well as from -pi to pi.
+        if samples < 1 or not low <= high <= low + _ONCE_ROUND:
             raise RayPatternError("%s: %s has %d samples from %g to %g rad; expected at least one, angles in order and "
-                                  "from -pi to pi" % (self._what, path, samples, low, high))
+                                  "once round at most" % (self._what, path, samples, low, high))
         return samples, low, high
 
     def _number(self, path, default):

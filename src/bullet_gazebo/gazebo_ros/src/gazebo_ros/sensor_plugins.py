@@ -24,6 +24,7 @@ class PacedSensor(ModelPlugin):
 
     message_class = None
     topic_tag, default_topic = "topicName", None
+    required = False
 
     def __init__(self, context):
         super().__init__(context)
@@ -134,16 +135,21 @@ class _RaySensor(PacedSensor):
 
 
 class Laser(_RaySensor):
-    """``libgazebo_ros_laser.so``. Of several rows the middle one is published."""
+    """``libgazebo_ros_laser.so``, ``libgazebo_ros_gpu_laser.so``. Of several rows the middle one is published. The
+    intensities are 0, as Gazebo's are of surfaces without a ``<laser_retro>``."""
 
     message_class = LaserScan
+
+    def __init__(self, context):
+        super().__init__(context)
+        self._intensities = [0.0] * self.pattern.columns
 
     def message(self, ranges):
         pattern = self.pattern
         row = ranges.reshape(pattern.rows, pattern.columns)[pattern.rows // 2]
         return LaserScan(angle_min=pattern.angle_min, angle_max=pattern.angle_max, angle_increment=pattern.increment,
                          scan_time=self._period_s, range_min=pattern.range_min, range_max=pattern.range_max,
-                         ranges=row.tolist())
+                         ranges=row.tolist(), intensities=self._intensities)
 
 
 class RangeFinder(_RaySensor):

@@ -198,6 +198,12 @@ class Spawner:
                                 lambda *screen: self._add_screen(prepared, *screen))
         try:
             plugin = plugin_class(context)
+        except PluginError as error:
+            context.close()
+            if plugin_class.required:
+                raise
+            self._leave_out(model_name, error)
+            return
         except Exception:
             context.close()
             raise
@@ -215,7 +221,7 @@ class Spawner:
 
     def _plugins(self, robot, spawn_namespace):
         found, sensors, options = [], [], {}
-        for element in (*urdf_extras.plugins(robot), *urdf_extras.sensor_plugins(robot)):
+        for element in (*urdf_extras.plugins(robot), *urdf_extras.sensor_plugins(robot, self._log.warn)):
             filename = element.get("filename") or ""
             plugin_class = self._table.find(filename)
             if plugin_class is None:
@@ -224,11 +230,17 @@ class Spawner:
                 continue
             namespace = urdf_extras.namespace_of(element, spawn_namespace)
             if issubclass(plugin_class, DrawnSensor):
-                sensors.append(_drawn(robot, element, namespace))
+                try:
+                    sensors.append(_drawn(robot, element, namespace))
+                except PluginError as error:
+                    self._leave_out(robot.name, error)
                 continue
             options.update(plugin_class.spawn_options(robot, element))
             found.append((plugin_class, element, namespace))
         return found, sensors, options
+
+    def _leave_out(self, model_name, error):
+        self._log.warn("model '%s' comes without one of its sensors: %s" % (model_name, error))
 
     def _check_name(self, name):
         if not name:

@@ -16,19 +16,23 @@ def plugins(robot):
     return [plugin for gazebo in robot.gazebo for plugin in gazebo.findall("plugin")]
 
 
-def sensor_plugins(robot):
+def sensor_plugins(robot, warn):
     """The ``<plugin>`` elements of the ``<sensor>`` elements of links.
 
-    Raises :class:`ExtrasError` for a sensor whose link the model does not have.
+    A sensor elsewhere is told to ``warn(text)`` and left out, its plugins with it.
     """
     found = []
     for gazebo in robot.gazebo:
         for sensor in gazebo.findall("sensor"):
-            link = gazebo.get("reference")
-            if link not in robot.links:
-                raise ExtrasError("sensor '%s' is on link '%s', which '%s' does not have; links: %s"
-                                  % (sensor.get("name", ""), link, robot.name, ", ".join(robot.links)))
-            found += sensor.findall("plugin")
+            link, inside = gazebo.get("reference"), sensor.findall("plugin")
+            if link in robot.links:
+                found += inside
+            elif link in robot.joints:
+                warn("sensor '%s' of '%s' is on a joint, '%s', and is left out; sensors are served on links"
+                     % (sensor.get("name", ""), robot.name, link))
+            else:
+                warn("sensor '%s' is on link '%s', which '%s' does not have, and is left out; links: %s"
+                     % (sensor.get("name", ""), link, robot.name, ", ".join(robot.links)))
     return found
 
 

@@ -9,10 +9,11 @@ from lxml import etree
 
 from bullet_sim import Pose, World
 from gazebo_ros import sensor_plugins
-from gazebo_ros.model_plugin import PluginContext, PluginError
+from gazebo_ros.drawn_sensor import DrawnSensor
+from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.ray_pattern import RAYS_PER_TICK, RayPattern, RayPatternError
-from gazebo_ros.urdf_extras import ExtrasError, plugins
+from gazebo_ros.urdf_extras import plugins
 from gazebo_ros.urdf_extras import sensor_plugins as found_in
 from urdf_model import parse_urdf
 
@@ -55,7 +56,7 @@ class Lab:
         self.world.add_ground_plane()
         robot = parse_urdf(urdf, "test")
         self.model = self.world.spawn(robot, "it", pose, static=static)
-        element = (plugins(robot) + found_in(robot))[0]
+        element = (plugins(robot) + found_in(robot, warn=pytest.fail))[0]
         self.ros = Ros()
         context = PluginContext(self.world, self.model, robot, element, "/ns", urdf, None, self.ros, {})
         try:
@@ -193,10 +194,24 @@ def test_after_a_reset_of_time_sensors_go_on(lab):
 @pytest.mark.parametrize(("element", "text"), [
     ("<range><min>2</min><max>1</max></range>", "from 2 to 1 m"), ("<range><min>x</min></range>", "'x'"),
     ("<scan><horizontal><samples>0</samples></horizontal></scan>", "0 samples"),
+    ("<scan><horizontal><samples>9</samples><min_angle>0</min_angle><max_angle>7</max_angle></horizontal></scan>",
+     "once round at most"),
+    ("<scan><horizontal><samples>9</samples><min_angle>1</min_angle></horizontal></scan>", "angles in order"),
     ("<scan><horizontal><samples>1e9</samples></horizontal></scan>", "at most")])
 def test_impossible_rays_are_refused(element, text):
     with pytest.raises(RayPatternError, match=text):
         RayPattern(etree.fromstring("<ray>%s</ray>" % element), "it")
+
+
+def test_a_laser_may_look_all_round(lab):
+    """As turtlebot3's, from 0 to 6.28319."""
+    ray = (RAY % ("", 360, "libgazebo_ros_laser.so")).replace("-0.5", "0.0").replace("0.5</max", "6.28319</max")
+    it = lab(BOX % ray, sensor_plugins.Laser, Pose((0, 0, 1)))
+    wall(it.world, 1.0)
+    scan = it.run(1.0)[-1]
+    assert (scan.angle_min, scan.angle_max) == (0.0, 6.28319)
+    assert scan.ranges[0] == pytest.approx(1.0, abs=0.01) and math.isinf(scan.ranges[180])
+    assert scan.intensities == [0.0] * 360
 
 
 def test_missing_elements_are_named(lab):
@@ -205,8 +220,21 @@ def test_missing_elements_are_named(lab):
     with pytest.raises(PluginError, match="no <ray> element"):
         lab(BOX % '<gazebo reference="link"><sensor name="s"><plugin filename="x"><topicName>a</topicName></plugin>'
             '</sensor></gazebo>', sensor_plugins.Laser)
-    with pytest.raises(ExtrasError, match="on link 'nose'"):
-        found_in(parse_urdf(BOX % '<gazebo reference="nose"><sensor name="s"/></gazebo>', "test"))
+
+
+@pytest.mark.parametrize(("reference", "text"), [("nose", "on link 'nose'"), ("turn", "on a joint, 'turn'")])
+def test_a_sensor_that_is_on_no_link_is_left_out_with_a_warning(reference, text):
+    said = []
+    elements = '<gazebo reference="%s"><sensor name="a"><plugin filename="x"/></sensor></gazebo>' \
+        '<gazebo reference="boom"><sensor name="b"><plugin filename="y"/></sensor></gazebo>' % reference
+    found = found_in(parse_urdf(ARM % elements, "test"), said.append)
+    assert [plugin.get("filename") for plugin in found] == ["y"]
+    assert len(said) == 1 and text in said[0] and "left out" in said[0]
+
+
+def test_sensors_may_be_left_out_and_brains_not():
+    assert not sensor_plugins.Laser.required and not sensor_plugins.PoseSensor.required
+    assert not DrawnSensor.required and ModelPlugin.required
 
 
 def test_all_file_names_lead_to_classes():
