@@ -10,10 +10,10 @@ import rospkg
 
 from rf_checks import report
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
-from rf_checks.judge import Judge
+from rf_checks.judge import WALL_LIMIT_S, Judge
 from rf_checks.lab import LabFailed
 
-PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED = 0, 1, 2, 3
+PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
 
 
 def _listing():
@@ -37,13 +37,16 @@ def _parser():
                     "have running is not touched.",
         epilog="exercises:\n%s\n\nWithout EXERCISE the program's name or a line `# exercise: NAME` in it decides.\n"
                "Else it is guessed from what the program does; the answer's first line says as what it was taken.\n"
-               "exit status: 0 passed, 1 not passed, 2 wrong words, 3 the check itself failed" % _listing())
+               "exit status: 0 passed, 1 not passed, 2 wrong words, 3 the check itself failed,\n"
+               "             4 not graded: this machine is too slow" % _listing())
     parser.add_argument("lab", nargs="?", metavar="LAB", help=" or ".join(LABS))
     parser.add_argument("words", nargs="*", metavar="[EXERCISE] PROGRAM", help="a Python file")
     parser.add_argument("--list", action="store_true", help="list the exercises and end")
     parser.add_argument("--start", metavar="EXERCISE",
                         help="copy this exercise's skeleton into the current folder and end")
     parser.add_argument("--seed", type=int, default=0, help="seed of start postures and goals (default: %(default)s)")
+    parser.add_argument("--wall-limit", type=float, default=WALL_LIMIT_S, metavar="SECONDS",
+                        help="give up ungraded after so long; a slow or busy machine needs more (default: %(default)g)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the result as JUnit XML")
     return parser
@@ -64,6 +67,8 @@ def _program_and_exercise(parser, options):
     for report_file in (options.json, options.junit):
         if report_file is not None and not report_file.absolute().parent.is_dir():
             parser.error("there is no folder %s to write %s into" % (report_file.absolute().parent, report_file.name))
+    if not options.wall_limit > 0.0:
+        parser.error("the wall limit is %g, expected a positive number of seconds" % options.wall_limit)
     if options.seed < 0:
         parser.error("the seed is %d, expected 0 or more" % options.seed)
     try:
@@ -103,7 +108,7 @@ def main(argv=None):
         signal.signal(number, lambda *_: sys.exit(130))
     print("Checking %s as %s %s; this takes up to a minute." % (program, exercise.lab, exercise.name), flush=True)
     try:
-        with Judge() as judge:
+        with Judge(options.wall_limit) as judge:
             result = judge.check(exercise, program, options.seed)
     except (LabFailed, OSError) as error:
         print("the check itself failed, which is not your program's fault: %s" % error, file=sys.stderr)
@@ -114,4 +119,6 @@ def main(argv=None):
     for path, write in ((options.json, report.as_json), (options.junit, report.as_junit)):
         if path is not None:
             path.write_text(write(result) + "\n", encoding="utf-8")
+    if result.not_graded:
+        return NOT_GRADED
     return PASSED if report.has_passed(result) else NOT_PASSED

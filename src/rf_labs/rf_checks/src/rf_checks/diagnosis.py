@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is wrong with a program, told from one run of it: the first fault that explains the others. Free of ROS."""
+import ast
 import re
 
 import numpy as np
@@ -16,6 +17,7 @@ _ON_ITS_WAY_S = 0.15
 
 PYTHON2 = ("print statement", "Missing parentheses in call to 'print'",
            "multiple exception types must be parenthesized")
+_THREAD = re.compile(r"^(?:Current thread|Thread) 0x", re.MULTILINE)
 _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
 
 
@@ -41,9 +43,27 @@ def line_of(program, traceback):
 
 
 def line_of_dump(program, dump):
-    """The line of `program` in a dump of Python's fault handler, innermost first, or None."""
-    lines = [int(number) for path, number in _FRAME.findall(dump) if path.endswith(program)]
-    return lines[0] if lines else None
+    """Where `program` (Path) was when Python's fault handler wrote `dump`: the head of its outermost loop, or None.
+
+    Of a program that is in no loop it is the innermost line.
+    """
+    for thread in _THREAD.split(dump):
+        lines = [int(number) for path, number in _FRAME.findall(thread) if path.endswith(program.name)]
+        if lines:
+            # Innermost first. In which line of its loop a program is caught is chance.
+            found = [loop for line in lines[::-1] for loop in _loops_around(program, line)]
+            return found[0] if found else lines[0]
+    return None
+
+
+def _loops_around(program, line):
+    """First lines of the loops that a line is in, the outermost first."""
+    try:
+        tree = ast.parse(program.read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return []
+    return sorted(node.lineno for node in ast.walk(tree)
+                  if isinstance(node, (ast.While, ast.For)) and node.lineno <= line <= node.end_lineno)
 
 
 def is_flood(counts):
@@ -57,7 +77,7 @@ def is_flood(counts):
 
 def meddling(run):
     """A Fault for a program that touched the world around the robot rather than the robot, or None."""
-    if run.ended == "simulator gone":
+    if run.ended == "simulator gone" or "/gazebo" in run.missing_nodes:
         return Fault("killed_simulator", "the simulator ended while the program ran: it was shut down or killed "
                      "(rosnode kill, os.kill, a second node named /gazebo, the robot deleted); a program must "
                      "leave it running", 0.0)
@@ -139,9 +159,9 @@ def _about_end(run, sides, limit_s):
         if not any(path_length(recording.arm(side)) > 0.02 for side in SIDES):
             return Fault("early_exit", "the program ended (exit status %s) before any arm moved%s" % (
                 run.exit_code, _last_words(run)))
-    if run.ended in ("sim time", "wall time"):
-        time = "%.0f s of simulation" % limit_s if run.ended == "sim time" else "a long time"
-        return Fault("no_end", "the program was still running after %s%s, and was ended" % (time, _at_line(run)))
+    if run.ended == "sim time":
+        return Fault("no_end", "the program was still running after %.0f s of simulation%s, and was ended"
+                     % (limit_s, _at_line(run)))
     if run.exit_code not in (None, 0):
         return Fault("exit_status", "the program ended with exit status %s%s" % (run.exit_code, _last_words(run)))
     return None
@@ -154,15 +174,15 @@ def left_on_its_way(run, sides):
     if run.ended != "exited" or end is None or not sides:
         return None
     for side in sides:
-        rows = moving_rows(recording.times, recording.arm(side))
-        if rows and recording.times[rows[1]] > end + _ON_ITS_WAY_S:
-            return Fault("early_exit", "the program ended while the %s arm was on its way: wait until the arm is there "
-                         "(move_to_joint_positions does) before you leave" % side)
         counts = recording.command_counts()[:, SIDES.index(side)]
         if 0 < counts[-1] <= 3:
             return Fault("early_exit", "the program sent %d joint command%s to the %s arm and ended without waiting "
                          "for the arm: send commands until it is there, as move_to_joint_positions does, and then go on"
                          % (counts[-1], "" if counts[-1] == 1 else "s", side))
+        rows = moving_rows(recording.times, recording.arm(side))
+        if rows and recording.times[rows[1]] > end + _ON_ITS_WAY_S:
+            return Fault("early_exit", "the program ended while the %s arm was on its way: wait until the arm is there "
+                         "(move_to_joint_positions does) before you leave" % side)
     return None
 
 

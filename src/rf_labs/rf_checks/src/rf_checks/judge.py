@@ -8,38 +8,38 @@ from pathlib import Path
 import numpy as np
 
 from rf_checks import diagnosis
-from rf_checks.lab import Lab, LabFailed, robot_description
-from rf_checks.pacing import cpu_time_s
+from rf_checks.lab import Lab, LabFailed, MasterSilent, TooSlow, robot_description, student_folder
+from rf_checks.observing import Observer
+from rf_checks.pacing import Tree
 from rf_checks.recording import RECORD_S, Criterion, Fault, Recording, Run
 from rf_checks.robot import Robot
-from rf_checks.sandbox import PROCESSES, Student, adopt_orphans, has_namespaces, python
+from rf_checks.run_clock import RunClock
+from rf_checks.sandbox import CPU_S, PROCESSES, Student, adopt_orphans, has_namespaces, python
 
-#: However slow the machine: one run takes no longer than this [s].
-WALL_LIMIT_S = 45.0
-#: A program that hardly ever rests for so much of its own processor time computes without end [s]; this share of the
-#: moments at which the judge looks is hardly ever.
-BUSY_S, BUSY_SHARE = 8.0, 0.3
+#: A check that is not done by then [s, wall] is given up, ungraded: the only limit in the time of the wall.
+WALL_LIMIT_S = 900.0
 #: Faults that the next run of the same program would only show again.
 REPEATED = ("not_enabled", "wrong_arm", "wrong_frame", "early_exit", "no_end", "quaternion_order", "degrees",
             "not_asked", "made_up")
-#: A world from which nothing is heard for so long [s] was paused.
+#: A world in which nothing happened for so long [s, as OwnTime counts] was paused.
 PAUSED_S = 10.0
-# After a program's end the robot is watched until it stands, and at most so long [sim s].
-SETTLE_S = 1.5
-_LOOK_S = 0.02
-# Records that are looked at for a flood while a program runs.
-RECENT = round(3 * diagnosis.FLOOD_WINDOW_S / RECORD_S)
-_LOOK_AT_GRAPH_S = 0.3
+_LOOK_S = 0.05
+#: How a run ended -> in the report's words; other words stay as they are.
+ENDS = {"sim time": "simulated time limit", "satisfied": "seen enough", "output": "wrote too much",
+        "processes": "too many processes", "flood": "flood of commands", "busy": "computed without end",
+        "paused": "simulation paused", "meddled": "lab meddled with"}
+MASTER = "/rosout and with it the ROS master"
 OWN_TOPICS = ("/clock", "/robot/joint_states", "/robot/state")
 
 
 @dataclass(frozen=True)
 class RunResult:
-    """One run: the program's words, its Criteria, its Fault or None."""
+    """One run: the program's words, its Criteria, its Fault or None; end: how_it_ended, None when it did not run."""
 
     arguments: tuple
     criteria: tuple
     fault: Fault | None
+    end: dict | None = None
 
     @property
     def points(self):
@@ -49,7 +49,7 @@ class RunResult:
 
 @dataclass(frozen=True)
 class Result:
-    """What a check came to."""
+    """What a check came to. not_graded: why there are no points, or ""."""
 
     exercise: object
     program: str
@@ -57,22 +57,25 @@ class Result:
     runs: tuple
     isolation: str
     lasted_s: float
+    not_graded: str = ""
 
     @property
     def points(self):
-        """0 to 100."""
-        return float(np.mean([run.points for run in self.runs]))
+        """0 to 100; None when it was not graded."""
+        return None if self.not_graded else float(np.mean([run.points for run in self.runs]))
 
     @property
     def fault(self):
         """The first Fault, or None."""
-        return next((run.fault for run in self.runs if run.fault), None)
+        return None if self.not_graded else next((run.fault for run in self.runs if run.fault), None)
 
 
 class Judge:
     """Keeps one lab for any number of programs; a context manager."""
 
-    def __init__(self):
+    def __init__(self, wall_limit_s=WALL_LIMIT_S):
+        """`wall_limit_s`: a check that takes longer is given up, ungraded [s]."""
+        self._wall_limit_s = wall_limit_s
         self._description = robot_description()
         self.robot = Robot(self._description)
         self._lab = None
@@ -95,69 +98,81 @@ class Judge:
         program = Path(program).resolve()
         calls = exercise.task.calls(np.random.default_rng(seed))
         fault = diagnosis.check_syntax(program.read_bytes().decode("utf-8", errors="replace"), program.name)
-        results = []
+        results, not_graded = [], ""
         not_run = (Criterion("not run", 0.0, 100.0, "for the fault below"),)
         for call in calls:
             if fault is not None:
                 results.append(RunResult(call.arguments, not_run, fault))
                 continue
-            run = self.run(program, exercise, call)
+            try:
+                run = self.run(program, exercise, call, began + self._wall_limit_s)
+            except TooSlow as error:
+                not_graded = str(error)
+                self.close()
+                break
             criteria = tuple(exercise.task.criteria(call, run, self.robot))
             share = sum(one.share * one.weight for one in criteria) / 100.0
             found = diagnosis.diagnose(run, exercise, call, self.robot, share)
-            results.append(RunResult(call.arguments, criteria, found))
+            results.append(RunResult(call.arguments, criteria, found, how_it_ended(run)))
             # What went that wrong goes wrong again, and costs time: the other runs count as this one.
             if found and (found.cap < 0.9 or (found.key in REPEATED and share < 0.5)):
                 fault = found
                 not_run = (Criterion("as the run before", share, 100.0, "not run, for the fault below"),)
         isolation = "namespaces" if has_namespaces() else "session"
-        return Result(exercise, str(program), seed, tuple(results), isolation, time.monotonic() - began)
+        return Result(exercise, str(program), seed, tuple(results), isolation, time.monotonic() - began, not_graded)
 
-    def run(self, program, exercise, call):
-        """One run; returns a Run."""
-        lab = self._fresh_lab(call.posture)
-        records = []
-        helpers = lab.helper_pids()
-        lab.watch.roots = helpers
-        lab.on_record = records.append
-        environment = {**os.environ, "ROS_MASTER_URI": lab.uri, "ROS_HOSTNAME": "localhost"}
+    def run(self, program, exercise, call, deadline=float("inf")):
+        """One run; returns a Run. Raises TooSlow at `deadline` (monotonic, s)."""
+        lab = self._fresh_lab(call.posture, deadline)
+        run = Run(list(call.arguments), Recording(lab.joint_names), program=program.name)
+        observer = Observer(call, lambda output: self._is_satisfied(exercise, call, run, output),
+                            lambda: self._look_at_graph(lab, run))
+        clock = RunClock()
+        environment = {**os.environ, "ROS_MASTER_URI": lab.uri, "ROS_HOSTNAME": "localhost", **clock.environment,
+                       "PYTHONPATH": os.pathsep.join((str(student_folder()), os.environ.get("PYTHONPATH", "")))}
         for name in ("ROS_IP", "ROS_NAMESPACE", "LAB_JUDGE_SOCKET"):
             environment.pop(name, None)
-        student = Student([python(), str(program), *call.arguments], environment, _workspace(), lab.folder)
-        lab.watch.roots = [*helpers, student.pid]
-        run = Run(list(call.arguments), Recording(lab.joint_names), program=program.name)
+        lab.watch.helpers.roots = lab.helper_pids()
+        began = time.monotonic()
+        student = observer.student = Student([python(), str(program), *call.arguments], environment, _workspace(),
+                                             lab.folder, pass_fds=(clock.descriptor,))
+        lab.watch.program = tree = Tree((student.pid,))
+        lab.watch.gives_up = lambda: time.monotonic() > deadline
+        lab.run_clock, lab.is_hurried = clock, True
+        lab.on_record = lambda record: observer.on_record(record, tree.used_s)
         try:
-            run.ended = self._watch(lab, student, records, run, exercise, call)
-            run.exit_code = student.exit_code
-            if run.ended in ("busy", "sim time", "wall time"):
+            lab.go_on()
+            self._watch(lab, observer, deadline)
+            run.wall_s, run.ended, run.exit_code = time.monotonic() - began, observer.ended, student.exit_code
+            if run.ended in ("busy", "sim time"):
                 student.dump()
-                run.stuck_at = diagnosis.line_of_dump(program.name, student.errors)
-            elif run.ended == "exited":
-                if records:
-                    records[-1]["exited"] = records[-1]["t"]
-                self._settle(lab, records)
+                run.stuck_at = diagnosis.line_of_dump(program, student.errors)
+            run.cpu_s = tree.used_s
         finally:
             student.end()
             lab.is_hurried = False
             lab.on_record = lambda record: None
-            lab.watch.roots = ()
+            lab.run_clock = None
+            observer.release()
+            tree.roots = ()
+            clock.close()
         run.output, run.errors, run.survivors = student.output, student.errors, student.survivors
-        run.recording = Recording(lab.joint_names, _with_exit(records))
+        run.recording = Recording(lab.joint_names, _with_exit(observer.records))
         if run.ended == "paused":
             self.close()
         else:
             lab.forget_strangers()
         return run
 
-    def _fresh_lab(self, posture):
+    def _fresh_lab(self, posture, deadline):
         for attempt in (1, 2):
             if self._lab is not None and not self._lab.is_as_it_was():
                 self.close()
             try:
                 if self._lab is None:
                     self._lab = Lab(self._description)
-                    self._lab.start()
-                self._lab.reset(posture)
+                    self._lab.start(deadline)
+                self._lab.reset(posture, deadline)
                 return self._lab
             except LabFailed:
                 self.close()
@@ -165,72 +180,64 @@ class Judge:
                     raise
         raise AssertionError  # the loop above returns or raises
 
-    def _watch(self, lab, student, records, run, exercise, call):
-        """Wait for the end of a run, whichever comes first; returns what it was."""
-        give_up = time.monotonic() + WALL_LIMIT_S
-        look_at_graph = 0.0
-        since, cpu_then = 0, 0.0
-        heard, heard_at = 0, time.monotonic()
-        lab.is_hurried = True
-        while True:
-            time.sleep(_LOOK_S)
-            count = len(records)
-            ended = student.exit_code is not None
-            if time.monotonic() > look_at_graph or ended:
-                look_at_graph = time.monotonic() + _LOOK_AT_GRAPH_S
-                self._look_at_graph(lab, run)
+    @staticmethod
+    def _watch(lab, observer, deadline):
+        """Wait for the end of a run, and end it where the records cannot: when there are none."""
+        began = time.monotonic()
+        while not observer.wait(_LOOK_S):
             if not lab.is_alive:
-                return "simulator gone"
-            if count > heard:
-                heard, heard_at = count, time.monotonic()
-            elif time.monotonic() > heard_at + PAUSED_S:
-                return "paused"
-            if run.missing_nodes or run.intruders or ended:
-                return "exited" if ended else "satisfied"
-            if student.wrote_too_much:
-                return "output"
-            family = student.family()
-            if len(family) > PROCESSES:
-                return "processes"
-            recent = Recording(lab.joint_names, records[max(0, count - RECENT):count])
-            if count and diagnosis.is_flood(recent.command_counts()):
-                return "flood"
-            used = cpu_time_s(family)
-            if used - cpu_then > BUSY_S:
-                if np.mean([record["rested"] for record in records[since:count]] or [False]) < BUSY_SHARE:
-                    return "busy"
-                since, cpu_then = count, used
-            if count and records[count - 1]["t"] - records[0]["t"] > call.limit_s:
-                return "sim time"
-            if time.monotonic() > give_up:
-                return "wall time"
-            run.output = student.output
-            if exercise.task.is_satisfied(call, run):
-                return "satisfied"
+                observer.end("simulator gone")
+            elif lab.stood_still_s() > PAUSED_S:
+                observer.end("paused")
+            elif observer.student.wrote_too_much:
+                observer.end("output")
+            elif len(observer.student.family()) > PROCESSES:
+                observer.end("processes")
+            elif time.monotonic() > deadline:
+                simulated_s, wall_s = len(observer.records) * RECORD_S, time.monotonic() - began
+                raise TooSlow("the machine reached %s of real time (%.1f simulated s in %.0f s)"
+                              % (_rounded(simulated_s / wall_s), simulated_s, wall_s))
+
+    @staticmethod
+    def _is_satisfied(exercise, call, run, output):
+        run.output = output
+        return exercise.task.is_satisfied(call, run)
 
     @staticmethod
     def _look_at_graph(lab, run):
+        """Whether a node of the lab's is gone, or somebody else publishes the simulator's topics; `run` says who."""
         try:
             run.missing_nodes = lab.missing_nodes()
             for topic in OWN_TOPICS:
                 strangers = lab.publishers(topic) - lab.own_nodes
                 if strangers:
                     run.intruders[topic] = sorted(strangers)
+        except MasterSilent:
+            # A busy machine answers late; a master that was halted or ended does not answer at all.
+            if lab.has_stopped_master():
+                run.missing_nodes = [MASTER]
         except LabFailed:
-            run.missing_nodes = ["/rosout and with it the ROS master"]
+            run.missing_nodes = [MASTER]
+        return bool(run.missing_nodes or run.intruders)
 
-    @staticmethod
-    def _settle(lab, records):
-        """Wait until the arms have stood for a moment."""
-        until = len(records) + round(SETTLE_S / RECORD_S)
-        quiet = round(0.3 / RECORD_S)
-        deadline = time.monotonic() + 20.0
-        while lab.is_alive and len(records) < until and time.monotonic() < deadline:
-            time.sleep(0.01)
-            recent = np.array([record["q"] for record in records[-quiet:]])
-            since = until - round(SETTLE_S / RECORD_S)
-            if len(records) > since + quiet and np.ptp(recent, axis=0).max() < 1e-4:
-                return
+
+def how_it_ended(run):
+    """How a run ended, for the report: a dict of plain values."""
+    how, number = run.ended, None
+    if how == "exited":
+        how = "finished" if run.exit_code == 0 else "exit code %s" % run.exit_code
+        if run.exit_code is not None and run.exit_code < 0:
+            number = -run.exit_code
+            how = "killed by signal %d" % number
+            if run.cpu_s > 0.95 * CPU_S:
+                how = "cpu limit of %d s" % CPU_S
+    return {"how": ENDS.get(how, how), "exit_code": None if number else run.exit_code, "signal": number,
+            "simulated_s": round(run.simulated_s, 2), "cpu_s": round(run.cpu_s, 2), "wall_s": round(run.wall_s, 2),
+            "real_time_factor": round(run.simulated_s / run.wall_s, 2) if run.wall_s else None}
+
+
+def _rounded(factor):
+    return "%.2f" % factor if factor < 0.1 else "%.1f" % factor
 
 
 def _with_exit(records):

@@ -8,6 +8,7 @@ import contextlib
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import socket
@@ -20,13 +21,17 @@ from pathlib import Path
 
 import rospkg
 
-from rf_checks.pacing import Watch
+from rf_checks.pacing import OwnTime, Watch, children_of, direct_children
 from rf_checks.recorder_names import PLUGIN_ELEMENT, SOCKET_VARIABLE
 
-START_TIMEOUT_S = 60.0
-RESET_TIMEOUT_S = 20.0
+#: How long the lab may take to start, and to put the robot back [s], as OwnTime counts.
+START_TIMEOUT_S, RESET_TIMEOUT_S = 120.0, 30.0
 STOP_TIMEOUT_S = 20.0
 RECORD_S = 0.01
+# After it was put back the robot gets this many records to come to rest.
+CALM_RECORDS = 20
+# The simulator sends its clock at most 500 times a wall second: a record must not be faster than that [s].
+_SHORTEST_RECORD_S = 0.0025
 #: Programs on whose answers a student's program waits, or that have yet to take in what it sent: time must not run away
 #: meanwhile either.
 HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserver")
@@ -37,6 +42,14 @@ _CALLER = "/lab_judge"
 
 class LabFailed(Exception):
     """The judge's own lab does not come up or is gone; the text says why."""
+
+
+class MasterSilent(LabFailed):
+    """The ROS master takes connections, but does not answer in time."""
+
+
+class TooSlow(Exception):
+    """This machine, as busy as it is, did not get done before the deadline; the text says how slow it was."""
 
 
 def free_port():
@@ -55,8 +68,10 @@ class Lab:
         """`description_xml`: the robot's URDF text."""
         self.uri = ""
         self.watch = Watch()
-        #: Called with each record (dict), in the thread that lets the world go on; must be quick.
+        #: Called with each record (dict), in the thread that lets the world go on: until it returns, the world waits.
         self.on_record = lambda record: None
+        #: The RunClock of the program that runs, or None.
+        self.run_clock = None
         #: False: at real time at most, because nobody needs more.
         self.is_hurried = False
         self.joint_names = ()
@@ -68,6 +83,14 @@ class Lab:
         self._connection = None
         self._ended = threading.Event()
         self._has_time = False
+        self._may_go = threading.Event()
+        self._may_go.set()
+        self._calm = None
+        self._own_time = OwnTime(self._pids)
+        self._still_time = OwnTime(lambda: self.watch.helpers.roots)
+        # Records that came, and how many of them when stood_still_s looked last.
+        self._heard = self._looked_at = 0
+        self._is_held = False
         #: Names of the lab's own nodes.
         self.own_nodes = frozenset()
 
@@ -87,8 +110,8 @@ class Lab:
         """False once the simulator, or its robot, is gone."""
         return not self._ended.is_set()
 
-    def start(self):
-        """Start everything and wait until the robot stands. Raises LabFailed."""
+    def start(self, deadline=float("inf")):
+        """Start everything and wait until the robot stands. Raises LabFailed; TooSlow at `deadline` (monotonic, s)."""
         self._folder = Path(tempfile.mkdtemp(prefix="lab-judge-"))
         port = free_port()
         self.uri = "http://localhost:%d" % port
@@ -101,25 +124,46 @@ class Lab:
             listener.listen(1)
             listener.settimeout(0.1)
             description = self._folder / "robot.urdf"
-            description.write_text(self._description.replace("</robot>", PLUGIN_ELEMENT + "</robot>"), encoding="utf-8")
+            # First of the plugins, so that nothing looks at a message before the recorder has waited for it.
+            description.write_text(re.sub(r"<robot\b[^>]*>", lambda tag: tag[0] + PLUGIN_ELEMENT, self._description,
+                                          count=1), encoding="utf-8")
             self._run(["roslaunch", "-p", str(port), str(_share() / "launch" / "lab.launch"),
                        "description:=%s" % description], environment)
-            self._connection = self._await(lambda: _accept(listener), "the simulator")
+            self._own_time.restart()
+            self._connection = self._await(lambda: _accept(listener), "the simulator", deadline)
         self._connection.settimeout(None)
         threading.Thread(target=self._pace, args=(self._connection, self._ended), daemon=True).start()
-        self._await(self._all_there, "the nodes around the robot")
+        self._await(self._all_there, "the nodes around the robot", deadline)
         self.own_nodes = frozenset(self.nodes() - TRANSIENT)
 
-    def reset(self, posture):
-        """Disable the robot and put its arms into `posture` (dict of joint to rad). Raises LabFailed."""
+    def reset(self, posture, deadline=float("inf")):
+        """Disable the robot, put its arms into `posture` (dict of joint to rad), and stop the time until go_on().
+
+        Raises LabFailed; TooSlow at `deadline` (monotonic, s).
+        """
         self.is_hurried = True
-        self._done = None
+        self._may_go.clear()
+        self._done, self._calm = None, threading.Event()
         self._order = {"names": list(posture), "positions": list(posture.values())}
-        deadline = time.monotonic() + RESET_TIMEOUT_S
-        while self._done is None and self.is_alive and time.monotonic() < deadline:
-            time.sleep(0.005)
-        if self._done != "":
-            raise LabFailed("the robot cannot be put back: %s" % (self._done or "the simulator does not answer"))
+        self._own_time.restart()
+        while not self._calm.wait(0.02):
+            if self._done or not self.is_alive or self._own_time.passed_s() > RESET_TIMEOUT_S:
+                self.go_on()
+                raise LabFailed("the robot cannot be put back: %s" % (self._done or "the simulator does not answer"))
+            if time.monotonic() > deadline:
+                self.go_on()
+                raise TooSlow("the robot was still being put back")
+
+    def go_on(self):
+        """Let time pass again after reset()."""
+        self._may_go.set()
+
+    def stood_still_s(self):
+        """How long the simulator has had for the next record [s, as OwnTime counts]. Ask several times a second."""
+        if self._is_held or self._heard != self._looked_at:
+            self._looked_at = self._heard
+            self._still_time.restart()
+        return self._still_time.passed_s()
 
     def nodes(self):
         """Names of all nodes that the master knows: a set. Raises LabFailed when there is no master."""
@@ -162,12 +206,21 @@ class Lab:
     def helper_pids(self):
         """Process ids of HELPERS in this lab."""
         found = []
-        for entry in Path("/proc").iterdir():
+        for pid in self._pids():
             with contextlib.suppress(OSError):
-                if entry.name.isdigit() and (entry / "environ").read_bytes().find(self.uri.encode()) >= 0:
-                    line = (entry / "cmdline").read_bytes()
-                    found += [int(entry.name)] if any(name.encode() in line for name in HELPERS) else []
+                line = Path("/proc/%d/cmdline" % pid).read_bytes()
+                found += [pid] if any(name.encode() in line for name in HELPERS) else []
         return found
+
+    def has_stopped_master(self):
+        """Whether the ROS master is gone, or was halted by a signal."""
+        states = []
+        for pid in self._pids():
+            with contextlib.suppress(OSError):
+                if b"rosmaster" in Path("/proc/%d/cmdline" % pid).read_bytes():
+                    text = Path("/proc/%d/stat" % pid).read_bytes()
+                    states.append(text[text.rfind(b")") + 2:][:1])
+        return not set(states) - {b"T", b"Z"}
 
     def log_tail(self):
         """The last lines of what the lab's own processes wrote."""
@@ -177,6 +230,7 @@ class Lab:
     def close(self):
         """End every process, quickly: nothing of this lab is of use to anybody."""
         self._ended.set()
+        self.go_on()
         if self._connection is not None:
             self._connection.close()
             self._connection = None
@@ -186,8 +240,14 @@ class Lab:
                     os.killpg(process.pid, sign)
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     process.wait(timeout_s)
+        # Where roslaunch had to be killed its nodes are left.
+        for pid in self._pids():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
         self._processes = []
         self.watch.close()
+        self._own_time.close()
+        self._still_time.close()
         if self._folder is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
 
@@ -198,17 +258,28 @@ class Lab:
             self._processes.append(subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=output,
                                                     stderr=subprocess.STDOUT, start_new_session=True))
 
-    def _await(self, condition, what):
-        deadline = time.monotonic() + START_TIMEOUT_S
+    def _pids(self):
+        """All processes of this lab."""
+        roots = {process.pid for process in self._processes if process.poll() is None}
+        # What lost its parent is a child of the judge; a student's program does not have this variable.
+        mark = ("%s=%s" % (SOCKET_VARIABLE, self._folder)).encode()
+        for pid in direct_children(os.getpid()) - roots:
+            with contextlib.suppress(OSError):
+                roots |= {pid} if mark in Path("/proc/%d/environ" % pid).read_bytes() else set()
+        return children_of(roots)
+
+    def _await(self, condition, what, deadline):
         while True:
             found = condition()
             if found:
                 return found
             ended = [process.args[0] for process in self._processes if process.poll() is not None]
-            if ended or time.monotonic() > deadline:
+            if ended or self._own_time.passed_s() > START_TIMEOUT_S:
                 reason = "%s ended" % ended[0] if ended else "not there after %g s" % START_TIMEOUT_S
                 raise LabFailed("the check's own lab does not start: waiting for %s: %s\n%s"
                                 % (what, reason, self.log_tail()))
+            if time.monotonic() > deadline:
+                raise TooSlow("the check's own lab was still starting, waiting for %s" % what)
             time.sleep(0.05)
 
     def _master(self):
@@ -217,8 +288,10 @@ class Lab:
     def _state(self):
         try:
             return self._master().getSystemState(_CALLER)[2]
+        except TimeoutError as error:
+            raise MasterSilent("the ROS master does not answer") from error
         except (OSError, xmlrpc.client.Error) as error:
-            raise LabFailed("the ROS master does not answer: %s" % error) from error
+            raise LabFailed("the ROS master is gone: %s" % error) from error
 
     def _all_there(self):
         services = {name for name, _ in self._state()[2]}
@@ -229,18 +302,31 @@ class Lab:
     def _pace(self, connection, ended):
         """Read records, wait until the watched programs rest, let the world go on."""
         lines = connection.makefile("r", encoding="utf-8")
+        calm_in = None
         try:
             self.joint_names = tuple(json.loads(next(lines))["joints"])
             for line in lines:
+                came_at = time.monotonic()
+                self._heard, self._is_held = self._heard + 1, True
                 record = json.loads(line)
                 self._has_time = True
                 if record.get("done") is not None:
-                    self._done = record["done"]
-                record["rested"] = self.watch.wait_until_idle()
+                    self._done, calm_in = record["done"], CALM_RECORDS
+                if calm_in is not None:
+                    calm_in -= 1
+                    if calm_in == 0:
+                        calm_in = None
+                        self._calm.set()
+                        self._may_go.wait()
+                if self.run_clock is not None:
+                    self.run_clock.advance(RECORD_S)
+                record["rested"] = self.watch.wait_until_rest()
                 self.on_record(record)
-                if not self.is_hurried:
-                    time.sleep(RECORD_S)
+                left_s = came_at + (_SHORTEST_RECORD_S if self.is_hurried else RECORD_S) - time.monotonic()
+                if left_s > 0.0:
+                    time.sleep(left_s)
                 order, self._order = self._order, None
+                self._is_held = False
                 connection.sendall((json.dumps(order) if order else "").encode() + b"\n")
         except (OSError, ValueError, StopIteration):
             pass  # the simulator has gone: that is what is_alive says
@@ -265,6 +351,11 @@ def _accept(listener):
 
 def _share():
     return Path(rospkg.RosPack().get_path("rf_checks"))
+
+
+def student_folder():
+    """Where Python finds what a program under judgement is started with."""
+    return _share() / "student"
 
 
 def robot_description():

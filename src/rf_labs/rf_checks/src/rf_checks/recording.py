@@ -67,9 +67,10 @@ class Recording:
 class Run:
     """One run of a program.
 
-    ended: how the run came to its end: "exited", "satisfied" (the judge had seen enough), "sim time", "wall time",
-    "busy", "flood", "output", "processes", "paused", "simulator gone". stuck_at: line of the program where it was when
-    the judge ended it.
+    ended: how the run came to its end: "exited", "satisfied" (the judge had seen enough), "sim time", "busy", "flood",
+    "output", "processes", "paused", "simulator gone", "meddled" (a node of the lab is gone, or another one publishes
+    its topics). stuck_at: line of the program where it was when the judge ended it. cpu_s: processor time that it used;
+    wall_s: how long it took.
     """
 
     arguments: list
@@ -83,6 +84,13 @@ class Run:
     missing_nodes: list = field(default_factory=list)
     intruders: dict = field(default_factory=dict)
     program: str = ""
+    cpu_s: float = 0.0
+    wall_s: float = 0.0
+
+    @property
+    def simulated_s(self):
+        """How much simulated time passed."""
+        return len(self.recording.records) * RECORD_S
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from rf_checks.exercises import PASS_MARK
 
 
 def has_passed(result):
-    return result.points >= PASS_MARK
+    return result.points is not None and result.points >= PASS_MARK
 
 
 def text(result):
@@ -20,6 +20,9 @@ def text(result):
             lines.append("    %-22s %5.1f of %4.1f   %s" % (one.name, one.share * one.weight, one.weight, one.found))
         if run.fault and run.fault.cap * 100.0 < sum(one.share * one.weight for one in run.criteria):
             lines.append("    %-22s no more than %.0f, for the fault below" % ("", 100.0 * run.fault.cap))
+    if result.not_graded:
+        return "\n".join([*lines, "not graded: %s. That says nothing about the program: try again when the machine has "
+                          "less to do, or with a longer --wall-limit." % result.not_graded])
     lines.append("%s: %.0f of 100 points (%s; seed %d, %.0f s)" % (
         "passed" if has_passed(result) else "not passed", result.points,
         "%g are due" % PASS_MARK, result.seed, result.lasted_s))
@@ -32,11 +35,13 @@ def as_json(result):
     """The same as a JSON text."""
     return json.dumps({
         "lab": result.exercise.lab, "exercise": result.exercise.name, "program": result.program, "seed": result.seed,
-        "points": round(result.points, 2), "pass_mark": PASS_MARK, "passed": has_passed(result),
+        "graded": not result.not_graded, "not_graded": result.not_graded or None,
+        "points": None if result.not_graded else round(result.points, 2), "pass_mark": PASS_MARK,
+        "passed": has_passed(result),
         "fault": result.fault.key if result.fault else None, "hint": result.fault.sentence if result.fault else None,
         "isolation": result.isolation, "wall_s": round(result.lasted_s, 2),
         "runs": [{"arguments": list(run.arguments), "points": round(run.points, 2),
-                  "fault": run.fault.key if run.fault else None,
+                  "fault": run.fault.key if run.fault else None, "end": run.end,
                   "criteria": [{"name": one.name, "points": round(one.share * one.weight, 2), "of": one.weight,
                                 "found": one.found} for one in run.criteria]} for run in result.runs],
     }, indent=1)
@@ -45,9 +50,13 @@ def as_json(result):
 def as_junit(result):
     """The same as JUnit XML: one case for each run; a failure says points and hint."""
     failed = sum(run.points < PASS_MARK for run in result.runs)
-    suite = ElementTree.Element("testsuite", name="%s.%s" % (result.exercise.lab, result.exercise.name),
-                                tests=str(len(result.runs)), failures=str(failed), errors="0",
-                                time="%.2f" % result.lasted_s)
+    name = "%s.%s" % (result.exercise.lab, result.exercise.name)
+    ungraded = bool(result.not_graded)
+    suite = ElementTree.Element("testsuite", name=name, tests=str(len(result.runs) + ungraded), failures=str(failed),
+                                errors=str(int(ungraded)), time="%.2f" % result.lasted_s)
+    if ungraded:
+        case = ElementTree.SubElement(suite, "testcase", name="not graded", classname=name)
+        ElementTree.SubElement(case, "error", message=_clean(result.not_graded))
     for run in result.runs:
         name = " ".join((result.exercise.name, *run.arguments))
         case = ElementTree.SubElement(suite, "testcase", name=name,

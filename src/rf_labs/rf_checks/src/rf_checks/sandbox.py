@@ -63,8 +63,11 @@ def adopt_orphans():
 class Student:
     """A running program. `output`, `errors`: what it wrote so far; `wrote_too_much`: that it was too much."""
 
-    def __init__(self, command, environment, workspace, hidden, namespaces=None):
-        """Start `command` (list). `workspace`: made read-only; `hidden`: folder that is not shown."""
+    def __init__(self, command, environment, workspace, hidden, namespaces=None, pass_fds=()):
+        """Start `command` (list). `workspace`: made read-only; `hidden`: folder that is not shown.
+
+        `pass_fds`: descriptors that it inherits, under their numbers.
+        """
         self.folder = tempfile.mkdtemp(prefix="lab-student-")
         self.survivors = 0
         self._before = direct_children(os.getpid())
@@ -78,7 +81,7 @@ class Student:
                "NUMBA_CACHE_DIR": self.folder}
         self._process = subprocess.Popen(
             [*enter, *limits, *command], env={**environment, **own}, cwd=self.folder, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True, pass_fds=pass_fds)
         self._streams = [_Stream(self._process.stdout), _Stream(self._process.stderr)]
 
     @property

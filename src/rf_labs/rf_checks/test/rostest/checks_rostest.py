@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[2]
 # Program -> the key of its fault, and words of which its sentence must have one.
 WRONG = {
     "syntax_error": ("syntax", "line 7"),
-    "infinite_loop": ("busy", "line 8", "line 9"),  # the loop's head or its body: it is caught in one of them
+    "infinite_loop": ("busy", "line 8"),
     "wrong_frame": ("wrong_frame", "`head`"),
     "quaternion_order": ("quaternion_order", "quat_t3d"),
     "degrees": ("degrees", "90 radians"),

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is told from a recorded run, without a robot: the first fault that explains the others; points and reports."""
+import dataclasses
 import json
 import subprocess
 import sys
@@ -10,7 +11,7 @@ import pytest
 
 from rf_checks import diagnosis, report
 from rf_checks.exercises import EXERCISES, UnknownExercise, choose
-from rf_checks.judge import Result, RunResult
+from rf_checks.judge import Result, RunResult, how_it_ended
 from rf_checks.recording import Criterion, Fault, Recording, Run, arm_joints
 from rf_checks.tasks_printed import IkFrame, matrices
 
@@ -109,10 +110,23 @@ def test_what_python_cannot_read_is_told(text, words):
 
 def test_the_line_of_the_program_is_found():
     assert diagnosis.line_of("me.py", TRACEBACK) == 12
-    dump = 'Current thread (most recent call first):\n  File "/usr/lib/x.py", line 1\n' \
-           '  File "/x/me.py", line 7 in run\n  File "/x/me.py", line 30 in <module>\n'
-    assert diagnosis.line_of_dump("me.py", dump) == 7
-    assert diagnosis.line_of_dump("other.py", dump) is None
+
+
+@pytest.mark.parametrize(("inner", "expected"), [(1, 4), (2, 4), (6, 4), (7, 4)])
+def test_the_loop_that_a_program_is_in_is_named_wherever_it_is_caught(tmp_path, inner, expected):
+    program = tmp_path / "me.py"
+    program.write_text("def f():\n    return 1\n\nwhile True:\n    for _ in range(9):\n        f()\n        f()\n")
+    dump = ('Thread 0x1 (most recent call first):\n  File "/usr/lib/python3/threading.py", line 30 in wait\n\n'
+            'Current thread 0x2 (most recent call first):\n  File "/usr/lib/x.py", line 1 in g\n'
+            '  File "%s", line %d in f\n  File "%s", line 6 in <module>\n' % (program, inner, program))
+    assert diagnosis.line_of_dump(program, dump) == expected
+    assert diagnosis.line_of_dump(tmp_path / "other.py", dump) is None
+
+
+def test_a_program_that_hangs_outside_of_a_loop_is_told_by_its_line(tmp_path):
+    (tmp_path / "me.py").write_text("import time\n\ntime.sleep(1000)\n")
+    dump = 'Current thread 0x2 (most recent call first):\n  File "/x/me.py", line 3 in <module>\n'
+    assert diagnosis.line_of_dump(tmp_path / "me.py", dump) == 3
 
 
 MATRIX = np.array([[0.0, -1.0, 0.0, 0.64], [1.0, 0.0, 0.0, -0.83], [0.0, 0.0, 1.0, 1e-3], [0.0, 0.0, 0.0, 1.0]])
@@ -186,8 +200,39 @@ def test_reports_say_the_same_in_three_ways():
     assert ElementTree.fromstring(report.as_junit(result(1.0))).get("failures") == "0"
 
 
+@pytest.mark.parametrize(("fields", "how", "code", "number"), [
+    ({"ended": "exited", "exit_code": 0}, "finished", 0, None),
+    ({"ended": "exited", "exit_code": 3}, "exit code 3", 3, None),
+    ({"ended": "exited", "exit_code": -11}, "killed by signal 11", None, 11),
+    ({"ended": "exited", "exit_code": -9, "cpu_s": 119.9}, "cpu limit of 120 s", None, 9),
+    ({"ended": "sim time", "exit_code": None}, "simulated time limit", None, None),
+    ({"ended": "busy", "exit_code": None}, "computed without end", None, None),
+])
+def test_the_report_says_how_a_run_ended(fields, how, code, number):
+    end = how_it_ended(run(records(seconds=2.0), wall_s=4.0, **fields))
+    assert (end["how"], end["exit_code"], end["signal"]) == (how, code, number)
+    assert (end["simulated_s"], end["real_time_factor"]) == (2.0, 0.5)
+
+
+def test_what_is_not_graded_loses_no_points_and_blames_nobody():
+    fault = Fault("flood", "too fast", 0.4)
+    slow = dataclasses.replace(result(1.0, fault), not_graded="the machine reached 0.2 of real time")
+    assert slow.points is None
+    text = report.text(slow)
+    assert "not graded: the machine reached 0.2 of real time" in text
+    assert "Hint" not in text
+    assert "not passed" not in text
+    data = json.loads(report.as_json(slow))
+    assert (data["graded"], data["points"], data["passed"]) == (False, None, False)
+    assert (data["fault"], data["hint"]) == (None, None)
+    assert data["not_graded"] == "the machine reached 0.2 of real time"
+    suite = ElementTree.fromstring(report.as_junit(slow))
+    assert suite.get("errors") == "1"
+    assert "0.2 of real time" in suite.find("testcase/error").get("message")
+
+
 def test_the_core_loads_without_ros():
     block = ("import sys; sys.modules.update(dict.fromkeys(('rospy', 'rosgraph', 'tf2_ros', 'baxter_core_msgs', "
-             "'geometry_msgs', 'gazebo_ros')))\nfrom rf_checks import diagnosis, exercises, measures, pacing, report, "
-             "robot, sandbox, slips")
+             "'geometry_msgs', 'gazebo_ros')))\nfrom rf_checks import diagnosis, exercises, measures, observing, "
+             "pacing, report, robot, run_clock, sandbox, slips")
     subprocess.run([sys.executable, "-c", block], check=True)

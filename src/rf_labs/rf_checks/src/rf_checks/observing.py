@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""When a run is over: decided at each record, by simulated time and the program's processor time. Free of ROS."""
+import threading
+
+import numpy as np
+
+from rf_checks import diagnosis
+from rf_checks.recording import RECORD_S, SIDES
+from rf_checks.sandbox import PROCESSES
+
+#: A program that hardly ever rests for so much of its own processor time computes without end [s]; this share of the
+#: records is hardly ever.
+BUSY_S, BUSY_SHARE = 8.0, 0.3
+# After a program's end the robot is watched until it has stood for QUIET_S, and at most SETTLE_S [sim s].
+SETTLE_S, QUIET_S, STILL_RAD = 1.5, 0.3, 1e-4
+# What costs more than a moment is looked at each so many records.
+_LOOK_AT_GRAPH, _LOOK_AT_FAMILY = 25, 5
+
+
+class Observer:
+    """Takes the records of one run. When the run is over the world stands still until :meth:`release`."""
+
+    def __init__(self, call, is_satisfied, look_at_graph):
+        """`is_satisfied(output)`: has the judge seen enough? `look_at_graph()`: was the lab meddled with?"""
+        self.records = []
+        self.ended = ""
+        self.student = None
+        self._call = call
+        self._is_satisfied = is_satisfied
+        self._look_at_graph = look_at_graph
+        self._window = round(diagnosis.FLOOD_WINDOW_S / RECORD_S)
+        self._busy_since, self._busy_cpu_s = 0, 0.0
+        self._exited_at = None
+        self._over, self._released = threading.Event(), threading.Event()
+
+    def on_record(self, record, cpu_s):
+        """One record, and the processor time that the program has used so far [s]."""
+        if self._over.is_set():
+            self._released.wait()
+            return
+        self.records.append(record)
+        if self._exited_at is None:
+            self.ended = self._end(record, cpu_s)
+            if self.ended == "exited":
+                record["exited"] = record["t"]
+                self._exited_at = len(self.records)
+        if self.ended and (self.ended != "exited" or self._has_settled()):
+            self._over.set()
+            self._released.wait()
+
+    def wait(self, timeout_s):
+        """Whether the run is over; waits so long for that."""
+        return self._over.wait(timeout_s)
+
+    def end(self, how):
+        """End the run from outside."""
+        if not self._over.is_set():
+            self.ended = how
+            self._over.set()
+
+    def release(self):
+        """Let the world go on; to be called once the run is dealt with."""
+        self._over.set()
+        self._released.set()
+
+    def _end(self, record, cpu_s):
+        count = len(self.records)
+        if self.student.exit_code is not None:
+            # Once more: who ended at once may have done it by then.
+            return "meddled" if self._look_at_graph() else "exited"
+        if count % _LOOK_AT_GRAPH == 0 and self._look_at_graph():
+            return "meddled"
+        if self.student.wrote_too_much:
+            return "output"
+        if count % _LOOK_AT_FAMILY == 0 and len(self.student.family()) > PROCESSES:
+            return "processes"
+        earlier = self.records[max(0, count - 1 - self._window)]
+        if sum(record["counts"][side] - earlier["counts"][side] for side in SIDES) > diagnosis.FLOOD_COMMANDS:
+            return "flood"
+        if cpu_s - self._busy_cpu_s > BUSY_S:
+            if np.mean([past["rested"] for past in self.records[self._busy_since:]]) < BUSY_SHARE:
+                return "busy"
+            self._busy_since, self._busy_cpu_s = count, cpu_s
+        if count * RECORD_S > self._call.limit_s:
+            return "sim time"
+        return "satisfied" if self._is_satisfied(self.student.output) else ""
+
+    def _has_settled(self):
+        since = len(self.records) - self._exited_at
+        quiet = round(QUIET_S / RECORD_S)
+        recent = np.array([record["q"] for record in self.records[-quiet:]])
+        return since * RECORD_S >= SETTLE_S or (since > quiet and np.ptp(recent, axis=0).max() < STILL_RAD)
