@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Vehicles that follow ``cmd_vel``: on two wheels, on four, or sliding."""
+import math
+
+import numpy as np
+from geometry_msgs.msg import Quaternion, TransformStamped, Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from tf2_msgs.msg import TFMessage
+
+from bullet_sim import Pose
+from gazebo_ros.model_plugin import ModelPlugin, PluginError
+from gazebo_ros.urdf_extras import unscoped
+from ros_controllers.convert import stamp
+from ros_controllers.due import Due
+from ros_controllers.wheel_odometry import WheelOdometry
+
+# Variances of x, y, z [m2], roll, pitch, yaw [rad2]: what the plane does not tell is as good as unknown.
+_UNKNOWN = 1e12
+_VARIANCES = (1e-5, 1e-5, _UNKNOWN, _UNKNOWN, _UNKNOWN, 1e-3)
+
+
+class Drive(ModelPlugin):
+    """Base of the classes below. Elements, with their defaults: ``commandTopic`` (cmd_vel), ``odometryTopic`` (odom),
+    ``odometryFrame`` (odom), ``robotBaseFrame`` (base_footprint), ``updateRate`` or ``odometryRate`` [Hz] (``rate``).
+    A command counts until the next one.
+    """
+
+    rate = 100.0
+    rate_tag = "updateRate"
+    tf_tag = "publishOdomTF"
+    variances = _VARIANCES
+
+    def __init__(self, context):
+        super().__init__(context)
+        self.what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
+        self.model = context.model
+        rate = self.number(self.rate_tag, self.rate)
+        self._due = Due(1.0 / rate if rate > 0.0 else 0.0)
+        self._odometry_frame = context.element_text("odometryFrame", "odom")
+        self._base_frame = context.element_text("robotBaseFrame", "base_footprint")
+        self._wanted = (0.0, 0.0, 0.0)
+        self.configure()
+        self._commands = context.mailbox(context.element_text("commandTopic", "cmd_vel"), Twist)
+        self._odometry = context.publisher(context.element_text("odometryTopic", "odom"), Odometry)
+        self._tf = context.publisher("/tf", TFMessage) if self.flag(self.tf_tag, True) else None
+
+    # -- of each kind ------------------------------------------------------------------------------------------------
+
+    def configure(self):
+        """Read the elements of this kind. Raises ``PluginError``."""
+
+    def drive(self, x, y, turn, dt):
+        """Before a step: go at ``x``, ``y`` [m/s] in the model's axes, and turn [rad/s]."""
+        raise NotImplementedError
+
+    def moved(self, time_s, dt):
+        """After a step, for a kind that counts."""
+
+    def where(self):
+        """(pose (4, 4), linear velocity (3,), angular velocity (3,)), the velocities in the model's axes."""
+        pose = self.model.base_pose().matrix()
+        linear, angular = (pose[:3, :3].T @ np.asarray(part) for part in self.model.base_twist())
+        return pose, linear, angular
+
+    # -- the loop ----------------------------------------------------------------------------------------------------
+
+    def update(self, time_s, dt):
+        message = self._commands.take()
+        if message is not None:
+            wanted = (message.linear.x, message.linear.y, message.angular.z)
+            if all(map(math.isfinite, wanted)):
+                self._wanted = wanted
+            else:
+                self.context.log.warn_throttle(5.0, "%s: a command of %g, %g m/s and %g rad/s is no number and ignored"
+                                               % (self.what, *wanted))
+        self.drive(*self._wanted, dt)
+
+    def publish(self, time_s):
+        self.moved(time_s, self.context.world.time_step_s)
+        if not self._due.is_due(time_s):
+            return
+        wanted = self._odometry.has_listeners, self._tf is not None and self._tf.has_listeners
+        if any(wanted):
+            pose, linear, angular = self.where()
+            now, place = stamp(time_s), pose[:3, 3].tolist()
+            turned = Quaternion(*_quaternion(pose))
+            if wanted[0]:
+                self._odometry.publish(self._message(now, place, turned, linear, angular))
+            if wanted[1]:
+                transform = TransformStamped(child_frame_id=self._base_frame)
+                transform.header.stamp, transform.header.frame_id = now, self._odometry_frame
+                translation = transform.transform.translation
+                translation.x, translation.y, translation.z = place
+                transform.transform.rotation = turned
+                self._tf.publish(TFMessage([transform]))
+        self.also_publish(time_s)
+
+    def also_publish(self, time_s):
+        """At the same rate, for a kind that has more to say."""
+
+    def reset(self):
+        self._wanted = (0.0, 0.0, 0.0)
+        self._commands.take()
+        self._due.restart()
+
+    def _message(self, now, place, turned, linear, angular):
+        message = Odometry(child_frame_id=self._base_frame)
+        message.header.stamp, message.header.frame_id = now, self._odometry_frame
+        position, twist = message.pose.pose.position, message.twist.twist
+        position.x, position.y, position.z = place
+        message.pose.pose.orientation = turned
+        twist.linear.x, twist.linear.y, twist.linear.z = linear.tolist()
+        twist.angular.x, twist.angular.y, twist.angular.z = angular.tolist()
+        message.pose.covariance = message.twist.covariance = np.diag(self.variances).ravel().tolist()
+        return message
+
+    # -- elements ----------------------------------------------------------------------------------------------------
+
+    def number(self, tag, default):
+        """A finite number, 0 or more."""
+        text = self.context.element_text(tag)
+        try:
+            value = default if text is None else float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and value >= 0.0):
+            raise PluginError("%s: <%s> is '%s', expected a number of 0 or more" % (self.what, tag, text))
+        return value
+
+    def positive(self, tag, default):
+        """A finite number above 0."""
+        value = self.number(tag, default)
+        if value == 0.0:
+            raise PluginError("%s: <%s> is 0, expected a number above 0" % (self.what, tag))
+        return value
+
+    def flag(self, tag, default):
+        """true, false, 1 or 0."""
+        text = self.context.element_text(tag)
+        if text is None:
+            return default
+        known = {"true": True, "1": True, "false": False, "0": False}
+        if text.lower() not in known:
+            raise PluginError("%s: <%s> is '%s', expected true or false" % (self.what, tag, text))
+        return known[text.lower()]
+
+    def joint(self, tag, default):
+        """The name of one of the model's joints."""
+        name = unscoped(self.model.name, self.context.element_text(tag, default))
+        if name not in self.model.joint_names:
+            raise PluginError("%s: <%s> is '%s', expected one of the joints %s"
+                              % (self.what, tag, name, ", ".join(self.model.joint_names) or "(there are none)"))
+        return name
+
+
+class _Wheels(Drive):
+    """Wheels on two sides."""
+
+    def sides(self):
+        """(joints of the left wheels, joints of the right ones), names."""
+        raise NotImplementedError
+
+    def configure(self):
+        left, right = self.sides()
+        self._left, self._right = self.model.index(left), self.model.index(right)
+        self._both = np.concatenate([self._left, self._right])
+        self._torque = np.full(len(self._both), self.positive(self.torque_tag, 5.0))
+        self._speeds = np.zeros(2)  # of the left and the right rims, as they are commanded [m/s]
+
+    def rims(self, x, turn):
+        """What the rims (2,) shall do [m/s], left and right."""
+        half = turn * self._separation / 2.0
+        return np.array([x - half, x + half])
+
+    def drive(self, x, y, turn, dt):
+        wanted = self.rims(x, turn)
+        change = self.acceleration * dt if self.acceleration else math.inf
+        self._speeds = np.clip(wanted, self._speeds - change, self._speeds + change)
+        rates = np.repeat(self._speeds / self._radius, (len(self._left), len(self._right)))
+        self.model.drive_velocity(self._both, rates, self._torque)
+
+    def reset(self):
+        super().reset()
+        self._speeds = np.zeros(2)
+
+
+class DiffDrive(_Wheels):
+    """``libgazebo_ros_diff_drive.so``. Elements besides those of :class:`Drive`: ``leftJoint`` (left_joint),
+    ``rightJoint`` (right_joint), ``wheelSeparation`` (0.34 m), ``wheelDiameter`` (0.15 m), ``wheelTorque`` (5 Nm at
+    most), ``wheelAcceleration`` (0: any; of the rim [m/s2]), ``odometrySource`` (world; encoder), ``legacyMode`` (true:
+    left and right are exchanged), ``publishWheelJointState`` (false: the wheels on ``joint_states``).
+    """
+
+    torque_tag = "wheelTorque"
+
+    def sides(self):
+        names = [self.joint("leftJoint", "left_joint")], [self.joint("rightJoint", "right_joint")]
+        if self.flag("legacyMode", True):
+            if self.context.element_text("legacyMode") is None:
+                self.context.log.warn("%s says no <legacyMode>, so left and right are exchanged, as in Gazebo; give "
+                                      "false where that is wrong" % self.what)
+            return names[::-1]
+        return names
+
+    def configure(self):
+        super().configure()
+        self._separation = self.positive("wheelSeparation", 0.34)
+        self._radius = self.positive("wheelDiameter", 0.15) / 2.0
+        self.acceleration = self.number("wheelAcceleration", 0.0)
+        source = self.context.element_text("odometrySource", "world").lower()
+        if source not in ("world", "encoder", "0", "1"):
+            raise PluginError("%s: <odometrySource> is '%s', expected world or encoder" % (self.what, source))
+        self._counted = WheelOdometry() if source in ("encoder", "0") else None
+        self._turned = self._angles()
+        self._wheels = None
+        if self.flag("publishWheelJointState", False):
+            self._wheels = self.context.publisher("joint_states", JointState)
+            self._wheel_names = [self.model.joint_names[i] for i in self._both]
+
+    def moved(self, time_s, dt):
+        if self._counted is None:
+            return
+        before, self._turned = self._turned, self._angles()
+        left, right = self._radius * (self._turned - before)
+        self._counted.move((left + right) / 2.0, (right - left) / self._separation, dt)
+
+    def where(self):
+        counted = self._counted
+        if counted is None:
+            return super().where()
+        pose = np.eye(4)
+        cosine, sine = math.cos(counted.heading), math.sin(counted.heading)
+        pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
+        pose[:2, 3] = counted.x, counted.y
+        return pose, np.array([counted.linear, 0.0, 0.0]), np.array([0.0, 0.0, counted.angular])
+
+    def also_publish(self, time_s):
+        if self._wheels is not None and self._wheels.has_listeners:
+            position, velocity, effort = (values[self._both].tolist() for values in self.model.read_joints())
+            message = JointState(None, self._wheel_names, position, velocity, effort)
+            message.header.stamp = stamp(time_s)
+            self._wheels.publish(message)
+
+    def joints_set(self):
+        self._turned = self._angles()
+
+    def reset(self):
+        super().reset()
+        self._turned = self._angles()
+        if self._counted is not None:
+            self._counted = WheelOdometry()
+
+    def _angles(self):
+        position = self.model.read_joints()[0]
+        return np.array([position[self._left].mean(), position[self._right].mean()])
+
+
+class SkidSteer(_Wheels):
+    """``libgazebo_ros_skid_steer_drive.so``. Elements besides those of :class:`Drive`: ``leftFrontJoint``,
+    ``rightFrontJoint``, ``leftRearJoint``, ``rightRearJoint`` (left_front_joint, ...), ``wheelSeparation`` (0.4 m),
+    ``wheelDiameter`` (0.15 m), ``torque`` (5 Nm at most), ``covariance_x``, ``covariance_y`` (0.0001 m2),
+    ``covariance_yaw`` (0.01 rad2). ``broadcastTF`` (true) takes the place of ``publishOdomTF``.
+    """
+
+    torque_tag = "torque"
+    tf_tag = "broadcastTF"
+    acceleration = 0.0
+
+    def sides(self):
+        return tuple([self.joint("%s%sJoint" % (side, end), "%s_%s_joint" % (side, end.lower())) for end in
+                      ("Front", "Rear")] for side in ("left", "right"))
+
+    def configure(self):
+        super().configure()
+        self._separation = self.positive("wheelSeparation", 0.4)
+        self._radius = self.positive("wheelDiameter", 0.15) / 2.0
+        self.variances = (self.number("covariance_x", 1e-4), self.number("covariance_y", 1e-4), _UNKNOWN, _UNKNOWN,
+                          _UNKNOWN, self.number("covariance_yaw", 1e-2))
+
+
+class PlanarMove(Drive):
+    """``libgazebo_ros_planar_move.so``: the model moves as commanded, whatever it stands on.
+
+    ``odometryRate`` (20 Hz) takes the place of ``updateRate``.
+    """
+
+    rate = 20.0
+    rate_tag = "odometryRate"
+
+    def drive(self, x, y, turn, dt):
+        pose = self.model.base_pose().matrix()
+        heading = math.atan2(pose[1, 0], pose[0, 0])
+        cosine, sine = math.cos(heading), math.sin(heading)
+        self.model.set_base_twist((x * cosine - y * sine, x * sine + y * cosine, 0.0), (0.0, 0.0, turn))
+
+
+def _quaternion(pose):
+    """x, y, z, w of a pose's rotation, w not below 0."""
+    quaternion = Pose.from_matrix(pose).quaternion
+    return quaternion if quaternion[3] >= 0.0 else tuple(-value for value in quaternion)
