@@ -12,6 +12,7 @@ from baxter_core_msgs.msg import JointCommand
 
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
+from gazebo_ros.faults import Faults
 from gazebo_ros.loop_publisher import LoopPublisher, PublisherHub
 from gazebo_ros.mailbox import Queue, RequestBoard
 from gazebo_ros.model_plugin import PluginContext
@@ -79,7 +80,7 @@ class Loop(BareWorld):
         context = PluginContext(self.world, self.model, self.robot, None, "/robot", "", log, ros,
                                 {"baxter_sim_hardware": {"enable": True}}, add_screen=lambda *_: None)
         self._queues = ros.queues
-        self._simulation = Simulation(self.world, RequestBoard(), log, real_time_factor=0.0)
+        self._simulation = Simulation(self.world, RequestBoard(), log, Faults(log), real_time_factor=0.0)
         publications = Publications(self._simulation, ros, writer, log, clock_rate=500.0)
         self._simulation.on_turn, self._simulation.on_tick = publications.on_turn, publications.on_tick
         self._simulation.host(HostedPlugin(BaxterPlugin(context), context, self.model.name, "Baxter"))

@@ -64,7 +64,7 @@ class Model(Body):
         self._commanded_effort = np.zeros(count)
         self._zeros = [0.0] * count
         self._bounds = None
-        self._gears = []
+        self._gears = {}  # of (joint, other), by index
         self._direct = None
         self._never_sleeps = static
         self._set_damping(joints)
@@ -219,16 +219,18 @@ class Model(Body):
     def couple(self, joint, other, ratio):
         """Have the joint with index ``other`` move ``ratio`` times as far as ``joint``, as a gear does, for good.
 
-        Both carry each other's load: what drives one drives both.
+        Both carry each other's load: what drives one drives both. Asked again, it is the same gear.
         """
-        gear = pybullet.createConstraint(
-            self.body, int(joint), self.body, int(other), pybullet.JOINT_GEAR, (0, 0, 1), (0, 0, 0), (0, 0, 0),
-            physicsClientId=self._client,
-        )
+        pair = int(joint), int(other)
+        if pair not in self._gears:
+            self._gears[pair] = pybullet.createConstraint(
+                self.body, pair[0], self.body, pair[1], pybullet.JOINT_GEAR, (0, 0, 1), (0, 0, 0), (0, 0, 0),
+                physicsClientId=self._client,
+            )
+        gear = self._gears[pair]
         pybullet.changeConstraint(
             gear, gearRatio=-1.0 / ratio, erp=POSITION_GAIN, maxForce=_GEAR_FORCE, physicsClientId=self._client
         )
-        self._gears.append(gear)
 
     def release(self, index):
         """Switch the motors of joints ``index`` (k,) off."""
@@ -288,7 +290,7 @@ class Model(Body):
     def remove(self):
         """For World: take the body out of the physics."""
         self.let_go()
-        for gear in self._gears:
+        for gear in self._gears.values():
             pybullet.removeConstraint(gear, physicsClientId=self._client)
         pybullet.removeBody(self.body, physicsClientId=self._client)
 

@@ -28,6 +28,7 @@ from gazebo_msgs.srv import (
 from bullet_sim import BulletSimError, Pose
 from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg, vector_from_msg
 from gazebo_ros.entities import WORLD_FRAMES, UnknownEntity
+from gazebo_ros.faults import SURVIVED
 from gazebo_ros.jobs import TimedJobs
 
 _REFUSALS = (UnknownEntity, BulletSimError, ValueError)
@@ -47,6 +48,7 @@ class BodyServices:
         self._world = simulation.world
         self._entities = entities
         self._log = log
+        self._faults = ros.faults
         self._wrenches = TimedJobs()  # of (model, link)
         self._efforts = TimedJobs()  # of (model, joint)
         self._link_state_commands = ros.queue("/gazebo/set_link_state", LinkState, depth=10, notice=notice)
@@ -65,22 +67,37 @@ class BodyServices:
 
     def take_commands(self):
         """Do what came in on /gazebo/set_link_state."""
-        for command in self._link_state_commands.drain():
-            try:
-                self._put_link(command)
-            except _REFUSALS as error:
-                self._log.warn_throttle(5.0, "/gazebo/set_link_state: %s" % error)
+        self._link_state_commands.handle(self._take_link_state)
+
+    def _take_link_state(self, command):
+        try:
+            self._put_link(command)
+        except _REFUSALS as error:
+            self._log.warn_throttle(5.0, "/gazebo/set_link_state: %s" % error)
 
     def push(self):
         """Before a physics step: apply the wrenches and efforts that are due."""
         if not (self._wrenches or self._efforts):
             return
         now = self._simulation.time_ns
-        for (model_name, link), (force, torque) in self._wrenches.due(now):
-            self._world.models[model_name].apply_wrench(link, force, torque)
-        for (model_name, joint), effort in self._efforts.due(now):
-            model = self._world.models[model_name]
-            model.add_effort(model.index([joint]), np.array([effort]))
+        for target, (force, torque) in self._wrenches.due(now):
+            self._push_one(self._wrenches, target, self._push_link, force, torque)
+        for target, effort in self._efforts.due(now):
+            self._push_one(self._efforts, target, self._push_joint, effort)
+
+    def _push_one(self, jobs, target, push, *arguments):
+        try:
+            push(*target, *arguments)
+        except SURVIVED as error:
+            self._faults.note("pushing %s::%s" % target, error, "it is pushed no more")
+            jobs.remove(lambda other: other == target)
+
+    def _push_link(self, model_name, link, force, torque):
+        self._world.models[model_name].apply_wrench(link, force, torque)
+
+    def _push_joint(self, model_name, joint, effort):
+        model = self._world.models[model_name]
+        model.add_effort(model.index([joint]), np.array([effort]))
 
     def forget(self, model_name=None):
         """Drop the wrenches and efforts of a model that is gone, or all."""

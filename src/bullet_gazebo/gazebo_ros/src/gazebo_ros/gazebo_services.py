@@ -34,6 +34,7 @@ from bullet_sim import BulletSimError
 from gazebo_ros.body_services import BodyServices
 from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg
 from gazebo_ros.entities import Entities, UnknownEntity
+from gazebo_ros.faults import SURVIVED, described
 from gazebo_ros.light_services import LightServices
 from gazebo_ros.mailbox import LoopEnded
 from gazebo_ros.simulation import AdvanceRefused
@@ -104,11 +105,13 @@ class GazeboServices:
         # Before the queues are read: what comes in from here on is told again.
         self._has_commands = False
         self._bodies.take_commands()
-        for command in self._model_state_commands.drain():
-            try:
-                self._put_model(command)
-            except (UnknownEntity, BulletSimError, ValueError) as error:
-                self._log.warn_throttle(5.0, "/gazebo/set_model_state: %s" % error)
+        self._model_state_commands.handle(self._take_model_state)
+
+    def _take_model_state(self, command):
+        try:
+            self._put_model(command)
+        except (UnknownEntity, BulletSimError, ValueError) as error:
+            self._log.warn_throttle(5.0, "/gazebo/set_model_state: %s" % error)
 
     def _note_command(self):
         self._has_commands = True
@@ -124,8 +127,8 @@ class GazeboServices:
             self._simulation.board.call(self._spawn_prepared, prepared, request)
         except (SpawnRefused, LoopEnded) as error:
             return SpawnModelResponse(False, "SpawnModel: Failure - %s" % error)
-        except Exception as error:  # noqa: BLE001  (a plugin's constructor is anybody's code)
-            self._log.error("spawning '%s' failed: %r" % (request.model_name, error))
+        except SURVIVED as error:  # a plugin's constructor is anybody's code
+            self._log.error("spawning '%s' failed: %s" % (request.model_name, described(error)))
             return SpawnModelResponse(False, "SpawnModel: Failure - %s: %s" % (type(error).__name__, error))
         self._ros.flush()
         return SpawnModelResponse(True, "SpawnModel: Successfully spawned entity")

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Log lines from the loop: handed to a thread, because a terminal or /rosout may block and the loop must not."""
 import collections
+import contextlib
 import sys
 import threading
 import time
+
+# A line is cut there [characters].
+LONGEST_LINE = 4000
 
 
 class LoopLog:
@@ -54,7 +58,10 @@ class LoopLog:
         self._thread.join(0.3)
 
     def _post(self, level, text):
-        self._lines.append((level, text))
+        # What clients send is quoted in lines: a megabyte of it helps nobody, half a surrogate pair cannot be written.
+        if len(text) > LONGEST_LINE:
+            text = "%s ... (%d characters more)" % (text[:LONGEST_LINE], len(text) - LONGEST_LINE)
+        self._lines.append((level, text.encode("utf-8", "replace").decode("utf-8")))
         self._wake.set()
 
     def _post_throttled(self, level, period_s, text):
@@ -71,6 +78,8 @@ class LoopLog:
             self._wake.clear()
             while self._lines:
                 level, text = self._lines.popleft()
-                self._sinks[level](text)
+                # A terminal that is gone must not end this thread: lines would heap up for ever.
+                with contextlib.suppress(Exception):
+                    self._sinks[level](text)
             if self._ending:
                 return

@@ -48,6 +48,14 @@ class Peer:
             with contextlib.suppress(OSError):
                 self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
 
+    @classmethod
+    def of(cls, transport):
+        """The one of a connection: several publishers of one topic must not write into each other's messages."""
+        peer = getattr(transport, "loop_peer", None)
+        if peer is None:
+            peer = transport.loop_peer = cls(transport)
+        return peer
+
     @property
     def has_rest(self):
         """True while a part of a message is still to be sent."""
@@ -191,7 +199,7 @@ class LoopPublisher:
     def _adopt(self, connections):
         """Follow rospy's list of connections (a new list at every change); return the peers that are new."""
         known = {id(peer.transport): peer for peer in self._peers}
-        self._peers = [known.get(id(connection)) or Peer(connection) for connection in connections]
+        self._peers = [known.get(id(connection)) or Peer.of(connection) for connection in connections]
         self._known = connections
         self.has_listeners = bool(connections)
         return [peer for peer in self._peers if id(peer.transport) not in known]

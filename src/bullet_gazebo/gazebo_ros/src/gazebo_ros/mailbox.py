@@ -8,12 +8,30 @@ import collections
 import threading
 from concurrent.futures import CancelledError, Future
 
+from gazebo_ros.faults import SURVIVED
 
-class Mailbox:
+
+def _raise(error):
+    raise error
+
+
+class _Box:
+    """What is common to both: handing messages to code that may fail on them."""
+
+    def guarded(self, take, *arguments):
+        """Loop thread: call ``take(*arguments)`` for one message; one that it fails on is dropped and counted."""
+        try:
+            take(*arguments)
+        except SURVIVED as error:
+            self._on_fault(error)
+
+
+class Mailbox(_Box):
     """Newest wins: a later message replaces one that was not taken yet."""
 
-    def __init__(self):
-        """Empty."""
+    def __init__(self, on_fault=_raise):
+        """Empty. ``on_fault(error)``: told of what :meth:`handle` survives."""
+        self._on_fault = on_fault
         #: Messages delivered since the start; read by the lock-step service.
         self.delivered = 0
         # A deque of one: append and pop are atomic, so no message is lost between the threads.
@@ -28,21 +46,28 @@ class Mailbox:
         """Loop thread: the newest message since the last call, or None."""
         return self._newest.pop() if self._newest else None
 
+    def handle(self, take):
+        """Loop thread: :meth:`guarded` for the newest message since the last call, if there is one."""
+        if self._newest:
+            self.guarded(take, self._newest.pop())
+
     def close(self):
         """Drop what is left."""
         self._newest.clear()
 
 
-class Queue:
+class Queue(_Box):
     """Each message counts: oldest first, up to ``depth`` unread ones; beyond that the oldest are lost and counted."""
 
-    def __init__(self, depth, notice=lambda: None):
-        """``depth``: how many unread messages are kept; ``notice()`` is called when one has come in."""
+    def __init__(self, depth, notice=lambda: None, on_fault=_raise):
+        """``depth``: how many unread messages are kept; ``notice()`` is called when one has come in; ``on_fault``: as
+        for :class:`Mailbox`."""
         if depth < 1:
             raise ValueError("queue depth is %r, expected at least 1" % (depth,))
         self.delivered = 0
         self.lost = 0
         self._notice = notice
+        self._on_fault = on_fault
         self._messages = collections.deque(maxlen=depth)
 
     def put(self, message):
@@ -62,6 +87,11 @@ class Queue:
         while self._messages:
             messages.append(self._messages.popleft())
         return messages
+
+    def handle(self, take):
+        """Loop thread: :meth:`guarded` for each unread message, oldest first."""
+        for message in self.drain():
+            self.guarded(take, message)
 
     def close(self):
         """Drop what is left."""
@@ -110,6 +140,9 @@ class RequestBoard:
                 continue
             try:
                 future.set_result(function(*arguments))
+            except SystemExit as error:
+                # A thread that gets it ends without a word, and its client waits for ever.
+                future.set_exception(RuntimeError("it called sys.exit(%r)" % (error.code,)))
             except Exception as error:  # noqa: BLE001  (whatever it is, it belongs to the one who asked)
                 future.set_exception(error)
         return count

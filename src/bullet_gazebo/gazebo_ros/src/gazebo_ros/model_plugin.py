@@ -5,6 +5,8 @@ A plugin lives in the loop thread. Everything it is given here may be called fro
 things other threads touch are the mailboxes and queues that the context hands out. Nothing it can call blocks: topics
 and services are registered with the ROS master by a thread of their own, messages are sent without waiting.
 """
+import contextlib
+
 import numpy as np
 
 
@@ -17,7 +19,10 @@ class ModelPlugin:
 
     Per tick the loop calls ``update`` of every plugin, makes one physics step, and calls ``publish`` of every plugin.
     Times are simulation seconds since the start of the world; ``dt`` is the length of a tick [s].
-    A plugin that raises is reported once with its traceback and left out from then on; the world goes on.
+    A plugin that raises is begun anew (``restarted``); at the third time within 10 s it counts as failed, and gets
+    ``hold`` and then ``while_failed`` in place of ``update`` and ``publish``, until a reset revives it. Messages that
+    are taken with ``handle`` (see :meth:`PluginContext.queue`) do not get that far: the one that cannot be digested is
+    dropped.
     """
 
     #: Whether a model whose plugin refuses it is not spawned. A sensor is left out instead, with a warning.
@@ -57,6 +62,25 @@ class ModelPlugin:
     def close(self):
         """The model is being deleted or the node ends. Topics and services of the context are closed after this."""
 
+    # -- when it has raised ---------------------------------------------------------------------------------------
+
+    def restarted(self):
+        """Returns the plugin that goes on in the place of this one. Nothing may move by it; what moves comes to rest.
+
+        As it stands here: a new one of the same class. What it opens of the same name and type is what this one had
+        opened, so that nobody has to connect anew; the rest is closed.
+        """
+        with contextlib.suppress(Exception):
+            self.close()
+        return type(self)(self.context)
+
+    def hold(self):
+        """It counts as failed: have the joints that it drives stay where they are, by the simplest means there is."""
+
+    def while_failed(self, time_s):
+        """In place of ``update`` and ``publish`` while it counts as failed; True asks to be revived."""
+        return False
+
 
 class PluginContext:
     """What one plugin of one model is given.
@@ -91,7 +115,8 @@ class PluginContext:
         self._ros = ros
         self._parameters = parameters
         self._add_screen = add_screen
-        self._opened = []
+        self._opened = []  # of (what it is: kind, name, type ..., the object)
+        self._kept = []  # the same, of the plugin before; see `begin_anew`
         self._queues, self._noted = [], set()  # of the queues, the numbers of those that something came into
 
     def resolve(self, name):
@@ -102,18 +127,28 @@ class PluginContext:
 
     def publisher(self, topic, msg_class, latch=False):
         """A :class:`gazebo_ros.loop_publisher.LoopPublisher`; ``has_listeners`` and ``publish`` are for the loop."""
-        return self._opening(self._ros.publisher(self.resolve(topic), msg_class, latch=latch))
+        name = self.resolve(topic)
+        return self._opening(("publisher", name, msg_class, latch),
+                             lambda: self._ros.publisher(name, msg_class, latch=latch))
 
     def mailbox(self, topic, msg_class):
-        """A subscription of which only the newest message counts: ``take()`` -> message or None."""
-        return self._opening(self._ros.mailbox(self.resolve(topic), msg_class))
+        """A subscription of which only the newest message counts: ``handle(function)`` calls ``function(message)`` if
+        one has come since, and drops and counts the message if that fails. ``take()`` -> message or None, unguarded."""
+        name = self.resolve(topic)
+        return self._opening(("mailbox", name, msg_class), lambda: self._ros.mailbox(name, msg_class))
 
     def queue(self, topic, msg_class, depth):
-        """A subscription that loses nothing up to ``depth`` unread messages: ``drain()`` -> list, oldest first."""
-        number = len(self._queues)
-        queue = self._opening(self._ros.queue(self.resolve(topic), msg_class, depth, lambda: self._noted.add(number)))
-        self._queues.append(queue)
-        return queue
+        """A subscription that loses nothing up to ``depth`` unread messages: ``handle(function)`` calls
+        ``function(message)`` for each, oldest first, and drops and counts a message on which that fails. ``drain()`` ->
+        list, unguarded."""
+        name = self.resolve(topic)
+
+        def make():
+            number = len(self._queues)
+            self._queues.append(self._ros.queue(name, msg_class, depth, lambda: self._noted.add(number)))
+            return self._queues[number]
+
+        return self._opening(("queue", name, msg_class, depth), make)
 
     def mail(self):
         """Loop thread: those of this context's :meth:`queue` objects that something came into since the last call, in
@@ -130,14 +165,14 @@ class PluginContext:
 
     def service(self, name, srv_class, handler):
         """Advertise a service; ``handler(request)`` runs in the loop thread between two ticks."""
-        return self._opening(self._ros.service(self.resolve(name), srv_class, handler))
+        return self._serving(self._ros.service, self.resolve(name), srv_class, handler)
 
     def service_in_thread(self, name, srv_class, handler):
         """Advertise a service that may take its time; ``handler(request)`` runs in a thread of its own.
 
         It reaches the model through :meth:`call_in_loop` only.
         """
-        return self._opening(self._ros.service_in_thread(self.resolve(name), srv_class, handler))
+        return self._serving(self._ros.service_in_thread, self.resolve(name), srv_class, handler)
 
     def call_in_loop(self, function, *arguments):
         """Any thread but the loop's: have ``function(*arguments)`` called between two ticks; returns or raises what it
@@ -160,7 +195,8 @@ class PluginContext:
         ``size_m``: width and height; ``pixels``: columns and rows. Returns a
         :class:`gazebo_ros.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """
-        return self._add_screen(link, np.asarray(place, dtype=float), size_m, pixels)
+        return self._opening(("screen", link, tuple(size_m), tuple(pixels)),
+                             lambda: self._add_screen(link, np.asarray(place, dtype=float), size_m, pixels))
 
     def param(self, name, default=None):
         """Value of a ROS parameter as it was when the model was spawned; relative names as in :meth:`resolve`."""
@@ -176,11 +212,61 @@ class PluginContext:
         text = self.element.findtext(tag)
         return text.strip() if text and text.strip() else default
 
+    def survived(self, place, error):
+        """Count an error that the plugin has dealt with: a line in the log now and then, a figure in /diagnostics.
+
+        ``place``: the topic or service, or in words what was being done.
+        """
+        self._ros.faults.note(place, error)
+
+    def begin_anew(self):
+        """From here to :meth:`end_anew`, what is opened again is what was open already."""
+        self._kept, self._opened = [*self._kept, *self._opened], []
+
+    def end_anew(self):
+        """Close what was open before :meth:`begin_anew` and has not been opened again."""
+        kept, self._kept = self._kept, []
+        _close_all(kept)
+
     def close(self):
         """Close every topic and service that was opened through this context."""
-        while self._opened:
-            self._opened.pop().close()
+        opened, self._opened, self._kept = [*self._kept, *self._opened], [], []
+        _close_all(opened)
 
-    def _opening(self, opened):
-        self._opened.append(opened)
-        return opened
+    def _opening(self, what, make):
+        """The object that was opened as ``what`` before, or a new one."""
+        for entry in self._kept:
+            if entry[0] == what:
+                self._kept.remove(entry)
+                break
+        else:
+            entry = what, make()
+        self._opened.append(entry)
+        return entry[1]
+
+    def _serving(self, advertise, name, srv_class, handler):
+        def make():
+            answering = _Answering(handler)
+            answering.service = advertise(name, srv_class, lambda request: answering.handler(request))
+            return answering
+
+        answering = self._opening(("service", advertise.__name__, name, srv_class), make)
+        answering.handler = handler
+        return answering
+
+
+class _Answering:
+    """A service whose handler can be replaced."""
+
+    def __init__(self, handler):
+        self.handler = handler
+
+    def close(self):
+        self.service.close()
+
+
+def _close_all(opened):
+    for what, thing in reversed(opened):
+        # Pictures on screens belong to the model and are closed with it.
+        if what[0] != "screen":
+            thing.close()

@@ -16,6 +16,8 @@ import rospy
 from bullet_sim import BulletSimError, World
 from gazebo_ros import snapshot
 from gazebo_ros.command_line import CommandLine
+from gazebo_ros.diagnostics import Diagnostics
+from gazebo_ros.faults import Faults
 from gazebo_ros.gazebo_services import GazeboServices
 from gazebo_ros.loop_log import LoopLog
 from gazebo_ros.loop_publisher import PublisherHub
@@ -118,8 +120,10 @@ def _build(log, cleanup, line):
     hub, inlets, board = PublisherHub(), InletHub(), RequestBoard()
     cleanup.callback(board.close)
     cleanup.callback(inlets.close)
-    ros = RosObjects(hub, inlets, board, log)
-    simulation = Simulation(world, board, log, real_time_factor=float(rospy.get_param("~real_time_factor", 1.0)),
+    faults = Faults(log)
+    ros = RosObjects(hub, inlets, board, log, faults)
+    simulation = Simulation(world, board, log, faults,
+                            real_time_factor=float(rospy.get_param("~real_time_factor", 1.0)),
                             paused=line.paused or bool(rospy.get_param("~paused", False)), deliveries=ros.deliveries)
     publications = Publications(simulation, ros, writer, log,
                                 clock_rate=float(rospy.get_param("~clock_rate", 1.0 / description.time_step_s)))
@@ -137,15 +141,22 @@ def _build(log, cleanup, line):
     rospy.set_param("~snapshot", str(writer.folder))
     ros.flush()
 
+    diagnostics = Diagnostics(simulation, faults, ros)
+    parts = (("sending messages", hub.service), ("reading messages", inlets.service),
+             ("publishing", publications.on_turn), ("services under /gazebo", services.take_commands))
+
     def on_turn():
-        hub.service()
-        inlets.service()
-        publications.on_turn()
-        services.take_commands()
+        for what, part in parts:
+            # One by one: where one of them fails, the others are still served.
+            faults.guarded(what, part)
+
+    def on_tick():
+        publications.on_tick()
+        diagnostics.on_tick()
 
     simulation.on_turn = on_turn
     simulation.before_step = services.push
-    simulation.on_tick = publications.on_tick
+    simulation.on_tick = on_tick
     simulation.on_time_reset = publications.time_was_reset
     cleanup.callback(simulation.unhost)
     return simulation

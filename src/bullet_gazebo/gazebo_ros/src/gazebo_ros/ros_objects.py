@@ -10,6 +10,7 @@ import weakref
 
 import rospy
 
+from gazebo_ros.faults import SURVIVED, described
 from gazebo_ros.loop_publisher import LoopPublisher
 from gazebo_ros.loop_subscriber import Inlet
 from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue
@@ -18,13 +19,15 @@ from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue
 class RosObjects:
     """Makes publishers, mailboxes, queues and services for the loop."""
 
-    def __init__(self, hub, inlets, board, log):
+    def __init__(self, hub, inlets, board, log, faults):
         """``hub``: :class:`PublisherHub`; ``inlets``: :class:`InletHub`; ``board``: :class:`RequestBoard`; ``log``:
-        :class:`LoopLog`."""
+        :class:`LoopLog`; ``faults``: :class:`Faults`, which are counted here by topic and service."""
         self._hub = hub
         self._inlets = inlets
         self._board = board
         self._log = log
+        #: For who finds more of them.
+        self.faults = faults
         self._jobs = queue.SimpleQueue()
         self._inboxes = {}
         self._delivered_before = {}
@@ -55,11 +58,11 @@ class RosObjects:
 
     def mailbox(self, topic, msg_class):
         """A :class:`Mailbox` that messages on ``topic`` fall into."""
-        return self._subscribe(_Inbox(Mailbox(), topic, self), msg_class)
+        return self._subscribe(_Inbox(Mailbox(self._counting(topic)), topic, self), msg_class)
 
     def queue(self, topic, msg_class, depth, notice=lambda: None):
         """A :class:`Queue` that messages on ``topic`` fall into; ``notice()`` is called after each, in any thread."""
-        return self._subscribe(_Inbox(Queue(depth, notice), topic, self), msg_class)
+        return self._subscribe(_Inbox(Queue(depth, notice, self._counting(topic)), topic, self), msg_class)
 
     def service(self, name, srv_class, handler):
         """Advertise ``name``; ``handler(request)`` runs in the loop thread."""
@@ -69,8 +72,17 @@ class RosObjects:
         """Advertise ``name``; ``handler(request)`` runs in rospy's thread for the request."""
         service = _Service(self)
 
+        def answer(request):
+            try:
+                return handler(request)
+            except rospy.ServiceException:
+                raise
+            except SURVIVED as error:
+                self.faults.note(name, error, "the request is answered with an error")
+                raise rospy.ServiceException("%s failed: %s" % (name, described(error))) from error
+
         def register():
-            service.registration = rospy.Service(name, srv_class, handler)
+            service.registration = rospy.Service(name, srv_class, answer)
 
         self._jobs.put(register)
         return service
@@ -107,10 +119,13 @@ class RosObjects:
         def register():
             inbox.registration = rospy.Subscriber(inbox.topic, msg_class, inbox.put, tcp_nodelay=True)
             # A connection that rospy made before this line is read by rospy, in a thread of its own.
-            _read_in_loop(inbox.registration.impl, self._inlets, self._log)
+            _read_in_loop(inbox.registration.impl, self._inlets, self._log, self.faults)
 
         self._jobs.put(register)
         return inbox
+
+    def _counting(self, topic):
+        return lambda error: self.faults.note(topic, error, "the message is dropped")
 
     def _forget(self, inbox):
         self._delivered_before[inbox.topic] = self._delivered_before.get(inbox.topic, 0) + inbox.delivered
@@ -130,7 +145,7 @@ class RosObjects:
                     self._log.error("cannot register with the ROS master: %s" % error)
 
 
-def _read_in_loop(impl, inlets, log):
+def _read_in_loop(impl, inlets, log, faults):
     """Have the loop read the connections of rospy's subscription ``impl``, as soon as they are made."""
     add = impl.add_connection
 
@@ -138,13 +153,13 @@ def _read_in_loop(impl, inlets, log):
         # Held weakly: a connection that rospy drops while it is being made leaves its socket to be closed with the last
         # reference, and the publisher serves nobody else before that.
         held = weakref.ref(connection)
-        connection.receive_loop = lambda _: _receive(held(), impl, inlets, log)
+        connection.receive_loop = lambda _: _receive(held(), impl, inlets, log, faults)
         return add(connection)
 
     impl.add_connection = add_connection
 
 
-def _receive(connection, impl, inlets, log):
+def _receive(connection, impl, inlets, log, faults):
     """What rospy's thread for a connection does, once that stands: wait for its end."""
 
     def deliver(data):
@@ -158,8 +173,8 @@ def _receive(connection, impl, inlets, log):
             impl.receive_callback([message], connection)
         except Exception as error:  # noqa: BLE001  (anything may be sent; the world goes on)
             if not impl.closed:
-                log.error_throttle(5.0, "%s: a message from %s cannot be read and is left out: %s"
-                                   % (impl.resolved_name, connection.callerid_pub, error))
+                faults.note(impl.resolved_name, error,
+                            "a message from %s cannot be read and is dropped" % connection.callerid_pub)
 
     try:
         # With the end of its header a publisher may have sent its first message, the one that it latches.
@@ -193,6 +208,7 @@ class _Inbox:
         self.topic = topic
         self.registration = None
         self.put = box.put
+        self.handle, self.guarded = box.handle, box.guarded
         self._box = box
         self._objects = objects
         if isinstance(box, Mailbox):

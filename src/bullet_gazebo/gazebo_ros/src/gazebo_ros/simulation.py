@@ -8,12 +8,15 @@ import time
 import traceback
 from concurrent.futures import Future
 
+from gazebo_ros.faults import SURVIVED, described
 from gazebo_ros.pacing import Pacer
 
 # While the world is paused: how long the loop sleeps when nobody asks for anything, and while a lock-step request
 # waits for its topics [s].
 IDLE_S = 0.005
 AWAIT_S = 0.0002
+# A plugin that has raised so often within so long [s, simulated time] is not begun anew once more.
+FAILURES, FAILURES_WITHIN_S = 3, 10.0
 
 
 class AdvanceRefused(Exception):
@@ -21,7 +24,11 @@ class AdvanceRefused(Exception):
 
 
 class HostedPlugin:
-    """A model plugin and what must be closed with it."""
+    """A model plugin, what must be closed with it, and how it does.
+
+    ``failures``: how often it has raised; ``last_error``: the newest one as text; ``has_failed``: whether it counts as
+    failed, so that it is not ticked until a reset revives it.
+    """
 
     def __init__(self, plugin, context, model_name, label):
         """``label``: the plugin's file name, for messages."""
@@ -29,6 +36,8 @@ class HostedPlugin:
         self.context = context
         self.model_name = model_name
         self.label = label
+        self.failures, self.last_error, self.has_failed = 0, "", False
+        self.failed_at = []  # simulation times of the newest failures [s]
 
 
 class _Advance:
@@ -43,12 +52,12 @@ class _Advance:
 class Simulation:
     """Runs a ``bullet_sim.World`` and its model plugins, tick by tick."""
 
-    def __init__(self, world, board, log, real_time_factor=1.0, paused=False, deliveries=dict,
+    def __init__(self, world, board, log, faults, real_time_factor=1.0, paused=False, deliveries=dict,
                  clock=time.monotonic):
         """Ready to :meth:`run`.
 
-        ``board``: :class:`gazebo_ros.mailbox.RequestBoard`. ``deliveries()`` -> how many messages have come in on each
-        topic that something in this world listens to.
+        ``board``: :class:`gazebo_ros.mailbox.RequestBoard`; ``faults``: :class:`gazebo_ros.faults.Faults`.
+        ``deliveries()`` -> how many messages have come in on each topic that something in this world listens to.
         """
         #: Called once per turn of the loop, also while paused; before each physics step; after each tick; after time
         #: went back to zero.
@@ -58,7 +67,9 @@ class Simulation:
         self.paused = paused
         self.plugins = []
         self.tick = 0
+        self._working, self._failed = [], []  # of the plugins
         self._log = log
+        self._faults = faults
         self._deliveries = deliveries
         self._clock = clock
         self._step_s = world.time_step_s
@@ -102,7 +113,7 @@ class Simulation:
         board = self.board
         while not stop():
             board.run_pending()
-            self.on_turn()
+            self._faults.guarded("between two ticks", self.on_turn)
             if self._advance is not None:
                 self._advance_turn()
             elif self.paused:
@@ -117,21 +128,23 @@ class Simulation:
     def do_tick(self):
         """One tick."""
         time_s, step_s = self.time_s, self._step_s
-        for hosted in self.plugins:
+        for hosted in self._working:
             try:
                 hosted.plugin.update(time_s, step_s)
-            except Exception:  # noqa: BLE001  (a plugin is anybody's code; the world goes on without it)
-                self._disable(hosted, "update")
-        self.before_step()
+            except SURVIVED as error:  # a plugin is anybody's code
+                self._has_raised(hosted, "update", error)
+        self._faults.guarded("before a step", self.before_step)
         self.world.step()
         self.tick += 1
         time_s = self.time_s
-        for hosted in self.plugins:
+        for hosted in self._working:
             try:
                 hosted.plugin.publish(time_s)
-            except Exception:  # noqa: BLE001
-                self._disable(hosted, "publish")
-        self.on_tick()
+            except SURVIVED as error:
+                self._has_raised(hosted, "publish", error)
+        if self._failed:
+            self._wait_for_revival(time_s)
+        self._faults.guarded("after a tick", self.on_tick)
 
     def start_advance(self, ticks, topics, timeout_s):
         """Advance the paused world by ``ticks`` once each of ``topics`` has delivered since the last advance.
@@ -154,32 +167,36 @@ class Simulation:
         return self._advance.future
 
     def reset(self, time_too):
-        """Put every model back to its start, and with ``time_too`` the time back to zero."""
+        """Put every model back to its start, and with ``time_too`` the time back to zero. Revives failed plugins."""
         self.world.reset_models()
         if time_too:
             self.world.reset_time()
             self.tick = 0
         for hosted in list(self.plugins):
+            hosted.failed_at = []
+            if hosted.has_failed:
+                self._revive(hosted, "a reset")
+        for hosted in self._working:
             try:
                 hosted.plugin.reset()
-            except Exception:  # noqa: BLE001
-                self._disable(hosted, "reset")
+            except SURVIVED as error:
+                self._has_raised(hosted, "reset", error)
         if time_too:
             self.on_time_reset()
         self._pacer.restart()
 
     def joints_were_set(self, model_name):
         """Tell the model's plugins that its joints were put elsewhere."""
-        for hosted in [hosted for hosted in self.plugins if hosted.model_name == model_name]:
+        for hosted in [hosted for hosted in self._working if hosted.model_name == model_name]:
             try:
                 hosted.plugin.joints_set()
-            except Exception:  # noqa: BLE001
-                self._disable(hosted, "joints_set")
+            except SURVIVED as error:
+                self._has_raised(hosted, "joints_set", error)
 
     def host(self, hosted):
         """Run this plugin from the next tick on."""
-        # A new list each time: the loop may be walking over the old one.
         self.plugins = [*self.plugins, hosted]
+        self._sort()
 
     def unhost(self, model_name=None):
         """Close the plugins of one model, or of all."""
@@ -215,17 +232,69 @@ class Simulation:
         self._delivered_before = self._deliveries()
         advance.future.set_result((self.tick, self.time_ns))
 
-    def _disable(self, hosted, where):
-        self._log.error("model plugin %s of model %s failed in %s() and is left out from now on; the world goes on.\n%s"
-                        % (hosted.label, hosted.model_name, where, traceback.format_exc()))
-        self._close(hosted)
+    def _sort(self):
+        # New lists each time: the loop may be walking over the old ones.
+        self._working = [hosted for hosted in self.plugins if not hosted.has_failed]
+        self._failed = [hosted for hosted in self.plugins if hosted.has_failed]
+
+    def _has_raised(self, hosted, where, error):
+        """A plugin has raised: begin it anew, or give it up for now where that has not helped."""
+        hosted.failures += 1
+        hosted.last_error = "%s() raised %s" % (where, described(error))
+        now = self.time_s
+        hosted.failed_at = [then for then in hosted.failed_at if now - FAILURES_WITHIN_S < then <= now] + [now]
+        who = _names(hosted)
+        if len(hosted.failed_at) >= FAILURES:
+            self._give_up(hosted, "%s has failed %d times within %g s" % (who, FAILURES, FAILURES_WITHIN_S))
+            return
+        self._log.error("%s: %s; it begins anew from where the model is now.\n%s"
+                        % (who, hosted.last_error, _trace(error)))
+        self._begin_anew(hosted)
+
+    def _begin_anew(self, hosted):
+        hosted.context.begin_anew()
+        try:
+            hosted.plugin = hosted.plugin.restarted()
+        except SURVIVED as error:
+            hosted.last_error = "beginning anew raised %s" % described(error)
+            self._give_up(hosted, "%s cannot begin anew" % _names(hosted))
+            return
+        hosted.context.end_anew()
+        hosted.has_failed = False
+        self._sort()
+
+    def _give_up(self, hosted, why):
+        hosted.has_failed = True
+        self._faults.guarded("%s, stopping its joints" % _names(hosted), hosted.plugin.hold)
+        self._sort()
+        self._log.error("%s and is stopped; the world goes on. A reset revives it: rosservice call /gazebo/reset_world "
+                        "{}. The last error: %s" % (why, hosted.last_error))
+
+    def _wait_for_revival(self, time_s):
+        for hosted in self._failed:
+            if self._faults.guarded("%s, failed" % _names(hosted), hosted.plugin.while_failed, time_s):
+                self._revive(hosted, "a request")
+
+    def _revive(self, hosted, by):
+        hosted.failed_at = []
+        self._begin_anew(hosted)
+        if not hosted.has_failed:
+            self._log.info("%s is revived by %s" % (_names(hosted), by))
 
     def _close(self, hosted):
         self.plugins = [other for other in self.plugins if other is not hosted]
+        self._sort()
         try:
             hosted.plugin.close()
-        except Exception:  # noqa: BLE001
-            self._log.error("model plugin %s of model %s failed in close():\n%s"
-                            % (hosted.label, hosted.model_name, traceback.format_exc()))
+        except SURVIVED as error:
+            self._log.error("%s failed in close():\n%s" % (_names(hosted), _trace(error)))
         with contextlib.suppress(Exception):
             hosted.context.close()
+
+
+def _names(hosted):
+    return "model plugin %s of model %s" % (hosted.label, hosted.model_name)
+
+
+def _trace(error):
+    return "".join(traceback.format_exception(error)).rstrip()

@@ -14,6 +14,7 @@ from lxml import etree
 from bullet_sim import BulletSimError, MeshFiles, Pose, with_stand_ins
 from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
+from gazebo_ros.faults import SURVIVED, described
 from gazebo_ros.model_plugin import PluginContext, PluginError
 from gazebo_ros.shared_picture import PictureWriter
 from gazebo_ros.simulation import HostedPlugin
@@ -144,7 +145,7 @@ class Spawner:
         except (PluginError, BulletSimError) as error:
             self._remove(prepared.name)
             raise SpawnRefused(str(error)) from error
-        except Exception:
+        except SURVIVED:
             self._remove(prepared.name)
             raise
         self._on_change()
@@ -157,8 +158,9 @@ class Spawner:
             try:
                 prepared = self.prepare_robot(found.name, "", found.robot, "", dict)
                 self.spawn(prepared, Pose.from_matrix(found.pose))
-            except SpawnRefused as error:
-                self._log.error("model '%s' of the world file: %s" % (found.name, error))
+            except SURVIVED as error:
+                why = str(error) if isinstance(error, SpawnRefused) else described(error)
+                self._log.error("model '%s' of the world file: %s" % (found.name, why))
 
     def delete(self, name):
         """Loop thread: remove a model and its plugins. Raises ``BulletSimError`` when there is none of that name."""
@@ -204,7 +206,7 @@ class Spawner:
                 raise
             self._leave_out(model_name, error)
             return
-        except Exception:
+        except SURVIVED:
             context.close()
             raise
         simulation.host(HostedPlugin(plugin, context, model_name, label))

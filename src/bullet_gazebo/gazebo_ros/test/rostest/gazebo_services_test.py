@@ -11,6 +11,7 @@ import dynamic_reconfigure.client
 import rospy
 import rostest
 from bullet_sim_msgs.srv import AdvanceTicks
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from gazebo_msgs.msg import ModelState, ModelStates, PerformanceMetrics
 from gazebo_msgs.srv import (
     DeleteModel,
@@ -279,15 +280,47 @@ class GazeboServices(unittest.TestCase):
                                check=False)
         self.assertEqual(wrong.returncode, 1)
 
-    def test_a_plugin_that_breaks_leaves_the_world_running(self):
+    def test_a_plugin_that_breaks_begins_anew_and_a_reset_revives_it(self):
         self.spawn_ok("arm", ARM % "", namespace="/arm")
         publisher = rospy.Publisher("/arm/break", String, queue_size=1)
         wait_until(lambda: publisher.get_num_connections() > 0, "a connection to /arm/break")
-        publisher.publish("now")
-        wait_until(lambda: "/arm/joint_states" not in dict(rospy.get_published_topics("/arm")),
-                   "the plugin to be closed")
-        before = self.get_world_properties().sim_time
-        wait_until(lambda: self.get_world_properties().sim_time > before, "time to go on")
+
+        def told(diagnostics):
+            """Of the plugin: (level, failures)."""
+            return [(status.level, pair.value) for message in diagnostics.messages[-1:] for status in message.status
+                    for pair in status.values if "of arm" in status.name and pair.key == "failures"]
+
+        with Listener("/diagnostics", DiagnosticArray) as diagnostics, Listener("/arm/joint_states",
+                                                                                JointState) as states:
+            states.wait(3)
+            level, count = DiagnosticStatus.OK, 0
+            # Three within 10 s of simulated time; on a busy machine more may be needed.
+            while level != DiagnosticStatus.ERROR and count < 20:
+                count += 1
+                publisher.publish("now")
+                wait_until(lambda count=count: told(diagnostics) and told(diagnostics)[0][1] == str(count),
+                           "failure %d on /diagnostics" % count)
+                level = told(diagnostics)[0][0]
+                if level == DiagnosticStatus.WARN:
+                    heard = len(states.messages)
+                    wait_until(lambda heard=heard: len(states.messages) > heard, "the plugin to go on")
+            self.assertEqual(level, DiagnosticStatus.ERROR)
+            self.assertGreaterEqual(count, 3)
+            self.assertEqual(publisher.get_num_connections(), 1)
+            before = self.get_world_properties().sim_time
+            wait_until(lambda: self.get_world_properties().sim_time > before, "time to go on")
+            states.messages.clear()
+            self.reset_world()
+            states.wait(3)
+            self.assertTrue(rospy.ServiceProxy("/arm/where", Trigger)().success)
+        self.assertTrue(self.delete_model("arm").success)
+
+    def test_a_service_whose_handler_breaks_answers_with_an_error(self):
+        self.spawn_ok("arm", ARM % "", namespace="/arm")
+        with self.assertRaisesRegex(rospy.ServiceException, "/arm/fail failed: RecursionError"):
+            rospy.ServiceProxy("/arm/fail", Trigger)()
+        with Listener("/arm/joint_states", JointState) as states:
+            states.wait(3)
         self.assertTrue(self.delete_model("arm").success)
 
     def test_topics_of_a_deleted_model_are_gone_and_come_back(self):

@@ -28,6 +28,7 @@ class ProbePlugin(ModelPlugin):
         self._sent_first = False
         self._target_box = context.mailbox("target", Float64)
         self._break = context.queue("break", String, depth=1)
+        context.service("fail", Trigger, _fail)
         context.service("where", Trigger, lambda _: TriggerResponse(True, repr(self._model.read_joints()[0].tolist())))
 
     def update(self, time_s, dt):
@@ -51,3 +52,7 @@ class ProbePlugin(ModelPlugin):
             if not self._sent_first:
                 self._first.publish(message)
                 self._sent_first = True
+
+
+def _fail(request):
+    raise RecursionError("broken on purpose")

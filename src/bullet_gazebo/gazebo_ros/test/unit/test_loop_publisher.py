@@ -259,3 +259,22 @@ def test_close_gives_the_registration_back_once(hub, impl):
     publisher.publish(FakeMessage(b"x"))
     hub.service()
     assert released == [1] and not publisher.has_listeners
+
+
+def test_two_publishers_of_one_topic_do_not_write_into_each_others_messages():
+    impl, hub = FakeImpl(), PublisherHub()
+    first, second = (LoopPublisher(hub, "/topic", FakeMessage) for _ in range(2))
+    for publisher in (first, second):
+        publisher.attach(impl)
+    transport = impl.connect()
+    hub.service()
+    large = b"a" * 3_000_000  # more than the sockets take at once
+    first.publish(FakeMessage(large))
+    second.publish(FakeMessage(b"b" * 100))
+    got = []
+    while len(got) < 1:
+        got += transport.received()
+        hub.service()
+    second.publish(FakeMessage(b"c" * 100))
+    got += transport.received()
+    assert got == [large, b"c" * 100]

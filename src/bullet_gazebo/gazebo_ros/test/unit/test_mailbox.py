@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Commands and requests on their way into the loop."""
+import sys
 import threading
 import time
 from types import SimpleNamespace
@@ -64,6 +65,34 @@ def test_a_queue_without_room_is_refused():
         Queue(0)
 
 
+def test_a_message_that_cannot_be_digested_is_dropped_and_the_next_one_counts():
+    faults, got = [], []
+
+    def take(message):
+        if message == "bad":
+            raise RecursionError("too deep")
+        if message == "worse":
+            raise SystemExit(1)
+        got.append(message)
+
+    queue = Queue(5, on_fault=faults.append)
+    for message in ("first", "bad", "worse", "last"):
+        queue.put(message)
+    queue.handle(take)
+    assert got == ["first", "last"] and [type(fault) for fault in faults] == [RecursionError, SystemExit]
+    box = Mailbox(on_fault=faults.append)
+    box.handle(take)
+    for message in ("bad", "newest"):
+        box.put(message)
+        box.handle(take)
+    assert got == ["first", "last", "newest"] and len(faults) == 3
+    # Who does not say what becomes of faults gets them.
+    box = Mailbox()
+    box.put("bad")
+    with pytest.raises(RecursionError):
+        box.handle(take)
+
+
 @pytest.fixture
 def board():
     board = RequestBoard()
@@ -102,6 +131,12 @@ def test_an_error_goes_to_the_caller_and_not_into_the_loop(board):
     thread, results = in_thread(lambda: board.call(lambda: 1 / 0))
     serve(board, lambda: not thread.is_alive())
     assert isinstance(results[0], ZeroDivisionError)
+
+
+def test_a_request_that_exits_is_an_error_of_that_request(board):
+    thread, results = in_thread(lambda: board.call(lambda: sys.exit(3)))
+    serve(board, lambda: not thread.is_alive())
+    assert isinstance(results[0], RuntimeError) and "sys.exit(3)" in str(results[0])
 
 
 def test_each_of_many_callers_gets_the_own_answer(board):

@@ -14,8 +14,11 @@ from rospy.impl.tcpros_base import TCPROSTransport
 from rospy.impl.tcpros_pubsub import TCPROSSub, robust_connect_subscriber
 from std_msgs.msg import String
 
+from gazebo_ros.faults import Faults
 from gazebo_ros.loop_publisher import PublisherHub
 from gazebo_ros.loop_subscriber import InletHub
+from gazebo_ros.mailbox import RequestBoard
+from gazebo_ros.model_plugin import PluginContext
 from gazebo_ros.ros_objects import RosObjects, _read_in_loop
 from lab_testing.waiting import wait_until
 
@@ -54,8 +57,8 @@ def scene(request):
     impl = SimpleNamespace(data_class=String, resolved_name="/chatter", closed=False, connections=[],
                            receive_callback=lambda messages, _: got.extend(messages))
     impl.add_connection = lambda connection: impl.connections.append(connection) or True
-    log = SimpleNamespace(error=errors.append, error_throttle=lambda period_s, text: errors.append(text))
-    _read_in_loop(impl, hub, log)
+    log = SimpleNamespace(error=errors.append)
+    _read_in_loop(impl, hub, log, Faults(log))
     connection = Connection()
     connection.read_buff.write(getattr(request, "param", b""))
     assert impl.add_connection(connection)
@@ -106,7 +109,7 @@ def test_a_message_that_cannot_be_read_is_told_and_the_next_one_counts(scene):
     scene.serve_until(lambda: scene.got, "the message after it")
     assert [message.data for message in scene.got] == ["and on"]
     error, = scene.errors
-    assert "/chatter: a message from /somebody cannot be read" in error
+    assert "/chatter: " in error and "a message from /somebody cannot be read" in error
 
 
 def test_the_connection_is_closed_when_the_publisher_goes(scene):
@@ -129,7 +132,7 @@ def test_a_connection_that_rospy_gave_up_halfway_does_not_keep_the_publisher_wai
     listening.settimeout(10.0)
     transport = TCPROSTransport(TCPROSSub("/chatter", String), "/chatter")
     impl = SimpleNamespace(add_connection=lambda _: True)
-    _read_in_loop(impl, InletHub(), None)
+    _read_in_loop(impl, InletHub(), None, None)
     impl.add_connection(transport)
     # What connect() asks for just before it has a socket.
     monkeypatch.setattr("rospy.impl.tcpros_base._is_use_tcp_keepalive", lambda close=transport.close: close())
@@ -150,7 +153,7 @@ def test_a_connection_that_is_gone_before_it_was_read_is_closed():
     hub, connection = InletHub(), Connection()
     connection.socket.close()
     impl = SimpleNamespace(add_connection=lambda _: True)
-    _read_in_loop(impl, hub, None)
+    _read_in_loop(impl, hub, None, None)
     impl.add_connection(connection)
     connection.receive_loop(None)
     assert connection.closed.is_set()
@@ -182,7 +185,8 @@ def registrations(monkeypatch):
 @pytest.fixture
 def objects():
     errors = []
-    yield RosObjects(PublisherHub(), InletHub(), None, SimpleNamespace(error=errors.append))
+    log = SimpleNamespace(error=errors.append)
+    yield RosObjects(PublisherHub(), InletHub(), RequestBoard(), log, Faults(log))
     assert not errors
 
 
@@ -224,3 +228,98 @@ def test_deliveries_never_become_less(objects, registrations):
     objects.mailbox("/commands", String).put(String("go"))
     assert objects.deliveries() == {"/commands": 4}
     assert objects.flush() and registrations.open == ["/commands"]
+
+
+@pytest.fixture
+def scene_of_faults():
+    errors = []
+    log = SimpleNamespace(error=errors.append)
+    board = RequestBoard()
+    yield SimpleNamespace(ros=RosObjects(PublisherHub(), InletHub(), board, log, Faults(log)), board=board,
+                          errors=errors)
+    board.close()
+
+
+@pytest.fixture
+def services(monkeypatch):
+    """{name: what rospy would call with a request}"""
+    found = {}
+    monkeypatch.setattr(rospy, "Service", lambda name, srv_class, handler: found.update({name: handler}) or
+                        SimpleNamespace(shutdown=lambda reason: found.pop(name)))
+    return found
+
+
+@pytest.mark.parametrize("kind", ["service", "service_in_thread"])
+@pytest.mark.parametrize("error", [KeyError("x"), RecursionError("too deep"), SystemExit(2)])
+def test_a_handler_that_fails_is_an_error_to_the_one_who_asked_and_counted(scene_of_faults, services, kind, error):
+    def fail(request):
+        raise error
+
+    ros = scene_of_faults.ros
+    getattr(ros, kind)("/break", None, fail)
+    assert ros.flush()
+    answers = []
+
+    def ask():
+        try:
+            services["/break"](None)
+        except Exception as answer:  # noqa: BLE001
+            answers.append(answer)
+
+    client = threading.Thread(target=ask)
+    client.start()
+    wait_until(lambda: (scene_of_faults.board.run_pending(), answers)[1], "the answer", 10.0)
+    client.join()
+    assert isinstance(answers[0], rospy.ServiceException) and "/break failed" in str(answers[0])
+    assert ros.faults.places["/break"].count == 1 and "/break" in scene_of_faults.errors[0]
+
+
+def test_a_message_that_a_handler_cannot_digest_is_counted_under_its_topic(scene_of_faults, registrations):
+    def fail(message):
+        raise ValueError(message.data)
+
+    ros = scene_of_faults.ros
+    for box in (ros.mailbox("/one", String), ros.queue("/many", String, depth=3)):
+        for text in ("a", "b"):
+            box.put(String(text))
+        box.handle(fail)
+    assert {place: fault.count for place, fault in ros.faults.places.items()} == {"/one": 1, "/many": 2}
+    assert ros.flush()
+
+
+def test_a_plugin_that_begins_anew_keeps_its_topics_and_services(scene_of_faults, registrations, services):
+    ros = scene_of_faults.ros
+    context = PluginContext(None, None, None, None, "/robot", "", None, ros, {}, add_screen=lambda *_: object())
+
+    def open_all(answer):
+        return (context.publisher("out", String), context.publisher("other", String, latch=True),
+                context.mailbox("in", String), context.queue("many", String, depth=3),
+                context.queue("many", String, depth=3), context.screen("glass", [[1.0]], (1.0, 2.0), (3, 4)),
+                context.service("ask", None, lambda request: answer))
+
+    first = open_all("old")
+    gone = context.publisher("gone", String)
+    context.begin_anew()
+    second = open_all("new")
+    context.publisher("more", String)
+    context.end_anew()
+    assert all(one is other for one, other in zip(first, second, strict=True)) and gone.is_closed
+    assert ros.flush()
+    assert sorted(registrations.open) == sorted(
+        "/robot/" + name for name in ("in", "many", "many", "more", "other", "out"))
+    second[3].put(String("x"))
+    assert context.mail() == [second[3]]
+    answers = []
+    client = threading.Thread(target=lambda: answers.append(services["/robot/ask"](None)))
+    client.start()
+    wait_until(lambda: (scene_of_faults.board.run_pending(), answers)[1], "the answer", 10.0)
+    client.join()
+    assert answers == ["new"]
+    # A beginning that got halfway loses nothing either.
+    context.begin_anew()
+    context.publisher("out", String)
+    context.begin_anew()
+    assert open_all("newest")[0] is first[0]
+    context.end_anew()
+    context.close()
+    assert ros.flush() and registrations.open == [] and services == {}

@@ -5,6 +5,7 @@ import time
 
 import pytest
 
+from gazebo_ros.faults import Faults
 from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros.simulation import AdvanceRefused, HostedPlugin, Simulation
@@ -30,14 +31,26 @@ class FakeWorld:
 
 class FakeLog:
     def __init__(self):
-        self.errors = []
+        self.errors, self.infos = [], []
 
     def error(self, text):
         self.errors.append(text)
 
+    def info(self, text):
+        self.infos.append(text)
+
 
 class FakeContext:
     closed = False
+
+    def __init__(self):
+        self.calls = []
+
+    def begin_anew(self):
+        self.calls.append("begin_anew")
+
+    def end_anew(self):
+        self.calls.append("end_anew")
 
     def close(self):
         self.closed = True
@@ -46,15 +59,16 @@ class FakeContext:
 class Recorder(ModelPlugin):
     """Writes down what is called."""
 
-    def __init__(self, fails_in=None):
+    def __init__(self, fails_in=None, error=RuntimeError, restart_fails=False):
         super().__init__(None)
         self.calls = []
-        self._fails_in = fails_in
+        self.fails_in, self.error, self.restart_fails = fails_in, error, restart_fails
+        self.wants_revival = False
 
     def _note(self, *call):
         self.calls.append(call)
-        if call[0] == self._fails_in:
-            raise RuntimeError("broken on purpose")
+        if call[0] == self.fails_in:
+            raise self.error("broken on purpose")
 
     def update(self, time_s, dt):
         self._note("update", time_s, dt)
@@ -71,6 +85,22 @@ class Recorder(ModelPlugin):
     def close(self):
         self._note("close")
 
+    def hold(self):
+        self._note("hold")
+
+    def restarted(self):
+        self._note("restarted")
+        if self.restart_fails:
+            raise RuntimeError("cannot begin")
+        return self
+
+    def while_failed(self, time_s):
+        self._note("while_failed", time_s)
+        return self.wants_revival
+
+    def named(self, what):
+        return [call for call in self.calls if call[0] == what]
+
 
 @pytest.fixture
 def log():
@@ -84,7 +114,7 @@ def counts():
 
 @pytest.fixture
 def simulation(log, counts):
-    return Simulation(FakeWorld(), RequestBoard(), log, paused=True, deliveries=lambda: dict(counts))
+    return Simulation(FakeWorld(), RequestBoard(), log, Faults(log), paused=True, deliveries=lambda: dict(counts))
 
 
 @pytest.fixture
@@ -122,16 +152,110 @@ def test_time_is_exact_after_days(simulation):
     assert simulation.time_ns == 259200 * 10**9 + 2_000_000
 
 
-@pytest.mark.parametrize("where", ["update", "publish"])
-def test_a_failing_plugin_is_reported_once_and_left_out(simulation, log, where):
-    bad, good = host(simulation, fails_in=where), host(simulation)
+CALLS = {"update": Simulation.do_tick, "publish": Simulation.do_tick,
+         "reset": lambda simulation: simulation.reset(time_too=False),
+         "joints_set": lambda simulation: simulation.joints_were_set("model")}
+
+
+@pytest.mark.parametrize("error", [RuntimeError, RecursionError, SystemExit, MemoryError])
+@pytest.mark.parametrize("where", CALLS)
+def test_a_plugin_that_raises_once_begins_anew(simulation, log, where, error):
+    bad, good = host(simulation, fails_in=where, error=error), host(simulation)
+    CALLS[where](simulation)
+    line, = log.errors
+    assert "libtest.so" in line and where + "()" in line and "broken on purpose" in line and error.__name__ in line
+    assert len(bad.plugin.named("restarted")) == 1 and not bad.plugin.named("hold")
+    assert bad.context.calls == ["begin_anew", "end_anew"] and not bad.context.closed
+    bad.plugin.fails_in = None
+    before = len(bad.plugin.named("update"))
+    simulation.do_tick()
+    assert len(bad.plugin.named("update")) == before + 1 and (bad.has_failed, bad.failures) == (False, 1)
+    assert good.plugin.named("update") and not good.plugin.named("restarted")
+    assert len(log.errors) == 1
+
+
+def test_at_the_third_failure_within_ten_seconds_a_plugin_counts_as_failed_until_a_reset(simulation, log):
+    bad, good = host(simulation, fails_in="update"), host(simulation)
+    for _ in range(5):
+        simulation.do_tick()
+    assert bad.has_failed and bad.failures == 3
+    assert len(bad.plugin.named("update")) == 3 and len(bad.plugin.named("publish")) == 2
+    assert bad.plugin.named("while_failed") == [("while_failed", time_s) for time_s in (0.006, 0.008, 0.01)]
+    assert len(bad.plugin.named("hold")) == 1
+    assert len(log.errors) == 3 and "reset_world" in log.errors[-1] and "broken on purpose" in log.errors[-1]
+    assert len(good.plugin.named("update")) == 5 and simulation.world.steps == 5
+    simulation.joints_were_set("model")
+    assert not bad.plugin.named("joints_set")
+
+    bad.plugin.fails_in = None
+    simulation.reset(time_too=False)
+    assert not bad.has_failed and bad.plugin.calls[-2:] == [("restarted",), ("reset",)]
+    simulation.do_tick()
+    assert bad.plugin.calls[-2][0] == "update" and bad.plugin.calls[-1][0] == "publish"
+    assert "revived by a reset" in log.infos[-1]
+
+
+def test_failures_that_are_ten_seconds_apart_are_each_the_first(simulation):
+    bad = host(simulation)
+    for _ in range(6):
+        bad.plugin.fails_in = "update"
+        simulation.do_tick()
+        bad.plugin.fails_in = None
+        simulation.tick += 2600
+    assert not bad.has_failed and bad.failures == 6
+
+
+def test_failures_before_time_went_back_do_not_count(simulation):
+    bad = host(simulation, fails_in="update")
+    simulation.do_tick()
+    simulation.do_tick()
+    simulation.reset(time_too=True)
+    simulation.do_tick()
+    assert not bad.has_failed and bad.failures == 3
+
+
+def test_a_failed_plugin_can_ask_to_be_revived(simulation, log):
+    bad = host(simulation, fails_in="publish")
+    for _ in range(4):
+        simulation.do_tick()
+    assert bad.has_failed
+    bad.plugin.fails_in, bad.plugin.wants_revival = None, True
+    simulation.do_tick()
+    assert not bad.has_failed and "revived by a request" in log.infos[-1]
+    simulation.do_tick()
+    assert bad.plugin.calls[-1][0] == "publish"
+
+
+def test_a_plugin_that_cannot_begin_anew_counts_as_failed_at_once(simulation, log):
+    bad = host(simulation, fails_in="update", restart_fails=True)
+    simulation.do_tick()
+    assert bad.has_failed and "cannot begin" in log.errors[-1]
+    bad.plugin.fails_in, bad.plugin.restart_fails = "while_failed", False
+    simulation.do_tick()  # what it raises now is only counted
+    bad.plugin.fails_in = None
+    simulation.reset(time_too=True)
+    assert not bad.has_failed
+
+
+@pytest.mark.parametrize("name", ["on_turn", "before_step", "on_tick"])
+def test_what_hangs_on_the_loop_may_raise(running, log, name):
+    def fail():
+        raise RuntimeError("broken on purpose")
+
+    running.board.call(setattr, running, name, fail)
+    running.paused = False
+    wait_until(lambda: running.tick > 20 and log.errors, "the world to go on")
+    assert "broken on purpose" in log.errors[0] and len(log.errors) == 1
+
+
+def test_a_model_that_is_deleted_takes_its_failed_plugin_along(simulation):
+    bad = host(simulation, fails_in="update")
     for _ in range(3):
         simulation.do_tick()
-    assert len(log.errors) == 1
-    assert "libtest.so" in log.errors[0] and where in log.errors[0] and "broken on purpose" in log.errors[0]
-    assert [call[0] for call in bad.plugin.calls].count(where) == 1
-    assert bad.context.closed and bad.plugin.calls[-1] == ("close",)
-    assert len(good.plugin.calls) == 6 and simulation.world.steps == 3
+    bad.plugin.fails_in = None
+    simulation.unhost("model")
+    simulation.do_tick()
+    assert bad.context.closed and simulation.plugins == [] and len(bad.plugin.named("while_failed")) == 1
 
 
 def test_reset_keeps_the_time_unless_asked(simulation):

@@ -19,6 +19,7 @@ from controller_manager import EFFORT, POSITION, ControllerTable
 from controller_manager.manager import ControllerManager
 from controller_manager.services import ControllerManagerServices
 from controller_manager.testing import FakeHardware
+from gazebo_ros.faults import Faults
 from gazebo_ros.loop_log import LoopLog
 from gazebo_ros.loop_publisher import PublisherHub
 from gazebo_ros.loop_subscriber import InletHub
@@ -57,7 +58,7 @@ def main():
     robot = parse_urdf(text, source="robot_description")
     log = LoopLog({"info": rospy.loginfo, "warn": rospy.logwarn, "error": rospy.logerr})
     hub, inlets, board = PublisherHub(), InletHub(), RequestBoard()
-    ros = RosObjects(hub, inlets, board, log)
+    ros = RosObjects(hub, inlets, board, log, Faults(log))
     context = PluginContext(None, None, robot, None, "/robot", text, log, ros, {})
     pushed = rospy.get_param("/robot/effort_joints", [])
     hardware = FakeHardware({joint.name: (EFFORT if joint.name in pushed else POSITION,)

@@ -150,6 +150,12 @@ class Arms:
         self._stream_stamp[:] = self._feed_forward_stamp[:] = -np.inf
         self._refresh_speed()
 
+    def take_over(self, position, velocity):
+        """Forget every command, and have set-points where the joints are and as fast as they move; (n,) measured."""
+        self.reset(position)
+        self._follow_joint(np.ones(len(self._mode), dtype=bool), position, velocity)
+        self._is_settled = False
+
     @property
     def sides(self):
         return tuple(self._limbs)

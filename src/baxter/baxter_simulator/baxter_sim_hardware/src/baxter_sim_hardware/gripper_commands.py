@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What every kind of gripper does with a command message: check it, echo it, hand it on."""
-import json
 import math
 
 from .errors import CommandRefused
+from .json_object import read_object
 from .robot import ENABLE_HINT
+
+#: A sender's name, which goes out with every state of the gripper, is no longer than this [characters].
+LONGEST_SENDER = 1000
 
 
 class Gripper:
@@ -32,18 +35,22 @@ class Gripper:
     def take(self, command, args, sender, sequence, enabled):
         """One command message.
 
-        args: JSON object or empty. sender, sequence: a client's own mark; with the same mark, commands of ONCE are one
-        command that is sent again, as the SDK does until it sees the effect. Raises CommandRefused for an unknown
-        command, for senseless arguments, and for what needs power while the robot is not enabled.
+        args: JSON object (see json_object) or empty. sender, sequence: a client's own mark; with the same mark,
+        commands of ONCE are one command that is sent again, as the SDK does until it sees the effect. Raises
+        CommandRefused for an unknown command, for senseless arguments, and for what needs power while the robot is not
+        enabled.
         """
         if command not in self.COMMANDS:
-            raise CommandRefused("unknown gripper command '%s'; choices are %s" % (command, ", ".join(self.COMMANDS)))
+            raise CommandRefused("unknown gripper command '%.100s'; choices are %s" % (
+                command, ", ".join(self.COMMANDS)))
+        if len(sender) > LONGEST_SENDER:
+            raise CommandRefused("sender has %d characters; it may have %d" % (len(sender), LONGEST_SENDER))
         method, needs_power = self.COMMANDS[command]
         is_repeated = sender and (command, sender, sequence) == (self.command, self.sender, self.sequence)
         self.command, self.sender, self.sequence = command, sender, sequence
         if is_repeated and command in self.ONCE:
             return
-        values = _parse(args)
+        values = read_object(args)
         if needs_power and not enabled:
             raise CommandRefused(ENABLE_HINT)
         getattr(self, method)(values)
@@ -69,13 +76,3 @@ class CustomGripper(Gripper):
 def is_number(value):
     """Whether a value from JSON is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _parse(args):
-    try:
-        values = json.loads(args) if args.strip() else {}
-    except ValueError as error:
-        raise CommandRefused("args are %r; they must be a JSON object (%s)" % (args, error)) from None
-    if not isinstance(values, dict):
-        raise CommandRefused("args are %r; they must be a JSON object" % args)
-    return values

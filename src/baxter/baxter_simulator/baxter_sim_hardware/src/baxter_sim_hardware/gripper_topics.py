@@ -28,6 +28,9 @@ _PROPERTIES = {
 _FLAGS = ("enabled", "calibrated", "ready", "moving", "gripping", "missed", "error", "reverse")
 _UNKNOWN = dict.fromkeys(_FLAGS, EndEffectorState.STATE_UNKNOWN)
 
+# Of all texts in what a client says of its tool, which the robot repeats a hundred times a second [characters].
+_LONGEST = 10000
+
 
 class GripperTopics:
     """makers and takers: as in PanelTopics. world, model: of bullet_sim; state: the robot's RobotState.
@@ -86,10 +89,12 @@ class GripperTopics:
 
     def _set_properties(self, side, msg, time_s):
         self._require_custom(side)
+        _require_short(msg)
         self._properties[side] = msg
 
     def _set_state(self, side, msg, time_s):
         self._require_custom(side)
+        _require_short(msg)
         self._told[side] = msg
 
     def _require_custom(self, side):
@@ -114,3 +119,10 @@ class GripperTopics:
         message.command, message.command_sender = gripper.command, gripper.sender
         message.command_sequence = gripper.sequence
         return message
+
+
+def _require_short(msg):
+    texts = [getattr(msg, name) for name in msg.__slots__]
+    length = sum(len(text) for text in texts if isinstance(text, str))
+    if length > _LONGEST:
+        raise CommandRefused("its texts have %d characters; all together may have %d" % (length, _LONGEST))

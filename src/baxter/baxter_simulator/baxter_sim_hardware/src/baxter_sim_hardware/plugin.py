@@ -7,6 +7,7 @@ import roslib.message
 from std_msgs.msg import Empty
 
 from baxter_sim_hardware import convert, endpoint, interface
+from baxter_sim_hardware.arms import BRAKES_EFFORT_FACTOR
 from baxter_sim_hardware.collision_topics import CollisionTopics
 from baxter_sim_hardware.errors import CommandRefused, HardwareError
 from baxter_sim_hardware.gripper_topics import GripperTopics
@@ -16,7 +17,7 @@ from baxter_sim_hardware.limbs import BASE_FRAME, finger_openings, limbs_of, tip
 from baxter_sim_hardware.panel_topics import PanelTopics
 from baxter_sim_hardware.procedure_topics import ProcedureTopics
 from baxter_sim_hardware.robot import Baxter
-from baxter_sim_hardware.robot_state import Event
+from baxter_sim_hardware.robot_state import Event, State
 from baxter_sim_hardware.schedule import Schedule
 from baxter_sim_hardware.screen_topics import ScreenTopics
 from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
@@ -42,16 +43,17 @@ class BaxterPlugin(ModelPlugin):
         # The pedestal stands on the floor and stays there.
         return {"static": True, "self_collision_pairs": self_collision_pairs(robot.links), "mesh_cuts": MESH_CUTS}
 
-    def __init__(self, context):
+    def __init__(self, context, before=None):
+        """``before``: the robot_state.State of the plugin that this one takes over from, if there is one."""
         super().__init__(context)
         self._model = context.model
         try:
-            self._build(context)
+            self._build(context, before)
         except HardwareError as error:
             raise PluginError("cannot be Baxter's brain for model '%s': %s" % (context.model.name, error)) from error
         self._open_topics(context)
 
-    def _build(self, context):
+    def _build(self, context, before):
         model, robot = context.model, context.robot
         model.call_directly()
         limbs = limbs_of(robot)
@@ -61,11 +63,12 @@ class BaxterPlugin(ModelPlugin):
         limits = JointLimits(names, model.lower[arm], model.upper[arm], model.max_velocity[arm], model.max_effort[arm])
         self._limb_index = {limb.side: model.index(limb.joint_names) for limb in limbs}
         self._chains = {limb.side: Chain.from_robot(robot, base=BASE_FRAME, tip=tip_of(limb.side)) for limb in limbs}
-        self._hold_other_joints(robot)
+        if before is None:
+            self._hold_other_joints(robot)
         self._dt = context.world.time_step_s
         self._baxter = Baxter(
             limbs, limits, model.read_joints()[0][arm], dt=self._dt,
-            profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"))
+            profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"), state=before)
         self._head = HeadTopics(model, self._baxter.state, self._dt)
         self._grippers = GripperTopics(context.world, model, self._baxter.state, self._dt)
         self._panel = PanelTopics(context, self._press_estop)
@@ -78,7 +81,9 @@ class BaxterPlugin(ModelPlugin):
         self._parts = (
             self._panel, self._head, self._grippers, self._collision, self._procedures, senses, ScreenTopics(context),
             StatusTopics(self._baxter, self._chains, self._read_arms, robot.links, context.urdf_xml, context.log))
-        if self._switch("enable", False):
+        if before is not None:
+            self._baxter.take_over(*self._read_arms())
+        elif self._switch("enable", False):
             self._apply(Event.ENABLE)
         self._alphabetical = np.argsort(model.joint_names)
         self._joint_state_messages = convert.JointStates([model.joint_names[i] for i in self._alphabetical])
@@ -87,6 +92,7 @@ class BaxterPlugin(ModelPlugin):
         self._gravity, self._gravity_ticks = None, 0  # what balances gravity (n,), and how long that holds
         self._servo = self._servo_index = None  # joints that were driven to a position last, and which those are
         self._last_warning = {}
+        self._has_started = before is not None
 
     def _hold_other_joints(self, robot):
         """Head straight, fingers open, and nothing left to dangle."""
@@ -140,7 +146,6 @@ class BaxterPlugin(ModelPlugin):
         self._outputs = list(groups.values())
         self._joint_state_schedule = groups[interface.JOINT_STATE_RATE][0]
         self._started = context.publisher(*started, latch=True)
-        self._has_started = False
         self._idle_since_s, self._idle_until_s = math.inf, -math.inf  # between these nothing is due to be published
 
     # -- the tick
@@ -183,7 +188,10 @@ class BaxterPlugin(ModelPlugin):
                 if publisher.has_listeners:
                     if snapshot is None:
                         snapshot = self._snapshot()
-                    publisher.publish(make(time_s, part, snapshot))
+                    try:
+                        publisher.publish(make(time_s, part, snapshot))
+                    except Exception as error:  # noqa: BLE001  (the robot goes on without one of its topics)
+                        self.context.survived("publishing %s" % publisher.topic, error)
         if not self._has_started:
             self._started.publish(Empty())
             self._has_started = True
@@ -205,6 +213,25 @@ class BaxterPlugin(ModelPlugin):
         jacobian = self._chains[side].jacobian(snapshot.position[index])
         return (snapshot.own_effort[index] - snapshot.effort[index],
                 endpoint.contact_wrench(jacobian, snapshot.effort[index], snapshot.own_effort[index]))
+
+    # -- when it has raised
+
+    def hold(self):
+        self._baxter.state.fail()
+        arm = self._arm_index
+        self._model.drive_position(arm, self._model.read_joints()[0][arm],
+                                   BRAKES_EFFORT_FACTOR * self._model.max_effort[arm])
+
+    def restarted(self):
+        before = self._baxter.state.state
+        return type(self)(self.context, State.DISABLED if before is State.FAILED else before)
+
+    def while_failed(self, time_s):
+        self._before = self._model.read_joints()
+        # What comes in now counts no more when the robot is back; but a reset is what it waits for.
+        keys = [self._letterboxes[queue][1] for queue in self.context.mail() if queue.drain()]
+        self._publish_due(time_s)
+        return "set_super_reset" in keys
 
     def joints_set(self):
         self._gravity_ticks = 0
@@ -242,12 +269,14 @@ class BaxterPlugin(ModelPlugin):
         letterboxes = self._letterboxes
         for queue in sorted(queues, key=lambda queue: letterboxes[queue][0]):
             _, key, part, take = letterboxes[queue]
-            for msg in queue.drain():
-                try:
-                    take(part, msg, time_s)
-                except CommandRefused as refusal:
-                    limb = "%s limb: " % part if part in SIDES else ""
-                    self._warn(time_s, (part, key), "%s%s refused: %s" % (limb, key, refusal))
+            queue.handle(lambda msg, key=key, part=part, take=take: self._take(take, key, part, msg, time_s))
+
+    def _take(self, take, key, part, msg, time_s):
+        try:
+            take(part, msg, time_s)
+        except CommandRefused as refusal:
+            limb = "%s limb: " % part if part in SIDES else ""
+            self._warn(time_s, (part, key), "%s%s refused: %s" % (limb, key, refusal))
 
     def _apply(self, event, time_s=0.0):
         position, velocity = self._read_arms()

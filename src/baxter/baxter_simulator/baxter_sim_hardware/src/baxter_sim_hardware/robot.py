@@ -12,18 +12,23 @@ class Baxter:
     """The robot's state and its arms, one tick at a time.
 
     limbs, limits, position, dt: as for `Arms`; profile: 'sim' or 'robot' (speed ratio at start);
-    disabled: what arms do without power, 'hold' or 'sink'.
+    disabled: what arms do without power, 'hold' or 'sink'; state: a robot_state.State to begin in.
     """
 
-    def __init__(self, limbs, limits, position, dt=0.002, profile="sim", disabled="hold"):
+    def __init__(self, limbs, limits, position, dt=0.002, profile="sim", disabled="hold", state=None):
         if profile not in SPEED_RATIO:
             raise HardwareError("profile is '%s'; choices are %s" % (profile, ", ".join(SPEED_RATIO)))
         if disabled not in DISABLED_BEHAVIOURS:
             raise HardwareError("disabled is '%s'; choices are %s" % (disabled, ", ".join(DISABLED_BEHAVIOURS)))
-        self.state = RobotState()
+        self.state = RobotState() if state is None else RobotState(state)
         self.arms = Arms(limbs, limits, position, speed_ratio=SPEED_RATIO[profile], dt=dt)
         self.arms.stop(position, 0.0 * position, brakes=True)
         self._sinks = disabled == "sink"
+
+    def take_over(self, position, velocity):
+        """Begin with arms that are moving, (n,) measured: forget every command, bring them to rest, and hold them."""
+        self.arms.take_over(position, velocity)
+        self.arms.stop(position, velocity, brakes=not self.state.enabled)
 
     def apply(self, event, position, velocity):
         """Take an enable, disable, stop, reset ... event; (n,) measured. Returns why it was turned down, or None."""

@@ -2,7 +2,8 @@
 """Enable, disable, stop and reset as one transition table.
 
 The wire fields of each state follow the physical robot: `ready` is true while enabled, a software stop shows an
-unknown button and an unknown source, a released emergency stop stays stopped until it is reset.
+unknown button and an unknown source, a released emergency stop stays stopped until it is reset, and a robot that
+failed is stopped with an error whose source is a fault.
 """
 from dataclasses import dataclass
 from enum import Enum, IntEnum
@@ -16,6 +17,7 @@ class State(Enum):
     STOPPED = "stopped by software"
     ESTOP_PRESSED = "emergency stop pressed"
     ESTOP_RELEASED = "emergency stop released, not yet reset"
+    FAILED = "failed"
 
 
 class Event(Enum):
@@ -66,6 +68,7 @@ ASSEMBLY = {
     State.STOPPED: Assembly(False, False, True, False, Button.UNKNOWN, Source.UNKNOWN),
     State.ESTOP_PRESSED: Assembly(False, False, True, False, Button.PRESSED, Source.USER),
     State.ESTOP_RELEASED: Assembly(False, False, True, False, Button.RELEASED, Source.USER),
+    State.FAILED: Assembly(False, False, True, True, Button.UNPRESSED, Source.FAULT),
 }
 
 # Every (state, event) pair has its row. Reset always ends disabled: the SDK's reset() waits for exactly that.
@@ -100,6 +103,12 @@ TRANSITIONS = {
     (State.ESTOP_RELEASED, Event.RESET): State.DISABLED,
     (State.ESTOP_RELEASED, Event.ESTOP_PRESS): State.ESTOP_PRESSED,
     (State.ESTOP_RELEASED, Event.ESTOP_RELEASE): State.ESTOP_RELEASED,
+    (State.FAILED, Event.ENABLE): State.FAILED,
+    (State.FAILED, Event.DISABLE): State.FAILED,
+    (State.FAILED, Event.STOP): State.FAILED,
+    (State.FAILED, Event.RESET): State.DISABLED,
+    (State.FAILED, Event.ESTOP_PRESS): State.FAILED,
+    (State.FAILED, Event.ESTOP_RELEASE): State.FAILED,
 }
 
 # What a person can do about a request that the table turned down.
@@ -109,6 +118,7 @@ REFUSALS = {
     (State.ESTOP_PRESSED, Event.RESET): "the emergency stop is pressed: release it, then reset",
     (State.ESTOP_RELEASED, Event.ENABLE): "the emergency stop was released but not reset: "
                                           "rosrun baxter_tools enable_robot.py -r",
+    (State.FAILED, Event.ENABLE): "the robot has failed: reset it first (rosrun baxter_tools enable_robot.py -r)",
 }
 
 
@@ -126,6 +136,10 @@ class RobotState:
     def assembly(self):
         """The AssemblyState fields that belong to the current state."""
         return ASSEMBLY[self.state]
+
+    def fail(self):
+        """The robot's own program cannot go on."""
+        self.state = State.FAILED
 
     def apply(self, event):
         """Take one event; return why it was turned down, or None when it was taken."""

@@ -14,6 +14,7 @@ import xacro
 from baxter_sim_hardware import JOINT_SUFFIXES, Poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
+from gazebo_ros.mailbox import Queue
 from gazebo_ros.resources import ResourceFinder
 from urdf_model import parse_urdf
 
@@ -23,20 +24,9 @@ NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINT_SUFFI
 TICK_S = 0.002
 
 
-class _Inbox:
-    def __init__(self):
-        self.messages = []
-
-    def drain(self):
-        if not self.messages:
-            return ()
-        messages, self.messages = self.messages, []
-        return messages
-
-
 class _Outbox:
     def __init__(self, lab, topic):
-        self._lab = lab
+        self._lab, self.topic = lab, topic
         # Of all but the pictures, which would fill the memory; tests of the screen listen themselves.
         self.has_listeners = topic != "sim/screen"
         self.messages = []  # (time_s, message)
@@ -83,6 +73,7 @@ class Lab:
         self.parameters = {"/baxter_sim_hardware/" + key: value for key, value in (parameters or {}).items()}
         self.log = _Log()
         self.inboxes, self.outboxes, self.services = {}, {}, {}
+        self.mailed, self.faults = [], []
         self.plugin = BaxterPlugin(self)
         self.effort_limit = self.model.max_effort[self.arm]
 
@@ -95,10 +86,22 @@ class Lab:
         return self.outboxes.setdefault(topic, _Outbox(self, topic))
 
     def queue(self, topic, msg_class, depth):
-        return self.inboxes.setdefault(topic, _Inbox())
+        if topic not in self.inboxes:
+            self.inboxes[topic] = Queue(depth, lambda: self.mailed.append(topic),
+                                        lambda error: self.survived(topic, error))
+        return self.inboxes[topic]
 
     def mail(self):
-        return [inbox for inbox in self.inboxes.values() if inbox.messages]
+        mailed, self.mailed = dict.fromkeys(self.mailed), []
+        return [self.inboxes[topic] for topic in mailed]
+
+    def survived(self, place, error):
+        self.faults.append((place, error))
+
+    def begin_anew(self):
+        pass
+
+    end_anew = begin_anew
 
     def service(self, name, srv_class, handler):
         self.services[name] = handler
@@ -110,7 +113,7 @@ class Lab:
     # -- what tests do with it
 
     def send(self, topic, message):
-        self.inboxes[topic].messages.append(message)
+        self.inboxes[topic].put(message)
 
     def enable(self, on=True):
         self.send("set_super_enable", Bool(on))

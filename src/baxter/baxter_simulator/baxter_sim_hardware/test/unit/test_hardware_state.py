@@ -39,9 +39,15 @@ released stop released -
 released reset disabled -
 released press pressed -
 released release released -
+failed enable failed refused
+failed disable failed -
+failed stop failed -
+failed reset disabled -
+failed press failed -
+failed release failed -
 """
 STATES = {"disabled": State.DISABLED, "enabled": State.ENABLED, "stopped": State.STOPPED,
-          "pressed": State.ESTOP_PRESSED, "released": State.ESTOP_RELEASED}
+          "pressed": State.ESTOP_PRESSED, "released": State.ESTOP_RELEASED, "failed": State.FAILED}
 EVENTS = {"enable": Event.ENABLE, "disable": Event.DISABLE, "stop": Event.STOP, "reset": Event.RESET,
           "press": Event.ESTOP_PRESS, "release": Event.ESTOP_RELEASE}
 
@@ -65,6 +71,7 @@ def test_every_pair_has_a_row():
     ("stopped", (False, False, True, False, 2, 2)),
     ("pressed", (False, False, True, False, 1, 1)),
     ("released", (False, False, True, False, 3, 1)),
+    ("failed", (False, False, True, True, 0, 3)),
 ])
 def test_wire_fields(name, fields):
     assembly = RobotState(STATES[name]).assembly

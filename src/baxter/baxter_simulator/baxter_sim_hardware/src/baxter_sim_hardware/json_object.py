@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""JSON objects that come in by message: read within limits, so that no text of anybody's costs more than an error.
+
+Python's own reader fails in its own ways on what JSON allows: brackets a thousand deep, integers of any length.
+"""
+import json
+import re
+
+from .errors import CommandRefused
+
+LONGEST = 10000  # characters of a text; the SDK's longest is about 100
+DEEPEST = 8  # objects and lists within each other; no command has more than one
+MOST_DIGITS = 18  # of an integer: what 64 bits hold
+LARGEST = 1e15  # magnitude of a number
+SHOWN = 100  # characters of a text that an error quotes
+
+# A string, whose end may be missing, or a bracket.
+_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"?|[][{}]', re.DOTALL)
+_BRACKETS = {"{": 1, "[": 1, "}": -1, "]": -1}
+
+
+def read_object(text):
+    """The JSON object in `text` as a dict, an empty one where there is nothing but white space.
+
+    NaN and Infinity are read, as Python writes them. Raises CommandRefused with what was found and what is allowed.
+    """
+    if not text.strip():
+        return {}
+    fault = _fault(text)
+    if fault:
+        raise CommandRefused("args are %s; %s" % (_quoted(text), fault))
+    try:
+        values = json.loads(text, parse_int=_integer, parse_float=_number)
+    except (ValueError, RecursionError) as error:
+        raise CommandRefused("args are %s; they must be a JSON object (%s)" % (_quoted(text), error)) from None
+    if not isinstance(values, dict):
+        raise CommandRefused("args are %s; they must be a JSON object" % _quoted(text))
+    return values
+
+
+def _fault(text):
+    if len(text) > LONGEST:
+        return "they have %d characters, and at most %d are read" % (len(text), LONGEST)
+    depth = 0
+    for token in _TOKEN.findall(text):
+        depth += _BRACKETS.get(token, 0)
+        if depth > DEEPEST:
+            return "they are nested deeper than %d, and one object is all that a command needs" % DEEPEST
+    return ""
+
+
+def _integer(digits):
+    if len(digits) > MOST_DIGITS + digits.startswith("-"):
+        raise ValueError("an integer of %d digits; at most %d are read" % (len(digits), MOST_DIGITS))
+    return _bounded(int(digits), digits)
+
+
+def _number(text):
+    return _bounded(float(text), text)
+
+
+def _bounded(value, text):
+    if not abs(value) <= LARGEST:
+        raise ValueError("the number %s; its magnitude may be up to %g" % (_quoted(text), LARGEST))
+    return value
+
+
+def _quoted(text):
+    return repr(text if len(text) <= SHOWN else text[:SHOWN] + " ...")

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What /gazebo says of itself on /diagnostics: messages and requests that it could not digest, plugins that failed."""
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from gazebo_ros.pacing import ticks_between
+
+RATE_HZ = 1.0
+#: What the names of the statuses begin with.
+PREFIX = "gazebo: "
+MESSAGES = PREFIX + "messages and requests"
+# In place of a status's hardware_id.
+_HARDWARE = "simulator"
+
+
+class Diagnostics:
+    """Call :meth:`on_tick` after each tick."""
+
+    def __init__(self, simulation, faults, ros):
+        """``faults``: :class:`gazebo_ros.faults.Faults`."""
+        self._simulation = simulation
+        self._faults = faults
+        self._divisor = ticks_between(RATE_HZ, 1.0 / simulation.step_s)
+        self._publisher = ros.publisher("/diagnostics", DiagnosticArray)
+
+    def on_tick(self):
+        """Publish what is due at this tick."""
+        simulation = self._simulation
+        if simulation.tick % self._divisor == 0 and self._publisher.has_listeners:
+            message = DiagnosticArray(status=self.statuses())
+            message.header.stamp = rospy.Time(*divmod(simulation.time_ns, 10**9))
+            self._publisher.publish(message)
+
+    def statuses(self):
+        """List of ``DiagnosticStatus``: one of all that was dropped, one of each plugin that has ever raised."""
+        return [self._dropped(), *(_status_of(hosted) for hosted in self._simulation.plugins if hosted.failures)]
+
+    def _dropped(self):
+        places = dict(self._faults.places)
+        total = sum(fault.count for fault in places.values())
+        if not total:
+            return DiagnosticStatus(DiagnosticStatus.OK, MESSAGES, "all understood", _HARDWARE, [])
+        return DiagnosticStatus(
+            DiagnosticStatus.WARN, MESSAGES, "%d could not be digested and were dropped" % total, _HARDWARE,
+            [KeyValue(place, "%d, the newest: %s" % (fault.count, fault.text)) for place, fault in places.items()])
+
+
+def _status_of(hosted):
+    name = "%splugin %s of %s" % (PREFIX, hosted.label, hosted.model_name)
+    values = [KeyValue("failures", str(hosted.failures)), KeyValue("newest", hosted.last_error)]
+    if hosted.has_failed:
+        return DiagnosticStatus(DiagnosticStatus.ERROR, name, "failed; a reset revives it", _HARDWARE, values)
+    return DiagnosticStatus(DiagnosticStatus.WARN, name, "works again, after %d failures" % hosted.failures, _HARDWARE,
+                            values)
