@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pybullet
 
-from urdf_model import Inertial
+from urdf_model import Inertial, bounds
 from urdf_model.transforms import inverse
 
-from .errors import BulletSimError
+from .errors import BulletSimError, within
 from .pose import Pose
 
 BASE = -1  # PyBullet's index of the root link
@@ -18,7 +18,10 @@ BASE = -1  # PyBullet's index of the root link
 class Body:
     """What ``Model`` is without its joints. SI units, radians, world coordinates."""
 
-    def __init__(self, client, name, robot, merged, body, root_offset, static, world):
+    #: For how many looks of ``StateWatch`` the base has stood still.
+    still_for = 0
+
+    def __init__(self, client, name, robot, merged, body, root_offset, static, world, self_collision=True):
         self.name = name
         self.robot = robot
         self.merged = merged
@@ -35,8 +38,12 @@ class Body:
         self._link_names = {index: link for link, index in self._link_index.items()}
         self._late_twist = None
         self._late_pushes = []
+        #: Whether the body was made so that some of its links can collide with each other.
+        self.self_collision = self_collision
         self._pairs = ()
-        self.set_self_collision_pairs(())
+        self._firm = set()  # indices of links that hold by friction without creeping
+        if self_collision:
+            self.set_self_collision_pairs(())
         self._weightless = {}  # body's name -> its mass
         for link in merged.links.values():
             if not link.gravity:
@@ -80,8 +87,9 @@ class Body:
         return self._twist(BASE, self._body_matrix(BASE)[:3, 3])
 
     def set_base_twist(self, linear, angular):
-        """Set the velocity of a free model's frame, in world axes [m/s, rad/s]."""
-        angular = np.asarray(angular, dtype=float)
+        """Set the velocity of a free model's frame, in world axes [m/s, rad/s]. Raises BulletSimError out of bounds."""
+        within(bounds.SPEED, linear, "the linear velocity")
+        angular = np.asarray(within(bounds.TURN_RATE, angular, "the angular velocity"), dtype=float)
         # The frame moves at `linear`; Bullet wants the velocity of the centre of mass.
         arm = self._body_matrix(BASE)[:3, :3] @ self._root_offset[:3, 3]
         at_centre = np.asarray(linear, dtype=float) + np.cross(angular, arm)
@@ -93,7 +101,10 @@ class Body:
         """Push a link during the next step: ``force`` [N] and ``torque`` [Nm] in world axes.
 
         The force acts at ``position`` (world, m), by default at the centre of mass of the link's body.
+        Raises BulletSimError out of bounds.
         """
+        within(bounds.FORCE, force, "the force on link '%s::%s'" % (self.name, link))
+        within(bounds.TORQUE, torque, "the torque on link '%s::%s'" % (self.name, link))
         push = (self._link_index[self._frame(link).link], force, torque, position)
         if not self.static:
             self._late_pushes.append(push)
@@ -142,6 +153,7 @@ class Body:
         """Have friction at a link's body hold without creeping: Bullet's otherwise gives way by 0.3 mm/s under load."""
         index = self._link_index[self._frame(link).link]
         pybullet.changeDynamics(self.body, index, frictionAnchor=1, physicsClientId=self._client)
+        self._firm.add(index)
 
     def renew_contacts(self, link):
         """Forget the contacts of a link's body; the next step finds those that there are.
@@ -179,6 +191,12 @@ class Body:
         inertia = np.asarray(inertia, dtype=float)
         if not (math.isfinite(mass) and mass > 0.0 and np.isfinite(inertia).all()):
             raise BulletSimError("a mass of %g kg cannot be set; expected a positive number" % mass)
+        within(bounds.MASS, mass, "the mass of link '%s'" % body)
+        within(bounds.INERTIA, inertia.ravel(), "the inertia of link '%s'" % body)
+        if mass < bounds.LEAST_MASS_KG:
+            raise BulletSimError(
+                "a mass of %g kg cannot be set; expected at least %g kg" % (mass, bounds.LEAST_MASS_KG)
+            )
         rotation = self.merged.frames[body].offset[:3, :3]
         inertia = rotation @ inertia @ rotation.T
         arguments = {"physicsClientId": self._client}
@@ -188,6 +206,9 @@ class Body:
         moments = np.diag(turned)
         if moments.min() <= 0.0:
             raise BulletSimError("the inertia %s has a moment that is not positive" % inertia.tolist())
+        if moments.min() < bounds.LEAST_INERTIA_PER_MASS_M2 * mass:
+            raise BulletSimError("the inertia %s has a moment of %g kg m^2; expected at least %g for a mass of %g kg"
+                                 % (inertia.tolist(), moments.min(), bounds.LEAST_INERTIA_PER_MASS_M2 * mass, mass))
         if np.abs(turned - np.diag(moments)).max() > 1e-3 * moments.max():
             raise BulletSimError(
                 "the principal axes of link '%s' cannot be turned; give an inertia with the present axes" % body
@@ -231,17 +252,34 @@ class Body:
             a, b = (self._link_index[self._frame(link).link] for link in pair)
             if a != b:
                 wanted.add((min(a, b), max(a, b)))
+        self._pairs = tuple(sorted(wanted))
+        if not self.self_collision:
+            if wanted:
+                self.self_collision = True
+                self._world.make_anew([self])
+            return
         links = sorted(self._link_names)
         for i, a in enumerate(links):
             for b in links[i + 1 :]:
                 pybullet.setCollisionFilterPair(
                     self.body, self.body, a, b, int((a, b) in wanted), physicsClientId=self._client
                 )
-        self._pairs = tuple(sorted(wanted))
 
     def link_name(self, index):
         """Return the merged name of the link that PyBullet numbers ``index`` (-1 is the root)."""
         return self._link_names[index]
+
+    def frame_of(self, motion):
+        """For World: the pose of the model's frame in what ``Model.motion`` or ``Model.last_good`` returned."""
+        return Pose.from_matrix(Pose(*motion[0]).matrix() @ self._root_offset_inverse)
+
+    def _restore_collisions(self):
+        """For Model: tell a body that has been made anew which links collide, and which hold firmly."""
+        pairs = {frozenset((self._link_names[a], self._link_names[b])) for a, b in self._pairs}
+        if self.self_collision:
+            self.set_self_collision_pairs([tuple(pair) for pair in pairs])
+        for index in self._firm:
+            pybullet.changeDynamics(self.body, index, frictionAnchor=1, physicsClientId=self._client)
 
     # -- inside -------------------------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ copies, the inertia exactly as merged, and 10 ms where loading the same robot fr
 import numpy as np
 import pybullet
 
-from urdf_model import Surface
+from urdf_model import Surface, bounds
 from urdf_model.transforms import quaternion_from_matrix, rigid
 
 from .pose import Pose
@@ -19,10 +19,8 @@ _JOINT_TYPES = {
     "continuous": pybullet.JOINT_REVOLUTE,
     "prismatic": pybullet.JOINT_PRISMATIC,
 }
-# A moving body needs some inertia, or the solver divides by zero: one gram, and for a mass the inertia of a ball of
-# 1.6 mm radius (0.4 m r^2), smaller than any part of a robot.
-_LEAST_MASS_KG = 1e-3
-_LEAST_INERTIA_PER_MASS_M2 = 1e-6
+# What a body that moves gets where its description gives it no mass: a gram.
+_ASSUMED_MASS_KG = 1e-3
 # What Gazebo assumes of a collision without <surface>: friction, and the damping of a contact [N s/m].
 _DEFAULT_FRICTION = 1.0
 _DEFAULT_DAMPING = 1.0
@@ -30,11 +28,11 @@ _DEFAULT_DAMPING = 1.0
 _RIGID_N_PER_M = 1e8
 
 
-def build(client, merged, pose, static, shapes, warn, mesh_cuts=None):
+def build(client, merged, pose, static, shapes, warn, mesh_cuts=None, self_collision=True):
     """Create the multibody of ``merged`` (urdf_model.MergedRobot) with its root body at ``pose``.
 
     Returns (body id, inertial offset (4, 4) of the root link). ``static`` fixes the root in the world;
-    ``mesh_cuts``: as for ``World.spawn``.
+    ``mesh_cuts``: as for ``World.spawn``. ``self_collision``: whether any two of its links shall ever collide.
     """
     root = merged.links[merged.root]
     body_of = {joint.child: joint for joint in merged.joints.values()}
@@ -71,7 +69,8 @@ def build(client, merged, pose, static, shapes, warn, mesh_cuts=None):
         baseInertialFramePosition=root_offset[:3, 3].tolist(),
         baseInertialFrameOrientation=quaternion_from_matrix(root_offset).tolist(),
         # Self-collision has to be asked for at creation; Model then leaves only the pairs that were wanted.
-        flags=pybullet.URDF_USE_SELF_COLLISION | (0 if static else pybullet.URDF_ENABLE_SLEEPING),
+        flags=(pybullet.URDF_USE_SELF_COLLISION if self_collision else 0)
+        | (0 if static else pybullet.URDF_ENABLE_SLEEPING),
         physicsClientId=client,
         **columns,
     )
@@ -105,7 +104,7 @@ def _contact(surface):
     # nothing is said. Cut at 1 the product is the smaller one whenever either link is as rough as that.
     arguments = {"lateralFriction": _DEFAULT_FRICTION if surface.friction is None else min(surface.friction, 1.0)}
     if surface.restitution is not None:
-        arguments["restitution"] = surface.restitution
+        arguments["restitution"] = min(surface.restitution, 1.0)  # beyond 1 it would gain energy at each bounce
     if surface.stiffness is not None and surface.stiffness < _RIGID_N_PER_M:
         arguments["contactStiffness"] = surface.stiffness
         arguments["contactDamping"] = _DEFAULT_DAMPING if surface.damping is None else surface.damping
@@ -129,9 +128,9 @@ _COLUMNS = (
 def _inertial(link, warn):
     """Return mass, principal moments (3,) and the inertial frame (4, 4) of a link that moves."""
     mass = link.inertial.mass
-    if mass <= 0.0:
-        warn("link '%s' moves and has no mass, so it gets %g kg; give it a positive <mass> in its <inertial>"
-             % (link.name, _LEAST_MASS_KG))
-        mass = _LEAST_MASS_KG
+    if mass < bounds.LEAST_MASS_KG:
+        warn("link '%s' moves and has %s mass, so it gets %g kg; give it a positive <mass> in its <inertial>"
+             % (link.name, "hardly any" if mass > 0.0 else "no", _ASSUMED_MASS_KG))
+        mass = _ASSUMED_MASS_KG
     moments, axes = principal_axes(link.inertial.inertia)
-    return mass, np.maximum(moments, _LEAST_INERTIA_PER_MASS_M2 * mass), rigid(axes, link.inertial.centre)
+    return mass, np.maximum(moments, bounds.LEAST_INERTIA_PER_MASS_M2 * mass), rigid(axes, link.inertial.centre)

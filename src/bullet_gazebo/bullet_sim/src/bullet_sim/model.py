@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import pybullet
 
+from urdf_model import bounds
+
 from .body import BASE, Body
-from .errors import BulletSimError
+from .errors import BulletSimError, within
 from .pose import Pose
 
 # Bullet's joint motor reaches its target as velocity = gain * error / time step. With 20 solver iterations a gain of
@@ -21,6 +23,17 @@ _DAMPING_MARGIN = 0.5
 
 # Stands for "as strong as need be" [N m, N].
 _RIGID_EFFORT = 1e9
+
+# Where the squares of all numbers add up to no more than this, none is anywhere near its bound.
+_SURELY_FINE = 1e10
+_LIGHT = 1e-20  # of efforts, which may be as large as they like
+
+# Of what Model.read_joints returns. Efforts follow from others' bounds and need only be numbers.
+_OF_JOINTS = (
+    bounds.JOINT_POSITION,
+    bounds.TURN_RATE,
+    bounds.Bound(-1e100, 1e100, "N or N m", "what a drive has given, which is bounded by itself"),
+)
 
 # What keeps coupled joints together at most [N, Nm]: more than any drive of a finger.
 _GEAR_FORCE = 1000.0
@@ -39,14 +52,21 @@ class Contact(NamedTuple):
     force: float  # along the normal, in the last step
 
 
+class Fault(NamedTuple):
+    """A state that cannot be."""
+
+    text: str  # what is out of its bound
+    is_finite: bool
+
+
 class Model(Body):
     """Made by ``World.spawn``. All arrays over joints are in the order of ``joint_names``; SI units and radians.
 
     A drive holds until another one replaces it, except efforts, which last one step.
     """
 
-    def __init__(self, client, name, robot, merged, body, root_offset, static, world):
-        super().__init__(client, name, robot, merged, body, root_offset, static, world)
+    def __init__(self, client, name, robot, merged, body, root_offset, static, world, self_collision=True):
+        super().__init__(client, name, robot, merged, body, root_offset, static, world, self_collision)
         self._gravity_key = None
         self._turned_gravity = None
         joints = list(merged.joints.values())
@@ -65,6 +85,7 @@ class Model(Body):
         self._zeros = [0.0] * count
         self._bounds = None
         self._gears = {}  # of (joint, other), by index
+        self._couplings = {}  # the same -> ratio
         self._direct = None
         self._never_sleeps = static
         self._set_damping(joints)
@@ -138,6 +159,7 @@ class Model(Body):
         if velocity is not None:
             # The motor adds the velocity to what closes the gap, so the gap is the one at the beginning of the step.
             position = position - velocity * self._world.time_step_s
+        self._refuse_nan(index, position, "position")
         if self._direct is not None:
             at_rest = np.zeros(gains) if velocity is None else velocity
             self._direct.drive_position(index, position, at_rest, max_effort, POSITION_GAIN)
@@ -159,6 +181,7 @@ class Model(Body):
         self._drive_otherwise(index)
         if max_effort.any():
             self._stay_awake()
+        self._refuse_nan(index, velocity, "velocity")
         pybullet.setJointMotorControlArray(
             self.body,
             index.tolist(),
@@ -174,6 +197,7 @@ class Model(Body):
         They move without inertia: what carries them does not feel it, as with Gazebo's ``Joint::SetPosition``. What
         they carry, and what they lean on, it does feel.
         """
+        self._refuse_nan(index, position, "position")
         self._stay_awake()
         self._drive_otherwise(index)
         pybullet.resetJointStatesMultiDof(
@@ -184,7 +208,12 @@ class Model(Body):
         self.drive_velocity(index, np.zeros(len(index)), np.full(len(index), _RIGID_EFFORT))
 
     def drive_effort(self, index, effort):
-        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; say it again for every step."""
+        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; say it again for every step.
+
+        What is beyond ``bounds.EFFORT`` is cut off there, as a drive would; raises BulletSimError for no number.
+        """
+        self._refuse_nan(index, effort, "effort")
+        effort = np.clip(effort, bounds.EFFORT.low, bounds.EFFORT.high)
         if not self._effort_driven[index].all():
             self.release(index)
             self._stay_awake()
@@ -196,14 +225,22 @@ class Model(Body):
         )
 
     def add_effort(self, index, effort):
-        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step, on top of what drives them."""
+        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step, on top of what drives them.
+
+        Raises BulletSimError out of bounds.
+        """
+        within(bounds.EFFORT, effort, "the effort on a joint of '%s'" % self.name)
         self.wake()
         pybullet.setJointMotorControlArray(
             self.body, index.tolist(), pybullet.TORQUE_CONTROL, forces=effort.tolist(), physicsClientId=self._client
         )
 
     def set_damping(self, index, damping):
-        """Set the viscous damping of joint ``index`` [Nm s/rad or N s/m], as far as the tick's length allows it."""
+        """Set the viscous damping of joint ``index`` [Nm s/rad or N s/m], as far as the tick's length allows it.
+
+        Raises BulletSimError out of bounds.
+        """
+        within(bounds.DAMPING, damping, "the damping of joint '%s'" % self.joint_names[index])
         self.damping[index] = min(damping, self._damping_bounds()[index])
         pybullet.changeDynamics(self.body, index, jointDamping=self.damping[index], physicsClientId=self._client)
 
@@ -211,6 +248,9 @@ class Model(Body):
         """Set how far joint ``index`` goes [rad or m]. Raises BulletSimError where ``lower`` is not below ``upper``."""
         if not lower < upper:
             raise BulletSimError("a lower limit of %g is not below the upper limit %g" % (lower, upper))
+        for limit, what in ((lower, "lower"), (upper, "upper")):
+            if math.isfinite(limit):
+                within(bounds.JOINT_POSITION, limit, "the %s limit of joint '%s'" % (what, self.joint_names[index]))
         pybullet.changeDynamics(
             self.body, index, jointLowerLimit=lower, jointUpperLimit=upper, physicsClientId=self._client
         )
@@ -228,6 +268,7 @@ class Model(Body):
                 physicsClientId=self._client,
             )
         gear = self._gears[pair]
+        self._couplings[pair] = ratio
         pybullet.changeConstraint(
             gear, gearRatio=-1.0 / ratio, erp=POSITION_GAIN, maxForce=_GEAR_FORCE, physicsClientId=self._client
         )
@@ -238,9 +279,15 @@ class Model(Body):
         self.drive_velocity(index, np.zeros(len(index)), np.zeros(len(index)))
 
     def set_joint_positions(self, index, position):
-        """Put joints ``index`` (k,) at ``position`` (k,), at rest, at once. Nothing in between is simulated."""
+        """Put joints ``index`` (k,) at ``position`` (k,), at rest, at once. Nothing in between is simulated.
+
+        Raises BulletSimError out of bounds.
+        """
         if len(index) != len(position):
             raise BulletSimError("%d joints but %d positions" % (len(index), len(position)))
+        if not np.dot(position, position) <= _SURELY_FINE:
+            for i, value in zip(index, position, strict=True):
+                within(bounds.JOINT_POSITION, value, "the position of joint '%s'" % self.joint_names[i])
         if len(index):
             # In one call, since each works out anew where every link is.
             pybullet.resetJointStatesMultiDof(
@@ -298,11 +345,20 @@ class Model(Body):
         """For World: the physics that holds the body is about to end."""
         self._direct = None  # Bullet itself does not notice that they are gone
 
+    def set_base_pose(self, pose):
+        super().set_base_pose(pose)
+        if self.static:
+            # Not asked for again: what a NaN touches has no place any more, though nothing moves it.
+            base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
+            self._good = (base, self._good[1])
+
     # -- start --------------------------------------------------------------------------------------------------
 
     def mark_start(self):
         """Remember base pose and joint positions as what ``reset`` returns to."""
         self._start = (self.base_pose(), self.read_joints()[0])
+        base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
+        self._good = (base, self._start[1])  # where it was well, as PyBullet has the base
 
     def reset(self):
         """Return to the marked start, at rest. Drives stay as they are."""
@@ -312,7 +368,102 @@ class Model(Body):
             self.set_base_twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self.set_joint_positions(np.arange(len(position)), position)
 
+    # -- for World: when the physics has failed -----------------------------------------------------------------
+
+    def fault(self):
+        """Return the Fault of the present state, or None where all is well, which then is kept for the next time.
+
+        Called after every step: one sum stands for all numbers.
+        """
+        if self.static:
+            base, total = self._good[0], 0.0
+        else:
+            base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
+            (x, y, z), (a, b, c, d) = base
+            total = x * x + y * y + z * z + a * a + b * b + c * c + d * d
+        joints = self._good[1]
+        if self._all:
+            joints, velocity, effort = self.read_joints()
+            total += joints @ joints + velocity @ velocity + _LIGHT * (effort @ effort)
+        if not total <= _SURELY_FINE:
+            found = self._fault(base, self.read_joints())
+            if found:
+                return Fault(found, math.isfinite(total))
+        self.still_for = self.still_for + 1 if base == self._good[0] else 0
+        self._good = (base, joints)
+        return None
+
+    def _fault(self, base, readings):
+        try:
+            within(bounds.POSITION, base[0], "the position of link '%s'" % self.merged.root)
+            within(bounds.POSITION, base[1], "the orientation of link '%s'" % self.merged.root)
+            for values, bound, what in zip(readings, _OF_JOINTS, ("position", "velocity", "effort"), strict=True):
+                for name, value in zip(self.joint_names, values.tolist(), strict=True):
+                    within(bound, value, "the %s of joint '%s'" % (what, name))
+        except BulletSimError as error:
+            return str(error)
+        return ""
+
+    def motion(self):
+        """Return what :meth:`take_body` needs to have the model go on as it is."""
+        twist = None if self.static else pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
+        base = self._good[0]
+        if not self.static:
+            base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
+        position, velocity, _ = self.read_joints()
+        return (base, position, twist, velocity)
+
+    def last_good(self):
+        """Return what :meth:`take_body` needs to have the model stand where it last was well, at rest."""
+        return (*self._good, None, np.zeros(len(self._all)))
+
+    def put_back(self):
+        """Stand where the model last was well, at rest."""
+        (position, quaternion), joints = self._good
+        if not self.static:
+            pybullet.resetBasePositionAndOrientation(self.body, position, quaternion, physicsClientId=self._client)
+            self.set_base_twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self.set_joint_positions(np.arange(len(self._all)), joints)
+
+    def take_body(self, body, motion):
+        """Go on with PyBullet's multibody ``body``, like the one before and just made in its place."""
+        base, joints, twist, velocity = motion
+        was_direct, self._direct = self._direct is not None, None
+        client = {"physicsClientId": self._client}
+        self.body, self._reading, self._gears = body, None, {}
+        self._effort_driven[:] = self._any_effort_driven = False
+        if twist is not None:
+            pybullet.resetBaseVelocity(body, *twist, **client)
+        for index in range(len(self._all)):
+            pybullet.changeDynamics(body, index, jointDamping=self.damping[index], **client)
+            if math.isfinite(self.lower[index]) or math.isfinite(self.upper[index]):
+                pybullet.changeDynamics(
+                    body, index, jointLowerLimit=self.lower[index], jointUpperLimit=self.upper[index], **client
+                )
+        if self._never_sleeps and not self.static:
+            self._never_sleeps = False
+            self._stay_awake()
+        if self._all:
+            self.release(np.arange(len(self._all)))
+            pybullet.resetJointStatesMultiDof(
+                body, self._all, joints[:, None].tolist(), velocity[:, None].tolist(), **client
+            )
+        for pair, ratio in self._couplings.items():
+            self.couple(*pair, ratio)
+        self._restore_collisions()
+        if was_direct:
+            self.call_directly()
+        self._good = (base, joints)
+
     # -- inside -------------------------------------------------------------------------------------------------
+
+    def _refuse_nan(self, index, values, what):
+        """Raise BulletSimError where one of ``values`` (k,) for joints ``index`` (k,) is no number."""
+        if np.isnan(np.dot(values, values)):
+            bad = [self.joint_names[i] for i, value in zip(index, values, strict=True) if np.isnan(value)]
+            if bad:
+                raise BulletSimError("the %s for %s of '%s' is nan; expected a number"
+                                     % (what, ", ".join(bad), self.name))
 
     def _array(self, values):
         """Return the (n,) floats ``values`` as an array, in a third of the time that np.array takes for a tuple."""

@@ -6,9 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from urdf_model import bounds
 from urdf_model.transforms import matrix_from_quaternion, quaternion_from_matrix, rigid
 
-from .errors import BulletSimError
+from .errors import BulletSimError, within
+
+# Longer ones are no rounding of a unit quaternion; their squares would have no number.
+_LONGEST_QUATERNION = 1e6
 
 
 class Pose(NamedTuple):
@@ -27,12 +31,15 @@ class Pose(NamedTuple):
         return rigid(matrix_from_quaternion(self.quaternion), np.asarray(self.position, dtype=float))
 
     def checked(self):
-        """Return this pose with a normalised quaternion; raises BulletSimError when it is no pose at all."""
+        """Return this pose with a normalised quaternion; raises BulletSimError when it is no pose in this world."""
         if len(self.position) != 3 or len(self.quaternion) != 4:
             raise BulletSimError("a pose is 3 numbers of position and 4 of quaternion, found %s" % (self,))
         if not all(math.isfinite(v) for v in (*self.position, *self.quaternion)):
             raise BulletSimError("pose %s is not finite" % (self,))
+        within(bounds.POSITION, self.position, "the position")
         norm = math.sqrt(sum(v * v for v in self.quaternion))
+        if norm > _LONGEST_QUATERNION:
+            raise BulletSimError("quaternion %s has a norm of %g; expected 1" % (list(self.quaternion), norm))
         if norm < 1e-6:
             # Messages start out with a quaternion of zeros; Gazebo takes that for "no rotation", and so do we.
             return Pose(tuple(self.position), (0.0, 0.0, 0.0, 1.0))

@@ -6,14 +6,15 @@ import os
 import numpy as np
 import pybullet
 
-from urdf_model import Link, Mesh, Plane, Robot, Shape, merge_fixed
+from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
 from .builder import build
-from .errors import BulletSimError
+from .errors import BulletSimError, within
 from .model import Contact, Model
 from .pose import Pose
 from .shapes import MeshFiles, ShapeStore
 from .stand_ins import with_stand_ins
+from .state_watch import StateWatch
 
 
 def plain_path(uri):
@@ -42,6 +43,7 @@ class World:
     :param seed: of ``World.random``, for whoever needs noise
     :param find_mesh: function from a mesh URI to a file path, or None when there is no such file
     :param warn: function that is told what was mended, in one line
+    :param error: function that is told, in one line, of which model Bullet gave no state that could be
     """
 
     _contact_ahead_in_force_m = None
@@ -55,15 +57,15 @@ class World:
         contact_ahead_m=0.004,
         find_mesh=plain_path,
         warn=lambda text: None,
+        error=lambda text: None,
     ):
-        if not 1e-5 <= time_step_s <= 0.05:
-            raise BulletSimError("a time step of %g s is out of range; expected 1e-5 to 0.05 s" % time_step_s)
-        self.time_step_s = time_step_s
+        self.time_step_s = within(bounds.TIME_STEP, time_step_s, "the time step")
         self.solver_iterations = solver_iterations
         self.tick = 0
         #: How many steps there have been, which a reset of the time does not take back.
         self.steps = 0
         self.models = {}
+        self._mesh_cuts = {}
         self.random = np.random.default_rng(seed)
         self._warn = warn
         self._client = pybullet.connect(pybullet.DIRECT)
@@ -72,6 +74,7 @@ class World:
         self._mesh_files = MeshFiles(find_mesh)
         self._shapes = ShapeStore(self._client, self._mesh_files)
         self._weightless = []  # models of which some link has no weight
+        self._watch = StateWatch(self, error)
         self._touched = []  # models that something was done to since the last step, perhaps in their sleep
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step_s,
@@ -95,18 +98,18 @@ class World:
         return self._gravity
 
     def set_gravity(self, gravity):
-        """Set gravity (3,) [m/s^2]. Raises BulletSimError unless it is three finite numbers."""
+        """Set gravity (3,) [m/s^2]. Raises BulletSimError unless it is three numbers within bounds."""
         gravity = tuple(float(g) for g in gravity)
-        if len(gravity) != 3 or not np.isfinite(gravity).all():
-            raise BulletSimError("gravity is three finite numbers, found %s" % (gravity,))
+        if len(gravity) != 3:
+            raise BulletSimError("gravity is three numbers, found %s" % (gravity,))
+        within(bounds.GRAVITY, gravity, "gravity")
         pybullet.setGravity(*gravity, physicsClientId=self._client)
         self._gravity = gravity
         self.wake_all()
 
     def set_solver_iterations(self, iterations):
-        """Set the iterations of Bullet's constraint solver, 1 to 1000."""
-        if not 1 <= iterations <= 1000:
-            raise BulletSimError("%s solver iterations are out of range; expected 1 to 1000" % iterations)
+        """Set the iterations of Bullet's constraint solver (``bounds.SOLVER_ITERATIONS``). Raises BulletSimError."""
+        within(bounds.SOLVER_ITERATIONS, iterations, "the number of solver iterations")
         pybullet.setPhysicsEngineParameter(numSolverIterations=iterations, physicsClientId=self._client)
         self.solver_iterations = iterations
 
@@ -115,7 +118,7 @@ class World:
         for model in self.models.values():
             model.wake()
 
-    def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=(), mesh_cuts=None):
+    def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=(), mesh_cuts=None, merged=None):
         """Put ``robot`` (urdf_model.Robot) into the world as ``name``, its frame at ``pose``; return its Model.
 
         The frame of a robot from a URDF is that of its root link. What stands in for meshes that are missing is told
@@ -125,7 +128,9 @@ class World:
         ``mesh_cuts``: {link: planes}, as for ``convex_parts.cut``, in the mesh's axes [m], has the collision meshes of
         those links cut and stood in for by the convex hulls of the parts. Where such a mesh is missing, the pairs of
         its body are left out: what stands in for it is too rough to fold an arm around.
-        Raises BulletSimError when the name is taken or empty or the pose is not finite.
+        ``merged``: the MergedRobot of ``robot``, which then has been checked and has no mesh that is missing: what
+        takes its time has been done, in another thread perhaps.
+        Raises BulletSimError when the name is taken or empty, and for numbers out of bounds.
         """
         if not name:
             raise BulletSimError("a model needs a name")
@@ -133,10 +138,17 @@ class World:
             raise BulletSimError("model '%s' exists already; delete it first or choose another name" % name)
         pose = (pose or Pose()).checked()
         static = robot.root == "world" if static is None else static
-        robot, mended = with_stand_ins(robot, self._mesh_files)
-        if mended:
-            self._warn("model '%s': %s" % (name, mended))
-        merged = merge_fixed(robot)
+        if merged is None:
+            try:
+                check_robot(robot)
+            except OutOfBounds as error:
+                raise BulletSimError("model '%s': %s" % (name, error)) from None
+            robot, mended = with_stand_ins(robot, self._mesh_files)
+            if mended:
+                self._warn("model '%s': %s" % (name, mended))
+            merged = merge_fixed(robot)
+        rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
+        pairs = [pair for pair in self_collision_pairs if all(merged.frames[link].link not in rough for link in pair)]
         body, root_offset = build(
             self._client,
             merged,
@@ -145,14 +157,14 @@ class World:
             self._shapes,
             lambda text: self._warn("model '%s': %s" % (name, text)),
             mesh_cuts,
+            bool(pairs),
         )
-        model = Model(self._client, name, robot, merged, body, root_offset, static, self)
-        if self_collision_pairs:
-            rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
-            model.set_self_collision_pairs(
-                [pair for pair in self_collision_pairs if all(merged.frames[link].link not in rough for link in pair)]
-            )
+        model = Model(self._client, name, robot, merged, body, root_offset, static, self, bool(pairs))
+        if pairs:
+            model.set_self_collision_pairs(pairs)
         self.models[name] = model
+        self._mesh_cuts[name] = mesh_cuts
+        self._watch.models_changed()
         return model
 
     def respawn(self, name, static):
@@ -181,7 +193,8 @@ class World:
         """Remove a model. Raises BulletSimError when there is none of that name."""
         model = self._model(name)
         model.remove()
-        del self.models[name]
+        del self.models[name], self._mesh_cuts[name]
+        self._watch.models_changed()
         self.note_weightless(model, False)
         self._touched = [other for other in self._touched if other is not model]
         # What stood on it shall fall.
@@ -195,6 +208,7 @@ class World:
         """For Model: something was done to ``model``, which may be asleep."""
         if model not in self._touched:
             self._touched.append(model)
+        self._watch.note_touched(model)
 
     def _put_contact_ahead(self):
         """PyBullet keeps one figure for all worlds of a process: put ours there, if another world's is."""
@@ -216,6 +230,22 @@ class World:
             touched, self._touched = self._touched, []
             for model in touched:
                 model.feel_again()
+        self._watch.look()
+
+    def make_anew(self, models, motions=None):
+        """Replace the multibodies of ``models`` by new ones like them, which go on as the old ones did.
+
+        ``motions``: {model: what ``Model.motion`` or ``Model.last_good`` returned}. All are removed before the first is
+        made: only then Bullet's search tree is empty, and whatever stood in it is forgotten.
+        """
+        motions = {model: (motions or {}).get(model) or model.motion() for model in models}
+        for model in models:
+            model.remove()
+        for model, motion in motions.items():
+            body, _ = build(self._client, model.merged, model.frame_of(motion), model.static, self._shapes,
+                            lambda text: None, self._mesh_cuts.get(model.name), model.self_collision)
+            model.take_body(body, motion)
+        self.wake_all()
 
     def reset_models(self):
         """Return every model to its marked start. Time goes on."""

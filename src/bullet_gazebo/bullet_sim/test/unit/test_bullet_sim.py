@@ -343,8 +343,8 @@ def test_mesh_is_converted_once_and_a_missing_one_gets_a_stand_in(tmp_path, monk
         (lambda world: world.delete("leg"), "there is no model 'leg'; models: arm"),
         (lambda world: world.models["arm"].index(["wrist"]), "no joint 'wrist'; its joints are shoulder, elbow"),
         (lambda world: world.models["arm"].link_pose("hand"), "no link 'hand'; its links are base, upper"),
-        (lambda world: world.set_gravity((0, math.inf, 0)), "three finite numbers"),
-        (lambda world: World(time_step_s=1.0), "out of range"),
+        (lambda world: world.set_gravity((0, math.inf, 0)), r"gravity is \(0, inf, 0\) m/s.2; expected -1000 to 1000"),
+        (lambda world: World(time_step_s=1.0), "the time step is 1 s; expected 1e-05 to 0.05 s"),
         (lambda world: world.spawn(parse_urdf(ARM), "free").gravity_efforts(), "need a fixed base"),
     ],
 )

@@ -30,23 +30,27 @@ from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twi
 from gazebo_ros.entities import WORLD_FRAMES, UnknownEntity
 from gazebo_ros.faults import SURVIVED
 from gazebo_ros.jobs import TimedJobs
+from urdf_model import bounds
 
 _REFUSALS = (UnknownEntity, BulletSimError, ValueError)
 _JOINT_TYPES = {"revolute": GetJointPropertiesResponse.REVOLUTE, "continuous": GetJointPropertiesResponse.CONTINUOUS,
                 "prismatic": GetJointPropertiesResponse.PRISMATIC}
 # Fields of ODEJointProperties that are about ODE's solver and have no counterpart in Bullet.
+# More wrenches and efforts at a time than this come from a program that never ends one, and each costs in every tick.
+_MOST_JOBS = 1000
 _ODE_ONLY = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor", "fmax", "vel")
 
 
 class BodyServices:
     """Advertises the services. Everything here runs in the loop thread."""
 
-    def __init__(self, simulation, entities, ros, log, notice):
-        """``entities``: :class:`gazebo_ros.entities.Entities`; ``notice()`` is called when there is something for
-        :meth:`take_commands`."""
+    def __init__(self, simulation, entities, changes, ros, log, notice):
+        """``entities``: :class:`gazebo_ros.entities.Entities`; ``changes``: :class:`gazebo_ros.changes.Changes`;
+        ``notice()`` is called when there is something for :meth:`take_commands`."""
         self._simulation = simulation
         self._world = simulation.world
         self._entities = entities
+        self._changes = changes
         self._log = log
         self._faults = ros.faults
         self._wrenches = TimedJobs()  # of (model, link)
@@ -111,30 +115,38 @@ class BodyServices:
             model, link = self._entities.link(request.body_name)
             if model.static and model.merged.frames[link].link == model.merged.root:
                 raise ValueError("link '%s' is fixed in the world; no wrench moves it" % request.body_name)
-            force, torque = vector_from_msg(request.wrench.force), vector_from_msg(request.wrench.torque)
+            self._make_room(self._wrenches)
+            force = vector_from_msg(request.wrench.force, bounds.FORCE, "the force")
+            torque = vector_from_msg(request.wrench.torque, bounds.TORQUE, "the torque")
             # From the link's origin to the point, in world axes; the force itself acts at the centre of mass.
-            lever = vector_from_msg(request.reference_point)
+            lever = vector_from_msg(request.reference_point, bounds.POSITION, "the reference point")
             if request.reference_frame not in WORLD_FRAMES:
                 frame = self._entities.frame(request.reference_frame)[0]
                 rotation = frame[:3, :3]
                 force, torque = rotation @ force, rotation @ torque
                 lever = rotation @ lever + frame[:3, 3] - np.array(model.link_pose(link).position)
-            payload = (force, torque + np.cross(lever, force))
+            torque = bounds.TORQUE.check(torque + np.cross(lever, force), "the torque at the centre of mass")
         except _REFUSALS as error:
             return ApplyBodyWrenchResponse(False, "ApplyBodyWrench: %s" % error)
+        payload = (force, torque)
         self._wrenches.add((model.name, link), payload, request.start_time.to_nsec(), request.duration.to_nsec())
         return ApplyBodyWrenchResponse(True, "ApplyBodyWrench: wrench will be applied")
 
     def _apply_joint_effort(self, request):
         try:
             model, joint = self._entities.joint(request.joint_name)
-            effort = float(request.effort)
-            if not np.isfinite(effort):
-                raise ValueError("the effort is %s, expected a finite number" % effort)
+            self._make_room(self._efforts)
+            effort = bounds.EFFORT.check(float(request.effort), "the effort on joint '%s'" % joint)
         except _REFUSALS as error:
             return ApplyJointEffortResponse(False, "ApplyJointEffort: %s" % error)
         self._efforts.add((model.name, joint), effort, request.start_time.to_nsec(), request.duration.to_nsec())
         return ApplyJointEffortResponse(True, "ApplyJointEffort: effort will be applied")
+
+    @staticmethod
+    def _make_room(jobs):
+        if len(jobs) >= _MOST_JOBS:
+            raise ValueError("%d are under way already, expected less; give them a duration, or clear them "
+                             "(clear_body_wrenches, clear_joint_forces)" % len(jobs))
 
     def _clear_body_wrenches(self, request):
         try:
@@ -188,9 +200,11 @@ class BodyServices:
         linear, angular = rotation @ linear, rotation @ angular
         # The model goes along, so that this link is there.
         base = pose @ np.linalg.inv(frame.offset)
+        linear = bounds.SPEED.check(linear + np.cross(angular, base[:3, 3] - pose[:3, 3]),
+                                    "the linear velocity of the model's frame")
         model.set_base_pose(Pose.from_matrix(base))
         if not model.static:
-            model.set_base_twist(linear + np.cross(angular, base[:3, 3] - pose[:3, 3]), angular)
+            model.set_base_twist(linear, angular)
 
     def _get_link_properties(self, request):
         response = GetLinkPropertiesResponse()
@@ -212,7 +226,7 @@ class BodyServices:
     def _set_link_properties(self, request):
         try:
             model, link = self._entities.link(request.link_name)
-            old = model.inertial(link)
+            old, had_weight = model.inertial(link), model.has_weight(link)
             pose = pose_from_msg(request.com)
             if not np.allclose(pose.position, old.centre, atol=1e-6):
                 raise ValueError("the centre of mass of link '%s' stays at %s; it cannot be moved to %s"
@@ -224,7 +238,10 @@ class BodyServices:
             inertia = rotation @ inertia @ rotation.T
             if not (request.mass == old.mass and np.allclose(inertia, old.inertia, rtol=1e-12, atol=0.0)):
                 model.set_inertial(link, request.mass, inertia)
+                self._changes.note((model.name, link, "inertial"),
+                                   lambda: model.set_inertial(link, old.mass, old.inertia))
             model.set_weight(link, request.gravity_mode)
+            self._changes.note((model.name, link, "weight"), lambda: model.set_weight(link, had_weight))
         except _REFUSALS as error:
             return SetLinkPropertiesResponse(False, "SetLinkProperties: %s" % error)
         return SetLinkPropertiesResponse(True, "SetLinkProperties: properties set")
@@ -258,13 +275,16 @@ class BodyServices:
             if damping is None and upper is None and lower is None:
                 raise ValueError("nothing to set: damping, hiStop and loStop are empty, and %s"
                                  % ("%s has no counterpart here" % ", ".join(ignored) if ignored else "so is the rest"))
-            if damping is not None and damping < 0.0:
-                raise ValueError("damping is %g, expected 0 or more" % damping)
+            if damping is not None:
+                bounds.DAMPING.check(damping, "damping")
+            old_lower, old_upper, old_damping = (
+                float(values[index]) for values in (model.lower, model.upper, model.damping))
             if upper is not None or lower is not None:
-                model.set_limits(index, float(model.lower[index]) if lower is None else lower,
-                                 float(model.upper[index]) if upper is None else upper)
+                model.set_limits(index, old_lower if lower is None else lower, old_upper if upper is None else upper)
+                self._changes.note((model.name, joint, "limits"), lambda: model.set_limits(index, old_lower, old_upper))
             if damping is not None:
                 model.set_damping(index, damping)
+                self._changes.note((model.name, joint, "damping"), lambda: model.set_damping(index, old_damping))
         except _REFUSALS as error:
             return SetJointPropertiesResponse(False, "SetJointProperties: %s" % error)
         rest = "; no counterpart here: %s" % ", ".join(ignored) if ignored else ""

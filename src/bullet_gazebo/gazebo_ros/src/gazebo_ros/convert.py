@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where geometry_msgs and the world's own types meet."""
-import math
-
 import numpy as np
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg
 
 from bullet_sim import Pose
+from urdf_model import bounds
 
 
 def pose_from_msg(msg):
@@ -25,12 +24,10 @@ def msg_from_pose(pose):
 
 
 def twist_from_msg(msg):
-    """``geometry_msgs/Twist`` -> (linear, angular) as arrays (3,); raises ``ValueError`` where not finite."""
+    """``geometry_msgs/Twist`` -> (linear, angular) as arrays (3,); raises ``ValueError`` out of bounds."""
     linear = np.array([msg.linear.x, msg.linear.y, msg.linear.z])
     angular = np.array([msg.angular.x, msg.angular.y, msg.angular.z])
-    if not all(math.isfinite(value) for value in (*linear, *angular)):
-        raise ValueError("the twist is not finite: linear %s, angular %s" % (linear, angular))
-    return linear, angular
+    return bounds.SPEED.check(linear, "the linear velocity"), bounds.TURN_RATE.check(angular, "the angular velocity")
 
 
 def msg_from_twist(linear, angular):
@@ -38,9 +35,9 @@ def msg_from_twist(linear, angular):
     return Twist(Vector3(*linear), Vector3(*angular))
 
 
-def vector_from_msg(msg):
-    """``geometry_msgs/Vector3`` or ``Point`` -> array (3,); raises ``ValueError`` where not finite."""
-    vector = np.array([msg.x, msg.y, msg.z])
-    if not np.isfinite(vector).all():
-        raise ValueError("the vector (%g, %g, %g) is not finite" % tuple(vector))
-    return vector
+def vector_from_msg(msg, bound, what):
+    """``geometry_msgs/Vector3`` or ``Point`` -> array (3,); raises ``ValueError`` where it is out of ``bound``.
+
+    ``bound``: a ``urdf_model.bounds.Bound``; ``what`` names the vector in the text.
+    """
+    return bound.check(np.array([msg.x, msg.y, msg.z]), what)

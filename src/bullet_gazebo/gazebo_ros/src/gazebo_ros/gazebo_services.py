@@ -32,6 +32,7 @@ from std_srvs.srv import Empty, EmptyResponse
 
 from bullet_sim import BulletSimError
 from gazebo_ros.body_services import BodyServices
+from gazebo_ros.changes import Changes
 from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg
 from gazebo_ros.entities import Entities, UnknownEntity
 from gazebo_ros.faults import SURVIVED, described
@@ -41,6 +42,7 @@ from gazebo_ros.simulation import AdvanceRefused
 from gazebo_ros.spawning import SpawnRefused
 from gazebo_ros.urdf_extras import unscoped
 from loop_reconfigure import Setting, SettingsServer
+from urdf_model import bounds
 
 _ROOT_ELEMENT = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
 _NOT_CONTENT = re.compile(r"<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>", re.DOTALL)
@@ -70,7 +72,8 @@ class GazeboServices:
         self._log = log
         self._entities = Entities(simulation.world)
         self._has_commands = False
-        self._bodies = BodyServices(simulation, self._entities, ros, log, self._note_command)
+        self._changes = Changes()
+        self._bodies = BodyServices(simulation, self._entities, self._changes, ros, log, self._note_command)
         LightServices(lights, ros)
         #: For the loop, before each physics step.
         self.push = self._bodies.push
@@ -159,6 +162,7 @@ class GazeboServices:
             return DeleteModelResponse(False, "DeleteModel: model does not exist - %s" % error)
         self._state_requests.pop(request.model_name, None)
         self._bodies.forget(request.model_name)
+        self._changes.forget(request.model_name)
         return DeleteModelResponse(True, "DeleteModel: successfully deleted model")
 
     def _pause(self, _):
@@ -173,6 +177,8 @@ class GazeboServices:
         if time_too:
             # Their times are of a past that is gone.
             self._bodies.forget()
+        self._changes.take_back()
+        self._settings.show(**self._physics())
         self._simulation.reset(time_too)
         return EmptyResponse()
 
@@ -229,9 +235,11 @@ class GazeboServices:
         pose = self._entities.pose_in_world(pose_from_msg(state.pose), state.reference_frame)
         linear, angular = twist_from_msg(state.twist)
         rotation = self._entities.frame(state.reference_frame)[0][:3, :3]
+        linear = bounds.SPEED.check(rotation @ linear, "the linear velocity in the world")
+        angular = bounds.TURN_RATE.check(rotation @ angular, "the angular velocity in the world")
         model.set_base_pose(pose)
         if not model.static:
-            model.set_base_twist(rotation @ linear, rotation @ angular)
+            model.set_base_twist(linear, angular)
 
     def _set_model_configuration(self, request):
         names, positions = request.joint_names, request.joint_positions
@@ -249,10 +257,10 @@ class GazeboServices:
     @staticmethod
     def _put_joints(model, names, positions):
         position = np.array(positions, dtype=float)
-        if not np.isfinite(position).all():
-            raise ValueError("joint positions are not finite: %s" % (list(positions),))
         if names:
             index = model.index(names)
+            for name, value in zip(names, positions, strict=True):
+                bounds.JOINT_POSITION.check(value, "the position of joint '%s'" % name)
             model.set_joint_positions(index, np.clip(position, model.lower[index], model.upper[index]))
 
     def _get_physics_properties(self, _):
@@ -278,18 +286,27 @@ class GazeboServices:
     def _set_physics(self, time_step, max_update_rate, gravity, iterations):
         """Raises ``ValueError`` or ``BulletSimError``."""
         simulation = self._simulation
-        if abs(time_step - simulation.step_s) > 1e-9:
+        if not abs(time_step - simulation.step_s) <= 1e-9:
             raise ValueError("time_step %g s cannot be set while the world runs; it is %g s (the world file's "
                              "max_step_size decides)" % (time_step, simulation.step_s))
-        if not max_update_rate >= 0.0:
-            raise ValueError("max_update_rate is %g Hz, expected 0 (as fast as possible) or a positive number"
-                             % max_update_rate)
+        # All of it before any of it is set.
+        bounds.UPDATE_RATE.check(max_update_rate, "max_update_rate")
+        bounds.SOLVER_ITERATIONS.check(iterations, "sor_pgs_iters")
+        bounds.GRAVITY.check(gravity, "gravity")
+        before = self._world.gravity, self._world.solver_iterations, simulation.real_time_factor
+        self._changes.note(("", "physics"), lambda: self._put_physics(*before))
         if iterations != self._world.solver_iterations:
             self._world.set_solver_iterations(iterations)
         self._world.set_gravity(gravity)
         factor = max_update_rate * simulation.step_s
         if abs(factor - simulation.real_time_factor) > 1e-9:
             simulation.real_time_factor = factor
+
+    def _put_physics(self, gravity, iterations, real_time_factor):
+        self._world.set_gravity(gravity)
+        self._world.set_solver_iterations(iterations)
+        if real_time_factor != self._simulation.real_time_factor:
+            self._simulation.real_time_factor = real_time_factor
 
     # -- the same for dynamic_reconfigure -------------------------------------------------------------------------
 
@@ -312,8 +329,11 @@ class GazeboServices:
 
         return SettingsServer(ros, "/gazebo", [
             Setting("time_step", step_s, step_s, step_s, "length of a step [s]; the world file decides"),
-            Setting("max_update_rate", now["max_update_rate"], 0.0, 1e5, "steps per second [Hz]; 0: as many as can be"),
+            Setting("max_update_rate", now["max_update_rate"], 0.0, bounds.UPDATE_RATE.high,
+                    "steps per second [Hz]; 0: as many as can be"),
+            # A slider shall be of use: Gazebo's own range, where the service takes more.
             *(Setting("gravity_" + axis, now["gravity_" + axis], -100.0, 100.0, "along %s [m/s^2]" % axis)
               for axis in "xyz"),
-            Setting("sor_pgs_iters", now["sor_pgs_iters"], 1, 1000, "iterations of the constraint solver"),
+            Setting("sor_pgs_iters", now["sor_pgs_iters"], bounds.SOLVER_ITERATIONS.low,
+                    bounds.SOLVER_ITERATIONS.high, "iterations of the constraint solver"),
         ], apply)

@@ -114,7 +114,7 @@ def _build(log, cleanup, line):
     cleanup.callback(writer.close)
     seed = rospy.get_param("~seed", 0) if line.seed is None else line.seed
     world = World(time_step_s=description.time_step_s, gravity=description.gravity, seed=int(seed), find_mesh=finder,
-                  warn=log.warn)
+                  warn=log.warn, error=log.error)
     cleanup.callback(world.close)
 
     hub, inlets, board = PublisherHub(), InletHub(), RequestBoard()

@@ -262,7 +262,7 @@ class GazeboBodies(unittest.TestCase):
         self.refused(self.apply_body_wrench("box::body", "moon", Point(), wrench, NOW, ALWAYS), "moon")
         self.refused(self.apply_body_wrench("cafe_table::link", "", Point(), wrench, NOW, ALWAYS), "fixed")
         wrench.force.x = math.nan
-        self.refused(self.apply_body_wrench("box::body", "", Point(), wrench, NOW, ALWAYS), "finite")
+        self.refused(self.apply_body_wrench("box::body", "", Point(), wrench, NOW, ALWAYS), "expected -1e+07 to 1e+07")
 
     def test_an_effort_moves_a_joint_until_it_is_cleared(self):
         self.accepted(self.apply_joint_effort("hinge", 1.0, NOW, rospy.Duration(0.1)))
@@ -275,7 +275,7 @@ class GazeboBodies(unittest.TestCase):
         self.assertGreater(self.get_joint_properties("hinge").position[0], 0.5)
         self.clear_joint_forces("hinge")
         self.refused(self.apply_joint_effort("knee", 1.0, NOW, ALWAYS), "knee", "hinge")
-        self.refused(self.apply_joint_effort("hinge", math.inf, NOW, ALWAYS), "finite")
+        self.refused(self.apply_joint_effort("hinge", math.inf, NOW, ALWAYS), "expected -1e+07 to 1e+07")
 
     def test_joint_properties_can_be_read_and_partly_set(self):
         got = self.get_joint_properties("hinge")

@@ -4,8 +4,8 @@
 import math
 
 import numpy as np
-from lxml import etree
 
+from urdf_model import XmlRefused, bounds, parse_xml
 from urdf_model.transforms import pose_matrix
 
 ROOT_TAGS = ("sdf", "gazebo")
@@ -42,19 +42,17 @@ class Document:
     :param source: names the text in messages; a path where there is one
     :param folder: what relative file names refer to, or None
     :param notes: Notes
+    :param most_bytes: how long the text may be
     """
 
-    def __init__(self, xml, source, folder, notes):
+    def __init__(self, xml, source, folder, notes, most_bytes=bounds.DESCRIPTION_BYTES):
         self.source = str(source)
         self.folder = folder
         self.notes = notes
-        data = xml.encode() if isinstance(xml, str) else xml
-        # No entities, no network: descriptions arrive over services, from anybody.
-        parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=False)
         try:
-            self.root = etree.fromstring(data.strip(), parser)
-        except etree.XMLSyntaxError as error:
-            raise SdfError("%s is not well-formed XML: %s" % (self.source, error)) from None
+            self.root = parse_xml(xml, most_bytes)
+        except XmlRefused as error:
+            raise SdfError("%s %s" % (self.source, error)) from None
         if self.root is None or self.root.tag not in ROOT_TAGS:
             found = "nothing" if self.root is None else "<%s>" % self.root.tag
             raise SdfError("%s is not an SDF: its root element is %s, expected <sdf>" % (self.source, found))

@@ -4,7 +4,7 @@
 import re
 from pathlib import Path
 
-from lxml import etree
+from urdf_model import XmlRefused, bounds, parse_xml, read_file
 
 
 class ModelFolders:
@@ -45,13 +45,11 @@ def description_file(folder):
     folder = Path(folder)
     named = []
     try:
-        manifest = etree.parse(
-            str(folder / "model.config"), etree.XMLParser(resolve_entities=False, no_network=True)
-        ).getroot()
+        manifest = parse_xml(read_file(folder / "model.config", bounds.DESCRIPTION_BYTES))
         for element in manifest.iterchildren("sdf"):
             version = tuple(int(word) for word in re.findall(r"\d+", element.get("version", "")))
             named.append((version, folder / (element.text or "").strip()))
-    except (OSError, etree.XMLSyntaxError):
+    except (OSError, XmlRefused, AttributeError):  # the last for a file without an element
         named = []
     for _, path in [*sorted(named, reverse=True), ((), folder / "model.sdf")]:
         if path.is_file():

@@ -29,19 +29,20 @@ class Frames:
 
     def where(self, name, element):
         """Return the 4x4 matrix of frame ``name`` in the scope; ``element`` is who asks, for the message."""
-        return self._where(name, element, ())
-
-    def _where(self, name, element, asked):
-        if name in OWN:
-            return np.eye(4)
-        if name in asked:
-            circle = " -> ".join((*asked, name))
-            raise self._document.error(element, "frame '%s' is given relative to itself: %s" % (name, circle))
-        if name not in self._given:
-            raise self._document.error(
-                element, "frame '%s' does not exist; frames: %s" % (name, ", ".join(self._given) or "none")
-            )
-        if name not in self._found:
-            base, pose, giver = self._given[name]
-            self._found[name] = self._where(base, giver, (*asked, name)) @ pose
-        return self._found[name]
+        # Without recursion: a chain may be as long as the file.
+        chain, asked = [], {}
+        while name not in OWN and name not in self._found:
+            if name in asked:
+                circle = " -> ".join((*asked, name))
+                raise self._document.error(element, "frame '%s' is given relative to itself: %s" % (name, circle))
+            if name not in self._given:
+                raise self._document.error(
+                    element, "frame '%s' does not exist; frames: %s" % (name, ", ".join(self._given) or "none")
+                )
+            asked[name] = None
+            chain.append((name, self._given[name][1]))
+            name, _, element = self._given[name]
+        matrix = np.eye(4) if name in OWN else self._found[name]
+        for name, pose in reversed(chain):
+            matrix = self._found[name] = matrix @ pose
+        return matrix

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from urdf_model import Limit, Robot
+from urdf_model import Limit, OutOfBounds, Robot, bounds, check_robot, read_file
 
-from .document import Document, Notes
+from .document import Document, Notes, SdfError
 from .folders import ModelFolders
 from .frames import Frames
 from .lights import Light, read_light
@@ -20,8 +20,6 @@ from .tree import Parts, SdfJoint, build_robot
 
 _QUIET = ("enable_wind", "allow_auto_disable", "meta")
 _MOVABLE = ("revolute", "continuous", "prismatic")
-# A limit beyond this [rad or m] means none; SDF's own default is 1e16.
-_NO_LIMIT = 1e12
 _DEEPEST_INCLUDE = 8
 
 
@@ -72,6 +70,7 @@ class ModelReader:
 
     def __init__(self, folders):
         self._folders = folders
+        self._opened = 0
 
     def model(self, document, element, depth=0, static=None):
         """Return the SdfModel of a <model>. ``static`` overrides what it says itself."""
@@ -96,6 +95,11 @@ class ModelReader:
         if static is not None:
             parts.static = static
         robot = build_robot(document, name, parts)
+        try:
+            check_robot(robot)
+            bounds.POSITION.check(pose[:3, 3], "the position of the model")
+        except OutOfBounds as error:
+            raise SdfError("%s: model '%s': %s" % (document.source, name, error)) from None
         if parts.static:
             said = etree.Element("gazebo")
             etree.SubElement(said, "static").text = "true"
@@ -107,6 +111,10 @@ class ModelReader:
         uri = document.text(element, "uri")
         if depth >= _DEEPEST_INCLUDE:
             raise document.error(element, "include of %s: more than %d files deep; is it in a circle?" % (uri, depth))
+        self._opened += 1
+        if self._opened > bounds.INCLUDES:
+            raise document.error(element, "more than %d files are included; do they include each other?"
+                                 % bounds.INCLUDES)
         path = self._folders.find(uri, document.folder)
         if path is None:
             looked = ", ".join(map(str, self._folders.folders)) or "no folder"
@@ -114,7 +122,7 @@ class ModelReader:
                 element, "model %s not found; looked in %s; add its folder to GAZEBO_MODEL_PATH" % (uri, looked)
             )
         try:
-            content = Path(path).read_bytes()
+            content = read_file(path, bounds.DESCRIPTION_BYTES)
         except OSError as error:
             raise document.error(element, "%s (%s) cannot be read: %s" % (uri, path, error.strerror)) from None
         inner = Document(content, path, Path(path).parent, document.notes)
@@ -177,6 +185,8 @@ class ModelReader:
             for link_name, (_, frame) in below.links.items():
                 frames.add(link_name, child, pose=frame)
             parts.links.update(below.links)
+            if len(parts.links) > bounds.LINKS:
+                raise document.error(child, "more than %d links in one model" % bounds.LINKS)
             parts.joints += below.joints
             parts.gazebo += below.gazebo
 
@@ -279,8 +289,8 @@ def _limit(document, given, name, kind):
         raise document.error(element, "joint '%s' has lower limit %g above its upper limit %g" % (name, lower, upper))
     # Below zero is SDF's way to say: unlimited.
     values = (document.number(element, tag, -1.0) for tag in ("effort", "velocity"))
-    effort, velocity = (value if value >= 0.0 else None for value in values)
-    if lower <= -_NO_LIMIT and upper >= _NO_LIMIT or kind == "continuous":
+    effort, velocity = (value if 0.0 <= value <= bounds.NO_LIMIT else None for value in values)
+    if lower <= -bounds.NO_LIMIT and upper >= bounds.NO_LIMIT or kind == "continuous":
         return ("continuous" if kind == "revolute" else kind), Limit(velocity=velocity, effort=effort)
-    lower, upper = max(lower, -_NO_LIMIT), min(upper, _NO_LIMIT)
+    lower, upper = max(lower, -bounds.NO_LIMIT), min(upper, bounds.NO_LIMIT)
     return kind, Limit(lower, upper, velocity, effort)

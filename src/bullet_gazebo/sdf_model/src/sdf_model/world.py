@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from urdf_model import OutOfBounds, bounds, read_file
+
 from .document import Document, Notes, SdfError
 from .folders import ModelFolders
 from .frames import Frames
@@ -41,10 +43,10 @@ def parse_sdf_world(path, folders=None):
     what is wrong in a model is in ``SdfWorld.problems``.
     """
     try:
-        content = Path(path).read_bytes()
+        content = read_file(path, bounds.WORLD_BYTES)
     except OSError as error:
         raise SdfError("world file %s cannot be read: %s" % (path, error.strerror)) from None
-    document = Document(content, path, Path(path).parent, Notes())
+    document = Document(content, path, Path(path).parent, Notes(), bounds.WORLD_BYTES)
     worlds = document.root.findall("world")
     if len(worlds) != 1:
         raise document.error(document.root, "it holds %d <world>, expected one" % len(worlds))
@@ -64,7 +66,7 @@ class _WorldReader:
         known = ("gravity", "physics", "include", "model", "light", "frame", "state", "scene", *_QUIET)
         document.note_unknown(element, known)
         if element.find("gravity") is not None:
-            self._world.gravity = document.vector(element, "gravity", (0.0,) * 3)
+            self._world.gravity = self._gravity(element)
         for child in element.iterchildren("physics"):
             self._physics(child)
         for child in element.iterchildren("scene"):
@@ -87,14 +89,22 @@ class _WorldReader:
         step = element.find("max_step_size")
         if step is not None:
             (value,) = document.numbers(step, 1)
-            if not 1e-5 <= value <= 0.05:
-                raise document.error(step, "max_step_size is %g s, expected 0.00001 to 0.05" % value)
-            self._world.time_step_s = value
+            self._world.time_step_s = self._bounded(bounds.TIME_STEP, value, step)
         if element.find("gravity") is not None:  # where older files have it
-            self._world.gravity = document.vector(element, "gravity", (0.0,) * 3)
+            self._world.gravity = self._gravity(element)
         factor = document.number(element, "real_time_factor", 1.0)
         if factor != 1.0:
             document.note(element.find("real_time_factor"), "real_time_factor %g: the launch argument decides" % factor)
+
+    def _gravity(self, element):
+        return self._bounded(bounds.GRAVITY, self._document.vector(element, "gravity", (0.0,) * 3),
+                             element.find("gravity"))
+
+    def _bounded(self, bound, values, element):
+        try:
+            return bound.check(values, "<%s>" % element.tag)
+        except OutOfBounds as error:
+            raise self._document.error(element, str(error)) from None
 
     def _entity(self, element):
         document, world = self._document, self._world

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """URDF robot descriptions as plain data: parse, validate, merge fixed links. Knows neither ROS nor a physics engine."""
 
+from .bounds import OutOfBounds, check_robot
 from .errors import UrdfError
+from .files import read_file
 from .merge import MergedFrame, MergedLink, MergedRobot, merge_fixed
 from .model import (
     Box,
@@ -21,6 +23,7 @@ from .model import (
 )
 from .parser import parse_urdf
 from .writer import drawing_urdf
+from .xml_text import XmlRefused, parse_xml, refuse_entities
 
 __all__ = [
     "Box",
@@ -34,6 +37,7 @@ __all__ = [
     "MergedRobot",
     "Mesh",
     "Mimic",
+    "OutOfBounds",
     "Plane",
     "Robot",
     "Shape",
@@ -41,7 +45,12 @@ __all__ = [
     "Surface",
     "Transmission",
     "UrdfError",
+    "XmlRefused",
+    "check_robot",
     "drawing_urdf",
     "merge_fixed",
     "parse_urdf",
+    "parse_xml",
+    "read_file",
+    "refuse_entities",
 ]

@@ -4,8 +4,8 @@
 import math
 
 import numpy as np
-from lxml import etree
 
+from . import bounds
 from .errors import UrdfError
 from .materials import MATERIALS
 from .model import (
@@ -26,6 +26,7 @@ from .model import (
     TransmissionJoint,
 )
 from .transforms import pose_matrix
+from .xml_text import XmlRefused, parse_xml
 
 JOINT_TYPES = MOVABLE_TYPES + ("fixed", "floating", "planar")
 
@@ -35,22 +36,25 @@ def parse_urdf(xml, source="robot_description"):
 
     Things that can be mended (an inertia that no body can have, a joint that nothing drives) are listed in
     ``Robot.warnings``. Raises UrdfError for what cannot: malformed XML, another root element, duplicate or unknown
-    names, a tree with no or several roots, numbers that are not finite.
+    names, a tree with no or several roots, numbers that are not finite or out of bounds (``bounds``), more than a
+    description may hold.
     """
-    return _Reader(xml, source).robot()
+    robot = _Reader(xml, source).robot()
+    try:
+        bounds.check_robot(robot)
+    except bounds.OutOfBounds as error:
+        raise UrdfError("%s: %s" % (source, error)) from None
+    return robot
 
 
 class _Reader:
     def __init__(self, xml, source):
         self.source = source
         self.warnings = []
-        data = xml.encode() if isinstance(xml, str) else xml
-        # No entities, no network: descriptions arrive over services, from anybody.
-        parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=False)
         try:
-            self.root = etree.fromstring(data.strip(), parser)
-        except etree.XMLSyntaxError as error:
-            raise UrdfError("%s is not well-formed XML: %s" % (source, error)) from None
+            self.root = parse_xml(xml)
+        except XmlRefused as error:
+            raise UrdfError("%s %s" % (source, error)) from None
         if self.root is None or self.root.tag != "robot":
             found = "nothing" if self.root is None else "<%s>" % self.root.tag
             raise UrdfError("%s is not a URDF: its root element is %s, expected <robot>" % (source, found))
@@ -222,6 +226,10 @@ class _Reader:
             if kind in MOVABLE_TYPES:
                 raise self.error(element, "axis of joint '%s' is zero; expected a direction such as 0 0 1" % name)
             axis, length = (1.0, 0.0, 0.0), 1.0
+        if not length <= bounds.NO_LIMIT:
+            raise self.error(
+                element, "axis of joint '%s' is %s; expected a direction such as 0 0 1" % (name, _words(axis))
+            )
         dynamics, mimic = element.find("dynamics"), element.find("mimic")
         return Joint(
             name,
@@ -248,12 +256,19 @@ class _Reader:
                 )
             return Limit()
         limit = Limit(velocity=self.number(element, "velocity"), effort=self.number(element, "effort"))
+        # Some tools write the largest number there is for "none".
+        limit.velocity, limit.effort = (
+            None if value is not None and value > bounds.NO_LIMIT else value
+            for value in (limit.velocity, limit.effort)
+        )
         for value, what in ((limit.velocity, "velocity"), (limit.effort, "effort")):
             if value is not None and value < 0.0:
                 raise self.error(element, "%s limit of joint '%s' is %g; expected 0 or more" % (what, name, value))
         if kind in ("revolute", "prismatic"):
-            limit.lower = self.number(element, "lower", default=0.0)
-            limit.upper = self.number(element, "upper", default=0.0)
+            limit.lower, limit.upper = (
+                min(max(self.number(element, key, default=0.0), -bounds.NO_LIMIT), bounds.NO_LIMIT)
+                for key in ("lower", "upper")
+            )
             if limit.lower > limit.upper:
                 raise self.error(
                     element, "joint '%s' has lower limit %g above its upper limit %g" % (name, limit.lower, limit.upper)
@@ -348,7 +363,7 @@ class _Reader:
             raise self.error(
                 element,
                 "%s of the %s of link '%s' is %s; expected positive numbers"
-                % (key, element.tag, link, " ".join("%g" % v for v in values)),
+                % (key, element.tag, link, _words(values)),
             )
         return values
 
@@ -379,6 +394,10 @@ class _Reader:
         if not math.isfinite(value):
             raise self.error(element, "%s='%s' is not finite" % (key, text))
         return value
+
+
+def _words(values):
+    return " ".join("%g" % value for value in values)
 
 
 def _reduction(text):

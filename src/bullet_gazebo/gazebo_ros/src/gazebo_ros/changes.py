@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What services have changed about the physics, and how it was before: a reset takes it back. ROS-free."""
+
+
+class Changes:
+    """One entry for each thing that was changed, with how to take it back."""
+
+    def __init__(self):
+        self._undo = {}
+
+    def note(self, key, undo):
+        """Remember ``undo()`` for the first change of ``key``, a tuple that begins with the model's name or ""."""
+        self._undo.setdefault(key, undo)
+
+    def take_back(self):
+        """Undo every change, the last one first. What cannot be undone raises, after the rest."""
+        undo, self._undo = list(self._undo.values()), {}
+        failed = None
+        for step in reversed(undo):
+            try:
+                step()
+            except Exception as error:  # noqa: BLE001  (raised below: the others are taken back first)
+                failed = error
+        if failed is not None:
+            raise failed
+
+    def forget(self, model_name):
+        """Drop what concerns a model that is gone."""
+        self._undo = {key: undo for key, undo in self._undo.items() if key[0] != model_name}

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files that descriptions name: read without ever waiting for one, and no more of it than expected."""
+
+import errno
+import os
+import stat
+
+
+def read_file(path, most_bytes):
+    """Return the content (bytes) of a regular file. Raises OSError for anything else, and for a larger one.
+
+    A named pipe has nothing to read until somebody writes, and a device may never end: neither is opened for waiting.
+    """
+    with open(path, "rb", opener=_open_at_once) as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "it is %s, not a file" % kind_of(status.st_mode), str(path))
+        # The kernel's own files say that they are empty, and reading some of them waits.
+        if status.st_size == 0:
+            raise OSError(errno.EINVAL, "it is empty", str(path))
+        content = file.read(most_bytes + 1) if status.st_size <= most_bytes else b""
+        if status.st_size > most_bytes or len(content) > most_bytes:
+            raise OSError(
+                errno.EFBIG, "it has %d bytes, expected at most %d" % (max(status.st_size, len(content)), most_bytes),
+                str(path),
+            )
+        return content
+
+
+def kind_of(mode):
+    """Return in words what a path with the ``st_mode`` ``mode`` is, where it is no regular file."""
+    kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a named pipe"), (stat.S_ISSOCK, "a socket"),
+             (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"))
+    return next((words for is_kind, words in kinds if is_kind(mode)), "something else")
+
+
+def _open_at_once(path, flags):
+    return os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC)

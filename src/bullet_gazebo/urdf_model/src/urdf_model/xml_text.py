@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""XML from anybody: no entities, no network, no more than a description may hold."""
+
+from lxml import etree
+
+from . import bounds
+
+
+class XmlRefused(ValueError):
+    """The text cannot be used; the error goes on from the text's name: "… is not well-formed XML: …"."""
+
+
+def parse_xml(text, most_bytes=bounds.DESCRIPTION_BYTES):
+    """Return the root element of ``text`` (str or bytes), without comments; None where it holds none.
+
+    Raises XmlRefused for what is not well-formed, declares entities, or is larger than a description may be.
+    """
+    data = text.encode() if isinstance(text, str) else text
+    if len(data) > most_bytes:
+        raise XmlRefused("has %d bytes; expected at most %d (are meshes written into it?)" % (len(data), most_bytes))
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=False)
+    try:
+        root = etree.fromstring(data.strip(), parser)
+    except etree.XMLSyntaxError as error:
+        raise XmlRefused("is not well-formed XML: %s" % error) from None
+    if root is not None:
+        refuse_entities(root)
+        count, most = sum(1 for _ in root.iter()), most_bytes // bounds.BYTES_PER_ELEMENT
+        if count > most:
+            raise XmlRefused("has %d elements; expected at most %d" % (count, most))
+    return root
+
+
+def refuse_entities(root):
+    """Raise XmlRefused where the document of ``root`` declares entities: what they stand for may be without end."""
+    declared = root.getroottree().docinfo.internalDTD
+    names = [] if declared is None else [entity.name for entity in declared.iterentities()]
+    if names:
+        raise XmlRefused("declares the entit%s %s; write what they stand for instead"
+                         % ("ies" if len(names) > 1 else "y", ", ".join(names[:5])))
