@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 # A start that is quicker than this passes without a word [s].
 FIRST_NOTICE_S = 1.0
-NOTICE_EVERY_S = 4.0
 POLL_S = 0.05
+# How often one looks whether what is waited for is on its way [s].
+LOOK_EVERY_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -26,23 +27,36 @@ class Condition:
     explain: Callable[[], str]
 
 
-def wait_in_order(conditions, timeout_s, say, is_shutdown=lambda: False, now=time.monotonic, sleep=time.sleep):
+def wait_in_order(conditions, timeout_s, line=None, is_coming=lambda: False, is_shutdown=lambda: False,
+                  now=time.monotonic, sleep=time.sleep):
     """Wait until each of `conditions` has been met, in their order, for `timeout_s` in all.
 
-    Parameters: `say` takes a line of text, every few seconds; `is_shutdown` ends the wait; `now` and `sleep` are the
-    clock [s], wall time by default because nothing else can be relied on while a robot starts.
+    Parameters:
+        line: a lab_environment.waiting_line.WaitingLine, which shows what is waited for; None: nothing is shown.
+        is_coming: tells whether what is waited for is visibly on its way, asked once a second; as long as it is, the
+            time limit does not run. It may raise an OSError, which ends the wait.
+        is_shutdown: ends the wait.
+        now, sleep: the clock [s], wall time by default because nothing else can be relied on while a robot starts.
     Raises OSError with errno ETIMEDOUT, or ESHUTDOWN.
     """
     begin_s = now()
-    notice_s = begin_s + FIRST_NOTICE_S
-    for condition in conditions:
-        while not condition.is_met():
-            if is_shutdown():
-                raise OSError(errno.ESHUTDOWN, "ROS is shutting down; was waiting for %s" % condition.what)
-            if now() - begin_s >= timeout_s:
-                raise OSError(errno.ETIMEDOUT, "waited %.0f s for %s: %s"
-                              % (timeout_s, condition.what, condition.explain()))
-            if now() >= notice_s:
-                say("waiting for %s ..." % condition.what)
-                notice_s = now() + NOTICE_EVERY_S
-            sleep(POLL_S)
+    deadline_s = begin_s + timeout_s
+    look_at_s = begin_s + LOOK_EVERY_S
+    try:
+        for condition in conditions:
+            while not condition.is_met():
+                if is_shutdown():
+                    raise OSError(errno.ESHUTDOWN, "ROS is shutting down; was waiting for %s" % condition.what)
+                if now() >= min(look_at_s, deadline_s):
+                    if is_coming():
+                        deadline_s = now() + timeout_s
+                    look_at_s = now() + LOOK_EVERY_S
+                if now() >= deadline_s:
+                    raise OSError(errno.ETIMEDOUT, "waited %.0f s for %s: %s"
+                                  % (now() - begin_s, condition.what, condition.explain()))
+                if line and now() - begin_s >= FIRST_NOTICE_S:
+                    line.say(condition.what, now() - begin_s)
+                sleep(POLL_S)
+    finally:
+        if line:
+            line.end()

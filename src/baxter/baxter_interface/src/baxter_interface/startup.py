@@ -6,7 +6,6 @@ Everything here waits in wall time, since ROS time may not run yet.
 import http.client
 import os
 import socket
-import sys
 import xml.parsers.expat
 import xmlrpc.client
 from urllib.parse import urlparse
@@ -15,14 +14,20 @@ import rosgraph
 import rospy
 import rospy.impl.simtime
 
+from lab_environment.simulator_start import StartWatch
+from lab_environment.waiting_line import WaitingLine
+
 from .patience import Condition, wait_in_order
 
-# Longest wait for a robot that is still starting [s, wall].
+# Longest wait for a robot [s, wall], not counting the time in which a simulator is visibly starting.
 STARTUP_TIMEOUT_S = 30.0
 # Longest wait for one part of a robot that is up [s, wall]: a part that it does not have need not cost more.
 PART_TIMEOUT_S = 5.0
 # Longest wait for one answer over the network [s].
 ANSWER_TIMEOUT_S = 2.0
+
+# All waits of a program share a line.
+LINE = WaitingLine()
 
 _LAUNCH_HINT = "is the robot or the simulator running (roslaunch baxter_gazebo baxter_world.launch)?"
 # All the ways in which asking the master can fail: not there, not a master, an answer that is an error.
@@ -35,25 +40,35 @@ def init_node(name, topic="robot/state", **options):
 
     The order matters when a program starts together with roslaunch: rospy.init_node looks at /use_sim_time once, and
     roslaunch sets that parameter a moment after the master is up.
-    Raises OSError with errno ETIMEDOUT that says what was found and what would be right.
+    A simulator that is visibly starting is waited for as long as it is.
+    Raises OSError with errno ETIMEDOUT that says what was found and what would be right; SimulatorDied, an OSError.
     """
     topic = rospy.resolve_name(topic)
-    # rospy's log works only after init_node.
-    wait_in_order([master_answers(), topic_published(topic)], STARTUP_TIMEOUT_S,
-                  say=lambda text: print(text, file=sys.stderr, flush=True))
+    wait_in_order([master_answers(), topic_published(topic)], STARTUP_TIMEOUT_S, LINE, simulator_is_coming())
     rospy.init_node(name, **options)
 
 
 def wait_for_start(conditions, timeout_s=None):
     """Wait, as an initialised node, for the master, for `conditions` in their order, and for the clock to run.
 
-    Parameters: `timeout_s` [s, wall], None for STARTUP_TIMEOUT_S.
-    Raises OSError with errno ETIMEDOUT or ESHUTDOWN; rospy.ROSInitException before rospy.init_node.
+    Parameters: `timeout_s` [s, wall], None for STARTUP_TIMEOUT_S; it does not run while a simulator is visibly
+    starting.
+    Raises OSError with errno ETIMEDOUT or ESHUTDOWN; SimulatorDied, an OSError; rospy.ROSInitException before
+    rospy.init_node.
     """
     if not rospy.core.is_initialized():
         raise rospy.ROSInitException("this program is no ROS node yet: call rospy.init_node(name) first")
     wait_in_order([master_answers(), *conditions, clock_runs()], STARTUP_TIMEOUT_S if timeout_s is None else timeout_s,
-                  say=rospy.logwarn, is_shutdown=rospy.is_shutdown)
+                  LINE, simulator_is_coming(), rospy.is_shutdown)
+
+
+def simulator_is_coming():
+    """Make a function that tells whether a simulator is visibly starting at this master.
+
+    It raises SimulatorDied, an OSError, once a simulator that it has seen is gone.
+    """
+    watch = StartWatch(rosgraph.get_master_uri(), _caller())
+    return lambda: bool(watch.look())
 
 
 def wait_for_part(topic, has_arrived):
@@ -166,15 +181,19 @@ def wait_for_subscribers(publisher, timeout=1.0, enough=None):
         expected = min(expected, enough)
     connected = Condition("", lambda: publisher.get_num_connections() >= expected, lambda: "")
     try:
-        wait_in_order([connected], timeout, say=rospy.logdebug, is_shutdown=rospy.is_shutdown)
+        wait_in_order([connected], timeout, is_shutdown=rospy.is_shutdown)
     except OSError:
         rospy.logdebug("%s: %d of %d subscribers connected within %.1f s", publisher.resolved_name,
                        publisher.get_num_connections(), expected, timeout)
 
 
-def _master():
+def _caller():
     # Before init_node there is no node name; the master only wants to know who asks.
-    return rosgraph.Master("/baxter_interface_%d" % os.getpid())
+    return "/baxter_interface_%d" % os.getpid()
+
+
+def _master():
+    return rosgraph.Master(_caller())
 
 
 def _nodes_of(topic, subscribers=False):

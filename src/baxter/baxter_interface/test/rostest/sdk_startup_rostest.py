@@ -14,6 +14,7 @@ CLOCK_START_S = 1000.0
 PROGRAM = """
 import sys, rospy
 from baxter_interface import Limb, RobotEnable, startup
+startup.LINE.again_after_s = 0.0
 {before}
 RobotEnable({versioned}).enable()
 limb = Limb("left")

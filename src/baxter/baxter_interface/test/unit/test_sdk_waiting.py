@@ -106,37 +106,72 @@ def test_ticker_refuses_a_rate_of_nothing():
         Ticker(FakeClock(), 0.0)
 
 
-def patient(clock, conditions, said, timeout_s=30.0):
-    wait_in_order(conditions, timeout_s, said.append, clock.is_shutdown, clock.now, clock.sleep)
+class FakeLine:
+    def __init__(self):
+        self.shown, self.ended = [], 0
+
+    def say(self, what, waited_s):
+        if what not in self.shown:
+            self.shown.append(what)
+
+    def end(self):
+        self.ended += 1
+
+
+def patient(clock, conditions, line=None, timeout_s=30.0, is_coming=lambda: False):
+    wait_in_order(conditions, timeout_s, line or FakeLine(), is_coming, clock.is_shutdown, clock.now, clock.sleep)
 
 
 def test_conditions_met_pass_without_a_word():
-    clock, said = FakeClock(), []
-    patient(clock, [Condition("it", lambda: True, str)] * 3, said)
-    assert said == [] and clock.slept_s == 0.0
+    clock, line = FakeClock(), FakeLine()
+    patient(clock, [Condition("it", lambda: True, str)] * 3, line)
+    assert line.shown == [] and clock.slept_s == 0.0
 
 
-def test_wait_names_what_it_waits_for_every_few_seconds():
-    clock, said = FakeClock(), []
+def test_wait_shows_what_it_waits_for_and_takes_the_line_away():
+    clock, line = FakeClock(), FakeLine()
     conditions = [Condition("a master", lambda: clock.slept_s > 10.0, str),
                   Condition("a robot", lambda: clock.slept_s > 20.0, str)]
-    patient(clock, conditions, said)
-    assert said == ["waiting for a master ..."] * 3 + ["waiting for a robot ..."] * 2
+    patient(clock, conditions, line)
+    assert line.shown == ["a master", "a robot"] and line.ended == 1
 
 
 def test_vain_wait_says_what_was_found_and_all_conditions_share_the_time():
-    clock, said = FakeClock(), []
+    clock, line = FakeClock(), FakeLine()
     conditions = [Condition("a master", lambda: clock.slept_s > 20.0, str),
                   Condition("a robot", lambda: False, lambda: "found a toaster")]
     with pytest.raises(OSError, match="waited 30 s for a robot: found a toaster") as caught:
-        patient(clock, conditions, said)
+        patient(clock, conditions, line)
     assert caught.value.errno == errno.ETIMEDOUT
     assert clock.slept_s == pytest.approx(30.0, abs=0.06)
+    assert line.ended == 1
+
+
+def test_the_time_limit_does_not_run_while_what_is_waited_for_is_on_its_way():
+    clock = FakeClock()
+    patient(clock, [Condition("a robot", lambda: clock.slept_s > 200.0, str)],
+            is_coming=lambda: clock.slept_s < 180.0)
+    clock = FakeClock()
+    with pytest.raises(OSError, match="waited 130 s for a robot"):
+        patient(clock, [Condition("a robot", lambda: False, str)], is_coming=lambda: clock.slept_s < 100.5)
+
+
+def test_what_dies_on_its_way_ends_the_wait():
+    clock = FakeClock()
+
+    def is_coming():
+        if clock.slept_s > 5.0:
+            raise OSError("the simulator is gone")
+        return True
+
+    with pytest.raises(OSError, match="the simulator is gone"):
+        patient(clock, [Condition("a robot", lambda: False, str)], is_coming=is_coming)
+    assert clock.slept_s < 7.0
 
 
 def test_shutdown_ends_the_wait():
     clock = FakeClock()
     clock.shutdown_at_s = 103.0
     with pytest.raises(OSError, match="shutting down") as caught:
-        patient(clock, [Condition("a master", lambda: False, str)], [])
+        patient(clock, [Condition("a master", lambda: False, str)])
     assert caught.value.errno == errno.ESHUTDOWN

@@ -14,6 +14,7 @@ import tf2_ros
 from cv_bridge import CvBridge
 from sensor_msgs.msg import Image, JointState
 
+from baxter_interface import startup
 from baxter_interface.patience import Condition, wait_in_order
 from gazebo_ros.snapshot import SnapshotError
 from live_plot.recording import Recording
@@ -207,7 +208,7 @@ def _message(topic, message_class, hint):
 def _wait(what, is_met, hint, timeout_s=TIMEOUT_S):
     explain = hint if callable(hint) else lambda: hint
     try:
-        wait_in_order([Condition(what, lambda: bool(is_met()), explain)], timeout_s, say=rospy.logwarn,
+        wait_in_order([Condition(what, lambda: bool(is_met()), explain)], timeout_s, startup.LINE,
                       is_shutdown=rospy.is_shutdown, sleep=lambda _: time.sleep(0.02))
     except OSError as error:
         raise ShowError(error.strerror) from error

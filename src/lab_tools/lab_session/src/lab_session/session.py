@@ -138,7 +138,8 @@ class Lab:
         condition = startup.topic_published(self._topic)
         met = Condition(condition.what, lambda: condition.is_met() or (ours and ours.poll() is not None),
                         condition.explain)
-        wait_in_order([met], timeout_s, say=_say)
+        # Whether one of ours is still on its way, its keeper knows.
+        wait_in_order([met], timeout_s, startup.LINE, (lambda: False) if ours else startup.simulator_is_coming())
         if ours and ours.poll() is not None:
             lines = Path(self._log).read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:]
             self.close()
@@ -186,7 +187,7 @@ def _find_or_start(lab):
     # What another notebook's kernel has left behind is on its way out, or still on its way up.
     if keeper.is_held(state) and state.read_text().startswith("ending"):
         wait_in_order([Condition("the simulator before this one to end", lambda: not keeper.is_held(state),
-                                 lambda: "it still runs")], keeper.STOP_TIMEOUT_S + 10.0, say=_say)
+                                 lambda: "it still runs")], keeper.STOP_TIMEOUT_S + 10.0, startup.LINE)
     has_simulator = any(name == "/gazebo" for name in lab.nodes)
     if has_simulator or keeper.is_held(state) or not is_local:
         try:

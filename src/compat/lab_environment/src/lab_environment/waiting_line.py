@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One line about a wait. Free of ROS."""
+import sys
+import time
+
+# Where lines stay, the next one comes after this at the earliest [s].
+AGAIN_AFTER_S = 30.0
+
+
+class WaitingLine:
+    """Says what a program waits for: on a terminal one line that counts the seconds, elsewhere one line that stays.
+
+    Parameters: `stream` is a text stream, None for the standard error of the moment; `now` is a clock [s].
+    Attribute `again_after_s`: where lines stay, none follows another within this time [s].
+    """
+
+    def __init__(self, stream=None, again_after_s=AGAIN_AFTER_S, now=time.monotonic):
+        self.again_after_s = again_after_s
+        self._stream = stream
+        self._now = now
+        self._said_at_s = None
+        self._shown = ""
+        self._last = ""
+
+    def say(self, what, waited_s):
+        """Show that the program has waited for `what` for `waited_s` [s]; may be called as often as one likes."""
+        stream = sys.stderr if self._stream is None else self._stream
+        if stream.isatty():
+            line = "waiting for %s: %.0f s" % (what, waited_s)
+            if line != self._shown:
+                # \r and "erase the line": every terminal understands these.
+                stream.write("\r\033[K" + line)
+                stream.flush()
+                self._shown = line
+        elif what != self._last and (self._said_at_s is None or self._now() - self._said_at_s >= self.again_after_s):
+            stream.write("waiting for %s ...\n" % what)
+            stream.flush()
+            self._said_at_s, self._last = self._now(), what
+
+    def end(self):
+        """The wait is over: take the line off the terminal."""
+        if self._shown:
+            stream = sys.stderr if self._stream is None else self._stream
+            stream.write("\r\033[K")
+            stream.flush()
+            self._shown = ""

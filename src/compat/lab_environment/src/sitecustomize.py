@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Read by every Python that starts in the lab's environment: has modules amended at the moment they are imported.
+
+Costs those that import none of them nothing: no module is imported here. docs/decisions/0008 says why it is done this
+way.
+"""
+import os
+import sys
+
+# Module that is amended when somebody imports it -> ours, whose `amend(module)` is called then.
+AMENDED = {"rospy.client": "lab_environment.first_clock"}
+
+
+class AmendingFinder:
+    """A finder for sys.meta_path: finds nothing itself, and has the modules of AMENDED amended once they are loaded."""
+
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        amendment = AMENDED.pop(name, None)
+        if amendment is None:
+            return None
+        for finder in sys.meta_path:
+            spec = None if finder is AmendingFinder else finder.find_spec(name, path, target)
+            if spec is not None:
+                _amend_when_loaded(spec.loader, amendment)
+                return spec
+        return None
+
+
+def _amend_when_loaded(loader, amendment):
+    load = loader.exec_module
+
+    def exec_module(module):
+        load(module)
+        # A program must not fail over a convenience; without the amendment it runs as it does elsewhere.
+        try:
+            __import__(amendment)
+            sys.modules[amendment].amend(module)
+        except Exception as error:
+            sys.stderr.write("%s: not amended by %s: %r\n" % (module.__name__, amendment, error))
+
+    loader.exec_module = exec_module
+
+
+def _run_the_next():
+    """Run the sitecustomize that this one hides: the system's, or one that the user has put in PYTHONPATH."""
+    for folder in sys.path:
+        path = os.path.join(folder, "sitecustomize.py")
+        if not os.path.isdir(os.path.join(folder, "lab_environment")) and os.path.isfile(path):
+            with open(path, "rb") as file:
+                exec(compile(file.read(), path, "exec"), {"__name__": "sitecustomize", "__file__": path})
+            return
+
+
+sys.meta_path.insert(0, AmendingFinder)
+_run_the_next()
