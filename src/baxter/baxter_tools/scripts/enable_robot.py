@@ -11,17 +11,18 @@ from baxter_interface.programs import run
 
 ACTIONS = {
     "state": lambda robot: print(robot.state()),
-    "enable": RobotEnable.enable,
-    "disable": RobotEnable.disable,
-    "reset": RobotEnable.reset,
-    "stop": RobotEnable.stop,
+    "enable": lambda robot: robot.enable() or print("the robot is enabled"),
+    "disable": lambda robot: robot.disable() or print("the robot is disabled"),
+    "reset": lambda robot: robot.reset() and print("the robot is reset; it is disabled until it is enabled (-e)"),
+    "stop": lambda robot: robot.stop() or print("the robot is stopped"),
 }
 
 
 def parse_arguments(argv):
     parser = argparse.ArgumentParser(
         prog="enable_robot.py", description=__doc__,
-        epilog="Options are carried out in the order given. A robot that is still starting is waited for, up to 30 s. "
+        epilog="Options are carried out in the order given. A robot is waited for, 30 s or "
+               "as long as a simulator is visibly starting. "
                "Exit status: 0 done, 1 something failed, 2 wrong options.")
     for flags, action, text in (
         (("-s", "--state"), "state", "print the robot's state"),

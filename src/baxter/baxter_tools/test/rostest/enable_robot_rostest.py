@@ -57,6 +57,10 @@ class EnableRobotTest(unittest.TestCase):
         seen = [line for line in result.stdout.splitlines() if line.startswith("enabled")]
         self.assertEqual(seen, ["enabled: False", "enabled: True", "enabled: False"])
 
+    def test_what_was_reached_is_said(self):
+        self.expect(["-e"], 0, "the robot is enabled\n")
+        self.expect(["-S", "-r", "-d"], 0, "the robot is stopped\n", "the robot is reset", "the robot is disabled\n")
+
     def test_stop_and_reset(self):
         self.expect(["-e", "-S", "-s"], 0, "stopped: True")
         self.expect(["--reset", "-s"], 0, "stopped: False", "enabled: False")
