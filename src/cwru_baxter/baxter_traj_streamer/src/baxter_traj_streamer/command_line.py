@@ -13,7 +13,8 @@ from .traj_client import MoveFailed, TrajClient
 def add_wait_option(parser, default_s):
     """``--wait SECONDS``; ``default_s`` None: until the move is over."""
     parser.add_argument("--wait", type=float, default=default_s, metavar="SECONDS",
-                        help="how long to wait for the result; the arm moves on in any case (default: %s)"
+                        help="how long to wait for the result, in the robot's time; the arm moves on in any case "
+                             "(default: %s)"
                         % ("until it is there" if default_s is None else "%g" % default_s))
 
 
@@ -22,6 +23,7 @@ def run(name, plan, wait_s):
 
     ``plan`` returns None where there is nothing to send.
     """
+    what_now = "nothing was sent"
     try:
         baxter_interface.startup.init_node(name, anonymous=True)
         client = TrajClient()
@@ -29,6 +31,8 @@ def run(name, plan, wait_s):
         trajectory = plan(client)
         if trajectory is None:
             return
+        what_now = ("trajActionServer stops the arm" if client.streamer.settings.stop_when_client_leaves else
+                    "the arm moves on (trajActionServer/cancel stops it)")
         result = client.move(trajectory, wait_s)
         if result is None:
             rospy.logwarn("no result within %g s; the arm moves on", wait_s)
@@ -39,4 +43,5 @@ def run(name, plan, wait_s):
     except REFUSALS as error:
         sys.exit("%s: %s" % (name, error))
     except (KeyboardInterrupt, rospy.ROSInterruptException):
-        pass
+        print("%s: interrupted; %s" % (name, what_now), file=sys.stderr)
+        sys.exit(130)

@@ -7,12 +7,14 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from baxter_dataflow.waiting import Stopwatch
+from baxter_interface import startup
+from baxter_interface.patience import FIRST_NOTICE_S
+
 from .interpolator import ACTION_NAME
 from .msg import trajAction, trajGoal
 from .streamer import BaxterTrajStreamer
 
-# How often it is said again what is waited for [s].
-REMINDER_S = 5.0
 # How often is looked whether a goal is over [s, wall].
 _POLL_S = 0.01
 
@@ -46,11 +48,14 @@ class SentGoal:
         return self._handle.get_comm_state() in (actionlib.CommState.DONE, actionlib.CommState.LOST)
 
     def wait(self, timeout_s=None):
-        """Wait for the end, at most ``timeout_s`` [s, wall]; returns whether it has come. Raises MoveFailed when the
-        server is gone."""
-        end = time.monotonic() + (float("inf") if timeout_s is None else timeout_s)
+        """Wait for the end, at most ``timeout_s`` [s, ROS time]; returns whether it has come.
+
+        Raises MoveFailed when the server is gone, ROSInterruptException when ROS shuts down.
+        """
+        watch = Stopwatch(rospy.get_time())
         while not self.is_over():
-            if time.monotonic() >= end or rospy.is_shutdown():
+            _raise_if_interrupted()
+            if timeout_s is not None and watch.elapsed_s(rospy.get_time()) >= timeout_s:
                 return False
             if not self._client.pub_goal.get_num_connections():
                 raise MoveFailed(GoalStatus.LOST, "%s is gone" % ACTION_NAME)
@@ -73,12 +78,26 @@ class TrajClient:
         self._action = actionlib.ActionClient(ACTION_NAME, trajAction)
 
     def wait_until_ready(self):
-        """Wait for the server and for the robot to be enabled, whatever was started first, and say what for."""
-        while not self._action.wait_for_server(rospy.Duration(REMINDER_S)) and not rospy.is_shutdown():
-            rospy.logwarn("waiting for %s: rosrun baxter_traj_streamer traj_interpolator_as", ACTION_NAME)
-        while (why := self.streamer.robot.why_not_ready()) and not rospy.is_shutdown():
-            rospy.logwarn_throttle(REMINDER_S, "waiting: %s" % why)
-            time.sleep(0.1)
+        """Wait for the server and for the robot to be enabled, whatever was started first, and say what for.
+
+        Raises ROSInterruptException when ROS shuts down.
+        """
+        self._wait("%s: rosrun baxter_traj_streamer traj_interpolator_as" % ACTION_NAME,
+                   lambda: self._action.wait_for_server(rospy.Duration(_POLL_S)))
+        if why := self.streamer.robot.why_not_ready():
+            self._wait("the robot: %s" % why, lambda: not self.streamer.robot.why_not_ready())
+
+    def _wait(self, what, is_there):
+        begin_s = time.monotonic()
+        try:
+            while not is_there():
+                _raise_if_interrupted()
+                if time.monotonic() - begin_s >= FIRST_NOTICE_S:
+                    startup.LINE.say(what, time.monotonic() - begin_s)
+                time.sleep(0.1)
+            _raise_if_interrupted()
+        finally:
+            startup.LINE.end()
 
     def send(self, trajectory, traj_id=1, feedback=lambda percent: None):
         """Send a JointTrajectory: a :class:`SentGoal`; ``feedback`` is called with the percent done.
@@ -88,9 +107,9 @@ class TrajClient:
         return SentGoal(self._action, trajectory, traj_id, feedback)
 
     def move(self, trajectory, timeout_s=None):
-        """Send a JointTrajectory and wait [s, wall; None: until the end]: the result, or None after ``timeout_s``.
+        """Send a JointTrajectory and wait [s, ROS time; None: until the end]: the result, or None after ``timeout_s``.
 
-        Raises MoveFailed.
+        Raises MoveFailed, ROSInterruptException when ROS shuts down; the arms move on then.
         """
         goal = self.send(trajectory)
         if not goal.wait(timeout_s):
@@ -104,6 +123,11 @@ class TrajClient:
         """The measured angles [rad] of these joints. Raises KeyError for one that the robot does not report."""
         angles = self.streamer.robot.angles()
         return [angles[name] for name in joint_names]
+
+
+def _raise_if_interrupted():
+    if rospy.is_shutdown():
+        raise rospy.ROSInterruptException("ROS is shutting down")
 
 
 def joint_trajectory(joint_names, times, positions, velocities=None):

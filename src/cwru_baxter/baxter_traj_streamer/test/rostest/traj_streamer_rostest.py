@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """trajActionServer and its clients against a fake robot."""
 import math
+import signal
 import subprocess
 import sys
 
@@ -168,6 +169,19 @@ class TrajStreamerTest(FakeRobotTest):
         self.assertIn("the arm moves on", run.stdout + run.stderr)
         self.wait_until_at(arm_joint_names("right"), self.streamer.settings.pose("pre_pose", "right"))
         # The goal outlives its client, and must not outlive this test.
+        wait_until(lambda: self.commands[-1][1].mode == JointCommand.POSITION_MODE, "the stream to end")
+
+    def test_an_interrupted_client_says_so_and_what_the_arm_does(self):
+        command = ["rosrun", "baxter_traj_streamer", "traj_action_client_pre_pose", "left", "--wait", "300"]
+        client = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        self.addCleanup(client.kill)
+        wait_until(lambda: self.raw_stream("left_s0"), "the arm to move")
+        client.send_signal(signal.SIGINT)
+        text = client.communicate(timeout=DEADLINE_S)[0]
+        self.assertEqual(client.returncode, 130, text)
+        self.assertIn("interrupted; the arm moves on", text)
+        self.assertNotIn("no result within", text)
+        self.wait_until_at(arm_joint_names("left"), self.streamer.settings.pose("pre_pose", "left"))
         wait_until(lambda: self.commands[-1][1].mode == JointCommand.POSITION_MODE, "the stream to end")
 
 
