@@ -57,6 +57,9 @@ main() {
             # Reports on a workspace that may be half built, so it sets nothing up.
             # A host that does not resolve, or has no route, is for the doctor to name.
             if [[ $# -gt 0 ]]; then use_robot "$1" 2>/dev/null || export ROS_MASTER_URI=http://$1:11311; fi
+            # What programs get that are started elsewhere.
+            LAB_USERS_PYTHON=$(command -v python3)
+            export LAB_USERS_PYTHON
             use_build_if_there
             if ! command -v python3 >/dev/null; then
                 echo "There is no python3 on this machine yet. fix: ./baxter.sh setup"
@@ -89,7 +92,9 @@ main() {
             exec python3 "$LAB_ROOT/tools/notebook.py" "$@"
             ;;
         sim | local | localhost | 127.*)
-            bring_up_to_date || exit
+            local command=("$@")
+            if [[ ${1:-} == --public* ]]; then command=("${@:2}"); fi
+            bring_up_to_date ${command[@]+"${command[@]}"} || exit
             case ${1:-} in
                 --public | --public=*)
                     local address=${1#--public}
@@ -108,7 +113,7 @@ main() {
             ;;
         *)
             use_robot "$mode" || exit
-            bring_up_to_date || exit
+            bring_up_to_date "$@" || exit
             use_build || exit
             enter "$@"
             ;;

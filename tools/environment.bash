@@ -2,6 +2,8 @@
 # The workspace's environment, as functions. Sourced by baxter.sh; LAB_ROOT names the workspace.
 
 DEFAULT_MASTER_URI=http://localhost:11311
+# The folders of src whose packages are the lab's; all others are somebody's own.
+LAB_FOLDERS=(baxter bullet_gazebo compat cwru_baxter lab_tools overlay probot rf_labs ros_control workspace_tests)
 
 # host_of URI: the host in http://host:port/
 host_of() {
@@ -79,13 +81,37 @@ use_robot() {
     export ROS_IP=$source_address
 }
 
-# Everything whose change makes an earlier set-up stale, as one hash. The workspace's own path counts too:
-# virtual environments and catkin build folders cannot be moved.
+# own_folders: the folders of src that are not the lab's and have packages, one a line
+own_folders() {
+    local folder
+    for folder in "$LAB_ROOT"/src/*/; do
+        folder=${folder%/} folder=${folder##*/}
+        [[ $folder != '*' && " ${LAB_FOLDERS[*]} " != *" $folder "* ]] || continue
+        if [[ -n $(find -L "$LAB_ROOT/src/$folder" -name package.xml -print -quit) ]]; then echo "$folder"; fi
+    done
+}
+
+# What a build of somebody's own packages reads, as one hash; empty where there are none.
+own_fingerprint() {
+    local folders
+    mapfile -t folders < <(own_folders)
+    [[ ${#folders[@]} -gt 0 ]] || return 0
+    (cd "$LAB_ROOT/src" && find -L "${folders[@]}" \( -name __pycache__ -o -name .git \) -prune -o -type f \( -name package.xml \
+        -o -name CMakeLists.txt -o -name setup.py -o -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name '*.cfg' \
+        -o -path '*/env-hooks/*' \) -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)
+}
+
+# Everything whose change makes an earlier set-up stale, as one hash; packages of one's own do not. The workspace's own path
+# counts too: virtual environments and catkin build folders cannot be moved.
 fingerprint() {
+    local folder folders=()
+    for folder in "${LAB_FOLDERS[@]}"; do
+        if [[ -d $LAB_ROOT/src/$folder ]]; then folders+=("src/$folder"); fi
+    done
     # The order of the files must not depend on the language of whoever asks.
     {
         echo "$LAB_ROOT"
-        cd "$LAB_ROOT" && find requirements*.txt tools/*.txt tools/setup.bash src $([[ -d src_overlay ]] && echo src_overlay) \
+        cd "$LAB_ROOT" && find requirements*.txt tools/*.txt tools/setup.bash ${folders[@]+"${folders[@]}"} $([[ -d src_overlay ]] && echo src_overlay) \
             \( -name meshes -o -name __pycache__ -o -name .git \) -prune -o \
             -type f \( -name package.xml -o -name CMakeLists.txt -o -name setup.py -o -name '*.msg' -o -name '*.srv' \
                 -o -name '*.action' -o -name '*.cfg' -o -name '*.xacro' -o -path '*/env-hooks/*' \
@@ -93,16 +119,75 @@ fingerprint() {
     } | sha256sum
 }
 
-# bring_up_to_date [--strict]: set up what is missing or stale. Where an earlier build is there to work with, a failure
+# is_set_up FINGERPRINT: is all there that the lab needs? A set-up at work in another shell, over nothing that has changed,
+# takes nothing away; one that was cut off may have.
+is_set_up() {
+    local state=$LAB_ROOT/.baxter
+    [[ -f $state/done && -f $LAB_ROOT/devel/setup.bash && -x $LAB_ROOT/.venv/bin/python3 && $(<"$state/done") == "$1" ]] ||
+        return 1
+    [[ ! -f $state/at_work ]] || ! flock -n "$state/lock" true
+}
+
+# bring_up_to_date [--strict] [COMMAND…]: all that COMMAND needs, of the lab and of packages of one's own.
+bring_up_to_date() {
+    local strict=()
+    if [[ ${1:-} == --strict ]]; then strict=(--strict) && shift; fi
+    set_up_the_lab "${strict[@]}" || return
+    build_own ${strict[@]+"${strict[@]}"} "$@" || [[ ${#strict[@]} -eq 0 ]]
+}
+
+# names_own WORD…: does one of the words name a package of one's own, or a path into one?
+names_own() {
+    local word folder folders
+    mapfile -t folders < <(own_folders)
+    for word in "$@"; do
+        for folder in "${folders[@]}"; do
+            [[ "$PWD/" == "$LAB_ROOT/src/$folder/"* || "/$word/" == *"/src/$folder/"* ]] && return 0
+            grep -qsrF --include=package.xml "<name>$word</name>" "$LAB_ROOT/src/$folder" && return 0
+        done
+    done
+    return 1
+}
+
+# build_own [--strict] [COMMAND…]: build the packages of one's own that have changed, and nothing else. A command that runs
+# one of the lab's does not wait for that; where another shell is building, only a command that names such a package does.
+build_own() {
+    local strict="" state=$LAB_ROOT/.baxter now status=0 folders
+    if [[ ${1:-} == --strict ]]; then strict=yes && shift; fi
+    now=$(own_fingerprint)
+    if [[ -z $now || -f $state/own_done && $(<"$state/own_done") == "$now" ]]; then return 0; fi
+    if [[ -z $strict ]] && ! names_own "$@"; then
+        case ${1:-} in rosrun | roslaunch | rosnode | rosservice | rosparam | rviz | roscore) return 0 ;; esac
+        if [[ -f $state/own_failed && $(<"$state/own_failed") == "$now" ]]; then
+            echo "baxter.sh: a package of your own does not build; going on without it. Its log: .baxter/logs/own-NAME.log" >&2
+            return 0
+        fi
+        exec 8>>"$state/own_lock"
+        flock -n 8 || {
+            echo "baxter.sh: another shell is building a package; going on with what was built before." >&2
+            exec 8>&-
+            return 0
+        }
+    else
+        exec 8>>"$state/own_lock"
+        flock -n 8 || { echo "another shell is building a package of your own; waiting for it to finish" >&2; flock 8; }
+        if [[ -f $state/own_done && $(<"$state/own_done") == "$now" ]]; then exec 8>&- && return 0; fi
+    fi
+    mapfile -t folders < <(own_folders)
+    (use_build && exec /usr/bin/python3 "$LAB_ROOT/tools/own_packages.py" "$LAB_ROOT" "${folders[@]}") >&2 8>&- </dev/null ||
+        status=$?
+    if [[ $status -eq 0 ]]; then printf '%s\n' "$now" >"$state/own_done"; else printf '%s\n' "$now" >"$state/own_failed"; fi
+    exec 8>&-
+    return "$status"
+}
+
+# set_up_the_lab [--strict]: set up what is missing or stale. Where an earlier build is there to work with, a failure
 # does not lock anybody out of it (a student's package that does not configure needs a shell to be mended in),
 # unless --strict asks for an error.
-bring_up_to_date() {
+set_up_the_lab() {
     local state=$LAB_ROOT/.baxter now status=0
     now=$(fingerprint)
-    if [[ -f $state/done && -f $LAB_ROOT/devel/setup.bash && -x $LAB_ROOT/.venv/bin/python3 ]] &&
-        [[ $(<"$state/done") == "$now" ]]; then
-        return 0
-    fi
+    if is_set_up "$now"; then return 0; fi
     if [[ ${1:-} == --strict ]] || ! has_earlier_build || [[ ! -f $state/failed || $(<"$state/failed") != "$now" ]]; then
         # Set-up talks on standard error: the output of a command in this environment belongs to the command.
         bash "$LAB_ROOT/tools/setup.bash" >&2 </dev/null || status=$?

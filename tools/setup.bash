@@ -223,8 +223,9 @@ step_build() {
     if [[ -f build/CMakeCache.txt ]] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$LAB_ROOT/src" build/CMakeCache.txt; then
         run rm -rf build devel
     fi
+    # -j without -l, which catkin_make would add: on a busy machine make waits then until the others have come to rest.
     # With the virtual environment's Python, installed executables get a first line that finds its packages.
-    run catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3"
+    run catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3" "-j$(nproc)"
     stamp "$key"
     note="$(find src -name CATKIN_IGNORE -prune -o -name package.xml -print | wc -l) packages"
 }
@@ -297,7 +298,10 @@ fi
 
 start_run
 started=$SECONDS
-rm -f "$STATE/done" "$STATE/failed"
+# What changes from here on is not part of this set-up. The note of the one before holds as long as nothing has changed.
+fingerprint_at_start=$(fingerprint) own_at_start=$(own_fingerprint)
+if [[ -f $STATE/done && $(<"$STATE/done") != "$fingerprint_at_start" ]]; then rm -f "$STATE/done"; fi
+rm -f "$STATE/failed"
 echo "Setting up $LAB_ROOT"
 platform_line /etc/os-release "$NOETIC" "$(uname -m)"
 for index in "${!STEPS[@]}"; do
@@ -313,7 +317,8 @@ done
 # Some steps alone do not make a set-up.
 if [[ ${#chosen[@]} -eq 0 ]]; then
     cut_off_step=""
-    write "$STATE/done" "$(fingerprint)"
+    write "$STATE/done" "$fingerprint_at_start"
+    if [[ -n $own_at_start ]]; then write "$STATE/own_done" "$own_at_start"; fi
 fi
 if [[ -z $cut_off_step ]]; then rm -f "$STATE/at_work"; fi
 echo "Set-up finished in $((SECONDS - started)) s."

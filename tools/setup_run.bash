@@ -18,7 +18,7 @@ start_run() {
     # A launch and a node started together on a fresh clone must not both build. The lock passes on to the commands of the
     # steps: what goes on after set-up itself was killed is waited for.
     if ! flock -n 9; then
-        echo "Another set-up is at work here; waiting for it…"
+        echo "another set-up is running in this workspace; waiting for it to finish"
         flock 9
         if [[ -f $STATE/done && $(<"$STATE/done") == "$(fingerprint)" ]]; then exit 0; fi
     fi

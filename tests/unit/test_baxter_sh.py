@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """baxter.sh: how it is called, and which ROS variables a command then sees. Nothing here sets up or builds."""
 
+import fcntl
 import os
 import subprocess
 from pathlib import Path
@@ -173,13 +174,98 @@ def fingerprint(folder):
 def test_set_up_is_stale_when_what_it_reads_has_changed(tmp_path):
     copy = copy_of_tools(tmp_path / "ws")
     seen = [fingerprint(copy)]
-    for change in ("src/foo/package.xml", "src/foo/msg/Bar.msg", "src/foo/urdf/foo.xacro", "requirements.txt"):
+    for change in ("src/compat/foo/package.xml", "src/compat/foo/msg/Bar.msg", "src/probot/foo/urdf/foo.xacro",
+                   "requirements.txt"):
         (copy / change).parent.mkdir(parents=True, exist_ok=True)
         (copy / change).write_text("changed")
         seen.append(fingerprint(copy))
-    (copy / "src/foo/node.py").write_text("print()")
+    (copy / "src/compat/foo/node.py").write_text("print()")
     assert fingerprint(copy) == seen[-1]  # Python needs no build
     assert len(set(seen)) == len(seen)
+
+
+def test_the_lab_is_all_that_is_in_src():
+    """What is not in LAB_FOLDERS counts as somebody's own."""
+    script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; printf "%s\\n" "${LAB_FOLDERS[@]}"'
+    listed = subprocess.run(["bash", "-c", script, "x", str(ROOT)], capture_output=True, text=True, check=True).stdout
+    tracked = subprocess.run(["git", "ls-files", "src"], cwd=ROOT, capture_output=True, text=True)
+    if tracked.returncode:
+        pytest.skip("no git checkout")
+    assert {path.split("/")[1] for path in tracked.stdout.splitlines()} | {"overlay"} == set(listed.split())
+
+
+@pytest.fixture
+def set_up_copy(tmp_path):
+    """A workspace that is set up, as far as baxter.sh can see; builds of one's own packages are noted in `builds`."""
+    copy = copy_of_tools(tmp_path / "ws")
+    for name in ("devel/setup.bash", ".baxter/build.stamp", ".venv/bin/python3"):
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).touch(mode=0o755)
+    (copy / "tools/setup.bash").write_text("echo set-up was started; exit 7\n")
+    (copy / "tools/own_packages.py").write_text(
+        "import pathlib, sys\nroot = pathlib.Path(sys.argv[1])\n"
+        "open(root / 'builds', 'a').write(' '.join(sys.argv[2:]) + '\\n')\n"
+        "sys.exit('does not build' if (root / 'broken').exists() else 0)\n")
+    (copy / ".baxter/done").write_text(fingerprint(copy))
+    return copy
+
+
+def new_package(copy, name):
+    (copy / "src" / name).mkdir()
+    (copy / "src" / name / "package.xml").write_text(f"<package><name>{name}</name></package>")
+
+
+def builds(copy):
+    return (copy / "builds").read_text().splitlines() if (copy / "builds").exists() else []
+
+
+def test_ones_own_package_starts_no_set_up_and_holds_up_no_command_of_the_lab(set_up_copy):
+    new_package(set_up_copy, "foo")
+    for command in (["rosrun", "baxter_tools", "enable_robot.py"],
+                    ["roslaunch", "baxter_gazebo", "baxter_world.launch"]):
+        done = baxter("sim", *command, script=set_up_copy / "baxter.sh", env={"PATH": "/usr/bin:/bin"})
+        assert "set-up" not in done.stdout + done.stderr
+        assert builds(set_up_copy) == []
+    for _ in range(2):
+        done = baxter("sim", "true", script=set_up_copy / "baxter.sh")
+        assert (done.returncode, done.stderr) == (0, "")
+    assert builds(set_up_copy) == ["foo"]
+    (set_up_copy / "src/foo/msg").mkdir()
+    (set_up_copy / "src/foo/msg/Bar.msg").write_text("float64 x")
+    baxter("sim", "rosrun", "foo", "node.py", script=set_up_copy / "baxter.sh")
+    assert builds(set_up_copy) == ["foo"] * 2
+
+
+def test_another_shell_that_builds_is_waited_for_only_by_who_needs_it(set_up_copy):
+    new_package(set_up_copy, "foo")
+    with open(set_up_copy / ".baxter/own_lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = baxter("sim", "echo", "works", script=set_up_copy / "baxter.sh", timeout=60)
+        assert done.stdout == "works\n" and "another shell is building" in done.stderr
+        waiting = subprocess.Popen([set_up_copy / "baxter.sh", "sim", "echo", "foo"], stderr=subprocess.PIPE, text=True,
+                                   stdout=subprocess.DEVNULL)
+        assert "waiting for it to finish" in waiting.stderr.readline()
+        assert builds(set_up_copy) == []
+    waiting.communicate(timeout=60)
+    assert builds(set_up_copy) == ["foo"]
+
+
+def test_a_set_up_in_another_shell_holds_up_nobody_while_nothing_has_changed(set_up_copy):
+    (set_up_copy / ".baxter/at_work").write_text("build\n")
+    with open(set_up_copy / ".baxter/lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert baxter("sim", "echo", "works", script=set_up_copy / "baxter.sh", timeout=60).stdout == "works\n"
+    # Nobody holds the lock: that set-up was cut off.
+    assert "set-up was started" in baxter("sim", "true", script=set_up_copy / "baxter.sh").stderr
+
+
+def test_ones_own_package_that_does_not_build_locks_nobody_out_and_is_tried_once(set_up_copy):
+    new_package(set_up_copy, "foo")
+    (set_up_copy / "broken").touch()
+    for text in ("does not build", "going on without it"):
+        done = baxter("sim", "echo", "works", script=set_up_copy / "baxter.sh")
+        assert done.stdout == "works\n" and text in done.stderr
+    assert builds(set_up_copy) == ["foo"]
 
 
 def test_failing_set_up_leaves_the_earlier_build_usable_and_is_tried_once(tmp_path):

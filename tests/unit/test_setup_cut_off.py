@@ -234,7 +234,7 @@ def test_what_outlives_a_killed_set_up_is_waited_for(workspace):
     first.wait()
     (fakes / "hang").unlink()
     second = start(root)
-    assert "Another set-up is at work" in second.stdout.readline()
+    assert "another set-up is running" in second.stdout.readline()
     assert (root / "build" / "half.o").exists()
     os.killpg(first.pid, signal.SIGKILL)
     status, said = finish(second)

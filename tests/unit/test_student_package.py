@@ -104,6 +104,12 @@ def test_hook_keeps_what_the_user_set(workspace):
     assert run(script, workspace, "sh", ROS_HOSTNAME="desk.local") == "http://localhost:11311|desk.local|unset\n"
 
 
+def test_catkin_make_does_not_wait_for_a_quiet_machine(workspace):
+    jobs = run('. devel/setup.sh && echo "$ROS_PARALLEL_JOBS"', workspace, "sh").strip()
+    assert jobs.startswith("-j") and "-l" not in jobs
+    assert run('. devel/setup.sh && echo "$ROS_PARALLEL_JOBS"', workspace, "sh", ROS_PARALLEL_JOBS="-j1") == "-j1\n"
+
+
 def test_bash_has_the_rosbash_functions(workspace):
     script = "source devel/setup.bash && roscd foo && pwd && complete -p rosrun"
     assert run(script, workspace).startswith(f"{workspace}/src/foo\n")

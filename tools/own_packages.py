@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Build the packages in src that are not the lab's, each by itself into the devel space; nothing else is touched.
+
+    own_packages.py ROOT FOLDER…
+
+What has not changed since its last build is left alone, unless a package of one's own that it depends on was built.
+Exit code 0: all are built; 1: one is not, and the lines on standard error name it and its log.
+"""
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from catkin_pkg.package import InvalidPackage
+from catkin_pkg.topological_order import topological_order
+
+# What a build reads; as in fingerprint() of environment.bash, and compiled code, which only make knows to be stale.
+NAMES = ("package.xml", "CMakeLists.txt", "setup.py")
+ENDINGS = (".msg", ".srv", ".action", ".cfg", ".c", ".cc", ".cpp", ".cxx", ".h", ".hpp")
+LOG_LINES_SHOWN = 20
+
+
+def packages(root: Path, folders):
+    """(path, package) in the order in which they have to be built. Raises InvalidPackage, RuntimeError."""
+    found = []
+    for folder in folders:
+        for path, package in topological_order(str(root / "src" / folder)):
+            # A cycle is reported in the place of a path.
+            if path is None:
+                raise RuntimeError(f"these packages need each other: {package}")
+            found.append((root / "src" / folder / path, package))
+    by_name = {package.name: (path, package) for path, package in found}
+    ordered, placed = [], set()
+
+    def place(name):
+        if name not in by_name or name in placed:
+            return
+        placed.add(name)
+        package = by_name[name][1]
+        for needed in sorted(dependencies(package)):
+            place(needed)
+        ordered.append(by_name[name])
+
+    for name in sorted(by_name):
+        place(name)
+    return ordered
+
+
+def dependencies(package):
+    return {one.name for kind in (package.build_depends, package.buildtool_depends, package.build_export_depends,
+                                  package.exec_depends) for one in kind}
+
+
+def state_of(path: Path) -> str:
+    """A hash of all that a build of the package reads."""
+    digest = hashlib.sha256()
+    for file in sorted(path.rglob("*")):
+        if file.is_file() and ".git" not in file.parts and (
+                file.name in NAMES or file.suffix in ENDINGS or "env-hooks" in file.parts):
+            digest.update(f"{file.relative_to(path)}\0".encode() + file.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def build(root: Path, path: Path, package, log: Path):
+    """Configure and build one package. Raises CalledProcessError."""
+    folder = root / ".baxter" / "own" / package.name
+    # Each configuration writes the setup files of the devel space anew, as if the package were a workspace of its own.
+    of_the_space = {file: file.read_bytes() for file in (root / "devel").iterdir() if file.is_file()}
+    commands = (
+        ["cmake", "-S", path, "-B", folder, f"-DCATKIN_DEVEL_PREFIX={root}/devel",
+         f"-DCMAKE_INSTALL_PREFIX={root}/install", f"-DPYTHON_EXECUTABLE={root}/.venv/bin/python3"],
+        # Without -l: on a busy machine make would wait for the others to come to rest.
+        ["cmake", "--build", folder, "--parallel", str(os.cpu_count() or 1)],
+    )
+    with log.open("wb") as output:
+        try:
+            for command in commands:
+                subprocess.run(command, stdout=output, stderr=output, stdin=subprocess.DEVNULL, check=True)
+        finally:
+            for file, content in of_the_space.items():
+                if file.read_bytes() != content:
+                    file.write_bytes(content)
+
+
+def main(arguments) -> int:
+    root, folders = Path(arguments[0]), arguments[1:]
+    logs = root / ".baxter" / "logs"
+    stamps = root / ".baxter" / "own"
+    for folder in (logs, stamps):
+        folder.mkdir(parents=True, exist_ok=True)
+    try:
+        ordered = packages(root, folders)
+    except (InvalidPackage, RuntimeError) as error:
+        print(f"baxter.sh: {error}", file=sys.stderr)
+        return 1
+    built = set()
+    for path, package in ordered:
+        stamp = stamps / f"{package.name}.stamp"
+        state = f"{path} {state_of(path)}"
+        if stamp.is_file() and stamp.read_text() == state and not dependencies(package) & built:
+            continue
+        print(f"building {package.name} …", file=sys.stderr, flush=True)
+        log = logs / f"own-{package.name}.log"
+        try:
+            build(root, path, package, log)
+        except subprocess.CalledProcessError:
+            print(f"baxter.sh: the package {package.name} does not build (log: {log}). The log ends with:",
+                  file=sys.stderr)
+            for line in log.read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:]:
+                print(f"  | {line}", file=sys.stderr)
+            return 1
+        stamp.write_text(state)
+        built.add(package.name)
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except KeyboardInterrupt:
+        sys.exit(130)
