@@ -9,15 +9,27 @@ from pathlib import Path
 from lab_doctor.checks import Level, examine
 from lab_doctor.probe import gather
 
+# The questions of probe.gather, as people call them.
+QUESTIONS = {"python": "Python's imports", "topics": "messages of the robot", "master": "the ROS master",
+             "is_fresh": "reading the packages", "listeners": "the list of open ports",
+             "other_masters": "other ROS masters", "users_python": "your own Python"}
+
+
+def say_what_takes_long(names):
+    named = ", ".join(QUESTIONS.get(name, "the " + name) for name in names)
+    print(f"waiting for {named} ...", file=sys.stderr, flush=True)
+
 
 def main() -> int:
-    findings = examine(gather(Path(__file__).resolve().parent.parent, dict(os.environ)))
+    findings = examine(gather(Path(__file__).resolve().parent.parent, dict(os.environ), say_what_takes_long))
     for finding in findings:
         print(f"{finding.level.value:6}{finding.topic:11}{finding.what}")
         if finding.fix:
             print(f"{'':17}fix: {finding.fix}")
     wrong = sum(finding.level is Level.WRONG for finding in findings)
-    print("Nothing is wrong." if not wrong else f"{wrong} wrong.")
+    busy = sum(finding.level is Level.BUSY for finding in findings)
+    verdict = f"{wrong} wrong" if wrong else "Nothing is wrong"
+    print(verdict + (f"; {busy} not checked." if busy else "."))
     return 1 if wrong else 0
 
 

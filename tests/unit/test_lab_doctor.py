@@ -9,8 +9,17 @@ from dataclasses import replace
 import pytest
 
 from lab_doctor.checks import Level, examine
-from lab_doctor.facts import Facts, Listener, Master, PythonFacts, Topics
-from lab_doctor.probe import ask_master, clock_offset_s, gather, parse_listeners, resolve
+from lab_doctor.facts import Facts, Listener, Master, OtherMaster, PythonFacts, Topics
+from lab_doctor.probe import (
+    answer_all,
+    ask_master,
+    clock_offset_s,
+    gather,
+    master_ports,
+    parse_listeners,
+    resolve,
+    users_python,
+)
 
 ENABLED = {"enabled": True, "stopped": False, "error": False}
 HEALTHY_LAB = Facts(
@@ -56,7 +65,7 @@ SICK = {
     "not built": (replace(HEALTHY_LAB, is_built=False), "build", "not built", "setup"),
     "stale build": (replace(HEALTHY_LAB, is_fresh=False), "build", "changed", "setup"),
     "pyenv first": (replace(HEALTHY_LAB, python=PythonFacts("/opt/pyenv/python3")), "python", "/opt/pyenv", "setup"),
-    "python hangs": (replace(HEALTHY_LAB, python=None), "python", "did not finish", "setup"),
+    "python does not start": (replace(HEALTHY_LAB, python=None), "python", "cannot be run", "setup"),
     "no rospy": (
         replace(HEALTHY_LAB, python=PythonFacts("/ws/.venv/bin/python3", {}, {"rospy": "ImportError: gone"})),
         "python", "cannot import rospy: ImportError: gone", "setup",
@@ -84,6 +93,12 @@ SICK = {
         "network", "does not resolve", "/etc/hosts",
     ),
     "no lab": (replace(HEALTHY_LAB, master=Master(error="refused"), topics=None), "master", "refused", "roslaunch"),
+    "lab at another port": (
+        replace(HEALTHY_LAB, master=Master(error="refused"), topics=None,
+                other_masters=[OtherMaster("http://localhost:11500", False),
+                               OtherMaster("http://localhost:11417", True)]),
+        "master", "refused", "ROS_MASTER_URI=http://localhost:11417 ./baxter.sh sim",
+    ),
     "robot off": (replace(ON_ROBOT, master=None, topics=None), "master", "did not answer in time", "ping baxter.local"),
     "no clock": (
         replace(HEALTHY_LAB, topics=Topics(robot_state=ENABLED)), "clock", "nothing arrives on /clock", "use_sim_time",
@@ -122,7 +137,14 @@ def test_fault_is_named_with_its_fix(name):
 NOTED = {
     "disabled": (with_state(enabled=False), "robot", "enable_robot.py -e"),
     "open port": (
-        replace(HEALTHY_LAB, listeners=[Listener("robot_state_publisher", 5, "0.0.0.0", 40001)]), "ports", "nft",
+        replace(HEALTHY_LAB, listeners=[Listener("robot_state_publisher", 5, "0.0.0.0", 40001)]), "ports", "",
+    ),
+    "conda first": (
+        replace(HEALTHY_LAB, users_python="/opt/conda/bin/python3"), "python", "./baxter.sh sim",
+    ),
+    "lab at another port": (
+        with_master(replace(HEALTHY_LAB, other_masters=[OtherMaster("http://localhost:11417", True)]), publishers={}),
+        "master", "ROS_MASTER_URI=http://localhost:11417",
     ),
     "no screen": (replace(HEALTHY_LAB, display=""), "display", "desktop"),
     "two names": (with_variables(HEALTHY_LAB, ROS_IP="127.0.0.1"), "network", "unset"),
@@ -135,6 +157,82 @@ def test_note_has_a_fix_and_is_not_wrong(name):
     findings = [finding for finding in examine(facts) if finding.level is not Level.OK]
     assert [(finding.topic, finding.level) for finding in findings] == [(topic, Level.NOTE)]
     assert fix in findings[0].fix
+
+
+BUSY = {
+    "python": ("python", replace(HEALTHY_LAB, python=None)),
+    "is_fresh": ("build", replace(HEALTHY_LAB, is_fresh=None)),
+    "master": ("master", replace(HEALTHY_LAB, master=None, topics=None)),
+    "topics": ("robot", replace(HEALTHY_LAB, topics=None)),
+}
+
+
+@pytest.mark.parametrize("question", BUSY)
+def test_what_was_not_answered_in_time_is_busy_and_not_wrong(question):
+    topic, facts = BUSY[question]
+    findings = [finding for finding in examine(replace(facts, timed_out=frozenset({question})))
+                if finding.level is not Level.OK]
+    assert [(finding.topic, finding.level) for finding in findings] == [(topic, Level.BUSY)]
+    assert "setup" not in findings[0].fix
+
+
+def test_a_simulator_that_does_not_answer_in_time_is_not_called_dead():
+    facts = with_master(HEALTHY_LAB, slow_nodes=["/gazebo"])
+    assert [(finding.topic, finding.level) for finding in examine(facts) if finding.level is not Level.OK] == [
+        ("simulator", Level.BUSY)]
+
+
+def test_open_ports_are_one_line_however_many():
+    listeners = [Listener(f"node_{number}", number, "0.0.0.0", 40000 + number) for number in range(9)]
+    finding, = (one for one in examine(replace(HEALTHY_LAB, listeners=listeners)) if one.topic == "ports")
+    assert "node_2 and 6 more" in finding.what and len(finding.what) < 120 and not finding.fix
+
+
+@pytest.mark.parametrize("uri", ["", "http://:11311", "localhost:11311"])
+def test_a_host_without_a_name_is_not_printed(uri):
+    facts = with_variables(replace(HEALTHY_LAB, master=Master(error="unsupported"), topics=None), ROS_MASTER_URI=uri)
+    for finding in examine(facts):
+        text = finding.what + finding.fix
+        assert "is  on" not in text and "ping `" not in text and "./baxter.sh ," not in text
+        assert not text.startswith(" ") and not finding.fix.endswith("./baxter.sh ")
+
+
+def test_questions_that_take_long_are_named_and_counted_as_open():
+    go_on, said = threading.Event(), []
+
+    def late():
+        go_on.wait(60.0)
+
+    def refuses():
+        raise TimeoutError
+
+    # Long enough for a busy machine to answer what has no reason to wait.
+    answers, timed_out = answer_all({"quick": lambda: 1, "late": late, "refuses": refuses}, 3.0, said.append, 1.5)
+    go_on.set()
+    assert answers == {"quick": 1} and timed_out == {"late", "refuses"}
+    assert said == [["late"]]
+
+
+def test_masters_are_found_by_their_processes():
+    text = (
+        'LISTEN 0 5 127.0.0.1:11417 0.0.0.0:* users:(("rosmaster",pid=10,fd=3))\n'
+        'LISTEN 0 5 127.0.0.1:40001 0.0.0.0:* users:(("gzserver",pid=11,fd=9))\n'
+        'LISTEN 0 5 *:22 *:*\n'
+    )
+    commands = {10: "/usr/bin/python3 /usr/bin/rosmaster --core -p 11417", 11: "python3 gzserver __name:=gazebo"}
+    assert master_ports(text, commands.get) == {11417}
+
+
+def test_ones_own_python_is_named_when_it_finds_no_rospy(tmp_path):
+    python = tmp_path / "bin" / "python3"
+    python.parent.mkdir()
+    python.write_text("#!/bin/sh\nexit 1\n")
+    python.chmod(0o755)
+    assert users_python({"LAB_USERS_PYTHON": str(python)}) == str(python)
+    assert users_python({"LAB_USERS_PYTHON": "/usr/bin/python3"}) == ""
+    assert users_python({}) == ""
+    python.write_text("#!/bin/sh\nexit 0\n")
+    assert users_python({"LAB_USERS_PYTHON": str(python)}) == ""
 
 
 def test_ports_are_no_matter_with_a_robot():

@@ -11,17 +11,15 @@ from lab_doctor.facts import Facts
 MAX_CLOCK_OFFSET_S = 0.25
 # Topics that exactly one node may publish: two simulators, or a simulator on the robot's own master.
 SIMULATOR_TOPICS = ("/clock", "/robot/joint_states")
-# The kernel hands out ports from this range (net.ipv4.ip_local_port_range) to whoever does not ask for a certain one.
-FIREWALL_LINE = (
-    "sudo nft 'table inet lab { chain input { type filter hook input priority 0; "
-    'iifname != "lo" tcp dport { 11311, 32768-60999 } ct state new drop; }; }\''
-)
+# So many processes are named in a line.
+NAMES_SHOWN = 3
 START_LINE = "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch"
 
 
 class Level(Enum):
     OK = "ok"
     NOTE = "note"
+    BUSY = "busy"
     WRONG = "WRONG"
 
 
@@ -46,12 +44,19 @@ def master_host(facts: Facts) -> str:
 def _entry(facts: Facts) -> str:
     """The command that enters the workspace for this master."""
     host = master_host(facts)
-    return "./baxter.sh sim" if is_loopback(host) else f"./baxter.sh {host}"
+    return "./baxter.sh sim" if not host or is_loopback(host) else f"./baxter.sh {host}"
+
+
+def _busy(topic, what):
+    """What was asked and not answered in time says nothing about what would have come."""
+    return Finding(topic, Level.BUSY, f"not checked: {what}", "the machine is busy; try again when it has come to rest")
 
 
 def check_build(facts):
     if not facts.is_built:
         yield Finding("build", Level.WRONG, "the workspace is not built", "./baxter.sh setup")
+    elif "is_fresh" in facts.timed_out:
+        yield _busy("build", "reading all packages takes too long")
     elif facts.is_fresh is False:
         what = "packages, messages or requirements have changed since the last set-up"
         yield Finding("build", Level.WRONG, what, "./baxter.sh setup")
@@ -61,8 +66,14 @@ def check_build(facts):
 
 def check_python(facts):
     python = facts.python
+    if facts.users_python:
+        what = (f"outside ./baxter.sh, python3 is {facts.users_python}: programs that are started there find no rospy")
+        yield Finding("python", Level.NOTE, what, f"start them with {_entry(facts)}, or source devel/setup.bash first")
+    if "python" in facts.timed_out:
+        yield _busy("python", "python3 has not finished importing what nodes import")
+        return
     if python is None:
-        yield Finding("python", Level.WRONG, "python3 did not finish importing what nodes import", "./baxter.sh setup")
+        yield Finding("python", Level.WRONG, "python3 cannot be run", "./baxter.sh setup")
         return
     expected = f"{facts.root}/.venv/bin/python3"
     if python.executable != expected:
@@ -122,17 +133,31 @@ def check_network(facts):
 
 def check_master(facts):
     uri = facts.variables.get("ROS_MASTER_URI", "")
-    if facts.master is None:
+    if not master_host(facts):
+        return  # check_network says so
+    if "master" in facts.timed_out and is_loopback(master_host(facts)):
+        what = f"somebody listens at {uri} and has not answered"
+        yield Finding("master", Level.BUSY, what, "a stopped or hung master, or a busy machine: try again")
+    elif facts.master is None:
         yield Finding("master", Level.WRONG, f"{uri} did not answer in time", _master_fix(facts))
     elif facts.master.error:
         yield Finding("master", Level.WRONG, f"{uri} does not answer: {facts.master.error}", _master_fix(facts))
     else:
         yield Finding("master", Level.OK, f"{uri} answers")
+        labs = [other.uri for other in facts.other_masters if other.has_simulator]
+        if labs and not any(facts.master.publishers.get(topic) for topic in SIMULATOR_TOPICS):
+            what = f"no simulator runs at this master; one runs at {', '.join(labs)}"
+            yield Finding("master", Level.NOTE, what, f"ROS_MASTER_URI={labs[0]} ./baxter.sh sim")
 
 
 def _master_fix(facts):
     host = master_host(facts)
     if is_loopback(host):
+        others = sorted(facts.other_masters, key=lambda other: not other.has_simulator)
+        if others:
+            kind = "a lab" if others[0].has_simulator else "a master"
+            uri = others[0].uri
+            return f"there is {kind} at {uri}: ROS_MASTER_URI={uri} ./baxter.sh sim; or {START_LINE}"
         return f"start the lab: {START_LINE}"
     return f"is {host} on, and does `ping {host}` answer? For the simulator on this machine: ./baxter.sh sim"
 
@@ -178,13 +203,19 @@ def check_simulators(facts):
             what = f"{len(nodes)} nodes publish {topic}: {', '.join(sorted(nodes))}"
             fix = f"keep one of them and stop the others: rosnode kill {sorted(nodes)[-1]}"
             yield Finding("simulator", Level.WRONG, what, fix)
+    for node in facts.master.slow_nodes:
+        yield _busy("simulator", f"{node} has not answered")
     for node in facts.master.dead_nodes:
         what = f"{node} is registered at the master and does not answer: it died without signing off"
         yield Finding("simulator", Level.WRONG, what, "rosnode cleanup (answer y), or stop the lab and start it again")
 
 
 def check_robot(facts):
-    if not _master_answers(facts) or facts.topics is None:
+    if not _master_answers(facts):
+        return
+    if "topics" in facts.timed_out:
+        yield _busy("robot", "the program that listens to /clock and /robot/state has not started in time")
+    if facts.topics is None:
         return
     state = facts.topics.robot_state
     if facts.topics.error:
@@ -213,9 +244,11 @@ def check_ports(facts):
     if not facts.listeners:
         yield Finding("ports", Level.OK, "no ROS process listens beyond this machine")
         return
-    names = ", ".join(f"{one.process} ({one.address}:{one.port})" for one in facts.listeners)
-    what = f"open to other machines: {names}. docs/security.md says why"
-    yield Finding("ports", Level.NOTE, what, FIREWALL_LINE)
+    names = [one.process for one in facts.listeners]
+    more = len(names) - NAMES_SHOWN
+    shown = ", ".join(names[:NAMES_SHOWN]) + (f" and {more} more" if more > 0 else "")
+    what = f"other machines can reach {shown}; docs/security.md says why, and has the firewall's line"
+    yield Finding("ports", Level.NOTE, what)
 
 
 def check_display(facts):

@@ -13,6 +13,8 @@ class Master:
     publishers: dict[str, list[str]] = field(default_factory=dict)  # topic -> nodes
     # Of the nodes that run a simulator: those that are registered and do not answer.
     dead_nodes: list[str] = field(default_factory=list)
+    # Those that are there and have not answered in time.
+    slow_nodes: list[str] = field(default_factory=list)
     clock_offset_s: float | None = None  # the master's host minus this machine
 
 
@@ -36,6 +38,14 @@ class PythonFacts:
 
 
 @dataclass(frozen=True)
+class OtherMaster:
+    """A ROS master of this machine at another port than ROS_MASTER_URI's."""
+
+    uri: str
+    has_simulator: bool
+
+
+@dataclass(frozen=True)
 class Listener:
     """A process that accepts connections from other machines."""
 
@@ -56,5 +66,10 @@ class Facts:
     is_built: bool = False
     is_fresh: bool | None = None
     python: PythonFacts | None = None
+    # What `python3` is outside the lab's environment, where that is not the system's: its path.
+    users_python: str = ""
+    other_masters: list[OtherMaster] = field(default_factory=list)
+    # Questions that were not answered in time: names of the fields above.
+    timed_out: frozenset[str] = frozenset()
     listeners: list[Listener] | None = None
     display: str = ""

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gather the facts, all at the same time, each with a deadline: a doctor that hangs on a dead network is no help."""
 
-import contextlib
 import http.client
 import json
 import re
@@ -16,9 +15,11 @@ from pathlib import Path
 from urllib.parse import urlparse
 
 from lab_doctor.checks import SIMULATOR_TOPICS, is_loopback
-from lab_doctor.facts import Facts, Listener, Master, PythonFacts, Topics
+from lab_doctor.facts import Facts, Listener, Master, OtherMaster, PythonFacts, Topics
 
 DEADLINE_S = 15.0
+# What takes longer than this is named to the one who waits.
+PATIENCE_S = 4.0
 CALL_TIMEOUT_S = 1.0
 CALLER_ID = "/lab_doctor"
 # Debian's roscpp nodes, and rospy nodes, carry their node name on the command line when roslaunch starts them.
@@ -26,8 +27,11 @@ ROS_PROCESS = re.compile(r"__name:=|rosmaster|roscore|roslaunch|rosrun|/lib/(tf2
 MODULES = ("rospy", "pybullet", "numpy", "transforms3d", "tf2_ros")
 
 
-def gather(root: Path, variables: dict[str, str]) -> Facts:
-    """Facts about the workspace at root and the ROS that the variables point to; takes at most DEADLINE_S."""
+def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadline_s: float = DEADLINE_S) -> Facts:
+    """Facts about the workspace at root and the ROS that the variables point to; takes at most deadline_s.
+
+    say: called with what is still waited for after PATIENCE_S.
+    """
     ros = {name: variables.get(name, "") for name in ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_IP")}
     host = urlparse(ros["ROS_MASTER_URI"]).hostname or ""
     hosts = {name for name in (host, ros["ROS_HOSTNAME"], ros["ROS_IP"]) if name}
@@ -37,9 +41,11 @@ def gather(root: Path, variables: dict[str, str]) -> Facts:
         "is_fresh": lambda: is_fresh(root),
         "python": ask_python,
         "listeners": list_listeners,
+        "other_masters": lambda: find_masters(ros["ROS_MASTER_URI"]),
+        "users_python": lambda: users_python(variables),
         **{f"address of {name}": lambda name=name: resolve(name) for name in hosts},
     }
-    answers = answer_all(questions, DEADLINE_S)
+    answers, timed_out = answer_all(questions, deadline_s, say)
     return Facts(
         root=str(root),
         variables=ros,
@@ -50,25 +56,83 @@ def gather(root: Path, variables: dict[str, str]) -> Facts:
         is_fresh=answers.get("is_fresh"),
         python=answers.get("python"),
         listeners=answers.get("listeners"),
+        other_masters=answers.get("other_masters") or [],
+        users_python=answers.get("users_python") or "",
+        timed_out=frozenset(timed_out),
         display=variables.get("DISPLAY", ""),
     )
 
 
-def answer_all(questions, timeout_s: float) -> dict:
-    """name -> answer of every question answered in time; one that raises has no answer. Threads that hang are left."""
-    answers = {}
+def answer_all(questions, timeout_s, say=lambda names: None, patience_s=PATIENCE_S) -> tuple[dict, set]:
+    """(name -> answer, names of what was not answered in time); a question that raises has no answer.
+
+    say: called once with the names that are open after patience_s. Threads that hang are left.
+    """
+    answers, timed_out, ended = {}, set(), set()
 
     def answer(name, question):
-        with contextlib.suppress(Exception):  # no answer: the checks say what that means
+        try:
             answers[name] = question()
+        except (TimeoutError, subprocess.TimeoutExpired):
+            timed_out.add(name)
+        except Exception:  # noqa: S110  (no answer: the checks say what that means)
+            pass
+        ended.add(name)
 
     threads = [threading.Thread(target=answer, args=item, daemon=True) for item in questions.items()]
-    deadline = time.monotonic() + timeout_s
+    begin = time.monotonic()
     for thread in threads:
         thread.start()
-    for thread in threads:
-        thread.join(max(0.0, deadline - time.monotonic()))
-    return dict(answers)
+    for limit_s in (min(patience_s, timeout_s), timeout_s):
+        for thread in threads:
+            thread.join(max(0.0, begin + limit_s - time.monotonic()))
+        open_names = set(questions) - ended
+        if open_names and limit_s < timeout_s:
+            say(sorted(open_names))
+    return dict(answers), timed_out | (set(questions) - ended)
+
+
+def users_python(variables: dict[str, str]) -> str:
+    """The path of the Python that comes first outside the lab's environment, "" for the system's own or the lab's.
+
+    baxter.sh notes it in LAB_USERS_PYTHON before it changes PATH.
+    """
+    python = variables.get("LAB_USERS_PYTHON", "")
+    lab = Path(variables.get("LAB_ROOT", "/nowhere"), ".venv", "bin")
+    if not python or Path(python).parent in (lab, Path("/usr/bin"), Path("/bin")):
+        return ""
+    can_import = subprocess.run([python, "-c", "import rospy"], capture_output=True, env=_outside(variables),
+                                timeout=DEADLINE_S).returncode == 0
+    return "" if can_import else python
+
+
+def _outside(variables):
+    return {name: value for name, value in variables.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
+
+
+def find_masters(uri: str) -> list[OtherMaster]:
+    """ROS masters of this machine at other ports; of processes that may be looked at, which are one's own."""
+    done = subprocess.run(["ss", "-Hltnp"], capture_output=True, text=True, timeout=DEADLINE_S, check=True)
+    found = []
+    for port in sorted(master_ports(done.stdout, _command_line) - {urlparse(uri).port}):
+        other = f"http://localhost:{port}"
+        try:
+            publishers = dict(_proxy(other).getSystemState(CALLER_ID)[2][0])
+        except (OSError, xmlrpc.client.Error, http.client.HTTPException, ValueError):
+            continue
+        found.append(OtherMaster(other, any(publishers.get(topic) for topic in SIMULATOR_TOPICS)))
+    return found
+
+
+def master_ports(text: str, command_line) -> set[int]:
+    """Lines of `ss -Hltnp` -> the ports that a rosmaster listens on. command_line: pid -> its command line."""
+    ports = set()
+    for line in text.splitlines():
+        columns = line.split()
+        process = re.search(r"pid=(\d+)", line)
+        if len(columns) >= 4 and process and re.search(r"/rosmaster( |$)", command_line(int(process[1]))):
+            ports.add(int(columns[3].rpartition(":")[2]))
+    return ports
 
 
 def resolve(name: str) -> tuple[str | None, bool]:
@@ -97,30 +161,37 @@ def _proxy(uri):
 
 
 def ask_master(uri: str) -> Master:
+    """What the master at uri says. Raises TimeoutError when somebody listens there and does not answer."""
     master = _proxy(uri)
     try:
         _, _, (publishers, _, _) = master.getSystemState(CALLER_ID)
         code, _, use_sim_time = master.getParam(CALLER_ID, "/use_sim_time")
+    except TimeoutError:
+        raise
     except (OSError, xmlrpc.client.Error, http.client.HTTPException, ValueError) as error:
         return Master(error=str(error) or type(error).__name__)
     by_topic = dict(publishers)
     simulators = {node for topic in SIMULATOR_TOPICS for node in by_topic.get(topic, [])}
     host = urlparse(uri).hostname
+    states = {node: _node_state(master, node) for node in sorted(simulators)}
     return Master(
         use_sim_time=code == 1 and bool(use_sim_time),
         publishers=by_topic,
-        dead_nodes=sorted(node for node in simulators if not _node_answers(master, node)),
+        dead_nodes=[node for node, state in states.items() if state == "dead"],
+        slow_nodes=[node for node, state in states.items() if state == "slow"],
         clock_offset_s=None if is_loopback(host) else clock_offset_s(uri),
     )
 
 
-def _node_answers(master, node):
+def _node_state(master, node):
     try:
         _, _, node_uri = master.lookupNode(CALLER_ID, node)
         _proxy(node_uri).getPid(CALLER_ID)
+    except TimeoutError:
+        return "slow"
     except (OSError, xmlrpc.client.Error, http.client.HTTPException):
-        return False
-    return True
+        return "dead"
+    return "alive"
 
 
 def clock_offset_s(uri: str, timeout_s: float = 1.5) -> float | None:
