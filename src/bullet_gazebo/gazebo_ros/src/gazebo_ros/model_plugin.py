@@ -67,12 +67,22 @@ class ModelPlugin:
     def restarted(self):
         """Returns the plugin that goes on in the place of this one. Nothing may move by it; what moves comes to rest.
 
-        As it stands here: a new one of the same class. What it opens of the same name and type is what this one had
-        opened, so that nobody has to connect anew; the rest is closed.
+        As it stands here: a new one of the same class, see :meth:`successor`.
+        """
+        return self.successor()
+
+    def successor(self, *arguments):
+        """Close this plugin; returns a new one of its class, made with the context and ``arguments``.
+
+        What it opens of the same name and type is what this one had opened, so that nobody has to connect anew; the
+        rest is closed.
         """
         with contextlib.suppress(Exception):
             self.close()
-        return type(self)(self.context)
+        self.context.begin_anew()
+        plugin = type(self)(self.context, *arguments)
+        self.context.end_anew()
+        return plugin
 
     def hold(self):
         """It counts as failed: have the joints that it drives stay where they are, by the simplest means there is."""

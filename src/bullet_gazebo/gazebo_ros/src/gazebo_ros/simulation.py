@@ -252,14 +252,12 @@ class Simulation:
         self._begin_anew(hosted)
 
     def _begin_anew(self, hosted):
-        hosted.context.begin_anew()
         try:
             hosted.plugin = hosted.plugin.restarted()
         except SURVIVED as error:
             hosted.last_error = "beginning anew raised %s" % described(error)
             self._give_up(hosted, "%s cannot begin anew" % _names(hosted))
             return
-        hosted.context.end_anew()
         hosted.has_failed = False
         self._sort()
 

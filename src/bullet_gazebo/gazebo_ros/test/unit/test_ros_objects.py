@@ -18,7 +18,7 @@ from gazebo_ros.faults import Faults
 from gazebo_ros.loop_publisher import PublisherHub
 from gazebo_ros.loop_subscriber import InletHub
 from gazebo_ros.mailbox import RequestBoard
-from gazebo_ros.model_plugin import PluginContext
+from gazebo_ros.model_plugin import ModelPlugin, PluginContext
 from gazebo_ros.ros_objects import RosObjects, _read_in_loop
 from lab_testing.waiting import wait_until
 
@@ -297,12 +297,18 @@ def test_a_plugin_that_begins_anew_keeps_its_topics_and_services(scene_of_faults
                 context.queue("many", String, depth=3), context.screen("glass", [[1.0]], (1.0, 2.0), (3, 4)),
                 context.service("ask", None, lambda request: answer))
 
-    first = open_all("old")
-    gone = context.publisher("gone", String)
-    context.begin_anew()
-    second = open_all("new")
-    context.publisher("more", String)
-    context.end_anew()
+    class Plugin(ModelPlugin):
+        def __init__(self, context, answer="old"):
+            super().__init__(context)
+            self.opened = open_all(answer)
+            self.own = context.publisher("gone" if answer == "old" else "more", String)
+
+        def close(self):
+            raise RuntimeError("broken on purpose")
+
+    plugin = Plugin(context)
+    first, gone = plugin.opened, plugin.own
+    second = plugin.successor("new").opened
     assert all(one is other for one, other in zip(first, second, strict=True)) and gone.is_closed
     assert ros.flush()
     assert sorted(registrations.open) == sorted(

@@ -151,11 +151,14 @@ class ControllerContext:
         return self._ros.publisher(self.resolve(topic), msg_class, latch=latch)
 
     def mailbox(self, topic, msg_class):
-        """A subscription of which only the newest message counts: ``take()`` -> message or None."""
+        """A subscription of which only the newest message counts: ``handle(function)`` calls ``function(message)`` if
+        one has come since, and drops and counts the message if that fails. ``take()`` -> message or None, unguarded."""
         return self._ros.mailbox(self.resolve(topic), msg_class)
 
     def queue(self, topic, msg_class, depth):
-        """A subscription that loses nothing up to ``depth`` unread messages: ``drain()`` -> list, oldest first."""
+        """A subscription that loses nothing up to ``depth`` unread messages: ``handle(function)`` calls
+        ``function(message)`` for each, oldest first, and drops and counts a message on which that fails. ``drain()`` ->
+        list, unguarded; ``guarded(function, ...)``: one such call."""
         return self._ros.queue(self.resolve(topic), msg_class, depth)
 
     def service(self, name, srv_class, handler):

@@ -5,7 +5,7 @@ import enum
 import numpy as np
 
 from .errors import ControllerError, HardwareError
-from .interfaces import COMMAND, JOINT_STATE
+from .interfaces import COMMAND, JOINT_STATE, POSITION
 
 
 class SwitchResult(enum.Enum):
@@ -67,6 +67,19 @@ class RobotHardware:
                 raise ControllerError("%s: joint '%s' cannot be used through %s: %s; joints with this interface: %s"
                                       % (asked_by, joint, interface, found, ", ".join(offered)))
         return np.array([self._index[joint] for joint in joints], dtype=int)
+
+    # -- a controller that has failed; claims as below ---------------------------------------------------------------
+
+    def hold(self, claims):
+        """Have the joints of ``claims`` stay where they are, as far as commands can do that: positions as they are now,
+        velocity and effort 0. A driver that has brakes uses them."""
+        for interface, joints in claims.items():
+            if interface in COMMAND:
+                index = [self._index[joint] for joint in joints]
+                self.command[interface][index] = self.position[index] if interface == POSITION else 0.0
+
+    def let_go(self, claims):
+        """The end of :meth:`hold` for the joints of ``claims``: a controller is about to start on them."""
 
     # -- a change of controllers; claims are {interface: joints} of each controller ----------------------------------
 

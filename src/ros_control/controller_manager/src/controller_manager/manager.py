@@ -6,7 +6,10 @@ from concurrent.futures import Future, InvalidStateError
 from .controller import Controller
 from .errors import ControllerError, Refused
 from .hardware import SwitchResult
-from .interfaces import COMMAND, POSITION
+from .interfaces import COMMAND
+
+# What a controller may raise without taking the others with it.
+_SURVIVED = (Exception, SystemExit)
 
 BEST_EFFORT = 1
 STRICT = 2
@@ -89,7 +92,7 @@ class ControllerManager:
         except ControllerError as error:
             context.close()
             raise Refused("cannot load controller '%s': %s" % (name, error)) from error
-        except Exception as error:
+        except _SURVIVED as error:
             context.close()
             raise Refused("cannot load controller '%s': its constructor failed with %s: %s"
                           % (name, type(error).__name__, error)) from error
@@ -169,7 +172,7 @@ class ControllerManager:
         """One tick. ``time_s``: control time [s], ``dt``: since the last update [s].
 
         ``reset_controllers`` stops and starts every running controller first. A controller that raises is reported
-        and taken out (state ``aborted``); its velocity and effort commands become 0.
+        and taken out (state ``aborted``), and its joints are held where they are; it can be started again.
         """
         for loaded in self._running:
             try:
@@ -177,17 +180,23 @@ class ControllerManager:
                     loaded.controller.stopping(time_s)
                     loaded.controller.starting(time_s)
                 loaded.controller.update(time_s, dt)
-            except Exception as error:  # noqa: BLE001  (a controller is anybody's code; the others go on)
+            except _SURVIVED as error:  # a controller is anybody's code; the others go on
+                # Who waits for the end of a goal is told.
+                with contextlib.suppress(*_SURVIVED):
+                    loaded.controller.stopping(time_s)
                 self._fail(loaded, "update", error)
         for loaded in self._idle:
             try:
                 loaded.controller.idle(time_s)
-            except Exception as error:  # noqa: BLE001
+            except _SURVIVED as error:
                 self._idle = [other for other in self._idle if other is not loaded]
                 self._log.error("controller '%s' failed in idle() with %s: %s; it is not called again before it runs"
                                 % (loaded.name, type(error).__name__, error))
         if self._switch is not None:
-            self._go_on_switching(time_s)
+            try:
+                self._go_on_switching(time_s)
+            except _SURVIVED as error:  # a driver is anybody's code, too
+                self._give_up_switch(error)
         self._has_updated = True
         if self._after_update:
             waiting, self._after_update = self._after_update, []
@@ -257,10 +266,21 @@ class ControllerManager:
             self._switch = None
             _finish(switch.future)
 
+    def _give_up_switch(self, error):
+        switch, self._switch = self._switch, None
+        text = "the hardware failed in changing controllers with %s: %s" % (type(error).__name__, error)
+        self._log.error(text)
+        for loaded in switch.start:
+            if loaded.state != RUNNING:
+                self._set_state(loaded, ABORTED)
+        with contextlib.suppress(InvalidStateError):
+            switch.future.set_exception(Refused(text))
+
     def _start(self, loaded, time_s):
         try:
+            self.hardware.let_go(loaded.controller.claims)
             loaded.controller.starting(time_s)
-        except Exception as error:  # noqa: BLE001
+        except _SURVIVED as error:
             self._fail(loaded, "starting", error)
         else:
             self._set_state(loaded, RUNNING)
@@ -268,19 +288,21 @@ class ControllerManager:
     def _stop(self, loaded, time_s):
         try:
             loaded.controller.stopping(time_s)
-        except Exception as error:  # noqa: BLE001
+        except _SURVIVED as error:
             self._fail(loaded, "stopping", error)
         else:
             self._set_state(loaded, STOPPED)
 
     def _fail(self, loaded, where, error):
-        self._log.error("controller '%s' failed in %s() with %s: %s; it is stopped, the others go on"
+        self._log.error("controller '%s' failed in %s() with %s: %s; it is stopped and its joints are held, the others "
+                        "go on. It can be started again: rosservice call .../controller_manager/switch_controller"
                         % (loaded.name, where, type(error).__name__, error))
         self._set_state(loaded, ABORTED)
-        for interface, joints in loaded.controller.claims.items():
-            if interface in COMMAND and interface != POSITION:
-                index = self.hardware.index(interface, joints, loaded.name)
-                self.hardware.command[interface][index] = 0.0
+        try:
+            self.hardware.hold(loaded.controller.claims)
+        except _SURVIVED as held:
+            self._log.error("the joints of controller '%s' cannot be held: %s: %s"
+                            % (loaded.name, type(held).__name__, held))
 
     def _set_state(self, loaded, state):
         loaded.state = state
@@ -295,7 +317,7 @@ class ControllerManager:
     def _close(self, loaded):
         try:
             loaded.controller.close()
-        except Exception as error:  # noqa: BLE001
+        except _SURVIVED as error:
             self._log.error("controller '%s' failed in close() with %s: %s"
                             % (loaded.name, type(error).__name__, error))
         loaded.controller.context.close()

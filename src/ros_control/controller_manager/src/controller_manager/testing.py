@@ -16,7 +16,7 @@ class FakeRos:
         return self.publishers.setdefault(topic, FakePublisher())
 
     def mailbox(self, topic, msg_class):
-        return self.inboxes.setdefault(topic, FakeInbox())
+        return self.inboxes.setdefault(topic, FakeInbox(newest_only=True))
 
     def queue(self, topic, msg_class, depth):
         return self.inboxes.setdefault(topic, FakeInbox())
@@ -42,10 +42,11 @@ class FakePublisher:
 
 
 class FakeInbox:
-    """A mailbox and a queue; ``put`` a message into it."""
+    """A mailbox and a queue; ``put`` a message into it. ``faults``: what was raised by who took one with ``handle``."""
 
-    def __init__(self):
-        self._messages = []
+    def __init__(self, newest_only=False):
+        self._messages, self._newest_only = [], newest_only
+        self.faults = []
 
     def put(self, message):
         self._messages.append(message)
@@ -57,6 +58,17 @@ class FakeInbox:
     def drain(self):
         messages, self._messages = self._messages, []
         return messages
+
+    def handle(self, take):
+        messages = self.drain()
+        for message in messages[-1:] if self._newest_only else messages:
+            self.guarded(take, message)
+
+    def guarded(self, take, *arguments):
+        try:
+            take(*arguments)
+        except (Exception, SystemExit) as error:
+            self.faults.append(error)
 
 
 class FakeLog:

@@ -37,7 +37,7 @@ class Recorder(Controller):
 
     def _note(self, call):
         if self.context.param("fails_in") == call:
-            raise ValueError("broken on purpose")
+            raise self.context.param("error", ValueError)("broken on purpose")
         self.calls.append(call)
 
     def starting(self, time_s):
@@ -64,13 +64,23 @@ class SlowHardware(FakeHardware):
         self.prepares = True
         self.result = SwitchResult.DONE
         self.ready = set()
-        self.switches = []
+        self.switches, self.held, self.released = [], [], []
+        self.fails = False
+
+    def hold(self, claims):
+        super().hold(claims)
+        self.held.append(claims)
+
+    def let_go(self, claims):
+        self.released.append(claims)
 
     def prepare_switch(self, start, stop):
         return self.prepares
 
     def do_switch(self, start, stop):
         self.switches.append((len(start), len(stop)))
+        if self.fails:
+            raise ZeroDivisionError
 
     def switch_result(self, claims=None):
         if claims is not None and self.ready.intersection(*claims.values()):
@@ -91,6 +101,7 @@ class Robot:
     def load(self, name, **parameters):
         context, ros = fake_context(name, parameters, log=self.log)
         self.contexts[name] = ros
+        ros.parameters = parameters
         self.manager.load(name, "test/Recorder", Recorder, context)
         return self.find(name).controller
 
@@ -397,20 +408,47 @@ def test_reset_restarts_running_controllers_before_the_update(robot):
     assert running == ["init", "starting", "stopping", "starting", "update"] and idle == ["init"]
 
 
+@pytest.mark.parametrize("error", [ValueError, RecursionError, SystemExit])
 @pytest.mark.parametrize("where", ["starting", "update", "stopping"])
-def test_a_failing_controller_is_reported_and_taken_out(robot, where):
+def test_a_failing_controller_is_reported_and_its_joints_are_held(robot, where, error):
     good = robot.load("good", position=["a"]).calls
-    robot.load("bad", fails_in=where, effort=["e"])
+    bad = robot.load("bad", fails_in=where, error=error, effort=["e"], position=["b"])
     robot.switch(["good", "bad"])
     robot.hardware.command[EFFORT][:] = 5.0
+    robot.hardware.command[POSITION][1], robot.hardware.position[1] = 7.0, 0.25
     robot.update()
     if where == "stopping":
         robot.switch(stop=["bad"])
     robot.update()
     assert robot.state("bad") == "aborted" and robot.state("good") == "running" and good.count("update") >= 2
     assert len(robot.log.of("error")) == 1 and "'bad' failed in %s()" % where in robot.log.of("error")[0]
+    assert "its joints are held" in robot.log.of("error")[0]
+    assert robot.hardware.held == [bad.claims]
     if where != "starting":
         assert robot.hardware.command[EFFORT][3] == 0.0, "no effort is left behind"
+        assert robot.hardware.command[POSITION][1] == 0.25, "nor a position"
+    if where == "update":
+        assert bad.calls[-1] == "stopping", "who waits for a goal is told"
+    robot.contexts["bad"].parameters["fails_in"] = None
+    robot.switch(["bad"])
+    robot.update()
+    assert robot.state("bad") == "running" and robot.hardware.released[-1] is bad.claims
+
+
+def test_hardware_that_fails_in_a_change_is_an_error_of_that_change(robot):
+    good = robot.load("good", position=["a"]).calls
+    robot.load("new", position=["b"])
+    robot.switch(["good"])
+    robot.hardware.fails = True
+    future = robot.switch(["new"])
+    with pytest.raises(Refused, match="the hardware failed .*ZeroDivisionError"):
+        future.result(0)
+    assert robot.state("new") == "aborted" and robot.state("good") == "running"
+    robot.hardware.fails = False
+    assert robot.switch(["new"]).result(0) is None and robot.state("new") == "running"
+    before = good.count("update")
+    robot.update()
+    assert good.count("update") == before + 1
 
 
 def test_close_releases_who_waits(robot):

@@ -67,6 +67,9 @@ class SimulatedHardware(RobotHardware):
             self._add_group(interface, list(gains), limits, list(gains.values()))
         self._continuous = np.array([robot.joints[name].type == "continuous" for name in self.joint_names], dtype=bool)
         self._frozen = None
+        # (n,) whether joints are held by their brakes, which is seldom; where, and how strong those are.
+        self._held = None
+        self._held_at, self._brakes = np.zeros(len(joints)), np.full(len(joints), _UNLIMITED)
         self.read()
         self.joints_set()
 
@@ -86,6 +89,27 @@ class SimulatedHardware(RobotHardware):
                 command = self._frozen[index] if group.interface == POSITION else np.zeros(len(index))
             position, velocity = self.position[index], self.velocity[index]
             group.drive(group.limiter.enforce(command, dt, position, velocity), position, velocity, dt)
+        if self._held is not None:
+            held = self._held
+            self._model.drive_position(self._model_index[held], self._held_at[held], self._brakes[held])
+
+    def hold(self, claims):
+        """The joints of ``claims`` have brakes: they stay where they are, whatever acts on them."""
+        super().hold(claims)
+        index = self._braked(claims)
+        if index:
+            self._held = np.zeros(len(self.joint_names), dtype=bool) if self._held is None else self._held
+            self._held_at[index] = self.position[index]
+            self._held[index] = True
+
+    def let_go(self, claims):
+        if self._held is not None:
+            self._held[self._braked(claims)] = False
+            self._held = self._held if self._held.any() else None
+
+    def hold_all(self):
+        """As :meth:`hold`, for all joints."""
+        self.hold(self.interface_joints)
 
     def joints_set(self):
         """The joints were put elsewhere (at the start too): stay there, and count limits from there."""
@@ -95,8 +119,14 @@ class SimulatedHardware(RobotHardware):
         self.command[EFFORT][:] = 0.0
         if self._frozen is not None:
             self._frozen = self.position.copy()
+        self._held_at = self.position.copy()
         for group in self._groups:
             group.reset()
+
+    def _braked(self, claims):
+        """Indices of the joints of ``claims`` that a command cannot hold."""
+        joints = {joint for interface in (VELOCITY, EFFORT) for joint in claims.get(interface, ())}
+        return [i for i, name in enumerate(self.joint_names) if name in joints]
 
     def stop(self, stopped):
         """Emergency stop: while ``stopped``, joints stay where they were when it came, without effort or velocity."""

@@ -71,7 +71,7 @@ class GazeboRosControl(ModelPlugin):
             return
         hardware.read()
         if self._stop_messages is not None:
-            self._take_stop()
+            self._stop_messages.handle(self._take_stop)
         last = self._last_update_s
         # Half a nanosecond: multiples of a tick and of the period meet in rounding only.
         if last is None or time_s - last >= self._period_s - 5e-10:
@@ -90,14 +90,21 @@ class GazeboRosControl(ModelPlugin):
         self._restart = True
         self.joints_set()
 
+    def restarted(self):
+        # The controllers that people have loaded stay: they begin anew from where the joints are, as after a reset.
+        self.reset()
+        return self
+
+    def hold(self):
+        if self._hardware is not None:
+            self._hardware.hold_all()
+            self._hardware.write(self.context.world.time_step_s)
+
     def close(self):
         if self._hardware is not None:
             self._services.close()
 
-    def _take_stop(self):
-        message = self._stop_messages.take()
-        if message is None:
-            return
+    def _take_stop(self, message):
         if self._stopped and not message.data:
             self._restart = True
         self._stopped = message.data

@@ -8,6 +8,9 @@ from std_msgs.msg import Bool
 from bullet_sim import Pose, World
 from controller_manager import POSITION, Controller
 from controller_manager.testing import FakeInbox, FakeLog, fake_context
+from gazebo_ros.faults import Faults
+from gazebo_ros.mailbox import RequestBoard
+from gazebo_ros.simulation import HostedPlugin, Simulation
 from gazebo_ros_control.plugin import GazeboRosControl, _flat
 from urdf_model import parse_urdf
 
@@ -202,3 +205,54 @@ def test_a_faulty_transmission_is_one_line_and_the_robot_lives(simulate, found, 
 
 def test_slashes_in_types_survive_the_parameter_server():
     assert _flat({"a": {"B": "m:C", "d": {"E": "n:F"}}, "g": "h:I"}) == {"a/B": "m:C", "a/d/E": "n:F", "g": "h:I"}
+
+
+class Loop:
+    """The simulator's loop around a Simulator's plugin."""
+
+    def __init__(self, simulator):
+        self.simulator = simulator
+        self.simulation = Simulation(simulator.world, RequestBoard(), simulator.log, Faults(simulator.log), paused=True)
+        self.simulation.tick = simulator.world.tick
+        self.hosted = HostedPlugin(simulator.plugin, simulator, "arm", "libgazebo_ros_control.so")
+        self.simulation.host(self.hosted)
+
+    def run(self, ticks):
+        for _ in range(ticks):
+            self.simulation.do_tick()
+
+    @property
+    def position(self):
+        return self.simulator.model.read_joints()[0][0]
+
+
+@pytest.mark.parametrize("time_too", [False, True])
+def test_a_plugin_that_fails_keeps_its_controllers_and_holds_its_joints_until_a_reset(simulate, monkeypatch, time_too):
+    simulator = simulate()
+    controller = simulator.start()
+    loop = Loop(simulator)
+    controller.target = 0.5
+    loop.run(300)
+    hardware, left = simulator.plugin._hardware, [None]
+    real = hardware.read
+
+    def read():
+        if left:
+            left.pop()
+            raise RecursionError("broken on purpose")
+        real()
+
+    monkeypatch.setattr(hardware, "read", read)
+    starts = len(controller.starts)
+    loop.run(50)
+    assert loop.hosted.failures == 1 and not loop.hosted.has_failed
+    assert len(controller.starts) == starts + 1 and loop.position == pytest.approx(0.5, abs=1e-3)
+    left[:] = [None] * 2
+    controller.target = -0.5
+    loop.run(500)
+    assert loop.hosted.has_failed and loop.position == pytest.approx(0.5, abs=2e-3)
+    loop.simulation.reset(time_too)
+    controller.target = 0.25
+    loop.run(300)
+    assert not loop.hosted.has_failed and loop.position == pytest.approx(0.25, abs=1e-3)
+    assert [loaded.state for loaded in simulator.plugin._manager.loaded] == ["running"]

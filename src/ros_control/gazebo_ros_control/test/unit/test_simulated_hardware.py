@@ -282,3 +282,19 @@ def test_a_free_robots_joints_carry_load_and_push(standing):
                                             heights.append(arm.model.base_pose().position[2])))
     assert max(heights) > height + 0.2
     assert arm.hardware.position == pytest.approx([0.0, 0.0], abs=1e-2)
+
+
+@pytest.mark.parametrize("interface", ["Effort", "Velocity", "Position"])
+def test_joints_whose_controller_has_failed_are_held_until_another_one_starts(make, interface):
+    arm = make(interface, mass=3.0)
+    kind = {"Effort": EFFORT, "Velocity": VELOCITY, "Position": POSITION}[interface]
+    claims = {kind: list(arm.hardware.joint_names)}
+    arm.run(0.05, 1.0 if kind == POSITION else 0.5, kind)
+    arm.hardware.hold(claims)
+    start = arm.hardware.position.copy()
+    arm.run(1.0)
+    assert np.abs(arm.hardware.position - start).max() < 5e-3
+    arm.hardware.let_go(claims)
+    if kind == EFFORT:
+        arm.run(0.5, 0.0, kind)
+        assert np.abs(arm.hardware.position - start).max() > 0.05, "free again"

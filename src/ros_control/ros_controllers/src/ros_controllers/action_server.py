@@ -127,9 +127,9 @@ class ActionServer:
             messages = sorted(messages + cancels, key=lambda message: getattr(message, "arrival", 0))
         for message in messages:
             if isinstance(message, GoalID):
-                self._take_cancel(message)
+                self._cancels.guarded(self._take_cancel, message)
             else:
-                self._take_goal(message)
+                self._goals.guarded(self._take_goal, message)
         if self._next_status_s is None or time_s >= self._next_status_s:
             self._publish_status()
 
@@ -160,7 +160,19 @@ class ActionServer:
         if stamp and stamp <= self._last_cancel:
             handle.cancel(text="a request to cancel all goals up to a later time came before this goal")
         else:
-            self._on_goal(handle)
+            self._answering(handle, self._on_goal)
+
+    def _answering(self, handle, callback):
+        """Have the owner's ``callback`` take a goal; one that it fails on ends, so that no client waits for it."""
+        try:
+            callback(handle)
+        except Exception as error:
+            text = "the server failed with %s: %s" % (type(error).__name__, error)
+            if handle._may("reject"):
+                handle.reject(text=text)
+            elif handle._may("abort"):
+                handle.abort(text=text)
+            raise
 
     def _take_cancel(self, message):
         everything = not message.id and not message.stamp
@@ -173,7 +185,7 @@ class ActionServer:
                 continue
             if handle._may("request cancel of"):
                 handle._step("request cancel of", "")
-                self._on_cancel(handle)
+                self._answering(handle, self._on_cancel)
         if message.id and not known:
             # The request has overtaken its goal; the goal is not begun when it comes.
             early = GoalHandle(self, None, GoalID(message.stamp, message.id), GoalStatus.RECALLING)

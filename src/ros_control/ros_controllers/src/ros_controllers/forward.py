@@ -30,9 +30,7 @@ class ForwardController(Controller):
             self._command = np.zeros(len(self.joints))
 
     def update(self, time_s, dt):
-        message = self._inbox.take()
-        if message is not None:
-            self._accept(message)
+        self._inbox.handle(self._accept)
         self.hardware.command[self.interface][self.index] = self._command
 
     def _accept(self, message):

@@ -134,9 +134,7 @@ class JointTrajectoryController(Controller):
         if verdict is not None:
             self._conclude(verdict)
         self._server.spin(time_s)
-        message = self._commands.take()
-        if message is not None:
-            self._on_command(message)
+        self._commands.handle(self._on_command)
         # Commands act until the next tick, so the joints shall go where they should be then.
         self._next = follower.look_ahead(self._uptime + dt)
         self._write(dt)

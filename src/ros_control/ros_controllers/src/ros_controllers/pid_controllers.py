@@ -40,9 +40,7 @@ class PidController(Controller):
         self.pid.reset()
 
     def update(self, time_s, dt):
-        message = self._inbox.take()
-        if message is not None:
-            self._accept(message)
+        self._inbox.handle(self._accept)
         error = self._error()
         output = self.pid.update(error, dt)
         self.hardware.command[self.interface][self.index] = output

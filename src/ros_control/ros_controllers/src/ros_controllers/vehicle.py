@@ -85,7 +85,7 @@ class VehicleController(Controller):
         driven, commanded = self._driven(), self._commanded(dt)
         if dt > 0.0:
             self._odometry.move(*(commanded if self._open_loop else driven), dt)
-        self._take_command(time_s)
+        self._commands.handle(lambda message: self._take_command(message, time_s))
         if time_s - self._commanded_s > self._timeout_s:
             self._wanted = (0.0, 0.0)
         speeds = []
@@ -102,10 +102,7 @@ class VehicleController(Controller):
             message.twist.linear.x, message.twist.angular.z = speeds
             self._out_publisher.publish(message)
 
-    def _take_command(self, time_s):
-        message = self._commands.take()
-        if message is None:
-            return
+    def _take_command(self, message, time_s):
         wanted = message.linear.x, message.angular.z
         if not all(map(math.isfinite, wanted)):
             self.log.warn_throttle(5.0, "%s: a velocity of %g m/s and %g rad/s is no number; the command is ignored"

@@ -309,3 +309,29 @@ def test_a_new_goal_may_have_the_id_of_one_that_ended_before_the_time_went_back(
         served.begun[-1].succeed()
         served.server.spin(0.5)
     assert len(served.begun) == 2
+
+
+def test_a_goal_that_the_owner_fails_on_is_rejected_and_the_next_one_is_not(served):
+    real = served.server._on_goal
+
+    def fail(handle):
+        served.server._on_goal = real
+        raise RecursionError("broken on purpose")
+
+    served.server._on_goal = fail
+    served.send("bad")
+    served.send("good")
+    served.server.spin(10.0)
+    assert served.statuses == {"bad": GoalStatus.REJECTED, "good": GoalStatus.ACTIVE}
+    assert "RecursionError: broken on purpose" in served.topics.sent["act/result"][0].status.text
+    assert isinstance(served.topics.ros.inboxes["act/goal"].faults[0], RecursionError)
+
+
+def test_a_cancel_request_that_the_owner_fails_on_ends_the_goal(served):
+    served.send("a")
+    served.server.spin(10.0)
+    served.server._on_cancel = lambda handle: 1 / 0
+    served.cancel("a")
+    served.server.spin(10.1)
+    assert served.results == [("a", GoalStatus.ABORTED)]
+    assert isinstance(served.topics.ros.inboxes["act/cancel"].faults[0], ZeroDivisionError)

@@ -254,3 +254,18 @@ def test_unknown_and_broken_entries_are_named():
             ControllerTable({"a/B": target}).find("a/B")
     with pytest.raises(ControllerError, match='expected "module:Class"'):
         ControllerTable({"a/B": "math"}).find("a/B")
+
+
+@pytest.mark.parametrize("kind, interface, parameters", [
+    ("position_controllers/JointPositionController", POSITION, {"joint": "a"}),
+    ("effort_controllers/JointGroupEffortController", EFFORT, {"joints": ["a", "b"]}),
+    ("effort_controllers/JointPositionController", EFFORT, {"joint": "b", "pid": PID}),
+    ("position_controllers/JointTrajectoryController", POSITION, {"joints": ["a", "b"]})])
+def test_a_command_that_a_controller_fails_on_is_dropped(kind, interface, parameters):
+    running = Running(kind, interface, parameters)
+    running.run(3)
+    running.send(object())  # as if something in it were of a kind that nobody thought of
+    before = running.command(interface)
+    running.run()
+    assert isinstance(running.ros.inboxes["/robot/arm/command"].faults[0], AttributeError)
+    assert running.command(interface) == pytest.approx(before, abs=0.1)

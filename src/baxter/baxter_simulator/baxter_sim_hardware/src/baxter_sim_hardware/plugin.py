@@ -224,7 +224,7 @@ class BaxterPlugin(ModelPlugin):
 
     def restarted(self):
         before = self._baxter.state.state
-        return type(self)(self.context, State.DISABLED if before is State.FAILED else before)
+        return self.successor(State.DISABLED if before is State.FAILED else before)
 
     def while_failed(self, time_s):
         self._before = self._model.read_joints()
