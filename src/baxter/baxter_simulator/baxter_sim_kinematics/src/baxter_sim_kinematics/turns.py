@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fair turns: a lock that goes to who has waited longest."""
+import collections
+import threading
+
+
+class Turns:
+    """A lock, as a context, whose waiters get it in the order in which they asked.
+
+    Python's own goes to whoever is fastest, and that is the thread that has just released it: a loop over ten thousand
+    poses would keep everybody else waiting until its end.
+    """
+
+    def __init__(self):
+        self._lock = threading.Lock()  # of what follows, and never held for long
+        self._is_taken = False
+        self._gates = collections.deque()
+
+    def __enter__(self):
+        with self._lock:
+            if not self._is_taken:
+                self._is_taken = True
+                return self
+            gate = threading.Lock()
+            gate.acquire()
+            self._gates.append(gate)
+        gate.acquire()  # until it is handed over
+        return self
+
+    def __exit__(self, *_):
+        with self._lock:
+            if self._gates:
+                self._gates.popleft().release()
+            else:
+                self._is_taken = False
