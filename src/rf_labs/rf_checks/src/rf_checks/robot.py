@@ -17,6 +17,11 @@ class Robot:
         self._robot = parse_urdf(description_xml)
         self._chains = {}
 
+    @property
+    def frame_names(self):
+        """Names of all frames that hang on `base`: list."""
+        return [link for link in self._robot.links if self._hangs_on_base(link)]
+
     def frame(self, name, joints):
         """(4, 4) pose of a frame in `base` [m]. `joints`: dict of name to rad."""
         if name in ("base", "world"):
@@ -30,6 +35,14 @@ class Robot:
         if chain is None:
             return self._fixed(name)
         return chain.fk(np.array([joints[joint] for joint in chain.joint_names]))
+
+    def _hangs_on_base(self, link):
+        while link != "base":
+            joint = self._robot.parent_joint(link)
+            if joint is None:
+                return False
+            link = joint.parent
+        return True
 
     def _fixed(self, name):
         """Pose of a frame that no joint moves."""

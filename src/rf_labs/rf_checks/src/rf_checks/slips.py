@@ -9,6 +9,8 @@ from rf_checks.recording import arm_joints
 
 # Near enough to say that a wrong answer is that wrong answer [m], [rad].
 NEAR_M, NEAR_RAD = 0.02, 0.06
+# Near enough to say so where any two of the robot's frames may be meant [m].
+SAME_M = 0.005
 
 SHEET_TF_LISTENER = "the sheet's own tf_listener listing has this slip, in the line that begins `quat = (q.x`"
 SHEET_NAMES = ("Case Western's notes have this slip in the lines `right_cmd.names.push_back(...)`: right_e1 and "
@@ -87,32 +89,64 @@ def wrong_rotations(start, axis, angle_rad):
     ]
 
 
-def matrix_slip(found, robot, joints, target, source, frames):
-    """What is wrong with a (4, 4) matrix that was to be the pose of `source` in `target`: (key, sentence) or None."""
-    true = robot.between(target, source, joints)
-    name = "%s -> %s" % (target, source)
+def matrix_slip(found, robot, joints, pairs, preferred):
+    """What is wrong with a (4, 4) matrix that was to be the pose of one of `pairs`: (key, sentence) or None.
+
+    pairs: (target, source) each, those of the exercise that are missing. preferred: frames that are named first where
+    several are in the same place.
+    """
     if np.allclose(found, np.eye(4)):
-        return "identity", "%s: the matrix printed is the identity: rotation and translation were not filled in" % name
-    if np.linalg.norm(found[:3, 3] - true[:3, 3]) < NEAR_M and not is_near(found[:3, :3], true[:3, :3]):
-        if is_xyzw_taken_as_wxyz(found[:3, :3], true[:3, :3]):
-            return "quaternion_order", ("%s: the rotation is that of a quaternion in the wrong order: tf gives x y z "
-                                        "w, quat2mat wants w x y z (%s)" % (name, SHEET_TF_LISTENER))
-        if is_near(found[:3, :3], true[:3, :3].T):
-            return "transposed", "%s: the rotation part is transposed, the translation is right" % name
-        return "rotation", "%s: the translation is right, the rotation part is not" % name
-    if _same(found, np.linalg.inv(true)):
-        return "wrong_frame", ("%s: this is the inverse, %s -> %s: lookup_transform takes the target frame first, then "
-                               "the source" % (name, source, target))
-    for other_target, other_source in ((a, b) for a in frames for b in frames if a != b):
-        if _same(found, robot.between(other_target, other_source, joints)):
+        return "identity", ("%s -> %s: the matrix printed is the identity: rotation and translation were not filled in"
+                            % pairs[0])
+    for target, source in pairs:
+        name, true = "%s -> %s" % (target, source), robot.between(target, source, joints)
+        slip = _rotation_slip(found, true, NEAR_M)
+        if slip:
+            return slip[0], "%s: %s" % (name, slip[1])
+        if _same(found, np.linalg.inv(true)):
+            return "wrong_frame", ("%s: this is the inverse, %s -> %s: lookup_transform takes the target frame first, "
+                                   "then the source" % (name, source, target))
+        if np.linalg.norm(found[:3, 3] - true[:3, 3]) < NEAR_M and not is_near(found[:3, :3], true[:3, :3]):
+            return "rotation", "%s: the translation is right, the rotation part is not" % name
+    return _another_pair(found, robot, joints, pairs, preferred)
+
+
+def _another_pair(found, robot, joints, pairs, preferred):
+    """Which frames the matrix is about, if not about the exercise's: as it is, or with a slip in its rotation."""
+    names = [*preferred, *(name for name in robot.frame_names if name not in preferred)]
+    poses = {name: robot.frame(name, joints) for name in names}
+    others = []
+    for target in names:
+        inverse = np.linalg.inv(poses[target])
+        others += [(target, source, inverse @ poses[source]) for source in names if source != target]
+    wanted = " and ".join("%s -> %s" % pair for pair in pairs)
+    for target, source, true in others:
+        if _same(found, true):
             return "wrong_frame", ("%s: the matrix is that of %s -> %s: another frame than the exercise's"
-                                   % (name, other_target, other_source))
+                                   % (wanted, target, source))
+    for target, source, true in others:
+        slip = _rotation_slip(found, true, SAME_M)
+        if slip:
+            return slip[0], ("the matrix printed is that of %s -> %s, and the exercise asks for %s. Besides, %s"
+                             % (target, source, wanted, slip[1]))
+    return None
+
+
+def _rotation_slip(found, true, near_m):
+    """What was done to the rotation of a pose that stands in the right place: (key, sentence) or None."""
+    if np.linalg.norm(found[:3, 3] - true[:3, 3]) > near_m or is_near(found[:3, :3], true[:3, :3]):
+        return None
+    if is_xyzw_taken_as_wxyz(found[:3, :3], true[:3, :3]):
+        return "quaternion_order", ("the rotation is that of a quaternion in the wrong order: tf gives x y z w, "
+                                    "quat2mat wants w x y z (%s)" % SHEET_TF_LISTENER)
+    if is_near(found[:3, :3], true[:3, :3].T):
+        return "transposed", "the rotation part is transposed, the translation is right"
     return None
 
 
 def _same(matrix, other):
     distance, angle = pose_error(matrix, other)
-    return distance < 0.005 and angle < 0.02
+    return distance < SAME_M and angle < 0.02
 
 
 def command_slip(commands):
@@ -127,9 +161,12 @@ def command_slip(commands):
         if len(names) != len(values):
             return "lengths", ("the joint command has %d names and %d values; each joint needs one of each"
                                % (len(names), len(values)))
-        # No joint of the arm turns farther than 3.1 rad.
-        if values and max(abs(value) for value in values) > 6.3:
-            worst = max(range(len(values)), key=lambda k: abs(values[k]))
-            return "degrees", ("%s was commanded to %.1f: angles are in radians, and this looks like degrees "
-                               "(numpy.deg2rad turns them)" % (names[worst], values[worst]))
+    # Of all commands the farthest: on the way there is no telling which is recorded.
+    value, name = max(((value, name) for _, _, names, values in commands
+                       for name, value in zip(names, values, strict=True)), key=lambda pair: abs(pair[0]),
+                      default=(0.0, ""))
+    # No joint of the arm turns farther than 3.1 rad.
+    if abs(value) > 6.3:
+        return "degrees", ("%s was commanded to %.1f: angles are in radians, and this looks like degrees "
+                           "(numpy.deg2rad turns them)" % (name, value))
     return None

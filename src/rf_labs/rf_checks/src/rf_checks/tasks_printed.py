@@ -13,7 +13,7 @@ from rf_checks.recording import SIDES, Criterion, Fault
 from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, Call, pose_matrix, postures
 
 SHEET_PAIRS = (("base", "left_hand"), ("left_hand", "right_hand"), ("head_camera", "left_gripper_base"))
-# Frames among which a wrong answer is looked for.
+# Frames that a wrong answer is looked for in first.
 FRAMES = ("base", "head", "head_camera", "left_hand", "right_hand", "left_gripper", "right_gripper",
           "left_gripper_base", "right_gripper_base", "torso", "left_wrist", "right_wrist")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -60,7 +60,8 @@ class TfListener:
                 distance, angle = min((measures.pose_error(matrix, true) for matrix in found), key=sum,
                                       default=(np.inf, np.inf))
             share = min(ramp(distance, 0.003, 0.02), ramp(angle, 0.01, 0.05))
-            text = "none of the %d printed is this" % len(found) if share == 0.0 else "%.1f mm off" % (1000 * distance)
+            none = "none of those printed is this" if found else "none printed"
+            text = none if share == 0.0 else "%.1f mm off" % (1000 * distance)
             result.append(Criterion("%s -> %s" % (target, source), share, 100.0 / len(call.expected), text))
         return result
 
@@ -73,11 +74,10 @@ class TfListener:
                   if not any(_near(matrix, robot.between(*pair, joints)) for pair in call.expected)]
         missing = [pair for pair in call.expected
                    if not any(_near(matrix, robot.between(*pair, joints)) for matrix in found)]
-        for target, source in missing:
-            for matrix in unused:
-                slip = slips.matrix_slip(matrix, robot, joints, target, source, FRAMES)
-                if slip:
-                    return Fault(*slip)
+        for matrix in unused if missing else ():
+            slip = slips.matrix_slip(matrix, robot, joints, missing, FRAMES)
+            if slip:
+                return Fault(*slip)
         if missing and unused:
             return Fault("wrong_numbers", "a matrix was printed that is no pose of this robot's frames as its arms "
                          "stand now: the arms stand elsewhere in each check, so numbers from another run do not fit")

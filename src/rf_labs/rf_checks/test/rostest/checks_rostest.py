@@ -28,6 +28,7 @@ WRONG = {
 ADVERSARIES = {
     "names_twice": ("repeated_names", "push_back"),
     "tf_quaternion_order": ("quaternion_order", "quat = (q.x"),
+    "tf_of_the_sheet": ("quaternion_order", "that of base -> head"),
     "crashes": ("crashed", "line 7"),
     "prints_made_up_matrices": ("wrong_numbers", "elsewhere"),
     "teleports": ("teleport", "set_model_configuration"),

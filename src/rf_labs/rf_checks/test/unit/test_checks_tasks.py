@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Grading of each kind of exercise, from traces that are made here: no simulator."""
+import itertools
 import math
 
 import numpy as np
@@ -10,7 +11,9 @@ from rf_checks.lab import robot_description
 from rf_checks.recording import SIDES, Recording, Run, arm_joints
 from rf_checks.robot import Robot
 
-JOINTS = ("head_pan", *arm_joints("left"), *arm_joints("right"))
+# All joints that the simulated robot has.
+OTHERS = ("head_pan", *("%s_gripper_%s_finger_joint" % pair for pair in itertools.product("lr", "lr")))
+JOINTS = (*OTHERS, *arm_joints("left"), *arm_joints("right"))
 POINT, QUATERNION = tasks.LAB_POINT, tasks.LAB_QUATERNION
 
 
@@ -22,7 +25,7 @@ def robot():
 def trace(left=((tasks.NEUTRAL,)), right=((tasks.NEUTRAL,)), seconds=2.0, ik=(), contacts=()):
     """A Recording in which each arm goes smoothly from posture to posture; requests and contacts come at the end."""
     count = round(seconds / 0.01)
-    columns = [np.zeros((count, 1))]
+    columns = [np.zeros((count, len(OTHERS)))]
     for postures in (left, right):
         postures = np.array(postures, dtype=float)
         place = np.linspace(0.0, len(postures) - 1.0, count)
@@ -137,6 +140,25 @@ def test_printed_matrices_are_graded(robot, change, points, key):
     true = robot.between("base", "left_hand", recording.joints_at(-1))
     run = Run([], recording, output=str(change(true).tolist()))
     assert graded(task, PAIR, run, robot) == (pytest.approx(points), key)
+
+
+@pytest.mark.parametrize("pair", [("base", "head"), ("base", "left_gripper"), ("left_hand", "right_hand_camera")])
+def test_another_pairs_matrix_with_the_sheets_slip_is_told_both(robot, pair):
+    recording = trace(left=((0.2, -0.4, 0.3, 0.8, -0.5, 1.1, 0.4),))
+    matrix = robot.between(*pair, recording.joints_at(-1))
+    matrix[:3, :3] = slips.rotation_of(*slips.quaternion_of(matrix[:3, :3]))
+    fault = tasks_printed.TfListener().slip(PAIR, Run([], recording, output=str(matrix.tolist())), robot)
+    assert fault.key == "quaternion_order"
+    assert all(words in fault.sentence for words in ("%s -> %s" % pair, "base -> left_hand", "quat = (q.x")), fault
+
+
+def test_degrees_are_told_by_the_farthest_command():
+    def commands(*angles):
+        return [("right", 1, ["right_s0", "right_s1"], [0.1, angle]) for angle in angles]
+
+    assert slips.command_slip(commands(0.5, 7.0, 57.3, 20.0)) == slips.command_slip(commands(9.0, 57.3))
+    assert "right_s1 was commanded to 57.3" in slips.command_slip(commands(7.0, 57.3))[1]
+    assert slips.command_slip(commands(3.0)) is None
 
 
 def test_another_pairs_matrix_is_named(robot):
