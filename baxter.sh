@@ -43,6 +43,15 @@ enter() {
     fi
 }
 
+# needs_no_lab WORDS…: do these words for the check only ask for a skeleton, the list or the help?
+needs_no_lab() {
+    local word
+    for word; do
+        case $word in --start | --start=* | --list | -h | --help) return 0 ;; esac
+    done
+    return 1
+}
+
 main() {
     local mode=${1:-sim}
     [[ $# -gt 0 ]] && shift
@@ -74,7 +83,8 @@ main() {
             exec python3 "$LAB_ROOT/tools/run_tests.py" "$@"
             ;;
         check)
-            bring_up_to_date || exit
+            # A skeleton, or the list of exercises, is no reason to wait for a set-up where there is a build.
+            { needs_no_lab "$@" && has_earlier_build; } || bring_up_to_date || exit
             use_loopback
             use_build || exit
             exec python3 "$LAB_ROOT/src/rf_labs/rf_checks/scripts/check" "$@"

@@ -3,6 +3,7 @@
 
 import fcntl
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -282,3 +283,33 @@ def test_failing_set_up_leaves_the_earlier_build_usable_and_is_tried_once(tmp_pa
         assert "set-up has failed" in done.stderr
     assert (copy / "tries").read_text() == "tried\n" * 2
     assert baxter("test", script=copy / "baxter.sh").returncode == 7  # tests of a stale build would say nothing
+
+
+@pytest.fixture
+def workspace(tmp_path):
+    """A workspace with a build that is older than its sources; a set-up there only leaves a mark."""
+    shutil.copy(ROOT / "baxter.sh", tmp_path)
+    files = {
+        "tools/setup.bash": 'touch "$LAB_ROOT/was_set_up"',
+        "devel/setup.bash": "",
+        ".venv/bin/python3": "#!/bin/bash",
+        ".baxter/build.stamp": "",
+        "src/rf_labs/rf_checks/scripts/check": "import sys; print(*sys.argv[1:])",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (tmp_path / ".venv/bin/python3").chmod(0o755)
+    shutil.copy(ROOT / "tools/environment.bash", tmp_path / "tools")
+    return tmp_path
+
+
+@pytest.mark.parametrize(("words", "is_set_up"), [
+    (["--start", "wave"], False), (["--start=wave"], False), (["--list"], False), (["--help"], False),
+    (["lab2", "wave.py"], True),
+])
+def test_a_skeleton_does_not_wait_for_a_set_up(workspace, words, is_set_up):
+    command = ["bash", workspace / "baxter.sh", "check", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == words
+    assert (workspace / "was_set_up").exists() == is_set_up
