@@ -22,6 +22,8 @@ STATE = ROOT / ".baxter" / "jupyter"
 KERNEL = "baxter"
 FIRST_PORT = 8888
 START_TIMEOUT_S = 60.0
+# Settings of JupyterLab's own, as defaults: it would ask each new user whether to fetch news.
+SETTINGS = {"@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False}}
 # A simulator that a notebook has started is given as long to end as roslaunch may need.
 STOP_TIMEOUT_S = 40.0
 
@@ -64,6 +66,9 @@ def environment(state: Path) -> dict[str, str]:
     for variable, name in folders.items():
         (state / name).mkdir(parents=True, exist_ok=True)
         made[variable] = str(state / name)
+    defaults = state / "config" / "labconfig" / "default_setting_overrides.json"
+    defaults.parent.mkdir(exist_ok=True)
+    defaults.write_text(json.dumps(SETTINGS, indent=1) + "\n", encoding="utf-8")
     return made
 
 

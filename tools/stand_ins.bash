@@ -8,6 +8,7 @@ STAND_INS=(
     src/compat/xacro
     src/compat/rqt_plot
     src/compat/joy
+    src/compat/media_export
 )
 
 # leave_out_stand_ins ROOT SHARE…: where an installed ROS (its share folders) has a package of that name, hide ours from

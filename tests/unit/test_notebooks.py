@@ -3,6 +3,7 @@
 
 import json
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,30 @@ def test_jupyter_listens_on_loopback_and_writes_into_one_folder(tmp_path):
     made = tool.environment(tmp_path)
     for name in ("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "IPYTHONDIR"):
         assert made[name].startswith(str(tmp_path)) and Path(made[name]).is_dir()
+
+
+def test_jupyterlab_does_not_ask_about_news(tmp_path):
+    """As JupyterLab itself reads its settings, from the schemas that it came with."""
+    lab = Path(sys.prefix) / "share/jupyter/lab"
+    program = (
+        "import json, sys\n"
+        "from jupyterlab_server.settings_utils import get_settings\n"
+        f"found, _ = get_settings({str(lab / 'settings')!r}, {str(lab / 'schemas')!r}, {str(tmp_path / 'user')!r},\n"
+        "    schema_name='@jupyterlab/apputils-extension:notification', labextensions_path=[])\n"
+        "print(json.dumps({name: entry['default'] for name, entry in found['schema']['properties'].items()}))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], env=tool.environment(tmp_path), capture_output=True,
+                          text=True)
+    assert done.returncode == 0, done.stderr
+    defaults = json.loads(done.stdout)
+    assert defaults["fetchNews"] == "false" and defaults["checkForUpdates"] is False
+
+
+def test_checkpoints_are_no_part_of_the_repository():
+    done = subprocess.run(["git", "check-ignore", "src/rf_labs/rf_lab2/notebooks/.ipynb_checkpoints/a.ipynb"], cwd=ROOT)
+    if done.returncode == 128:
+        pytest.skip("no git checkout")
+    assert done.returncode == 0
 
 
 def test_list_and_unknown_name_on_the_command_line():

@@ -4,7 +4,10 @@ import subprocess
 import sys
 
 import numpy as np
-import pybullet
+
+from bullet_sim import quiet_pybullet  # noqa: F401  (before pybullet, which prints a line when it is imported)
+
+import pybullet  # isort: skip
 
 from gazebo_ros.drawing import DrawingError
 from gazebo_ros.snapshot import SnapshotError

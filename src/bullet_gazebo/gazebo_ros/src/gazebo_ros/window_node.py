@@ -27,6 +27,7 @@ def main():
     if not os.environ.get("DISPLAY"):
         print("gazebo_gui: no display (DISPLAY is not set), the lab goes on without a window; rviz or gui:=false")
         return 0
+    _keep_the_output_for_python()
     from gazebo_ros import window  # loads PyBullet, which is of no use without a display
 
     if not window.can_open():
@@ -45,6 +46,15 @@ def main():
     sys.stdout.flush()
     # PyBullet's window thread is not always willing to end.
     os._exit(0)
+
+
+def _keep_the_output_for_python():
+    """Let what C prints to the standard output go nowhere: PyBullet lists its threads, and who made the OpenGL."""
+    sys.stdout.flush()
+    sys.stdout = os.fdopen(os.dup(1), "w", buffering=1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.close(nowhere)
 
 
 def _show(window, stop):
