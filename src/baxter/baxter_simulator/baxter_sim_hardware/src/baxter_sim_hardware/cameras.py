@@ -155,7 +155,8 @@ class Rack:
         """Close a camera. Raises :class:`CameraRefused`."""
         self._known(name)
         if name not in self.open:
-            raise CameraRefused(errno.EALREADY, "%s is closed already; open: %s"
+            # The one code that clients of the robot take for "it was not open".
+            raise CameraRefused(errno.EINVAL, "%s is closed already; open: %s"
                                 % (name, ", ".join(self.open) or "none"))
         del self.open[name]
 

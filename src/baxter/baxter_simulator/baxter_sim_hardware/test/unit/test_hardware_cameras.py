@@ -112,7 +112,7 @@ def test_closed_and_unknown_cameras_are_named():
         cameras.close_camera("head")
     with pytest.raises(CameraRefused, match="no camera 'nose'; cameras: left, right, head") as unknown:
         cameras.open_camera("nose", Settings(320, 200, 25.0, {}))
-    assert (closed.value.code, unknown.value.code) == (errno.EALREADY, errno.ENODEV)
+    assert (closed.value.code, unknown.value.code) == (errno.EINVAL, errno.ENODEV)
 
 
 def test_a_refused_request_leaves_the_camera_as_it_was():
