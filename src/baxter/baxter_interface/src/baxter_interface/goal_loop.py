@@ -13,6 +13,7 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
 
 from .presence import Presence
+from .resets import PUT_ELSEWHERE, Resets
 
 RATE_HZ = 20.0
 # No goal ends sooner than this after it has come [s, wall]: actionlib's simple client loses track of a goal, and waits
@@ -53,6 +54,7 @@ class GoalLoop:
         self._next = self._current = None
         self._cancelled = self._ending = False
         self._presence = Presence(rospy.resolve_name("robot/state"), robot.silence_s)
+        self._resets, self._resets_before = Resets(), 0
         self._clock = RosClock(gives_up=lambda: self._is_unwanted() or bool(self._trouble()))
         self._thread = threading.Thread(target=self._run, name=label, daemon=True)
         self._server = actionlib.ActionServer(name, action, self._on_goal, self._on_cancel, auto_start=False)
@@ -107,6 +109,7 @@ class GoalLoop:
 
     def _carry_out(self, handle):
         """Returns how the goal ends: the handle's method, the result, and a text."""
+        self._resets_before = self._resets.count
         work = self._begin(handle)
         why = work.refusal or self._trouble()
         watch, ticker = Stopwatch(self._clock.now()), Ticker(self._clock, RATE_HZ)
@@ -127,18 +130,32 @@ class GoalLoop:
                     work.stop()
             if why:
                 why = "%s; %s" % (why, work.missed())
+            if self._resets.count != self._resets_before:
+                self._stop_after_reset(work)
         rospy.logerr("%s: goal aborted: %s", self._label, why)
         return handle.set_aborted, work.make_result(), why
+
+    def _stop_after_reset(self, work):
+        """Stop what a step may have begun that was said before the reset and heard after it.
+
+        A stop says where the robot is, which must not be where it was; so time has to pass.
+        """
+        clock = RosClock(gives_up=lambda: self._is_unwanted() or self._ending or rospy.is_shutdown())
+        clock.sleep(1.0 / RATE_HZ)
+        if not self._is_unwanted() and not self._trouble(since_reset=True):
+            work.stop()
 
     def _is_unwanted(self):
         return self._cancelled or self._next is not None
 
-    def _trouble(self):
-        """Why nothing can be moved now, "" if it can."""
+    def _trouble(self, since_reset=False):
+        """Why nothing can be moved now, "" if it can. since_reset: although the robot was put elsewhere meanwhile."""
         if self._ending or rospy.is_shutdown():
             return "the action server was shut down"
         if self._presence.is_gone():
             return "the robot was lost: nobody publishes its state any more"
+        if not since_reset and self._resets.count != self._resets_before:
+            return PUT_ELSEWHERE
         state = self._robot.state()
         if state.stopped:
             return "the robot is stopped; reset and enable it: rosrun baxter_tools enable_robot.py -e"

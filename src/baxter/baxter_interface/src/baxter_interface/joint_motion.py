@@ -58,11 +58,15 @@ def _duration_s(name, distance_rad):
 
 @dataclass(frozen=True)
 class Step:
-    """What to do now: command these angles [rad] (None: command nothing), and how the move ended, if it did."""
+    """What to do now: command these angles [rad] (None: command nothing), and how the move ended, if it did.
+
+    halt: stop the joints wherever they are by now; the angles at hand may be of another time.
+    """
 
     command: dict | None
     arrived: bool = False
     failure: str = ""
+    halt: bool = False
 
     @property
     def is_last(self):
@@ -86,13 +90,16 @@ class Move:
         self._near_since_s = None
         self._disabled_since_s = None
 
-    def step(self, elapsed_s, angles, speeds, enabled=None, aborted=False):
+    def step(self, elapsed_s, angles, speeds, enabled=None, aborted=False, interrupted=""):
         """Decide at `elapsed_s` after the start.
 
         Parameters: measured `angles` [rad] and `speeds` [rad/s] by joint name (more joints than the target's do no
-        harm); `enabled` as the robot says it, None if it does not; `aborted` by the caller's own test.
+        harm); `enabled` as the robot says it, None if it does not; `aborted` by the caller's own test; `interrupted`:
+        what has happened to the robot that ends every motion.
         """
         here = {name: angles[name] for name in self._target}
+        if interrupted:
+            return Step(None, failure="%s; %s" % (interrupted, self._worst(here)), halt=True)
         # A disabled robot ignores commands: wherever it is, it does not hold the target.
         powered = enabled is None or enabled
         if powered and self._is_there(elapsed_s, here, speeds):

@@ -17,6 +17,7 @@ from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
 from . import settings, startup
 from .joint_checks import JOINTS, limb_joint_names, require_joint, require_joint_values, require_number, require_side
 from .joint_motion import Move
+from .resets import PUT_ELSEWHERE, Resets
 from .services import call_service
 
 # Joint angles of the neutral pose, the same on both arms [rad].
@@ -58,6 +59,7 @@ class Limb:
         self._command_publisher = rospy.Publisher(
             prefix + "joint_command", JointCommand, queue_size=1, tcp_nodelay=True)
         # Subscribe last: from here on callbacks run on another thread.
+        self._resets = Resets()
         self._subscribers = [
             rospy.Subscriber("robot/state", AssemblyState, self._on_robot_state, queue_size=1),
             rospy.Subscriber(prefix + "endpoint_state", EndpointState, self._on_endpoint_state, queue_size=1,
@@ -152,6 +154,16 @@ class Limb:
         """Command joint torques on top of gravity compensation, a dict of name to Nm; to be repeated. Raises so too."""
         self._command(JointCommand.TORQUE_MODE, torques, "Nm")
 
+    def halt(self):
+        """Stop the joints where they are, however fast they move, and hold them there."""
+        # Expires into position mode, without the angles being known.
+        self.set_joint_velocities(dict.fromkeys(self._joint_names, 0.0))
+
+    @property
+    def resets(self):
+        """How often the robot was put elsewhere so far, which only a simulation does; what moves it ends then."""
+        return self._resets.count
+
     def move_to_neutral(self, timeout=15.0):
         """Move to the neutral pose and wait; `timeout` [s] and result as of move_to_joint_positions."""
         target = {"%s_%s" % (self.name, joint): angle for joint, angle in NEUTRAL_POSE.items()}
@@ -166,8 +178,8 @@ class Limb:
             threshold: error of each joint below which it has arrived [rad].
             test: called at every step; when it returns True the arm stops.
         Returns True on arrival: the exact target is commanded last and held. Returns False on time-out, when `test`
-        stopped it, when the robot is not enabled, and when no joints were given; one line of log says which, with the
-        joint that is farthest off.
+        stopped it, when the robot is not enabled, when its simulation was reset, and when no joints were given; one
+        line of log says which, with the joint that is farthest off.
         Raises as set_joint_positions; rospy.ROSInterruptException when the node is shut down meanwhile.
         """
         target = require_joint_values(positions, self._joint_names, "rad")
@@ -176,14 +188,18 @@ class Limb:
             return False
         threshold = require_number(threshold, "the threshold [rad]")
 
-        clock = RosClock()
+        resets = self.resets
+        clock = RosClock(gives_up=lambda: rospy.is_shutdown() or self.resets != resets)
         watch, ticker = Stopwatch(clock.now()), Ticker(clock, COMMAND_RATE_HZ)
         move = Move(self.joint_angles(), target, None if is_unlimited(timeout) else timeout, threshold)
         while not rospy.is_shutdown():
             step = move.step(watch.elapsed_s(clock.now()), self.joint_angles(), self.joint_velocities(),
-                             enabled=self._enabled(), aborted=bool(callable(test) and test()))
+                             enabled=self._enabled(), aborted=bool(callable(test) and test()),
+                             interrupted=PUT_ELSEWHERE if self.resets != resets else "")
             if step.command is not None:
                 self.set_joint_positions(step.command)
+            elif step.halt:
+                self.halt()
             if step.failure:
                 rospy.logerr("%s arm: %s", self.name, step.failure)
             if step.is_last:
@@ -268,7 +284,8 @@ class Limb:
             self._robot_state = message
 
     def _unregister(self):
-        for end in (*self._subscribers, self._speed_publisher, self._timeout_publisher, self._command_publisher):
+        for end in (*self._subscribers, self._resets, self._speed_publisher, self._timeout_publisher,
+                    self._command_publisher):
             end.unregister()
 
 

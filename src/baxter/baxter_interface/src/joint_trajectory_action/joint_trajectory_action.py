@@ -74,7 +74,8 @@ class JointTrajectoryActionServer:
         self._wake = threading.Condition()
         self._ending = False
         # A request is heard also while a simulation is paused.
-        self._clock = RosClock(gives_up=lambda: self._ending or self._inbox or self._watch.is_gone())
+        self._clock = RosClock(gives_up=lambda: (
+            self._ending or self._inbox or self._watch.was_interrupted() or self._watch.is_gone()))
         self._ticker = Ticker(self._clock, rate)
         self._stopwatch = Stopwatch(self._clock.now())
         self._was_gone = False
@@ -259,8 +260,13 @@ class JointTrajectoryActionServer:
             self._abort(handle, _ERROR_CODES[verdict.outcome], verdict.text)
 
     def _give_up(self, why):
-        """End what is being done without a further command: the robot holds, or does not listen anyway."""
+        """End what is being done, and stop the arm, if it can still be commanded.
+
+        What was commanded last may be far from where the arm is now, and a robot follows it until it expires.
+        """
         goal = self._motion.goal
+        if not self._watch.refusal():
+            self._limb.halt()
         if goal is None:
             rospy.loginfo("%s arm: %s, so the end of the last trajectory is not held any longer", self._limb.name, why)
         else:

@@ -9,6 +9,7 @@ from sensor_msgs.msg import JointState
 
 from baxter_interface import startup
 from baxter_interface.presence import Presence
+from baxter_interface.resets import PUT_ELSEWHERE, Resets
 
 # Joint states come 50 times a second or more; older ones [s, ROS time] are no basis for motion.
 STALE_AFTER_S = 0.5
@@ -30,6 +31,7 @@ class RobotWatch:
         self._heard_ros_s = self._heard_wall_s = None
         self._topic = rospy.resolve_name("robot/joint_states")
         self._presence = Presence(self._topic, lambda: time.monotonic() - self._heard_wall_s)
+        self._resets = Resets(self._on_reset)
         self._subscribers = [
             rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=1),
             rospy.Subscriber("robot/joint_states", JointState, self._on_joint_states, queue_size=1, tcp_nodelay=True),
@@ -44,6 +46,11 @@ class RobotWatch:
         """Forget what happened until now; return why the arm cannot be commanded, "" if it can."""
         with self._lock:
             self._event = ""
+        return self.refusal()
+
+    def refusal(self):
+        """Why the arm cannot be commanded now, "" if it can."""
+        with self._lock:
             state, cuff = self._state, self._cuff
         if self.is_gone() or self._age_s() > STALE_AFTER_S:
             return "the robot reports no joint states on %s" % self._topic
@@ -65,6 +72,10 @@ class RobotWatch:
         if age_s > STALE_AFTER_S:
             return "the robot has reported no joint states for %.1f s" % age_s
         return ""
+
+    def was_interrupted(self):
+        """Whether something has happened since :meth:`begin` that ends a motion; cheaper than :meth:`trouble`."""
+        return bool(self._event)
 
     def is_enabled(self):
         """Whether the robot says it is enabled."""
@@ -88,6 +99,10 @@ class RobotWatch:
                 self._note("the robot was stopped")
             elif not message.enabled:
                 self._note("the robot was disabled")
+
+    def _on_reset(self):
+        with self._lock:
+            self._note(PUT_ELSEWHERE)
 
     def _on_cuff(self, message):
         with self._lock:

@@ -150,3 +150,11 @@ def test_error_just_over_the_threshold_is_no_arrival():
     off = {name: angle + 1.01 * JOINT_ANGLE_TOLERANCE for name, angle in NEUTRAL.items()}
     step = Move(off, NEUTRAL, 1.0).step(2.0, off, dict.fromkeys(off, 0.0))
     assert not step.arrived and math.isclose(step.command["left_s0"], 0.0)
+
+
+def test_a_robot_that_was_put_elsewhere_is_halted_wherever_it_is_and_told_nothing_else():
+    move = Move(START, NEUTRAL, 15.0)
+    assert not move.step(0.5, START, {}).is_last
+    step = move.step(0.51, START, {}, interrupted="the robot was put elsewhere")
+    assert step.is_last and step.halt and step.command is None
+    assert step.failure.startswith("the robot was put elsewhere; ")

@@ -18,6 +18,7 @@ from baxter_interface.joint_checks import SIDES
 from baxter_interface.joint_motion import Move
 from baxter_interface.limb import COMMAND_RATE_HZ
 from baxter_interface.programs import ProgramFailed
+from baxter_interface.resets import PUT_ELSEWHERE
 from baxter_sim_hardware import Poses
 
 from .path_planner import NoPath, PathPlanner
@@ -55,13 +56,14 @@ class Arms:
 
         `is_enabled` tells whether the robot is. Raises ProgramFailed; the arms then stay where they are.
         """
-        clock = RosClock()
+        resets = self._resets()
+        clock = RosClock(gives_up=lambda: rospy.is_shutdown() or self._resets() != resets)
         # Raw: a robot at a low speed ratio would let the joints fall behind one by one, and off the way.
         try:
             for here, there in itertools.pairwise(way):
                 move = Move(here, there, STRETCH_TIMEOUT_S)
                 watch, ticker = Stopwatch(clock.now()), Ticker(clock, COMMAND_RATE_HZ)
-                while not (step := self._step(move, watch.elapsed_s(clock.now()), is_enabled())).arrived:
+                while not (step := self._step(move, watch.elapsed_s(clock.now()), is_enabled(), resets)).arrived:
                     if rospy.is_shutdown():
                         raise ProgramFailed("ROS shut down while the arms moved")
                     if step.failure:
@@ -69,13 +71,18 @@ class Arms:
                     self.command(step.command or here, raw=True)
                     ticker.sleep()
         except BaseException:
-            self.command(self.angles(), raw=False)
+            for limb in self._limbs:
+                limb.halt()
             raise
         self.command(way[-1], raw=False)
 
-    def _step(self, move, elapsed_s, enabled):
+    def _resets(self):
+        return [limb.resets for limb in self._limbs]
+
+    def _step(self, move, elapsed_s, enabled, resets):
         speeds = {name: speed for limb in self._limbs for name, speed in limb.joint_velocities().items()}
-        return move.step(elapsed_s, self.angles(), speeds, enabled=enabled)
+        return move.step(elapsed_s, self.angles(), speeds, enabled=enabled,
+                         interrupted=PUT_ELSEWHERE if self._resets() != resets else "")
 
 
 class Folding:

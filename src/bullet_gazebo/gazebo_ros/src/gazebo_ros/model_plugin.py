@@ -54,7 +54,10 @@ class ModelPlugin:
         """After the physics step: publish what is due. ``time_s`` is the time that the step reached."""
 
     def joints_set(self):
-        """A service has put the model's joints elsewhere (set_model_configuration); targets may want to follow."""
+        """A service has put the model's joints elsewhere (set_model_configuration); targets may want to follow.
+
+        Nothing may move then until a new command comes. What is in the queues by now came before.
+        """
 
     def reset(self):
         """The world was put back to its start. After ``reset_simulation`` the next ``time_s`` is smaller."""

@@ -155,6 +155,7 @@ def _build(log, cleanup, line):
         diagnostics.on_tick()
 
     simulation.on_turn = on_turn
+    simulation.read_messages = inlets.service
     simulation.before_step = services.push
     simulation.on_tick = on_tick
     simulation.on_time_reset = publications.time_was_reset

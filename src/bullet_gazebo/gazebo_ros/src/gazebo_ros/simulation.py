@@ -60,8 +60,8 @@ class Simulation:
         ``deliveries()`` -> how many messages have come in on each topic that something in this world listens to.
         """
         #: Called once per turn of the loop, also while paused; before each physics step; after each tick; after time
-        #: went back to zero.
-        self.on_turn = self.before_step = self.on_tick = self.on_time_reset = lambda: None
+        #: went back to zero; before models are put elsewhere, to read what has come in by then.
+        self.on_turn = self.before_step = self.on_tick = self.on_time_reset = self.read_messages = lambda: None
         self.world = world
         self.board = board
         self.paused = paused
@@ -168,6 +168,7 @@ class Simulation:
 
     def reset(self, time_too):
         """Put every model back to its start, and with ``time_too`` the time back to zero. Revives failed plugins."""
+        self.read_messages()
         self.world.reset_models()
         if time_too:
             self.world.reset_time()
@@ -187,6 +188,7 @@ class Simulation:
 
     def joints_were_set(self, model_name):
         """Tell the model's plugins that its joints were put elsewhere."""
+        self.read_messages()
         for hosted in [hosted for hosted in self._working if hosted.model_name == model_name]:
             try:
                 hosted.plugin.joints_set()

@@ -9,6 +9,7 @@ from baxter_core_msgs.msg import JointCommand
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Ticker
 from baxter_interface import goal_loop
+from baxter_interface.resets import PUT_ELSEWHERE
 
 from .action_server import TrajServer
 from .errors import GoalRefused
@@ -95,6 +96,7 @@ class Interpolator:
         return judge(trajectory.joint_names, points, self._limits, measured, self._settings)
 
     def _follow(self, handle):
+        resets = self._robot.resets
         try:
             plan = self._judge(handle, self._robot.angles())
         except GoalRefused as refusal:
@@ -103,25 +105,29 @@ class Interpolator:
             return
         self._count += 1
         handle.set_accepted()
-        end, text = self._stream(handle, plan)
+        end, text = self._stream(handle, plan, resets)
         if text:
             rospy.logwarn("goal %d: %s", self._count, text)
         end(self._result(handle), text)
 
-    def _stream(self, handle, plan):
-        """Move the arms; returns how the goal ends: the handle's method, and a text."""
+    def _stream(self, handle, plan, resets):
+        """Move the arms; returns how the goal ends: the handle's method, and a text. resets: those before ``plan``."""
         now = rospy.get_time()
         motion = Motion(plan, now, self._settings.stop_deceleration)
         # The time of a simulator that is gone stands still.
-        ticker = Ticker(RosClock(gives_up=lambda: rospy.is_shutdown() or self._robot.is_gone()), self._settings.rate_hz)
+        ticker = Ticker(RosClock(gives_up=lambda: (
+            rospy.is_shutdown() or self._robot.resets != resets or self._robot.is_gone())), self._settings.rate_hz)
         feedback_due = now
         settled_by = None
         while not rospy.is_shutdown():
             before, now = now, rospy.get_time()
-            if now < before:
-                return handle.set_aborted, "time went backwards: the simulation was reset"
             if why := self._robot.why_not_ready():
                 return handle.set_aborted, why
+            if now < before or self._robot.resets != resets:
+                # What was commanded last is far from where the arms are now, and they follow it until it expires.
+                self._command(plan.joint_names, np.zeros(len(plan.joint_names)), JointCommand.VELOCITY_MODE)
+                return handle.set_aborted, (
+                    "time went backwards: the simulation was reset" if now < before else PUT_ELSEWHERE)
             left_alone = self._settings.stop_when_client_leaves and not self._server.has_client(handle)
             if left_alone or self._is_unwanted():
                 motion.stop(now)
@@ -164,12 +170,12 @@ class Interpolator:
         return "%s is %.4f rad from its goal, %g are accepted (goal_tolerance) after %g s (settle_time_s)" % (
             names[joint], error[joint], self._settings.goal_tolerance, self._settings.settle_time_s)
 
-    def _command(self, names, positions, mode):
+    def _command(self, names, values, mode):
         for side, publisher in self._publishers.items():
             own = [i for i, name in enumerate(names) if name.startswith(side)]
             if own:
                 publisher.publish(JointCommand(mode=mode, names=[names[i] for i in own],
-                                               command=[positions[i] for i in own]))
+                                               command=[values[i] for i in own]))
 
     def _result(self, handle):
         """``return_val`` counts the goals that were followed, as the notes' server does."""

@@ -9,6 +9,7 @@ from sensor_msgs.msg import JointState
 
 from baxter_interface import startup
 from baxter_interface.presence import Presence
+from baxter_interface.resets import Resets
 
 
 class RobotLink:
@@ -24,6 +25,7 @@ class RobotLink:
         self._heard_wall_s = time.monotonic()
         self._topic = rospy.resolve_name("robot/joint_states")
         self._presence = Presence(self._topic, lambda: time.monotonic() - self._heard_wall_s)
+        self._resets = Resets()
         # Subscribe last: from here on callbacks run on another thread.
         self._subscribers = [
             rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=1),
@@ -39,6 +41,11 @@ class RobotLink:
         """{joint: angle [rad]}, as last reported; a copy."""
         with self._lock:
             return dict(self._angles)
+
+    @property
+    def resets(self):
+        """How often the robot was put elsewhere so far, which only a simulation does."""
+        return self._resets.count
 
     def is_gone(self):
         """Whether no node is there any more that publishes joint angles. A paused simulation is not gone."""

@@ -168,17 +168,25 @@ class ControllerManager:
             future.set_result(None)
         return future
 
+    def restart(self, time_s):
+        """Stop and start every running controller at control time ``time_s`` [s]: what they were about ends."""
+        for loaded in self._running:
+            try:
+                loaded.controller.stopping(time_s)
+                loaded.controller.starting(time_s)
+            except _SURVIVED as error:  # a controller is anybody's code; the others go on
+                self._fail(loaded, "restart", error)
+
     def update(self, time_s, dt, reset_controllers=False):
         """One tick. ``time_s``: control time [s], ``dt``: since the last update [s].
 
-        ``reset_controllers`` stops and starts every running controller first. A controller that raises is reported
-        and taken out (state ``aborted``), and its joints are held where they are; it can be started again.
+        ``reset_controllers``: :meth:`restart` first. A controller that raises is reported and taken out (state
+        ``aborted``), and its joints are held where they are; it can be started again.
         """
+        if reset_controllers:
+            self.restart(time_s)
         for loaded in self._running:
             try:
-                if reset_controllers:
-                    loaded.controller.stopping(time_s)
-                    loaded.controller.starting(time_s)
                 loaded.controller.update(time_s, dt)
             except _SURVIVED as error:  # a controller is anybody's code; the others go on
                 # Who waits for the end of a goal is told.

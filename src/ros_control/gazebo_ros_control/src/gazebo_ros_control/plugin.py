@@ -81,13 +81,15 @@ class GazeboRosControl(ModelPlugin):
         hardware.write(dt)
 
     def joints_set(self):
-        if self._hardware is not None:
-            self._hardware.joints_set()
+        if self._hardware is None:
+            return
+        self._hardware.joints_set()
+        # Controllers begin anew from where the joints are now: what they were about led on from elsewhere. At once, so
+        # that a command counts that comes before the next tick.
+        self._manager.restart(self.context.world.time_s)
 
     def reset(self):
-        # Controllers begin anew from where the joints are now: what they were about belongs to the time before.
         self._last_update_s = None
-        self._restart = True
         self.joints_set()
 
     def restarted(self):
@@ -105,7 +107,8 @@ class GazeboRosControl(ModelPlugin):
             self._services.close()
 
     def _take_stop(self, message):
-        if self._stopped and not message.data:
+        if self._stopped != message.data:
+            # A goal ends with the stop: its time goes on, and it would be reached by a joint that stands.
             self._restart = True
         self._stopped = message.data
         self._hardware.stop(message.data)

@@ -2,6 +2,7 @@
 """What the elements of the plugin mean, in a physics world without a master."""
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from std_msgs.msg import Bool
 
@@ -161,7 +162,7 @@ def test_joint_limits_are_read_in_the_namespace(simulate):
     assert simulator.velocity == pytest.approx(0.25, abs=1e-3)
 
 
-def test_reset_and_release_of_the_emergency_stop_restart_controllers(simulate):
+def test_reset_and_both_ends_of_an_emergency_stop_restart_controllers(simulate):
     simulator = simulate("<eStopTopic>stop</eStopTopic>")
     controller = simulator.start()
     simulator.run(2)
@@ -173,9 +174,28 @@ def test_reset_and_release_of_the_emergency_stop_restart_controllers(simulate):
     assert len(controller.starts) == 2, "nothing was stopped"
     simulator.inboxes["stop"].put(Bool(True))
     simulator.run(2)
+    assert len(controller.starts) == 3
     simulator.inboxes["stop"].put(Bool(False))
     simulator.run(2)
-    assert len(controller.starts) == 3
+    assert len(controller.starts) == 4
+
+
+def test_joints_that_were_set_stay_and_a_command_before_the_next_tick_counts(simulate):
+    simulator = simulate()
+    controller = simulator.start()
+    controller.target = 0.5
+    simulator.run(300)
+    for put in (simulator.plugin.joints_set, simulator.plugin.reset):
+        simulator.model.set_joint_positions(simulator.model.index(["j"]), np.array([-0.3]))
+        controller.target = None
+        put()
+        simulator.run(100)
+        assert simulator.model.read_joints()[0][0] == pytest.approx(-0.3, abs=1e-6)
+        simulator.model.set_joint_positions(simulator.model.index(["j"]), np.array([-0.3]))
+        put()
+        controller.target = 0.2
+        simulator.run(300)
+        assert simulator.model.read_joints()[0][0] == pytest.approx(0.2, abs=1e-4)
 
 
 @pytest.mark.parametrize(("found", "other", "text"), [

@@ -48,6 +48,9 @@ TOPICS = (
           "`set_properties` said"),
     Topic("started", "sim/started", "std_msgs/Empty", LATCHED,
           "the robot stands, publishes and listens"),
+    Topic("resets", "sim/resets", "std_msgs/UInt32", LATCHED,
+          "a number that changes whenever the joints are put elsewhere: by a reset of the world or the simulation, by "
+          "set_model_configuration, by another robot in this one's place"),
     Topic("joint_command", "limb/{limb}/joint_command", "baxter_core_msgs/JointCommand", None,
           "any subset of the limb's joints in any order; mode 1 position, 2 velocity, 3 torque, 4 raw position"),
     Topic("joint_command_timeout", "limb/{limb}/joint_command_timeout", "std_msgs/Float64", None,

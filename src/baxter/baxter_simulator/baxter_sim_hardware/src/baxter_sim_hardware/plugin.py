@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter as a model plugin of /gazebo: messages in and out, drives of the simulated joints. No decisions of its own."""
+import itertools
 import math
 
 import numpy as np
 import roslib.message
-from std_msgs.msg import Empty
+from std_msgs.msg import Empty, UInt32
 
 from baxter_sim_hardware import convert, endpoint, interface
 from baxter_sim_hardware.arms import BRAKES_EFFORT_FACTOR
@@ -32,6 +33,8 @@ QUEUE_DEPTH = 200  # messages between two ticks: 2 ms of a client that writes at
 # How often the torque that balances gravity is computed anew where it only raises what a drive may exert [ticks]: from
 # one time to the next an arm at full speed turns by 0.04 rad, and the torque changes by 2 Nm.
 GRAVITY_TICKS = 5
+# What `sim/resets` says next. One for all robots of this process: another one in the same place says another number.
+_resets = itertools.count(1)
 WARN_PERIOD_S = 5.0  # [simulated s] between two warnings of one kind
 
 
@@ -119,6 +122,7 @@ class BaxterPlugin(ModelPlugin):
         makers = {key: make for part in self._parts for key, make in part.makers.items()}
         takers = {key: take for part in self._parts for key, take in part.takers.items()}
         latched = {key: begin for part in self._parts for key, begin in getattr(part, "latched", {}).items()}
+        latched["resets"] = self._count_resets_on
         groups = {}  # rate -> (schedule, [(function that makes a message, part, publisher)])
         takers = self._with_own_takers({row.key: takers[row.key] for row in interface.TOPICS if row.key in takers})
         order = {key: place for place, key in enumerate(takers)}
@@ -234,10 +238,16 @@ class BaxterPlugin(ModelPlugin):
         return "set_super_reset" in keys
 
     def joints_set(self):
+        # What has come in by now was said to the robot where it was.
+        self._measured = self._read_arms()
+        mail = self.context.mail()
+        if mail:
+            self._take_messages(mail, self.context.world.time_s)
         self._gravity_ticks = 0
         self._baxter.arms.reset(self._model.read_joints()[0][self._arm_index])
         self._head.reset()
         self._grippers.reset()
+        self._tell_of_reset()
 
     def reset(self):
         self.joints_set()
@@ -245,6 +255,13 @@ class BaxterPlugin(ModelPlugin):
             if part not in (self._head, self._grippers) and hasattr(part, "reset"):
                 part.reset()
         self._last_warning.clear()
+
+    def _count_resets_on(self, publisher):
+        self._resets = publisher
+        self._tell_of_reset()
+
+    def _tell_of_reset(self):
+        self._resets.publish(UInt32(next(_resets)))
 
     # -- in
 

@@ -191,6 +191,14 @@ def make_lab(robot):
         lab.close()
 
 
+@pytest.fixture(scope="module")
+def one_lab(robot):
+    """One Lab for all tests of a file, which leave it as they please; a robot costs more than what they do with it."""
+    made = Lab(robot)
+    yield made
+    made.close()
+
+
 @pytest.fixture
 def lab(make_lab):
     """An enabled robot in neutral."""

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Was the robot put elsewhere? Only a simulation does that: what was commanded before does not count after it."""
+import rospy
+from std_msgs.msg import UInt32
+
+PUT_ELSEWHERE = "the robot was put elsewhere: the simulation was reset, or its joints were set"
+
+
+class Resets:
+    """Counts how often a simulated robot was put elsewhere; a physical one has no such topic, and counts 0.
+
+    on_reset: function that is called each time, in a thread of rospy's.
+    """
+
+    def __init__(self, on_reset=lambda: None):
+        #: How often so far.
+        self.count = 0
+        self._on_reset = on_reset
+        self._last = None
+        self._subscriber = rospy.Subscriber("robot/sim/resets", UInt32, self._on_number, queue_size=10)
+
+    def unregister(self):
+        """Listen no more."""
+        self._subscriber.unregister()
+
+    def _on_number(self, message):
+        # Latched: the first one only says where counting begins, and the same one comes again with a new connection.
+        before, self._last = self._last, message.data
+        if before not in (None, message.data):
+            self.count += 1
+            self._on_reset()
