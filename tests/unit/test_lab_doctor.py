@@ -109,6 +109,12 @@ SICK = {
     "two times": (with_master(HEALTHY_LAB, use_sim_time=False), "clock", "use_sim_time is not set", "true"),
     "robot's clock ahead": (with_master(ON_ROBOT, clock_offset_s=3.2), "clock", "3.2 s ahead", "time server"),
     "robot's clock behind": (with_master(ON_ROBOT, clock_offset_s=-3.2), "clock", "3.2 s behind", "time server"),
+    "plugin failed": (
+        replace(HEALTHY_LAB, topics=replace(HEALTHY_LAB.topics, troubles=[
+            ("gazebo: plugin libbaxter.so of baxter", 2, "failed; a reset revives it")])),
+        "simulator", "libbaxter.so of baxter: failed", "reset_world",
+    ),
+    "robot failed": (with_state(enabled=False, stopped=True, error=True), "robot", "has failed", "enable_robot.py -r"),
     "two simulators": (
         with_master(HEALTHY_LAB, publishers={"/clock": ["/gazebo", "/gazebo_2"]}),
         "simulator", "/gazebo_2", "rosnode kill",

@@ -13,6 +13,7 @@ MAX_CLOCK_OFFSET_S = 0.25
 SIMULATOR_TOPICS = ("/clock", "/robot/joint_states")
 # So many processes are named in a line.
 NAMES_SHOWN = 3
+ERROR_LEVEL = 2  # of a diagnostic_msgs/DiagnosticStatus
 START_LINE = "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch"
 
 
@@ -210,6 +211,17 @@ def check_simulators(facts):
         yield Finding("simulator", Level.WRONG, what, "rosnode cleanup (answer y), or stop the lab and start it again")
 
 
+def check_troubles(facts):
+    """What the simulator survived: a plugin that failed is held still, a message that it dropped harmed nobody."""
+    if facts.topics is None:
+        return
+    for name, level, message in facts.topics.troubles:
+        failed = level >= ERROR_LEVEL
+        level = Level.WRONG if failed else Level.NOTE
+        fix = "rosservice call /gazebo/reset_world {}" if failed else "rostopic echo -n 1 /diagnostics says which"
+        yield Finding("simulator", level, f"{name}: {message}", fix)
+
+
 def check_robot(facts):
     if not _master_answers(facts):
         return
@@ -223,6 +235,9 @@ def check_robot(facts):
     elif state is None:
         what = "nothing arrives on /robot/state: no robot and no simulator, or none that can call this machine"
         yield Finding("robot", Level.WRONG, what, f"mend what is wrong above, or start the lab: {START_LINE}")
+    elif state["stopped"] and state["error"]:
+        what = "the robot has failed and is stopped: its own program, or a motor board"
+        yield Finding("robot", Level.WRONG, what, "rosrun baxter_tools enable_robot.py -r, then -e")
     elif state["stopped"]:
         what = "the robot was stopped (emergency stop, or enable_robot.py -S)"
         fix = "release the stop button, then rosrun baxter_tools enable_robot.py -r, and -e"
@@ -264,6 +279,7 @@ CHECKS = (
     check_master,
     check_clock,
     check_simulators,
+    check_troubles,
     check_robot,
     check_ports,
     check_display,

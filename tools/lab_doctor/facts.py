@@ -25,6 +25,8 @@ class Topics:
     clock_messages: int = 0
     clock_advanced: bool = False
     robot_state: dict[str, bool | int] | None = None  # fields of baxter_core_msgs/AssemblyState
+    # What the simulator says on /diagnostics that is not right: (name, level, message).
+    troubles: list[tuple[str, int, str]] = field(default_factory=list)
     error: str = ""
 
 
