@@ -170,6 +170,7 @@ BUSY = {
     "is_fresh": ("build", replace(HEALTHY_LAB, is_fresh=None)),
     "master": ("master", replace(HEALTHY_LAB, master=None, topics=None)),
     "topics": ("robot", replace(HEALTHY_LAB, topics=None)),
+    "listeners": ("ports", replace(HEALTHY_LAB, listeners=None)),
 }
 
 
@@ -189,7 +190,8 @@ def test_a_simulator_that_does_not_answer_in_time_is_not_called_dead():
 
 
 def test_open_ports_are_one_line_however_many():
-    listeners = [Listener(f"node_{number}", number, "0.0.0.0", 40000 + number) for number in range(9)]
+    listeners = [Listener(f"node_{number}", 10 * number + copy, "0.0.0.0", 40000 + 10 * number + copy)
+                 for number in range(9) for copy in range(2)]
     finding, = (one for one in examine(replace(HEALTHY_LAB, listeners=listeners)) if one.topic == "ports")
     assert "node_2 and 6 more" in finding.what and len(finding.what) < 120 and not finding.fix
 

@@ -254,12 +254,16 @@ def check_robot(facts):
 
 def check_ports(facts):
     """Only where everything is meant to stay on this machine; with a robot, it has to reach us."""
-    if not is_loopback(master_host(facts)) or facts.listeners is None:
+    if not is_loopback(master_host(facts)):
+        return
+    if "listeners" in facts.timed_out:
+        yield _busy("ports", "listing all ports takes too long")
+    if facts.listeners is None:
         return
     if not facts.listeners:
         yield Finding("ports", Level.OK, "no ROS process listens beyond this machine")
         return
-    names = [one.process for one in facts.listeners]
+    names = sorted({one.process for one in facts.listeners})
     more = len(names) - NAMES_SHOWN
     shown = ", ".join(names[:NAMES_SHOWN]) + (f" and {more} more" if more > 0 else "")
     what = f"other machines can reach {shown}; docs/security.md says why, and has the firewall's line"

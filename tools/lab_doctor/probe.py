@@ -268,7 +268,7 @@ def ask_python() -> PythonFacts:
 
 def list_listeners() -> list[Listener]:
     """ROS processes of ours that listen on an address other than loopback."""
-    done = subprocess.run(["ss", "-Hltnp"], capture_output=True, text=True, timeout=CALL_TIMEOUT_S, check=True)
+    done = subprocess.run(["ss", "-Hltnp"], capture_output=True, text=True, timeout=DEADLINE_S, check=True)
     return parse_listeners(done.stdout, _command_line)
 
 
