@@ -16,6 +16,7 @@ import rospy.impl.simtime
 
 from lab_environment.simulator_start import StartWatch
 from lab_environment.waiting_line import WaitingLine
+from rospy_limits.node import limit_ports
 
 from .patience import Condition, wait_in_order
 
@@ -45,6 +46,7 @@ def init_node(name, topic="robot/state", **options):
     """
     topic = rospy.resolve_name(topic)
     wait_in_order([master_answers(), topic_published(topic)], STARTUP_TIMEOUT_S, LINE, simulator_is_coming())
+    limit_ports()
     rospy.init_node(name, **options)
 
 

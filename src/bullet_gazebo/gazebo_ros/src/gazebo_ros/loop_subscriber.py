@@ -15,12 +15,12 @@ import struct
 import threading
 import time
 
+from rospy_limits.limits import size_fault
+
 _LENGTH = struct.Struct("<I")
 # How much is read at once [bytes]: a few commands; of a message that is larger, what is missing of it.
 PORTION_BYTES = 4096
 LARGEST_PORTION_BYTES = 256 * 1024
-# A message that claims to be longer is none: roscpp's own bound [bytes].
-LARGEST_MESSAGE_BYTES = 10**9
 # Receive buffer of a connection [bytes]: who sends more than the loop can take is held up, instead of being obeyed
 # seconds later.
 RECEIVE_BUFFER_BYTES = 128 * 1024
@@ -49,13 +49,15 @@ _EMPTY = (errno.EAGAIN, errno.EWOULDBLOCK, errno.EINTR)
 class Inlet:
     """The receiving end of one publisher's connection. The loop reads; any thread may wait for ``ended``."""
 
-    def __init__(self, connection, deliver, held=b""):
+    def __init__(self, connection, deliver, largest_bytes, held=b""):
         """``connection``: a connected stream socket, of which a duplicate is read: it may be closed elsewhere at any
-        time. ``deliver(data)`` takes the bytes of each message, in the loop. ``held``: bytes that have been read
-        already, as far as they are not delivered."""
+        time. ``deliver(data)`` takes the bytes of each message, in the loop. A message that announces more than
+        ``largest_bytes`` ends the connection. ``held``: bytes that have been read already, as far as they are not
+        delivered."""
         self._socket = connection.dup()
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         self._deliver = deliver
+        self._largest_bytes = largest_bytes
         self._held = bytearray(held)
         #: Set when nothing more will come.
         self.ended = threading.Event()
@@ -87,8 +89,8 @@ class Inlet:
         held, start = self._held, 0
         while len(held) - start >= _LENGTH.size:
             length, = _LENGTH.unpack_from(held, start)
-            if length > LARGEST_MESSAGE_BYTES:
-                self.end("a message claims to have %d bytes" % length)
+            if length > self._largest_bytes:
+                self.end(size_fault(length, self._largest_bytes))
                 return
             end = start + _LENGTH.size + length
             if end > len(held):

@@ -34,6 +34,7 @@ from gazebo_ros.single_instance import refusal, running_instance
 from gazebo_ros.spawning import Spawner
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
 from gazebo_ros.world_lights import WorldLights
+from rospy_limits.node import limit_ports
 from sdf_model import ModelFolders
 
 # How long threads may hold the interpreter [s]. PyBullet keeps it during a step, and with the default of 5 ms one busy
@@ -67,6 +68,7 @@ def main(argv=None):
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
+    limit_ports()
     rospy.init_node(name, argv=argv, disable_rostime=True, disable_signals=True)
     rospy.rostime._set_rostime(rospy.Time(0, 0))
     if not rospy.has_param("/use_sim_time"):

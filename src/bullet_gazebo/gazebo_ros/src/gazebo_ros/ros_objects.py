@@ -14,6 +14,7 @@ from gazebo_ros.faults import SURVIVED, described
 from gazebo_ros.loop_publisher import LoopPublisher
 from gazebo_ros.loop_subscriber import Inlet
 from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue
+from rospy_limits.messages import largest_message_bytes
 
 
 class RosObjects:
@@ -178,7 +179,7 @@ def _receive(connection, impl, inlets, log, faults):
 
     try:
         # With the end of its header a publisher may have sent its first message, the one that it latches.
-        inlet = Inlet(connection.socket, deliver, held=connection.read_buff.getvalue())
+        inlet = Inlet(connection.socket, deliver, largest_message_bytes(), held=connection.read_buff.getvalue())
     except (AttributeError, OSError):  # it has been closed already
         connection.close()
         return

@@ -10,6 +10,7 @@ import rospkg
 import rospy
 
 from gazebo_ros.snapshot import SnapshotError, SnapshotReader
+from rospy_limits.node import limit_ports
 
 # Pictures a second; a robot that is watched needs no more, and without a graphics card each costs tens of ms.
 _FRAME_RATE = 20.0
@@ -37,6 +38,7 @@ def main():
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
+    limit_ports()
     rospy.init_node("gazebo_gui", disable_rostime=True, disable_signals=True)
     try:
         _show(window, lambda: ending.is_set() or rospy.is_shutdown())

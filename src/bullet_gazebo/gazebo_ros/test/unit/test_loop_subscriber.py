@@ -12,6 +12,9 @@ from gazebo_ros.loop_subscriber import Inlet, InletHub
 from lab_testing.waiting import wait_until
 
 
+LARGEST_BYTES = 10_000_000
+
+
 class Clock:
     """Goes on by a look's period whenever it is read."""
 
@@ -30,7 +33,7 @@ class Line:
             self.far = socket.create_connection(server.getsockname())
             self.near, _ = server.accept()
         self.got = []
-        self.inlet = Inlet(self.near, self.got.append)
+        self.inlet = Inlet(self.near, self.got.append, LARGEST_BYTES)
         hub.add(self.inlet)
 
     def close(self):
@@ -163,11 +166,12 @@ def test_a_connection_closed_from_this_side_ends(hub, line):
     replacement.close()
 
 
-def test_an_impossible_length_ends_the_connection_with_the_reason(hub, line):
-    line.far.sendall(framed(b"fine") + struct.pack("<I", loop_subscriber.LARGEST_MESSAGE_BYTES + 1))
+@pytest.mark.parametrize("announced", [LARGEST_BYTES + 1, 10**9, 2**32 - 1])
+def test_a_message_that_announces_too_much_ends_the_connection_with_size_and_limit(hub, line, announced):
+    line.far.sendall(framed(b"fine") + struct.pack("<I", announced))
     serve_until(hub, line.inlet.ended.is_set, "the end")
     assert line.got == [b"fine"]
-    assert "1000000001 bytes" in line.inlet.fault
+    assert str(announced) in line.inlet.fault and str(LARGEST_BYTES) in line.inlet.fault
 
 
 def test_the_end_of_the_loop_ends_all(hub, line):

@@ -14,6 +14,7 @@ import yaml
 from gazebo_ros.drawing import DrawingCache
 from gazebo_ros.resources import ResourceFinder
 from gazebo_ros.snapshot import SnapshotError, SnapshotReader
+from rospy_limits.node import limit_ports
 from sensor_renderer.errors import RenderingError, SensorError
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
@@ -166,6 +167,7 @@ def main():
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
+    limit_ports()
     rospy.init_node("sensor_renderer", disable_rostime=True, disable_signals=True)
     path = os.path.join(rospkg.RosPack().get_path("sensor_renderer"), "config", "camera_drivers.yaml")
     with open(path, encoding="utf-8") as file:

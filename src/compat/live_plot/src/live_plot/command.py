@@ -12,6 +12,7 @@ import rospy
 from live_plot import fields
 from live_plot.recording import Recording
 from live_plot.subscriptions import Subscriptions, topic_types
+from rospy_limits.node import limit_ports
 
 POLL_S = 0.2
 END_POLL_MS = 50
@@ -144,6 +145,7 @@ def main(name):
     options = parse(name, rospy.myargv()[1:])
     if not rosgraph.is_master_online():
         sys.exit("%s: no ROS master at %s; start roscore or a launch file" % (name, rosgraph.get_master_uri()))
+    limit_ports()
     rospy.init_node(name, anonymous=True, disable_signals=not options.png)
     try:
         (save_picture if options.png else show_window)(options)

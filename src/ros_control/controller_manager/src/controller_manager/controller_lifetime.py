@@ -19,6 +19,8 @@ from controller_manager_msgs.srv import (
 )
 from std_msgs.msg import Bool
 
+from rospy_limits.node import limit_ports
+
 # Between two looks at something that is not there yet [wall s].
 _POLL_S = 0.1
 _FAILED_LOAD_PAUSE_S = 1.0
@@ -38,6 +40,7 @@ def run_until_ended(node_name, work, clean_up):
     the signal's handler, which interrupts the main thread anywhere, also where it holds a lock that cleaning up needs.
     """
     try:
+        limit_ports()
         rospy.init_node(node_name, anonymous=True, disable_signals=True)
     except KeyboardInterrupt:
         return 0

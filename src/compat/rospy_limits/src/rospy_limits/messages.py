@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Messages and requests that announce too large a size are refused by that, before they are read."""
+import contextlib
+import struct
+
+import rospy
+from rospy.exceptions import TransportTerminated
+from rospy.impl.transport import INBOUND
+
+from rospy_limits import limits
+
+_LENGTH = struct.Struct("<I")
+_known = []
+
+
+class MessageTooLarge(TransportTerminated):
+    """A message announces more bytes than are taken; rospy does not take such a connection up again."""
+
+
+def largest_message_bytes():
+    """The longest message or request that this node takes [bytes]: its parameter, asked for once, or the default."""
+    if _known:
+        return _known[0]
+    value = limits.MESSAGE_BYTES
+    try:
+        value = rospy.get_param(limits.SIZE_PARAMETER, value)
+    except Exception:  # noqa: BLE001  (no master for the moment: it is asked again the next time)
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 1 <= value < 2**32:
+        rospy.logerr("%s is %r, expected a number of bytes from 1 to %d; taking %d",
+                     rospy.resolve_name(limits.SIZE_PARAMETER), value, 2**32 - 1, limits.MESSAGE_BYTES)
+        value = limits.MESSAGE_BYTES
+    _known.append(int(value))
+    return _known[0]
+
+
+def checked_read(read_messages):
+    """``TCPROSTransportProtocol.read_messages``, which raises :class:`MessageTooLarge` before it waits for more."""
+
+    def read(protocol, buffer, message_queue, connection):
+        length, = _LENGTH.unpack(buffer.getbuffer()[:_LENGTH.size])
+        if length > largest_message_bytes():
+            raise MessageTooLarge(limits.size_fault(length, largest_message_bytes()))
+        read_messages(protocol, buffer, message_queue, connection)
+
+    return read
+
+
+def reported_receive(receive_once, events):
+    """``TCPROSTransport.receive_once``, with a line about a publisher whose message is too large."""
+
+    def receive(transport):
+        try:
+            return receive_once(transport)
+        except MessageTooLarge as error:
+            if transport.direction == INBOUND:
+                with contextlib.suppress(AttributeError):
+                    events.add(("size", transport.name, transport.callerid_pub),
+                               "%s: the connection to %s is closed: %s"
+                               % (transport.name, transport.callerid_pub, error))
+            raise
+
+    return receive

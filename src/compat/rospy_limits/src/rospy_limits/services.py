@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What takes the place of rospy's way to serve one connection of a service."""
+import collections
+import select
+import threading
+
+from rospy.exceptions import TransportException, TransportTerminated
+
+from rospy_limits import limits
+from rospy_limits.messages import MessageTooLarge
+
+
+class _Counts:
+    """How many connections each address has."""
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._counts = collections.Counter()
+
+    def enter(self, host):
+        with self._lock:
+            if self._counts[host] >= limits.SERVICES_PER_ADDRESS:
+                return False
+            self._counts[host] += 1
+            return True
+
+    def leave(self, host):
+        with self._lock:
+            self._counts[host] -= 1
+            if not self._counts[host]:
+                del self._counts[host]
+
+
+def connection_server(events):
+    """What to put in the place of ``rospy.impl.tcpros_service.ServiceImpl.handle``. Runs in the connection's thread."""
+    counts = _Counts()
+
+    def handle(service, transport, header):
+        if header.get("probe") == "1":
+            transport.close()
+            return
+        try:
+            host = transport.socket.getpeername()[0]
+        except (AttributeError, OSError):
+            transport.close()
+            return
+        caller = "%s at %s" % (header.get("callerid"), host)
+        if not counts.enter(host):
+            text = "%s has %d service connections to this node already" % (host, limits.SERVICES_PER_ADDRESS)
+            _refuse(service, transport, text)
+            events.add(("services", host), "%s: connection of %s refused: %s" % (service.resolved_name, caller, text))
+            return
+        try:
+            _serve(service, transport, header.get("persistent", "").lower() in ("1", "true"), caller, events)
+        finally:
+            counts.leave(host)
+            transport.close()
+
+    return handle
+
+
+def _serve(service, transport, is_persistent, caller, events):
+    if not is_persistent and not _has_come(transport, limits.REQUEST_S):
+        events.add(("request", service.resolved_name), "%s: connection of %s closed: no request within %g s"
+                   % (service.resolved_name, caller, limits.REQUEST_S))
+        return
+    try:
+        while True:
+            for request in transport.receive_once():
+                service._handle_request(transport, request)
+            if not is_persistent:
+                return
+    except TransportTerminated as error:
+        if isinstance(error, MessageTooLarge):
+            _reject(service, transport, caller, error, events)
+        # Otherwise the client has gone.
+    except (TransportException, OSError) as error:
+        _reject(service, transport, caller, error, events)
+
+
+def _reject(service, transport, caller, error, events):
+    text = "request refused: %s" % error
+    events.add(("request", service.resolved_name, caller), "%s: connection of %s closed: %s"
+               % (service.resolved_name, caller, text))
+    _refuse(service, transport, text)
+
+
+def _has_come(transport, timeout_s):
+    """Whether a first byte is there in time; the end of the connection counts as one."""
+    poller = select.poll()
+    try:
+        poller.register(transport.socket, select.POLLIN)
+        return bool(poller.poll(1000.0 * timeout_s))
+    except (AttributeError, OSError, ValueError, TypeError):
+        return True  # closed from this side meanwhile
+
+
+def _refuse(service, transport, text):
+    """Tell the client, who gets it as the text of a ServiceException, and close."""
+    try:
+        service._write_service_error(transport, text)
+        _read_away(transport.socket)
+    except (AttributeError, OSError, TransportException, TransportTerminated):
+        pass
+    transport.close()
+
+
+def _read_away(connection, most_bytes=1 << 20, wait_s=0.5):
+    """Take a part of what was sent: closing on unread bytes would reset the connection before the answer is read."""
+    connection.settimeout(wait_s)
+    while most_bytes > 0:
+        portion = connection.recv(65536)
+        if not portion:
+            return
+        most_bytes -= len(portion)

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What takes the place of rospy's server for topics and services."""
+import threading
+
+import rosgraph.network
+import rospy.impl.tcpros_base as tcpros_base
+from rospy.core import is_shutdown_requested
+
+from rospy_limits.handshakes import HandshakeServer
+
+#: Connections that the kernel holds until they are accepted. rospy asks for 5; beyond, clients wait for a second.
+BACKLOG = 128
+
+
+def limited_server(events):
+    """The class to put in the place of ``rospy.impl.tcpros_base.TCPServer``."""
+
+    class LimitedTCPServer(tcpros_base.TCPServer):
+        def __init__(self, inbound_handler, port=0):
+            super().__init__(inbound_handler, port)
+            self.server_sock.listen(BACKLOG)
+            self._handshakes = HandshakeServer(self.server_sock, inbound_handler, events)
+
+        def run(self):
+            self._handshakes.run()
+
+        def shutdown(self):
+            self._handshakes.close()
+            super().shutdown()
+
+    return LimitedTCPServer
+
+
+def connection_handler(events):
+    """What to put in the place of ``TCPROSServer._tcp_server_callback``: it gets the header that has been read."""
+
+    def take(server, connection, address, data):
+        try:
+            header = rosgraph.network.decode_ros_handshake_header(data)
+        except rosgraph.network.ROSHandshakeException as error:
+            connection.close()
+            events.add(("header", address[0]), "connection from %s:%d closed: no handshake header of ROS (%s)"
+                       % (*address[:2], error))
+            return
+        if "topic" in header:
+            # A latched message may have to wait for the client, or for somebody else whom the publisher waits for.
+            threading.Thread(target=_answer, name="handshake", daemon=True,
+                             args=(server.topic_connection_handler, connection, address, header, events)).start()
+        elif "service" in header:
+            _answer(server.service_connection_handler, connection, address, header, events)
+        else:
+            _answer(lambda *_: "no topic or service name in the header", connection, address, header, events)
+
+    return take
+
+
+def _answer(handler, connection, address, header, events):
+    """Have rospy take the connection over, or send its reason why not and close it."""
+    try:
+        reason = handler(connection, address, header)
+        if not reason:
+            return
+        if is_shutdown_requested():
+            reason = "node shutting down"
+        else:
+            events.add(("refused", header.get("callerid")), "connection of %s at %s:%d refused: %s"
+                       % (header.get("callerid", "an unnamed node"), *address[:2], reason))
+        rosgraph.network.write_ros_handshake_header(connection, {"error": reason})
+    except Exception as error:  # noqa: BLE001  (anything may be sent, and a connection may end at any point)
+        if not is_shutdown_requested():
+            events.add(("failed", address[0]), "connection of %s at %s:%d failed: %s"
+                       % (header.get("callerid", "an unnamed node"), *address[:2], error))
+    connection.close()

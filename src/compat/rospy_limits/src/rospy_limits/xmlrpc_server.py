@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A node's XML-RPC server with a deadline for each connection and a number of them for each address."""
+import collections
+import contextlib
+import errno
+import socket
+import threading
+import time
+
+import rosgraph.xmlrpc
+
+from rospy_limits import limits
+
+_NO_MORE_FILES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
+#: How long the server sleeps after it has run out of descriptors [s]; otherwise it would ask without end.
+PAUSE_S = 0.2
+
+
+class Connections:
+    """The open connections of a server, each with the time at which it is closed. Any thread.
+
+    A connection that is closed for what it did not do is shut down only: the thread that waits for it closes it.
+    """
+
+    def __init__(self, events, clock=time.monotonic):
+        """``events``: :class:`rospy_limits.event_log.EventLog`."""
+        self._events = events
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._deadlines = collections.OrderedDict()  # {socket: (address, deadline)}, the longest unchanged first
+
+    def add(self, connection, host):
+        """A new connection of address ``host``. Where it is one too many, the one that has waited longest is closed."""
+        with self._lock:
+            of_host = [other for other, (its_host, _) in self._deadlines.items() if its_host == host]
+            if len(of_host) >= limits.XMLRPC_PER_ADDRESS:
+                self._end(of_host[0], host)
+            self._deadlines[connection] = host, self._clock() + limits.XMLRPC_FIRST_S
+
+    def allow(self, connection, time_s):
+        """The connection has done something and is left open for another ``time_s`` [s]."""
+        with self._lock:
+            if connection in self._deadlines:
+                host, _ = self._deadlines.pop(connection)
+                self._deadlines[connection] = host, self._clock() + time_s
+
+    def remove(self, connection):
+        """The connection is closed."""
+        with self._lock:
+            self._deadlines.pop(connection, None)
+
+    def expire(self):
+        """Close those whose time is over."""
+        now = self._clock()
+        with self._lock:
+            for connection, (host, deadline) in list(self._deadlines.items()):
+                if now >= deadline:
+                    self._end(connection, host)
+
+    def make_room(self, reason):
+        """Close the quarter that has waited longest."""
+        self._events.add("xmlrpc files", "no XML-RPC connection can be accepted: %s; those that have waited longest "
+                         "are closed" % reason)
+        with self._lock:
+            for connection, (host, _) in list(self._deadlines.items())[:1 + len(self._deadlines) // 4]:
+                self._end(connection, host)
+
+    def _end(self, connection, host):
+        del self._deadlines[connection]
+        with contextlib.suppress(OSError):
+            connection.shutdown(socket.SHUT_RDWR)
+        self._events.add(("xmlrpc", host), "XML-RPC connection from %s closed: idle, or one of more than %d"
+                         % (host, limits.XMLRPC_PER_ADDRESS))
+
+
+class _RequestHandler(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler):
+    def do_POST(self):
+        connections = self.server.connections
+        connections.allow(self.connection, limits.XMLRPC_REQUEST_S)
+        try:
+            length = int(self.headers.get("Content-Length", ""))
+        except ValueError:
+            length = -1
+        if not 0 <= length <= limits.MESSAGE_BYTES:
+            # What follows is not read, so that nothing after it can be.
+            self.close_connection = True
+            self.send_error(413 if length >= 0 else 411, explain="Content-Length is %r, expected 0 to %d bytes"
+                            % (self.headers.get("Content-Length"), limits.MESSAGE_BYTES))
+            return
+        super().do_POST()
+        connections.allow(self.connection, limits.XMLRPC_IDLE_S)
+
+
+def limited_server(events):
+    """The class to put in the place of ``rosgraph.xmlrpc.ThreadingXMLRPCServer``."""
+
+    class LimitedXMLRPCServer(rosgraph.xmlrpc.ThreadingXMLRPCServer):
+        def __init__(self, addr, log_requests=1):
+            self.connections = Connections(events)
+            super().__init__(addr, log_requests)
+            self.RequestHandlerClass = _RequestHandler
+
+        def get_request(self):
+            try:
+                return super().get_request()
+            except OSError as error:
+                if error.errno in _NO_MORE_FILES:
+                    self.connections.make_room(error.strerror)
+                    time.sleep(PAUSE_S)
+                raise
+
+        def process_request(self, request, client_address):
+            self.connections.add(request, client_address[0])
+            super().process_request(request, client_address)
+
+        def shutdown_request(self, request):
+            self.connections.remove(request)
+            super().shutdown_request(request)
+
+        def service_actions(self):
+            super().service_actions()
+            self.connections.expire()
+
+    return LimitedXMLRPCServer

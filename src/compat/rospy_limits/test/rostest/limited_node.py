@@ -1,0 +1,27 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""A node with one of each: a service, a latched topic that is published in the caller's thread, a subscription."""
+import rospy
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, SetBoolResponse
+
+from rospy_limits.node import limit_ports
+
+# More than a socket takes of a client that does not read.
+LARGE_BYTES = 20_000_000
+
+
+def main():
+    limit_ports()
+    rospy.init_node("limited")
+    latched = rospy.Publisher("latched", String, latch=True, queue_size=None)
+    latched.publish(String("x" * LARGE_BYTES))
+    echo = rospy.Publisher("echo", String, queue_size=10)
+    keep = [rospy.Service("serve", SetBool, lambda request: SetBoolResponse(request.data, "served")),
+            rospy.Subscriber("heard", String, echo.publish), rospy.Subscriber("large", String, echo.publish)]
+    rospy.spin()
+    del keep
+
+
+if __name__ == "__main__":
+    main()
