@@ -31,6 +31,7 @@ from gazebo_ros.resources import ResourceFinder, model_folders
 from gazebo_ros.ros_objects import RosObjects
 from gazebo_ros.simulation import Simulation
 from gazebo_ros.single_instance import refusal, running_instance
+from gazebo_ros.snapshot import SnapshotError
 from gazebo_ros.spawning import Spawner
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
 from gazebo_ros.world_lights import WorldLights
@@ -111,8 +112,7 @@ def _build(log, cleanup, line):
                                   rospy.get_param("~model_plugins", None))
     finder = ResourceFinder(packages)
 
-    snapshot.remove_stale()
-    writer = snapshot.SnapshotWriter()
+    writer = _snapshot_writer(log)
     cleanup.callback(writer.close)
     seed = rospy.get_param("~seed", 0) if line.seed is None else line.seed
     world = World(time_step_s=description.time_step_s, gravity=description.gravity, seed=int(seed), find_mesh=finder,
@@ -132,7 +132,10 @@ def _build(log, cleanup, line):
     lights = WorldLights(description.lights, description.scene)
 
     def tell_viewers():
-        writer.write_scene(spawner.listed(), lights.listed())
+        try:
+            writer.write_scene(spawner.listed(), lights.listed())
+        except SnapshotError as error:
+            log.error_throttle(60.0, str(error))
         publications.write_snapshot()
 
     spawner = Spawner(simulation, table, ros, finder, folders, log, on_change=tell_viewers, folder=writer.folder)
@@ -140,7 +143,8 @@ def _build(log, cleanup, line):
     spawner.spawn_world(description.models)
     tell_viewers()
     lights.on_change = tell_viewers
-    rospy.set_param("~snapshot", str(writer.folder))
+    if writer.folder is not None:
+        rospy.set_param("~snapshot", str(writer.folder))
     ros.flush()
 
     diagnostics = Diagnostics(simulation, faults, ros)
@@ -163,6 +167,16 @@ def _build(log, cleanup, line):
     simulation.on_time_reset = publications.time_was_reset
     cleanup.callback(simulation.unhost)
     return simulation
+
+
+def _snapshot_writer(log):
+    """A new snapshot; where there is no room for one, the lab goes on without pictures."""
+    snapshot.remove_stale()
+    try:
+        return snapshot.SnapshotWriter()
+    except SnapshotError as error:
+        log.error("%s until there is room and the simulator is started again; everything else works" % error)
+        return snapshot.NoSnapshot()
 
 
 def _resource_folders():

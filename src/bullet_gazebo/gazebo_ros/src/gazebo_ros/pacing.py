@@ -100,19 +100,43 @@ class RateMeter:
 
 
 class SlownessWatch:
-    """Decides when a low real-time factor is worth a warning: several windows in a row, then not again for a while."""
+    """Decides when a low real-time factor is worth a line, and what it says: once, then at most every five minutes."""
 
-    def __init__(self, threshold=0.95, windows=3, quiet_windows=10):
-        """Below ``threshold`` times the factor that was asked for a window counts as slow."""
+    def __init__(self, threshold=0.95, windows=3, quiet_s=300.0, clock=time.monotonic):
+        """Slow is a window below ``threshold`` times the factor that was asked for; worth a line are ``windows`` of
+        them in a row, but not within ``quiet_s`` [s, wall time] of the line before."""
         self._threshold = threshold
         self._windows = windows
-        self._quiet = quiet_windows
-        self._slow = 0
+        self._quiet_s = quiet_s
+        self._clock = clock
+        self._slow = []
+        self._told_at = None
+        self._sum, self._count = 0.0, 0
 
-    def is_news(self, factor, wanted):
-        """Take in one window's factor and the one asked for; True when it is time to warn."""
+    def news(self, factor, wanted):
+        """Take in one window's factor and the one asked for; returns (present factor, its mean since the last line,
+        how long ago that was [s]; both None at the first), or None where there is nothing to say."""
+        self._sum += factor
+        self._count += 1
         if factor >= self._threshold * wanted:
-            self._slow = 0
-            return False
-        self._slow += 1
-        return self._slow >= self._windows and (self._slow - self._windows) % self._quiet == 0
+            self._slow = []
+            return None
+        self._slow = [*self._slow, factor][-self._windows:]
+        now = self._clock()
+        if len(self._slow) < self._windows or (self._told_at is not None and now - self._told_at < self._quiet_s):
+            return None
+        mean, ago = None, None
+        if self._told_at is not None:
+            mean, ago = self._sum / self._count, now - self._told_at
+        self._told_at, self._sum, self._count = now, 0.0, 0
+        return sum(self._slow) / len(self._slow), mean, ago
+
+
+def slowness_line(wanted, factor, mean, ago_s):
+    """What to say of a low real-time factor; the arguments after ``wanted`` as from :meth:`SlownessWatch.news`."""
+    if mean is None:
+        return ("the simulation runs at %.2f of real time instead of %g: this machine is too busy; close windows "
+                "(gui:=false), or publish /clock less often (clock_rate:=250). Said again every five minutes at most."
+                % (factor, wanted))
+    return ("the simulation runs at %.2f of real time instead of %g; %.2f on average in the %.0f minutes since the "
+            "last such line" % (factor, wanted, mean, ago_s / 60.0))

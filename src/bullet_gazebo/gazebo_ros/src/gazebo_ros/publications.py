@@ -9,7 +9,7 @@ from gazebo_msgs.msg import LinkStates, ModelStates, PerformanceMetrics
 from rosgraph_msgs.msg import Clock
 
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
-from gazebo_ros.pacing import RateMeter, SlownessWatch, ticks_between
+from gazebo_ros.pacing import RateMeter, SlownessWatch, slowness_line, ticks_between
 
 _CLOCK_MESSAGE = struct.Struct("<III")
 _CLOCK_BYTES = 8
@@ -138,6 +138,6 @@ class Publications:
             metrics.header.stamp = rospy.Time(*divmod(simulation.time_ns, 10**9))
             self._metrics.publish(metrics)
         wanted = simulation.real_time_factor
-        if not simulation.paused and self._watch.is_news(factor, wanted):
-            self._log.warn("the simulation runs at %.2f of real time instead of %g: this machine is too busy; close "
-                           "windows (gui:=false), or publish /clock less often (clock_rate:=250)" % (factor, wanted))
+        news = None if simulation.paused else self._watch.news(factor, wanted)
+        if news is not None:
+            self._log.warn(slowness_line(wanted, *news))

@@ -9,7 +9,7 @@ import struct
 
 import numpy as np
 
-from gazebo_ros.snapshot import SnapshotError
+from gazebo_ros.snapshot import SnapshotError, no_room, open_shared, reserve
 
 _HEADER = struct.Struct("<QQQ")
 _SEQUENCE = struct.Struct("<Q")
@@ -20,12 +20,21 @@ class PictureWriter:
     """The simulator's side; the picture is black at first."""
 
     def __init__(self, path, width, height):
-        """``path``: a file that is not there yet; ``width``, ``height`` [pixels]."""
+        """``path``: a file that is not there yet; ``width``, ``height`` [pixels]. Raises ``SnapshotError`` for want of
+        room."""
         self.path = path
         self._sequence = 0
         size = _HEADER.size + 3 * width * height
-        with open(path, "w+b") as file:
-            file.truncate(size)
+        try:
+            file = open(path, "xb+")  # noqa: SIM115
+        except OSError as error:
+            raise SnapshotError(no_room(path, error)) from error
+        with file:
+            try:
+                reserve(file, size, path)
+            except SnapshotError:
+                path.unlink()
+                raise
             self._memory = mmap.mmap(file.fileno(), size)
         _HEADER.pack_into(self._memory, 0, width, height, 0)
         self._pixels = np.frombuffer(self._memory, np.uint8, 3 * width * height, _HEADER.size).reshape(height, width, 3)
@@ -42,17 +51,29 @@ class PictureWriter:
         self.path.unlink(missing_ok=True)
 
 
+class NoPicture:
+    """In the place of a :class:`PictureWriter` where there is no memory to share: nobody sees it."""
+
+    def show(self, pixels):
+        """Does nothing."""
+
+    def close(self):
+        """Does nothing."""
+
+
 class PictureReader:
     """A viewer's side. ``width``, ``height`` [pixels]."""
 
     def __init__(self, path):
         """Raises ``SnapshotError`` when there is no picture."""
         try:
-            with open(path, "rb") as file:
+            with open_shared(path) as file:
                 self._memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         except (OSError, ValueError) as error:
             raise SnapshotError("no picture in %s: %s" % (path, error)) from error
         self.width, self.height, _ = _HEADER.unpack_from(self._memory, 0)
+        if len(self._memory) < _HEADER.size + 3 * self.width * self.height:
+            raise SnapshotError("%s is shorter than a picture of %d x %d" % (path, self.width, self.height))
         self._seen = None
 
     def read(self):

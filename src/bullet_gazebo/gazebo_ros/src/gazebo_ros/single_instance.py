@@ -4,41 +4,130 @@
 A node that registers under a name which is in use shuts the older one down. For a simulator that means a lab that dies
 without a word, so a second one looks first and stays out.
 """
+import contextlib
+import os
+import socket
+import struct
+import time
 import xmlrpc.client
+from urllib.parse import urlsplit
 
 import rosgraph
 
-_PING_TIMEOUT_S = 2.0
+# Until a connection is made, and from there to an answer [s]. Who is dead refuses at once; who is alive may be busy.
+_CONNECT_S = 2.0
+_ANSWER_S = 10.0
+# How often and how far apart [s] one tries to take what nobody seems to have.
+_TRIES, _TRY_S = 20, 0.05
+_PEER = struct.Struct("3i")  # struct ucred: process, user, group
 
 
 class _Transport(xmlrpc.client.Transport):
     def make_connection(self, host):
         connection = super().make_connection(host)
-        connection.timeout = _PING_TIMEOUT_S
+        connection.timeout = _ANSWER_S
         return connection
 
 
-def running_instance(node_name, caller_id="/gazebo_ros_look_up"):
-    """(URI, process id) of a node that is registered as ``node_name`` and answers, or None.
+def running_instance(node_name, caller_id="/gazebo_ros_look_up", master_uri=None):
+    """(URI, process id) of a node that is registered as ``node_name`` and alive, or None.
 
-    A registration that a dead node left behind does not count. Raises ``OSError`` when there is no master.
+    A registration that a dead node left behind does not count; a node that takes connections and does not answer does,
+    with None for the process. Raises ``OSError`` when there is no master.
     """
-    master = rosgraph.Master(caller_id)
+    master = rosgraph.Master(caller_id, master_uri)
     try:
         uri = master.lookupNode(node_name)
     except rosgraph.MasterError:
         return None
+    address = urlsplit(uri)
+    node = xmlrpc.client.ServerProxy(uri, transport=_Transport())
     try:
-        code, _, pid = xmlrpc.client.ServerProxy(uri, transport=_Transport()).getPid(caller_id)
+        socket.create_connection((address.hostname, address.port), timeout=_CONNECT_S).close()
+    except OSError:
+        return None
+    try:
+        # Its port may belong to another node by now.
+        code, _, name = node.getName(caller_id)
+        if code == 1 and name != node_name:
+            return None
+    except TimeoutError:
+        return uri, None
+    except (OSError, xmlrpc.client.Error):
+        pass  # not every client library knows its name
+    try:
+        code, _, pid = node.getPid(caller_id)
+    except TimeoutError:
+        return uri, None
     except (OSError, xmlrpc.client.Error):
         return None
     return (uri, pid) if code == 1 else None
 
 
-def refusal(node_name, uri, pid):
-    """What to tell the user when an instance runs already."""
-    return ("A simulator is running on this ROS master (%s): node %s, process %d, %s.\n"
-            "This one does not start. To stop the other one: press Ctrl-C in its terminal, or\n"
-            "    rosnode kill %s\n"
-            "To run two side by side, give the second its own master (ROS_MASTER_URI=http://localhost:11312)."
-            % (rosgraph.get_master_uri(), node_name, pid, uri, node_name))
+class Claim:
+    """This process's right to start the simulator ``node_name`` on a master, from before that is registered.
+
+    Held by a socket in Linux's abstract namespace, so that it ends with the process, however that ends. It is seen on
+    this machine only.
+    """
+
+    def __init__(self, node_name, master_uri):
+        """Nothing is taken yet."""
+        address = urlsplit(master_uri)
+        host = address.hostname or ""
+        if host in ("localhost", "::1") or host.startswith("127."):
+            host = "localhost"
+        self._name = "\0gazebo_ros simulator %s:%s %s" % (host, address.port, node_name)
+        self._socket = None
+
+    def take(self):
+        """Take it and return None, or the process [id] of this user that has it."""
+        for _ in range(_TRIES):
+            ours = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+            try:
+                ours.bind(self._name)
+                ours.listen()
+            except OSError:
+                ours.close()
+            else:
+                self._socket = ours
+                return None
+            with contextlib.suppress(OSError):
+                return self._holder()
+            time.sleep(_TRY_S)  # it is just being taken or given back
+        return None
+
+    def release(self):
+        """Give it back; twice is once."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _holder(self):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+            probe.connect(self._name)
+            pid, user, _ = _PEER.unpack(probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
+        # Other users cannot keep ours from starting; what they have on the master is seen there.
+        return pid if user == os.getuid() else None
+
+
+def refusal(node_name, uri, pid, master_uri=None):
+    """What to tell the user, in three lines, when an instance runs already."""
+    who = "process %d, %s" % (pid, uri) if pid else "%s, which does not answer at the moment" % uri
+    return _refusal("A simulator is running on this ROS master", node_name, who, "rosnode kill %s" % node_name,
+                    master_uri)
+
+
+def refusal_while_starting(node_name, launch_pid, master_uri=None):
+    """What to tell the user, in three lines, when another roslaunch is about to start an instance."""
+    return _refusal("A simulator is being started on this ROS master", node_name,
+                    "by roslaunch, process %d" % launch_pid, "kill -INT %d" % launch_pid, master_uri)
+
+
+def _refusal(what, node_name, who, stop, master_uri):
+    master_uri = master_uri or rosgraph.get_master_uri()
+    address = urlsplit(master_uri)
+    return ("%s (%s): node %s, %s. Nothing was started or changed.\n"
+            "To stop it: press Ctrl-C in its terminal, or   %s\n"
+            "To run a second one beside it, give that a master of its own: ROS_MASTER_URI=http://%s:%d"
+            % (what, master_uri, node_name, who, stop, address.hostname, (address.port or 11311) + 1))

@@ -12,10 +12,13 @@ of values, time [s], then the values.
 Of each body, in the scene's order: position x y z [m], quaternion x y z w, joint angles [rad or m].
 """
 import contextlib
+import errno
 import fcntl
 import json
 import mmap
 import os
+import shutil
+import stat
 import struct
 import tempfile
 from pathlib import Path
@@ -42,30 +45,90 @@ def _shared_memory_folder():
 
 
 def remove_stale(parent=None):
-    """Delete this user's folders of simulators that are gone; returns their paths."""
+    """Delete this user's folders of simulators that are gone; returns their paths.
+
+    What bears such a name and is a link, or somebody else's, is neither followed nor touched: everybody may write where
+    the folders are.
+    """
     parent = _shared_memory_folder() if parent is None else Path(parent)
     removed = []
     for folder in parent.glob("%s%d-*" % (_PREFIX, os.getuid())):
         try:
-            with open(folder / "state", "rb") as file:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                _remove(folder)
-                removed.append(folder)
-        except FileNotFoundError:
-            # Made this moment by another simulator, or half removed: an old one is safe to delete.
-            with contextlib.suppress(OSError):
-                folder.rmdir()
+            with _own_folder(folder) as descriptor:
+                try:
+                    with _open_in(descriptor, "state") as file:
+                        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                        _remove(folder, descriptor)
+                        removed.append(folder)
+                except FileNotFoundError:
+                    # Made this moment by another simulator, or half removed: an old one is safe to delete.
+                    folder.rmdir()
         except OSError:
             continue
     return removed
 
 
-def _remove(folder):
-    for path in list(folder.glob("*")):
+def _remove(folder, descriptor):
+    for name in os.listdir(descriptor):
         with contextlib.suppress(OSError):
-            path.unlink()
+            os.unlink(name, dir_fd=descriptor)
     with contextlib.suppress(OSError):
         folder.rmdir()
+
+
+@contextlib.contextmanager
+def _own_folder(folder):
+    """A descriptor of a folder that is this user's and no link. Raises ``OSError``."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        _check_owner(os.fstat(descriptor), folder)
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _open_in(descriptor, name):
+    """A file of the folder, to read: a plain one of this user. Raises ``OSError``."""
+    file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=descriptor)
+    try:
+        status = os.fstat(file)
+        _check_owner(status, name)
+        if not stat.S_ISREG(status.st_mode):
+            raise PermissionError(errno.EPERM, "no plain file", str(name))
+        return open(file, "rb")
+    except OSError:
+        os.close(file)
+        raise
+
+
+def _check_owner(status, path):
+    if status.st_uid != os.getuid():
+        text = "belongs to user %d, expected %d" % (status.st_uid, os.getuid())
+        raise PermissionError(errno.EPERM, text, str(path))
+
+
+def open_shared(path):
+    """A file in a simulator's folder, to read: this user's, neither it nor the folder a link. Raises ``OSError``."""
+    path = Path(path)
+    with _own_folder(path.parent) as descriptor:
+        return _open_in(descriptor, path.name)
+
+
+def reserve(file, size, path):
+    """Make an open file as long as ``size`` [bytes] and have the memory for it; raises :class:`SnapshotError`.
+
+    Without that, writing to it while the memory of the machine is full would end the process.
+    """
+    try:
+        os.posix_fallocate(file.fileno(), 0, size)
+    except OSError as error:
+        raise SnapshotError(no_room(path, error)) from error
+
+
+def no_room(path, error):
+    """What to tell the user when something cannot be written for viewers."""
+    return ("cannot write %s: %s; cameras and the window stand still (df -h %s says what is free)"
+            % (path, error.strerror or error, Path(path).parent.parent))
 
 
 def _locked(path):
@@ -82,22 +145,47 @@ def _locked(path):
     return None
 
 
+class NoSnapshot:
+    """In the place of a :class:`SnapshotWriter` where there is no memory to share: viewers have nothing to draw."""
+
+    folder = None
+    revision = resets = 0
+
+    def write_scene(self, bodies, light=None):
+        """Does nothing, as the others here."""
+
+    def write(self, tick, time_s, parts):
+        """Does nothing."""
+
+    def close(self):
+        """Does nothing."""
+
+
 class SnapshotWriter:
     """The simulator's side."""
 
     def __init__(self, parent=None):
-        """Makes the folder (private to the user) and takes its lock."""
+        """Makes the folder (private to the user) and takes its lock. Raises :class:`SnapshotError` for want of room."""
         parent = _shared_memory_folder() if parent is None else Path(parent)
         self._file = None
         while self._file is None:
-            self.folder = Path(tempfile.mkdtemp(prefix="%s%d-%d-" % (_PREFIX, os.getuid(), os.getpid()), dir=parent))
-            self._file = _locked(self.folder / "state")
+            try:
+                prefix = "%s%d-%d-" % (_PREFIX, os.getuid(), os.getpid())
+                self.folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
+                self._file = _locked(self.folder / "state")
+            except OSError as error:
+                raise SnapshotError(no_room(parent / _PREFIX / "state", error)) from error
         self.revision = 0
         #: How many times the time was set back: what a viewer saw at the same time before was another world.
         self.resets = 0
         self._sequence = 0
         size = _HEADER.size + 2 * _SLOT_BYTES
-        self._file.truncate(size)
+        try:
+            reserve(self._file, size, self.folder / "state")
+        except SnapshotError:
+            self._file.close()
+            shutil.rmtree(self.folder, ignore_errors=True)
+            raise
         self._memory = mmap.mmap(self._file.fileno(), size)
         self._values = [np.frombuffer(self._memory, np.float64, CAPACITY, _HEADER.size + k * _SLOT_BYTES + _SLOT.size)
                         for k in range(2)]
@@ -108,14 +196,20 @@ class SnapshotWriter:
         """Say which bodies there are, and by which light they are seen.
 
         ``bodies``: list of dictionaries with ``name``, ``joints`` (names) and whatever a viewer needs to draw it.
-        States written from here on refer to this list. ``light``: as :meth:`WorldLights.listed` says it.
+        States written from here on refer to this list. ``light``: as :meth:`WorldLights.listed` says it. Raises
+        :class:`SnapshotError` where it cannot be written; viewers then wait for the next one.
         """
         self.revision += 1
         path = self.folder / "scene.json"
         draft = path.with_suffix(".new")
-        draft.write_text(json.dumps({"revision": self.revision, "bodies": bodies, "light": light or {}}),
-                         encoding="utf-8")
-        draft.replace(path)
+        try:
+            draft.write_text(json.dumps({"revision": self.revision, "bodies": bodies, "light": light or {}}),
+                             encoding="utf-8")
+            draft.replace(path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                draft.unlink(missing_ok=True)
+            raise SnapshotError(no_room(path, error)) from error
 
     def write(self, tick, time_s, parts):
         """Write the state: ``parts`` are arrays that, one after the other, are the slot's values.
@@ -144,7 +238,8 @@ class SnapshotWriter:
         self._values = None
         with contextlib.suppress(BufferError):
             self._memory.close()
-        _remove(self.folder)
+        with contextlib.suppress(OSError), _own_folder(self.folder) as descriptor:
+            _remove(self.folder, descriptor)
         self._file.close()
 
 
@@ -177,12 +272,11 @@ class SnapshotReader:
         """``folder`` as the writer made it; :class:`SnapshotError` when there is none."""
         self._folder = Path(folder)
         try:
-            with open(self._folder / "state", "rb") as file:
+            with open_shared(self._folder / "state") as file:
                 self._memory = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         except (OSError, ValueError) as error:
             raise SnapshotError("no snapshot in %s: %s" % (folder, error)) from error
-        magic, _ = _HEADER.unpack_from(self._memory, 0)
-        if magic != MAGIC:
+        if len(self._memory) < _HEADER.size + 2 * _SLOT_BYTES or _HEADER.unpack_from(self._memory, 0)[0] != MAGIC:
             raise SnapshotError("%s/state is no snapshot of this version" % folder)
 
     @property
@@ -207,7 +301,8 @@ class SnapshotReader:
     def scene(self):
         """The :class:`Scene` as it is now."""
         try:
-            scene = json.loads((self._folder / "scene.json").read_text(encoding="utf-8"))
+            with open_shared(self._folder / "scene.json") as file:
+                scene = json.loads(file.read().decode("utf-8"))
         except (OSError, ValueError) as error:
             raise SnapshotError("no scene in %s: %s" % (self._folder, error)) from error
         return Scene(scene["revision"], scene["bodies"], scene["light"])

@@ -16,8 +16,9 @@ from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
 from gazebo_ros.faults import SURVIVED, described
 from gazebo_ros.model_plugin import PluginContext, PluginError
-from gazebo_ros.shared_picture import PictureWriter
+from gazebo_ros.shared_picture import NoPicture, PictureWriter
 from gazebo_ros.simulation import HostedPlugin
+from gazebo_ros.snapshot import SnapshotError
 from sdf_model import SdfError, parse_sdf_model
 from urdf_model import Plane, UrdfError, drawing_urdf, merge_fixed, parse_urdf
 
@@ -67,7 +68,7 @@ class Spawner:
         self.sensors = {}
         # The screens that plugins have: {model name: list of (what the scene says, PictureWriter)}.
         self._screens = {}
-        self._folder = Path(folder or ".")
+        self._folder = None if folder is None else Path(folder)
         self._number = itertools.count()
 
     def listed(self):
@@ -215,7 +216,13 @@ class Spawner:
         frames = merge_fixed(prepared.robot).frames
         if link not in frames:
             raise PluginError("a screen shall hang on link '%s', which '%s' has not" % (link, prepared.robot.name))
-        picture = PictureWriter(self._folder / ("screen%d" % next(self._number)), *pixels)
+        if self._folder is None:
+            return NoPicture()
+        try:
+            picture = PictureWriter(self._folder / ("screen%d" % next(self._number)), *pixels)
+        except SnapshotError as error:
+            self._log.error(str(error))
+            return NoPicture()
         entry = {"link": frames[link].link, "offset": (frames[link].offset @ place).ravel().tolist(),
                  "size": list(size_m), "picture": str(picture.path)}
         self._screens.setdefault(prepared.name, []).append((entry, picture))

@@ -11,7 +11,6 @@ from gazebo_ros import loop_subscriber
 from gazebo_ros.loop_subscriber import Inlet, InletHub
 from lab_testing.waiting import wait_until
 
-
 LARGEST_BYTES = 10_000_000
 
 

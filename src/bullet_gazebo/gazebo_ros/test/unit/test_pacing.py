@@ -12,6 +12,7 @@ from gazebo_ros.pacing import (
     Pacer,
     RateMeter,
     SlownessWatch,
+    slowness_line,
     ticks_between,
     wake_on_time,
 )
@@ -142,22 +143,51 @@ def test_the_meter_counts_no_time_before_a_restart(clock):
     assert meter.update(1.0) == pytest.approx(1.0)
 
 
-def test_a_single_slow_second_is_no_news():
-    watch = SlownessWatch(windows=3, quiet_windows=10)
-    assert [watch.is_news(factor, 1.0) for factor in (0.5, 1.0, 0.9, 0.9, 1.0)] == [False] * 5
+def watched(clock, factors, **settings):
+    """What a watch says second by second: [(second, news)]."""
+    watch = SlownessWatch(clock=clock, **settings)
+    said = []
+    for second, factor in enumerate(factors):
+        clock.now += 1.0
+        news = watch.news(factor, 1.0)
+        if news is not None:
+            said.append((second, news))
+    return said
 
 
-def test_lasting_slowness_is_news_once_in_a_while():
-    watch = SlownessWatch(windows=3, quiet_windows=10)
-    news = [watch.is_news(0.5, 1.0) for _ in range(25)]
-    assert [index for index, is_news in enumerate(news) if is_news] == [2, 12, 22]
+def test_a_single_slow_second_is_no_news(clock):
+    assert watched(clock, [0.5, 1.0, 0.9, 0.9, 1.0]) == []
+
+
+def test_lasting_slowness_is_said_once_and_every_five_minutes_with_the_figure_since(clock):
+    said = watched(clock, [0.5] * 100 + [0.3] * 550)
+    assert [second for second, _ in said] == [2, 302, 602]
+    assert said[0][1] == (pytest.approx(0.5), None, None)
+    assert said[1][1] == (pytest.approx(0.3), pytest.approx((97 * 0.5 + 203 * 0.3) / 300), pytest.approx(300.0))
+    assert said[2][1] == (pytest.approx(0.3), pytest.approx(0.3), pytest.approx(300.0))
+
+
+def test_slowness_that_comes_and_goes_is_not_said_more_often(clock):
+    said = watched(clock, ([0.5] * 10 + [1.0] * 10) * 20)
+    assert len(said) == 2 and said[1][0] - said[0][0] >= 300
+    assert said[1][1][1] == pytest.approx(0.75, abs=0.02)
+
+
+def test_slowness_that_is_over_is_not_said_again(clock):
+    assert len(watched(clock, [0.5] * 100 + [1.0] * 1000)) == 1
 
 
 def test_slowness_is_relative_to_what_was_asked_for():
     watch = SlownessWatch(windows=1)
-    assert not watch.is_news(0.5, 0.5)
-    assert watch.is_news(0.9, 2.0)
-    assert not watch.is_news(0.9, 0.0)
+    assert watch.news(0.5, 0.5) is None
+    assert watch.news(0.9, 2.0) is not None
+    assert watch.news(0.9, 0.0) is None
+
+
+def test_the_lines_name_the_figures():
+    assert "0.42 of real time" in slowness_line(1.0, 0.42, None, None)
+    line = slowness_line(1.0, 0.42, 0.61, 310.0)
+    assert "0.42" in line and "0.61 on average" in line and "5 minutes" in line
 
 
 @pytest.mark.parametrize(("rate", "tick_rate", "ticks"), [

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The snapshot: what one process writes, another reads whole or not at all."""
+import errno
 import fcntl
 import os
 import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from gazebo_ros import snapshot
+from gazebo_ros.shared_picture import PictureReader, PictureWriter
 from gazebo_ros.snapshot import SnapshotError, SnapshotReader, SnapshotWriter
 
 
@@ -149,3 +152,132 @@ def test_a_reader_can_tell_one_time_from_the_same_after_a_reset(writer):
     after = reader.read()
     assert (before.tick, before.time_s) == (after.tick, after.time_s)
     assert (before.resets, after.resets) == (0, 1)
+
+
+def left_over(parent, name="1-abc"):
+    """A folder as a dead simulator leaves it behind."""
+    folder = parent / ("%s%d-%s" % (snapshot._PREFIX, os.getuid(), name))
+    folder.mkdir(0o700)
+    (folder / "state").write_bytes(b"x")
+    (folder / "scene.json").write_text("{}", encoding="ascii")
+    return folder
+
+
+def test_a_link_that_bears_the_name_of_a_left_over_folder_is_not_followed(tmp_path):
+    shared, elsewhere = tmp_path / "shared", tmp_path / "elsewhere"
+    shared.mkdir()
+    elsewhere.mkdir()
+    precious = left_over(elsewhere)
+    link = shared / precious.name
+    link.symlink_to(precious)
+    assert snapshot.remove_stale(shared) == []
+    assert sorted(path.name for path in precious.iterdir()) == ["scene.json", "state"]
+    assert link.is_symlink()
+
+
+def test_a_link_in_the_place_of_the_state_is_not_opened(tmp_path):
+    folder = left_over(tmp_path)
+    (folder / "state").unlink()
+    os.mkfifo(tmp_path / "fifo")
+    for target in (tmp_path / "fifo", "/dev/zero"):
+        (folder / "state").symlink_to(target)
+        assert snapshot.remove_stale(tmp_path) == []
+        with pytest.raises(SnapshotError):
+            SnapshotReader(folder)
+        (folder / "state").unlink()
+    os.mkfifo(folder / "state")
+    assert snapshot.remove_stale(tmp_path) == []
+    with pytest.raises(SnapshotError, match="plain file"):
+        SnapshotReader(folder)
+
+
+@pytest.mark.parametrize("whose", ["folder", "state"])
+def test_what_belongs_to_somebody_else_is_neither_removed_nor_opened(tmp_path, monkeypatch, whose):
+    folder = left_over(tmp_path)
+    theirs = (folder if whose == "folder" else folder / "state").stat().st_ino
+    fstat = os.fstat
+
+    def foreign(descriptor):
+        status = fstat(descriptor)
+        if status.st_ino != theirs:
+            return status
+        return os.stat_result([*status[:4], os.getuid() + 1, *status[5:10]])
+
+    monkeypatch.setattr(os, "fstat", foreign)
+    assert snapshot.remove_stale(tmp_path) == []
+    with pytest.raises(SnapshotError, match="belongs to user %d" % (os.getuid() + 1)):
+        SnapshotReader(folder)
+    monkeypatch.undo()
+    assert (folder / "state").exists()
+    assert snapshot.remove_stale(tmp_path) == [folder]
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_state_that_is_too_short_is_none(tmp_path):
+    with pytest.raises(SnapshotError, match="no snapshot of this version"):
+        SnapshotReader(left_over(tmp_path))
+
+
+def no_space(*_, **__):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_without_room_there_is_no_snapshot_and_nothing_is_left(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "posix_fallocate", no_space)
+    with pytest.raises(SnapshotError, match="No space left on device.*stand still"):
+        SnapshotWriter(tmp_path)
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_scene_without_room_leaves_the_old_one_and_the_next_is_seen(writer, monkeypatch):
+    writer.write_scene([{"name": "old", "joints": []}])
+    reader = SnapshotReader(writer.folder)
+    with monkeypatch.context() as full:
+        full.setattr(Path, "write_text", no_space)
+        with pytest.raises(SnapshotError, match="scene.json: No space left"):
+            writer.write_scene([{"name": "new", "joints": []}])
+    assert [body["name"] for body in reader.scene().bodies] == ["old"]
+    # A state of the scene that could not be written is of another revision, so that nobody takes it for the old one's.
+    writer.write(1, 0.002, [[0.0] * 7])
+    assert reader.read().revision != reader.scene().revision
+    writer.write_scene([{"name": "new", "joints": []}])
+    assert [body["name"] for body in reader.scene().bodies] == ["new"]
+
+
+def test_a_picture_without_room_is_an_error_and_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "posix_fallocate", no_space)
+    with pytest.raises(SnapshotError, match="No space left"):
+        PictureWriter(tmp_path / "screen1", 4, 3)
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_picture_is_written_through_no_link(tmp_path):
+    precious = tmp_path / "precious"
+    precious.write_text("mine", encoding="ascii")
+    (tmp_path / "screen1").symlink_to(precious)
+    with pytest.raises(SnapshotError):
+        PictureWriter(tmp_path / "screen1", 4, 3)
+    with pytest.raises(SnapshotError):
+        PictureReader(tmp_path / "screen1")
+    assert precious.read_text(encoding="ascii") == "mine"
+
+
+def test_a_picture_that_is_shorter_than_it_says_is_refused(tmp_path):
+    picture = PictureWriter(tmp_path / "screen1", 4, 3)
+    picture.show(np.zeros((3, 4, 3), np.uint8))
+    os.truncate(tmp_path / "screen1", 30)
+    with pytest.raises(SnapshotError, match="shorter"):
+        PictureReader(tmp_path / "screen1")
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="mounts a file system of its own")
+def test_a_full_file_system_ends_no_process(tmp_path):
+    """As root: a real tmpfs with 64 kB left, on which writing to reserved memory would be the end (SIGBUS)."""
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(tmp_path)], check=False).returncode:
+        pytest.skip("may not mount here")
+    try:
+        with pytest.raises(SnapshotError, match="No space left"):
+            SnapshotWriter(tmp_path)
+        assert os.listdir(tmp_path) == []
+    finally:
+        subprocess.run(["umount", str(tmp_path)], check=True)

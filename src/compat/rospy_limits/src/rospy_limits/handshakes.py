@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Accepting connections and reading their handshake headers without waiting for any of them. ROS-free.
 
-One thread serves them all: a client that sends nothing, or a byte a second, holds up nobody. Each has a deadline, and each
-address a number of connections.
+One thread serves them all: a client that sends nothing, or a byte a second, holds up nobody. Each has a deadline, and
+each address a number of connections.
 """
 import collections
 import contextlib
@@ -63,7 +63,8 @@ def _notice_lost_peers(connection):
     """Have the kernel ask whether the other machine still is there, as rospy does where it is the one that connects."""
     with contextlib.suppress(OSError, AttributeError):
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        for option, value in zip((socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT), KEEPALIVE, strict=True):
+        options = socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT
+        for option, value in zip(options, KEEPALIVE, strict=True):
             connection.setsockopt(socket.IPPROTO_TCP, option, value)
 
 

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What our ``roslaunch`` adds to ROS's: a second simulator on a master is refused before anything is touched.
+
+roslaunch sets parameters first and starts nodes in any order, and each node that bears the name of another shuts that
+one down. By the time the second simulator itself could refuse, the first lab has lost its nodes. So the launch file is
+read, and if there is a simulator in it, and one on the master or about to be, roslaunch ends there.
+"""
+import contextlib
+import sys
+
+import roslaunch.parent
+import roslaunch.pmon
+from rosgraph.names import ns_join
+
+from gazebo_ros.single_instance import Claim, refusal, refusal_while_starting, running_instance
+
+_PACKAGE, _TYPES = "gazebo_ros", ("gzserver", "gazebo")
+
+
+def guard():
+    """Have every ``ROSLaunchParent`` of this process look before it starts anything."""
+    parent = roslaunch.parent.ROSLaunchParent
+    load_config, start_monitor = parent._load_config, parent._start_pm
+
+    def load_and_look(launch):
+        load_config(launch)
+        launch.simulators = _Simulators(launch.config)
+        reason = launch.simulators.reason_against()
+        if reason:
+            print(reason, file=sys.stderr)
+            sys.exit(1)
+
+    def start_and_listen(launch):
+        start_monitor(launch)
+        launch.pm.add_process_listener(launch.simulators)
+
+    parent._load_config, parent._start_pm = load_and_look, start_and_listen
+
+
+class _Simulators(roslaunch.pmon.ProcessListener):
+    """The simulators in a launch file, and this process's claims to start them."""
+
+    def __init__(self, config):
+        self._master_uri = config.master.uri
+        self._nodes = {ns_join(node.namespace, node.name): node for node in config.nodes
+                       if node.package == _PACKAGE and node.type in _TYPES}
+        self._claims = {name: Claim(name, self._master_uri) for name in self._nodes}
+
+    def reason_against(self):
+        """What to tell the user where there is one already; "" where not, and then nobody else may start one."""
+        for name, claim in self._claims.items():
+            found = None
+            with contextlib.suppress(OSError):  # no master yet: roslaunch starts one
+                found = running_instance(name, "/roslaunch_look_up", self._master_uri)
+            if found is not None:
+                return refusal(name, *found, self._master_uri)
+            holder = claim.take()
+            if holder is not None:
+                return refusal_while_starting(name, holder, self._master_uri)
+        return ""
+
+    def process_died(self, process_name, exit_code):
+        """A simulator that has ended for good, in a launch that goes on, is in nobody's way."""
+        name = "/" + process_name.rpartition("-")[0]
+        if name in self._claims and not self._nodes[name].respawn:
+            self._claims[name].release()
