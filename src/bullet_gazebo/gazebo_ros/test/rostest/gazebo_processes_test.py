@@ -17,7 +17,7 @@ from gazebo_ros import snapshot
 from lab_testing.ports import free_port
 from lab_testing.waiting import wait_until
 
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 # A subscriber of /clock that stops itself, as Ctrl-Z would, after the first message.
 STOPPED_LISTENER = """
 import os, signal, rospy
@@ -88,7 +88,7 @@ class GazeboProcesses(unittest.TestCase):
                 except (OSError, rosgraph.MasterException):
                     return False
 
-            wait_until(has_clock, "the launched simulator")
+            wait_until(has_clock, "the launched simulator", DEADLINE_S)
             self.assertEqual(len(snapshot_folders() - before), 1)
             launch.send_signal(signal.SIGINT)
             self.assertEqual(launch.wait(DEADLINE_S), 0)

@@ -170,10 +170,12 @@ def test_without_descriptors_the_silent_ones_go_and_serving_goes_on(scene):
     scene.turn_until(lambda: scene.server.pending == 1, "the silent client")
     scene.connect(framed(b"me"))
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    # The lowest free number is the first that is not allowed any more.
-    lowest = os.dup(scene.listener.fileno())
-    os.close(lowest)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (lowest, hard))
+    # No number below the highest is free, and none above it is allowed.
+    highest = max(int(name) for name in os.listdir("/proc/self/fd"))
+    fillers = [os.dup(scene.listener.fileno())]
+    while fillers[-1] < highest:
+        fillers.append(os.dup(scene.listener.fileno()))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (fillers[-1] + 1, hard))
     try:
         scene.turn_until(lambda: scene.lines, "the line about it")
         assert len(scene.lines) == 1 and "Too many open files" in scene.lines[0]
@@ -186,6 +188,8 @@ def test_without_descriptors_the_silent_ones_go_and_serving_goes_on(scene):
         assert is_closed(silent)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        for filler in fillers:
+            os.close(filler)
 
 
 def test_one_kind_of_event_costs_one_line_a_minute_with_their_number():
