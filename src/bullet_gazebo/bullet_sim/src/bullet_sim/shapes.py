@@ -5,19 +5,24 @@ import contextlib
 import hashlib
 import locale
 import os
+import stat
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import pybullet
 
-from urdf_model import Box, Cylinder, Mesh, Plane, Sphere
+from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, read_file
+from urdf_model.files import kind_of
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
-from .convex_parts import cut
 from .errors import BulletSimError
+from .limited import MESHES, LimitError
+from .mesh_loading import MOST_BYTES, to_wavefront
 
 NO_SHAPE = -1
+# Part of what cached files are named by: raise it when the same mesh would come out differently.
+_VERSION = b"2"
 # A plane that is tilted, or one of several shapes, becomes a slab of this size [m]: Bullet's own plane goes alone.
 _SLAB_M = (200.0, 200.0, 1.0)
 
@@ -28,54 +33,51 @@ class MeshCache:
     The file name is a hash of the mesh's content, so a mesh that changes is converted again and copies cost nothing.
     """
 
-    def __init__(self, folder=None):
+    def __init__(self, folder=None, warn=lambda text: None):
+        """``warn(text)`` is told of meshes that are made simpler."""
+        self._warn = warn
         base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
         self.folder = Path(folder or os.path.join(base, "bullet_sim", "meshes"))
         self._known = {}  # (path, size, time of change, planes) -> Wavefront file
 
-    def wavefront(self, path, planes=()):
+    def wavefront(self, path, planes=(), hollow=True):
         """Return the path of a Wavefront copy of the mesh at ``path``, in metres, z up.
 
-        ``planes``: as for ``convex_parts.cut``; given, the copy holds one object for each part.
+        ``planes``: as for ``convex_parts.cut``; given, the copy holds one object for each part. ``hollow``: whether its
+        triangles matter, or only their convex hull, of which the points may do.
         Raises BulletSimError when the mesh cannot be read.
         """
         try:
             status = os.stat(path)
             key = (str(path), status.st_size, status.st_mtime_ns, planes)
             if key not in self._known or not self._known[key].exists():
-                content = Path(path).read_bytes() + (repr(planes).encode() if planes else b"")
+                content = read_file(path, MOST_BYTES) + (repr(planes).encode() if planes else b"") + _VERSION
                 target = self.folder / (hashlib.sha256(content).hexdigest()[:32] + ".obj")
                 self._known[key] = target if target.exists() else self._convert(path, target, planes)
         except OSError as error:
             raise BulletSimError("mesh %s cannot be read: %s" % (path, error.strerror)) from None
-        return str(self._known[key])
+        hull = self._known[key].with_suffix(".hull.obj")
+        return str(hull if not hollow and hull.exists() else self._known[key])
 
     def _convert(self, path, target, planes):
-        import trimesh  # 0.1 s to import, and needed only the first time that a mesh is seen
-
-        try:
-            scene = trimesh.load(str(path), force="scene")
-            mesh = scene.to_geometry() if hasattr(scene, "to_geometry") else scene.dump(concatenate=True)
-            mesh.merge_vertices(merge_tex=True, merge_norm=True)
-        except Exception as error:  # trimesh's loaders raise whatever their format library raises
-            raise BulletSimError("mesh %s cannot be read: %s" % (path, error)) from None
-        if len(mesh.faces) == 0:
-            raise BulletSimError("mesh %s holds no triangles" % path)
-        if planes:
-            lines = _parts_as_wavefront(cut(mesh.triangles, planes))
-        else:
-            lines = ["o mesh"]
-            lines += ["v %.9g %.9g %.9g" % tuple(vertex) for vertex in mesh.vertices]
-            lines += ["f %d %d %d" % tuple(face) for face in mesh.faces + 1]
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError:
             self.folder = Path(tempfile.mkdtemp(prefix="bullet_sim_meshes_"))
             target = self.folder / target.name
         # Another simulator may be converting the same mesh: write beside, then rename, which is atomic.
-        with tempfile.NamedTemporaryFile("w", dir=str(self.folder), suffix=".part", delete=False) as part:
-            part.write("\n".join(lines) + "\n")
-        os.replace(part.name, str(target))
+        with tempfile.TemporaryDirectory(dir=str(self.folder), prefix="part_") as draft:
+            part = Path(draft) / "mesh"
+            try:
+                remark = MESHES.call(to_wavefront, str(path), str(part), planes)
+            except LimitError as error:
+                raise BulletSimError("mesh %s cannot be used: %s" % (path, error)) from None
+            hull = Path(str(part) + ".hull")
+            if hull.exists():
+                os.replace(hull, target.with_suffix(".hull.obj"))
+            os.replace(part, target)
+        if remark:
+            self._warn("mesh %s: %s" % (path, remark))
         return target
 
 
@@ -91,17 +93,11 @@ def _points_in_numbers():
         locale.setlocale(locale.LC_NUMERIC, in_force)
 
 
-def _parts_as_wavefront(parts):
-    """Return the lines of a file with one object for each list of points; Bullet makes a convex hull of each."""
-    lines, first = [], 1
-    for number, points in enumerate(parts):
-        lines.append("o part%d" % number)
-        lines += ["v %.9g %.9g %.9g" % point for point in points]
-        # Only which points belong together counts for a hull; faces say so, three points at a time.
-        last = first + len(points) - 1
-        lines += ["f %d %d %d" % (i, min(i + 1, last), min(i + 2, last)) for i in range(first, last + 1, 3)]
-        first = last + 1
-    return lines
+def _reason(uri):
+    scheme = uri.partition("://")[0].lower()
+    if scheme in ("http", "https", "ftp"):
+        return ": meshes are not fetched over the network; save it and name the file"
+    return ""
 
 
 class MeshFiles:
@@ -111,19 +107,22 @@ class MeshFiles:
         self._find_mesh = find_mesh
         self._cache = cache or MeshCache()
 
-    def exists(self, mesh):
-        """Whether there is such a file, which is all that matters for drawing."""
-        return self._find_mesh(mesh.filename) is not None
-
-    def wavefront(self, mesh, planes=()):
-        """Return the file to collide with; raises BulletSimError when the mesh cannot be found or read.
-
-        ``planes``: as for MeshCache.
-        """
+    def path(self, mesh):
+        """Return where the file is; raises BulletSimError when there is none, or what is there is no file."""
         path = self._find_mesh(mesh.filename)
         if path is None:
-            raise BulletSimError("mesh %s cannot be found" % mesh.filename)
-        return self._cache.wavefront(path, planes)
+            raise BulletSimError("mesh %s cannot be found%s" % (mesh.filename, _reason(mesh.filename)))
+        mode = os.stat(path).st_mode
+        if not stat.S_ISREG(mode):
+            raise BulletSimError("mesh %s cannot be used: it is %s, not a file" % (mesh.filename, kind_of(mode)))
+        return path
+
+    def wavefront(self, mesh, planes=(), hollow=True):
+        """Return the file to collide with; raises BulletSimError when the mesh cannot be found or read.
+
+        ``planes``, ``hollow``: as for MeshCache.
+        """
+        return self._cache.wavefront(self.path(mesh), planes, hollow)
 
 
 class ShapeStore:
@@ -146,7 +145,7 @@ class ShapeStore:
             geometry, origin, file, planes = shape.geometry, shape.origin, None, ()
             if isinstance(geometry, Mesh):
                 planes = (mesh_cuts or {}).get(shape.link, ())
-                file = self._mesh_files.wavefront(geometry, planes)
+                file = self._mesh_files.wavefront(geometry, planes, concave)
             elif isinstance(geometry, Plane) and (len(shapes) > 1 or not np.allclose(origin, np.eye(4), atol=1e-12)):
                 geometry, origin = Box(_SLAB_M), origin @ pose_matrix((0.0, 0.0, -_SLAB_M[2] / 2.0))
             parts.append((geometry, file, origin, concave and not planes))

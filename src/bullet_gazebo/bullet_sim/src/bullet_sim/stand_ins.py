@@ -32,7 +32,7 @@ def with_stand_ins(robot, mesh_files):
     told, links = [], {}
     for link in robot.links.values():
         collisions, lost = _sift(link.collisions, mesh_files.wavefront)
-        visuals, unseen = _sift(link.visuals, lambda mesh: _must_exist(mesh, mesh_files))
+        visuals, unseen = _sift(link.visuals, mesh_files.path)
         if not lost and not unseen:
             continue
         # A mesh that is there to be looked at is not borrowed: it may be too fine to collide with.
@@ -50,11 +50,6 @@ def with_stand_ins(robot, mesh_files):
     if not links:
         return robot, ""
     return dataclasses.replace(robot, links={**robot.links, **links}), "; ".join(told)
-
-
-def _must_exist(mesh, mesh_files):
-    if not mesh_files.exists(mesh):
-        raise BulletSimError("mesh %s cannot be found" % mesh.filename)
 
 
 def _sift(shapes, check):

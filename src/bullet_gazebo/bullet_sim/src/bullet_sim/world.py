@@ -12,7 +12,7 @@ from .builder import build
 from .errors import BulletSimError, within
 from .model import Contact, Model
 from .pose import Pose
-from .shapes import MeshFiles, ShapeStore
+from .shapes import MeshCache, MeshFiles, ShapeStore
 from .stand_ins import with_stand_ins
 from .state_watch import StateWatch
 
@@ -71,8 +71,9 @@ class World:
         self._client = pybullet.connect(pybullet.DIRECT)
         if self._client < 0:
             raise BulletSimError("PyBullet gave no physics client; are too many worlds open in this process?")
-        self._mesh_files = MeshFiles(find_mesh)
-        self._shapes = ShapeStore(self._client, self._mesh_files)
+        #: MeshFiles, which any thread may ask.
+        self.mesh_files = MeshFiles(find_mesh, MeshCache(warn=warn))
+        self._shapes = ShapeStore(self._client, self.mesh_files)
         self._weightless = []  # models of which some link has no weight
         self._watch = StateWatch(self, error)
         self._touched = []  # models that something was done to since the last step, perhaps in their sleep
@@ -143,7 +144,7 @@ class World:
                 check_robot(robot)
             except OutOfBounds as error:
                 raise BulletSimError("model '%s': %s" % (name, error)) from None
-            robot, mended = with_stand_ins(robot, self._mesh_files)
+            robot, mended = with_stand_ins(robot, self.mesh_files)
             if mended:
                 self._warn("model '%s': %s" % (name, mended))
             merged = merge_fixed(robot)
@@ -166,6 +167,15 @@ class World:
         self._mesh_cuts[name] = mesh_cuts
         self._watch.models_changed()
         return model
+
+    def make_shape(self, merged, link, static=None, mesh_cuts=None):
+        """Make the collision shape of a body of ``merged`` (urdf_model.MergedRobot) beforehand.
+
+        One costs up to 20 ms: a robot with many need not bring them all in one tick. ``static``, ``mesh_cuts``: as for
+        :meth:`spawn`.
+        """
+        static = merged.root == "world" if static is None else static
+        self._shapes.compound(merged.links[link].collisions, static and link == merged.root, mesh_cuts)
 
     def respawn(self, name, static):
         """Replace a model by itself, fixed in the world or free, where it stands; return the new Model.

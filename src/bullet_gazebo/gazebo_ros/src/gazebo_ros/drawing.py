@@ -3,11 +3,16 @@
 import hashlib
 import json
 import os
+import shutil
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+from bullet_sim.limited import MESHES, LimitError
+from bullet_sim.mesh_loading import MOST_BYTES, load_scene
+from urdf_model import read_file
 
 #: Triangles that a mesh of :data:`USUAL_M` [m, its longest side] keeps; a robot of thirty links then draws in some
 #: 15 ms without a graphics card. Larger and smaller ones keep more and less, within bounds: a finger covers few pixels.
@@ -17,6 +22,7 @@ _LEAST, _MOST = 0.5, 2.5
 # Part of the name of cached files: raise it when the same mesh would come out differently.
 _VERSION = 3
 _FINEST_GRID = 512
+_MANY = 100_000
 
 
 class MeshPart(NamedTuple):
@@ -40,6 +46,11 @@ def thin_out(vertices, faces, target):
         return vertices, faces
     low, size = vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), 1e-9)
     coarse, fine = 2, _FINEST_GRID
+    if len(faces) > _MANY:
+        # A first pass on the finest grid, so that the others have little left to do.
+        vertices, faces = _cluster(vertices, faces, np.floor((vertices - low) * (_FINEST_GRID / size)).astype(np.int64))
+        if len(faces) <= target:
+            return vertices, faces
     best = None
     while fine - coarse > 1:
         cells = (coarse + fine) // 2
@@ -76,10 +87,11 @@ class DrawingCache:
     def parts(self, path):
         """The list of :class:`MeshPart` of the mesh file at ``path``; raises :class:`DrawingError`."""
         try:
-            content = Path(path).read_bytes()
+            content = read_file(path, MOST_BYTES)
         except OSError as error:
             raise DrawingError("mesh %s cannot be read: %s" % (path, error.strerror)) from error
         key = "%s-%d-%d" % (hashlib.sha256(content).hexdigest()[:32], self._triangles, _VERSION)
+        del content
         index = self._folder / key / "parts.json"
         if not index.exists():
             index = self._make(path, key)
@@ -87,23 +99,16 @@ class DrawingCache:
         return [MeshPart(str(index.parent / name), tuple(colour) if colour else None) for name, colour in listed]
 
     def _make(self, path, key):
-        pieces = _read(path)
-        total = sum(len(faces) for _, faces, _ in pieces)
-        size = float(np.ptp(np.concatenate([vertices for vertices, _, _ in pieces]), axis=0).max())
-        kept = self._triangles * min(max(size / USUAL_M, _LEAST), _MOST)
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError:
             self._folder = Path(tempfile.mkdtemp(prefix="bullet_gazebo_drawings_"))
         draft = Path(tempfile.mkdtemp(dir=self._folder))
-        listed = []
-        for number, (vertices, faces, colour) in enumerate(pieces):
-            vertices, faces = thin_out(vertices, faces, max(20, round(kept * len(faces) / total)))
-            if len(faces):
-                name = "part%d.obj" % number
-                (draft / name).write_text(_wavefront(vertices, faces), encoding="ascii")
-                listed.append((name, colour))
-        (draft / "parts.json").write_text(json.dumps(listed), encoding="utf-8")
+        try:
+            MESHES.call(write_parts, str(path), str(draft), self._triangles)
+        except LimitError as error:
+            shutil.rmtree(draft, ignore_errors=True)
+            raise DrawingError("mesh %s cannot be used: %s" % (path, error)) from None
         target = self._folder / key
         try:
             draft.rename(target)
@@ -112,25 +117,41 @@ class DrawingCache:
         return target / "parts.json"
 
 
+def write_parts(path, folder, triangles):
+    """Write the mesh at ``path`` into ``folder``, thinned out: ``parts.json`` and what it lists.
+
+    ``triangles``: what a mesh of :data:`USUAL_M` keeps.
+    """
+    pieces = _read(path)
+    total = sum(len(faces) for _, faces, _ in pieces)
+    size = float(np.ptp(np.concatenate([vertices for vertices, _, _ in pieces]), axis=0).max())
+    kept = triangles * min(max(size / USUAL_M, _LEAST), _MOST)
+    listed = []
+    for number, (vertices, faces, colour) in enumerate(pieces):
+        vertices, faces = thin_out(vertices, faces, max(20, round(kept * len(faces) / total)))
+        if len(faces):
+            name = "part%d.obj" % number
+            (Path(folder) / name).write_text(_wavefront(vertices, faces), encoding="ascii")
+            listed.append((name, colour))
+    (Path(folder) / "parts.json").write_text(json.dumps(listed), encoding="utf-8")
+
+
 def _read(path):
     """The mesh as [(vertices (n, 3), faces (m, 3), rgba or None)], one for each colour."""
     import trimesh
 
     gamma = 1.0 / 2.2 if str(path).lower().endswith(".dae") else 1.0
-    try:
-        scene = trimesh.load(str(path), force="scene")
-        pieces = {}
-        for node in scene.graph.nodes_geometry:
-            transform, name = scene.graph[node]
-            mesh = scene.geometry[name]
-            if len(getattr(mesh, "faces", ())) == 0:
-                continue
-            vertices = trimesh.transform_points(mesh.vertices, transform)
-            pieces.setdefault(_colour(mesh, gamma), []).append((vertices, np.asarray(mesh.faces)))
-    except Exception as error:  # noqa: BLE001  (trimesh raises whatever the library behind a format does)
-        raise DrawingError("mesh %s cannot be read: %s" % (path, error)) from error
+    scene = load_scene(path)
+    pieces = {}
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if len(getattr(mesh, "faces", ())) == 0:
+            continue
+        vertices = trimesh.transform_points(mesh.vertices, transform)
+        pieces.setdefault(_colour(mesh, gamma), []).append((vertices, np.asarray(mesh.faces)))
     if not pieces:
-        raise DrawingError("mesh %s has no triangles" % path)
+        raise DrawingError("it holds no triangles")
     joined = []
     for colour, meshes in pieces.items():
         starts = np.cumsum([0] + [len(vertices) for vertices, _ in meshes[:-1]])

@@ -127,14 +127,16 @@ class GazeboServices:
             prepare = self._spawner.prepare_sdf if is_sdf else self._spawner.prepare
             prepared = prepare(request.model_name, request.model_xml, request.robot_namespace,
                                _parameters)
+            self._spawner.make_shapes(prepared)
             self._simulation.board.call(self._spawn_prepared, prepared, request)
-        except (SpawnRefused, LoopEnded) as error:
+        except (SpawnRefused, BulletSimError, LoopEnded) as error:
             return SpawnModelResponse(False, "SpawnModel: Failure - %s" % error)
         except SURVIVED as error:  # a plugin's constructor is anybody's code
             self._log.error("spawning '%s' failed: %s" % (request.model_name, described(error)))
             return SpawnModelResponse(False, "SpawnModel: Failure - %s: %s" % (type(error).__name__, error))
         self._ros.flush()
-        return SpawnModelResponse(True, "SpawnModel: Successfully spawned entity")
+        mended = "; %s" % prepared.mended if prepared.mended else ""
+        return SpawnModelResponse(True, "SpawnModel: Successfully spawned entity%s" % mended)
 
     def _spawn_prepared(self, prepared, request):
         try:

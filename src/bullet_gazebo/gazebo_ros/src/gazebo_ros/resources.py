@@ -25,9 +25,9 @@ class ResourceFinder:
         self._may_look_anew = True
 
     def __call__(self, name):
-        """The path of an existing file, or None."""
+        """The path of what exists and is no folder, or None. It need not be a file: who opens it looks."""
         if name not in self._found:
-            self._found[name] = next((str(path) for path in self._candidates(name) if path.is_file()), None)
+            self._found[name] = next((str(path) for path in self._candidates(name) if _is_there(path)), None)
         return self._found[name]
 
     def forget_missing(self):
@@ -60,3 +60,10 @@ class ResourceFinder:
         self._may_look_anew = False
         self._packages = rospkg.RosPack()
         return self._package_folder(name)
+
+
+def _is_there(path):
+    try:
+        return path.exists() and not path.is_dir()
+    except (OSError, ValueError):  # a name that is too long, or holds a zero byte
+        return False

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from bullet_sim import BulletSimError, MeshFiles, Pose, with_stand_ins
+from bullet_sim import BulletSimError, Pose, with_stand_ins
 from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
 from gazebo_ros.faults import SURVIVED, described
@@ -20,7 +20,7 @@ from gazebo_ros.shared_picture import NoPicture, PictureWriter
 from gazebo_ros.simulation import HostedPlugin
 from gazebo_ros.snapshot import SnapshotError
 from sdf_model import SdfError, parse_sdf_model
-from urdf_model import Plane, UrdfError, drawing_urdf, merge_fixed, parse_urdf
+from urdf_model import Mesh, OutOfBounds, Plane, UrdfError, bounds, drawing_urdf, merge_fixed, parse_urdf
 
 
 class SpawnRefused(Exception):
@@ -32,9 +32,12 @@ class Prepared:
 
     #: Where the model stands in the frame it is spawned in (4x4), which an SDF may say itself. None: there.
     origin = None
+    #: What stands in for meshes that cannot be had, in one line; "" where nothing does.
+    mended = ""
 
-    def __init__(self, name, xml, drawing, robot, namespace, start, plugins, sensors, parameters, options):
+    def __init__(self, name, xml, drawing, merged, robot, namespace, start, plugins, sensors, parameters, options):
         self.name = name
+        self.merged = merged
         self.xml = xml
         self.drawing = drawing
         self.robot = robot
@@ -61,7 +64,7 @@ class Spawner:
         self._log = log
         self._on_change = on_change
         self.model_folders = model_folders
-        self._mesh_files = MeshFiles(finder)
+        self._mesh_files = simulation.world.mesh_files
         #: What viewers draw of the models that were spawned here: {model name: URDF text, or None for a floor}.
         self.drawings = {}
         #: The sensors that need pictures, for who draws them: {model name: list of dictionaries}.
@@ -122,11 +125,28 @@ class Spawner:
         if mended:
             self._log.warn("model '%s': %s (are the files there, and the packages in ROS_PACKAGE_PATH?)"
                            % (name, mended))
+        merged = merge_fixed(robot)
         if mended or drawing is None:
-            drawing = None if is_floor(robot) else drawing_urdf(merge_fixed(robot))
+            drawing = None if is_floor(robot) else drawing_urdf(merged)
         options = {"static": urdf_extras.is_static(robot), **options}
-        return Prepared(name, xml, drawing, robot, namespace, start, plugins, sensors, parameters() if plugins else {},
-                        options)
+        for link in _with_meshes(merged):
+            for shape in merged.links[link].collisions:
+                cuts = (options.get("mesh_cuts") or {}).get(shape.link)
+                if cuts and isinstance(shape.geometry, Mesh):
+                    self._mesh_files.wavefront(shape.geometry, cuts)
+        prepared = Prepared(name, xml, drawing, merged, robot, namespace, start, plugins, sensors,
+                            parameters() if plugins else {}, options)
+        prepared.mended = mended
+        return prepared
+
+    def make_shapes(self, prepared):
+        """Any thread but the loop's, once that runs: have the loop make what takes long of a model, one at a turn.
+
+        Raises ``BulletSimError``.
+        """
+        static, cuts = prepared.options.get("static"), prepared.options.get("mesh_cuts")
+        for link in _with_meshes(prepared.merged):
+            self._simulation.board.call(self._simulation.world.make_shape, prepared.merged, link, static, cuts)
 
     def spawn(self, prepared, pose):
         """Loop thread: make the model at ``pose`` and start its plugins. Raises :class:`SpawnRefused`."""
@@ -134,7 +154,7 @@ class Spawner:
         try:
             if prepared.origin is not None:
                 pose = Pose.from_matrix(pose.checked().matrix() @ prepared.origin)
-            model = world.spawn(prepared.robot, prepared.name, pose, **prepared.options)
+            model = world.spawn(prepared.robot, prepared.name, pose, merged=prepared.merged, **prepared.options)
         except BulletSimError as error:
             raise SpawnRefused(str(error)) from error
         try:
@@ -254,8 +274,18 @@ class Spawner:
     def _check_name(self, name):
         if not name:
             raise SpawnRefused("the model needs a name (model_name is empty)")
+        try:
+            bounds.check_name(name, "the model's name")
+        except OutOfBounds as error:
+            raise SpawnRefused(str(error)) from error
         if name in self.drawings:
             raise SpawnRefused("entity already exists: delete the model '%s' first or choose another name" % name)
+
+
+def _with_meshes(merged):
+    """The names of the bodies that collide by a mesh."""
+    return [link.name for link in merged.links.values()
+            if any(isinstance(shape.geometry, Mesh) for shape in link.collisions)]
 
 
 def _drawn(robot, plugin, namespace):

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Work on files from anybody, in a process of its own that has limits: a library that never ends, or takes all memory,
+ends there and nowhere else, and the interpreter's lock stays free for the physics.
+
+The limit is processor time, not time: a busy machine comes to the same answer later.
+"""
+
+import importlib
+import json
+import os
+import resource
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+#: What a call may take: processor time [s], memory beyond what the process has [bytes], and time where it does nothing.
+PROCESSOR_S = 4
+MEMORY_BYTES = 1_500_000_000
+WAITING_S = 60.0
+_IDLE_S = 10.0
+_START = "from bullet_sim.limited import serve; serve()"
+
+
+class LimitError(Exception):
+    """The work failed, or came to a limit; the text says which."""
+
+
+class LimitedProcess:
+    """Calls functions in a process that is started when it is needed and ends when it has not been for a while.
+
+    Any thread may call; one call at a time is worked on.
+    """
+
+    def __init__(self, processor_s=PROCESSOR_S, memory_bytes=MEMORY_BYTES, waiting_s=WAITING_S):
+        self._limits = processor_s, memory_bytes
+        self._waiting_s = waiting_s
+        self._lock = threading.Lock()
+        self._process = None
+
+    def call(self, function, *arguments):
+        """Return ``function(*arguments)``: a function of a module, arguments and result as JSON has them.
+
+        Raises LimitError with the text of what it raises, or with the limit that it came to.
+        """
+        request = {"function": [function.__module__, function.__name__], "arguments": arguments}
+        with self._lock:
+            line = self._ask(json.dumps(request).encode() + b"\n")
+        answer = json.loads(line)
+        if "error" in answer:
+            raise LimitError(answer["error"])
+        return answer["result"]
+
+    def close(self):
+        """End the process."""
+        with self._lock:
+            self._end()
+
+    def _ask(self, request):
+        for _ in range(2):
+            if self._process is None:
+                self._process = _start(*self._limits)
+            line = self._exchange(request)
+            if line is not None:
+                return line
+        raise LimitError("the process for it cannot be started")
+
+    def _exchange(self, request):
+        """Return the answer's line, or None from a process that had ended, since nothing was asked for a while."""
+        process, line, gives_up_at = self._process, b"", time.monotonic() + self._waiting_s
+        try:
+            process.stdin.write(request)
+            process.stdin.flush()
+        except OSError:
+            self._end()
+            return None
+        while not line.endswith(b"\n"):
+            readable = select.select([process.stdout], [], [], max(0.0, gives_up_at - time.monotonic()))[0]
+            part = os.read(process.stdout.fileno(), 65536) if readable else b""
+            if not part:
+                if readable and process.wait() == 0:
+                    self._end()
+                    return None
+                raise LimitError(self._why(bool(readable)))
+            line += part
+        return line
+
+    def _why(self, has_ended):
+        if not has_ended:
+            self._end()
+            return "it took more than %g s" % self._waiting_s
+        code = self._process.wait()
+        self._end()
+        if code == -signal.SIGXCPU:
+            return "it took more than %g s of processor time" % self._limits[0]
+        return "the process that worked on it ended with code %d" % code
+
+    def _end(self):
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.wait()
+            process.stdin.close()
+            process.stdout.close()
+
+
+def _start(processor_s, memory_bytes):
+    # One thread is enough, and each of a numerical library's own takes memory.
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    return subprocess.Popen(
+        [sys.executable, "-c", _START, str(processor_s), str(memory_bytes)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment, bufsize=0,
+    )
+
+
+def serve():
+    """The process: answer requests until there are no more, or none for a while."""
+    processor_s, memory_bytes = int(sys.argv[1]), int(sys.argv[2])
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # at Ctrl-C it ends with the one that asks
+    os.nice(5)  # physics comes first
+    answers = os.fdopen(os.dup(1), "wb", buffering=0)
+    os.dup2(2, 1)  # what libraries print is no answer
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
+    pending = b""
+    while True:
+        if not select.select([0], [], [], _IDLE_S)[0]:
+            return
+        part = os.read(0, 65536)
+        if not part:
+            return
+        pending += part
+        while b"\n" in pending:
+            line, _, pending = pending.partition(b"\n")
+            answers.write(_answer(json.loads(line), processor_s, memory_bytes) + b"\n")
+
+
+def _answer(request, processor_s, memory_bytes):
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    limit = int(used.ru_utime + used.ru_stime + processor_s + 0.999)
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, resource.RLIM_INFINITY))
+    module, name = request["function"]
+    try:
+        result = getattr(importlib.import_module(module), name)(*request["arguments"])
+        return json.dumps({"result": result}).encode()
+    except MemoryError:
+        return json.dumps({"error": "it took more than %d MB of memory" % (memory_bytes // 1_000_000)}).encode()
+    except Exception as error:  # noqa: BLE001  (whatever it is, it belongs to the one who asked)
+        return json.dumps({"error": str(error) or type(error).__name__}).encode()
+
+
+#: The process that all meshes of this program are read in.
+MESHES = LimitedProcess()

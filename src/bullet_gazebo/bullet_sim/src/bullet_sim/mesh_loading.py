@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Mesh files from anybody: formats that simulators share, nothing fetched, no entities, a bounded number of triangles.
+
+To be called in a process with limits (``limited``): libraries for formats do what a file tells them to.
+"""
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+from urdf_model import bounds, read_file, refuse_entities
+
+#: What of a mesh is read.
+MOST_BYTES = 100_000_000
+MOST_TRIANGLES = 2_000_000
+_MOST_BYTES_BESIDE = 10_000_000
+# What Gazebo and rviz read, and a little more. Archives are not among them: what they hold may be without end.
+_FORMATS = ("dae", "stl", "obj", "ply", "off", "glb", "gltf")
+# Materials and buffers that a mesh names. Pictures are not drawn.
+_BESIDE = (".mtl", ".bin")
+
+#: What collides: with more triangles a shape of a fixed body costs its loop more than 20 ms when it is made, and with
+#: more points a convex one does.
+MOST_HOLLOW_TRIANGLES = 12_000
+MOST_HULL_POINTS = 6_000
+# Directions in which a hull with more points keeps its outermost one: neighbours are 0.09 rad apart, so that at most
+# 0.1 % of its size is cut off (1 - cos 0.045).
+_HULL_DIRECTIONS = 1_500
+_GRIDS = (128, 96, 64, 48, 32, 24, 16, 12, 8)
+
+
+class MeshError(ValueError):
+    """A mesh that cannot be used; the text goes on from its name: "… holds no triangles"."""
+
+
+class _Beside:
+    """For trimesh: files in the mesh's own folder, and of those only materials and buffers."""
+
+    def __init__(self, folder):
+        self._folder = folder
+
+    def get(self, name):
+        name = str(name)
+        path = (self._folder / name).resolve()
+        if path.suffix.lower() not in _BESIDE or self._folder.resolve() not in path.parents:
+            raise FileNotFoundError(name)
+        return read_file(path, _MOST_BYTES_BESIDE)
+
+    __getitem__ = get
+
+    def keys(self):
+        return ()
+
+
+def load_scene(path):
+    """Return the trimesh.Scene in the file at ``path``. Raises MeshError, OSError, and what libraries raise."""
+    import trimesh  # 0.1 s to import, and needed only the first time that a mesh is seen
+
+    path = Path(path)
+    kind = path.suffix[1:].lower()
+    if kind not in _FORMATS:
+        raise MeshError("it is in the format '%s'; expected one of %s" % (kind, ", ".join(_FORMATS)))
+    content = read_file(path, MOST_BYTES)
+    if kind == "dae":
+        _refuse_entities(content)
+    scene = trimesh.load(
+        io.BytesIO(content), file_type=kind, force="scene", resolver=_Beside(path.parent), process=False
+    )
+    triangles = 0
+    for name in scene.graph.geometry_nodes:
+        copies, mesh = len(scene.graph.geometry_nodes[name]), scene.geometry[name]
+        triangles += copies * len(getattr(mesh, "faces", ()))
+        if triangles > MOST_TRIANGLES:
+            raise MeshError("it holds more than %d triangles" % MOST_TRIANGLES)
+        vertices = np.asarray(mesh.vertices)
+        if len(vertices) and not np.abs(vertices).max() <= bounds.POSITION.high:
+            raise MeshError("a corner is at %g; expected at most %g" % (np.abs(vertices).max(), bounds.POSITION.high))
+    if triangles <= MOST_HOLLOW_TRIANGLES:
+        # Merges corners that are one, which takes as long as all the rest: what is thinned out need not have it.
+        for mesh in scene.geometry.values():
+            if len(getattr(mesh, "faces", ())):
+                mesh.process()
+    return scene
+
+
+def _refuse_entities(content):
+    from lxml import etree
+
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+    refuse_entities(etree.fromstring(content, parser))
+
+
+def to_wavefront(path, target, planes):
+    """Write the mesh at ``path`` to the Wavefront file ``target``, as bodies collide with it, in metres, z up.
+
+    ``planes``: as for ``convex_parts.cut``; given, there is one object for each part. Where the hull has more points
+    than pays, ``target`` + ".hull" holds one that is as good. Raises MeshError. Returns a remark, "" where there is
+    none.
+    """
+    from .convex_parts import cut
+
+    scene = load_scene(path)
+    mesh = scene.to_geometry() if hasattr(scene, "to_geometry") else scene.dump(concatenate=True)
+    faces = np.asarray(getattr(mesh, "faces", ()))
+    if len(faces) == 0:
+        raise MeshError("it holds no triangles")
+    if planes:
+        parts = [hull_points(np.array(points)) for points in cut(mesh.triangles, [tuple(plane) for plane in planes])]
+        _write(target, parts_as_wavefront([[tuple(point) for point in points.tolist()] for points in parts]))
+        return ""
+    remark = ""
+    if len(faces) > MOST_HOLLOW_TRIANGLES:
+        _write(target + ".hull", _cloud(hull_points(_outer(np.asarray(mesh.vertices)))))
+        vertices, thinned = thinned_out(np.asarray(mesh.vertices), faces, MOST_HOLLOW_TRIANGLES)
+        remark = "it is thinned out from %d triangles to %d to collide with" % (len(faces), len(thinned))
+        faces = thinned
+    else:
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+        vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+        if len(vertices) > MOST_HULL_POINTS:
+            _write(target + ".hull", _cloud(hull_points(vertices)))
+    lines = ["o mesh"]
+    lines += ["v %.9g %.9g %.9g" % tuple(vertex) for vertex in vertices]
+    lines += ["f %d %d %d" % tuple(face) for face in faces + 1]
+    _write(target, lines)
+    return remark
+
+
+def hull_points(points):
+    """Return those of ``points`` (n, 3) that matter for their convex hull, all where there are few."""
+    points = np.asarray(points, dtype=float)
+    if len(points) <= MOST_HULL_POINTS:
+        return points
+    # Directions evenly over the sphere: a Fibonacci lattice.
+    k = np.arange(_HULL_DIRECTIONS) + 0.5
+    height, turn = 1.0 - 2.0 * k / _HULL_DIRECTIONS, np.pi * (1.0 + 5.0**0.5) * k
+    level = np.sqrt(1.0 - height * height)
+    directions = np.stack([level * np.cos(turn), level * np.sin(turn), height], axis=1)
+    best, outermost = np.full(_HULL_DIRECTIONS, -np.inf), np.zeros(_HULL_DIRECTIONS, dtype=int)
+    for start in range(0, len(points), 4096):
+        reach = directions @ points[start : start + 4096].T
+        here = reach.argmax(axis=1)
+        reach = reach[np.arange(_HULL_DIRECTIONS), here]
+        better = reach > best
+        best[better], outermost[better] = reach[better], start + here[better]
+    return points[np.unique(outermost)]
+
+
+def thinned_out(vertices, faces, most):
+    """Return (vertices, faces) of about the same shape with at most ``most`` triangles.
+
+    Vertices that share a cell of a cubic grid become one, their mean; the finest of a few grids that will do is taken.
+    """
+    low, size = vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), 1e-12)
+    for cells in _GRIDS:
+        cluster = _clusters(vertices, low, cells / size)
+        count = np.bincount(cluster)
+        merged = np.stack([np.bincount(cluster, vertices[:, axis]) / count for axis in range(3)], axis=1)
+        corners = cluster[faces]
+        whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 0] != corners[:, 2])
+        vertices, faces = merged, np.unique(corners[whole], axis=0)
+        if len(faces) <= most:
+            break
+    return vertices, faces
+
+
+def _clusters(vertices, low, cells_per_m):
+    """Return for each of ``vertices`` (n, 3) the number of the cell that it lies in; empty cells have none."""
+    cell = np.floor((vertices - low) * cells_per_m).astype(np.int64) @ np.array([1, 1024, 1024**2])
+    return np.unique(cell, return_inverse=True)[1]
+
+
+def _outer(vertices):
+    """Return of the vertices in each cell of a fine grid the one that is farthest out."""
+    low, size = vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), 1e-12)
+    cluster = _clusters(vertices, low, _GRIDS[0] / size)
+    away = np.linalg.norm(vertices - vertices.mean(axis=0), axis=1)
+    farthest = np.zeros(cluster.max() + 1, dtype=int)
+    order = np.argsort(away)
+    farthest[cluster[order]] = order  # of several the last one stays
+    return vertices[farthest]
+
+
+def parts_as_wavefront(parts):
+    """Return the lines of a file with one object for each list of points; Bullet makes a convex hull of each."""
+    lines, first = [], 1
+    for number, points in enumerate(parts):
+        lines.append("o part%d" % number)
+        lines += ["v %.9g %.9g %.9g" % tuple(point) for point in points]
+        # Only which points belong together counts for a hull; faces say so, three points at a time.
+        last = first + len(points) - 1
+        lines += ["f %d %d %d" % (i, min(i + 1, last), min(i + 2, last)) for i in range(first, last + 1, 3)]
+        first = last + 1
+    return lines
+
+
+def _cloud(points):
+    return parts_as_wavefront([points])
+
+
+def _write(target, lines):
+    Path(target).write_text("\n".join(lines) + "\n", encoding="ascii")

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Meshes from anybody: what is hostile is refused by a limit that the error names, what is large is made simpler."""
+
+import os
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+
+from bullet_sim import BulletSimError, MeshCache, MeshFiles
+from bullet_sim.mesh_loading import MOST_HOLLOW_TRIANGLES, MOST_HULL_POINTS, hull_points
+from urdf_model import Mesh
+
+COLLADA = """<?xml version="1.0"?>%s<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><up_axis>Z_UP</up_axis></asset>%s</COLLADA>"""
+
+
+def bumpy_ball(across):
+    """Vertices and faces of a ball of 1 m radius, 2 * ``across`` ** 2 triangles."""
+    u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, across + 1), np.linspace(0.01, np.pi - 0.01, across + 1))
+    radius = 1.0 - 0.02 * np.cos(20.0 * u) ** 2 * np.sin(v)
+    points = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1) * radius[..., None]
+    i = (np.arange(across)[:, None] * (across + 1) + np.arange(across)).ravel()
+    faces = np.concatenate([np.stack([i, i + 1, i + across + 1], 1),
+                            np.stack([i + 1, i + across + 2, i + across + 1], 1)])
+    return points.reshape(-1, 3), faces
+
+
+def write_stl(path, vertices, faces, announced=None):
+    corners = vertices[faces].astype("<f4")
+    records = np.zeros(len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+    records["corners"] = corners
+    count = struct.pack("<I", len(faces) if announced is None else announced)
+    path.write_bytes(b"\0" * 80 + count + records.tobytes())
+    return str(path)
+
+
+def points_of(path):
+    with open(path, encoding="ascii") as file:
+        lines = [line.split() for line in file]
+    return (np.array([words[1:] for words in lines if words[0] == "v"], dtype=float),
+            sum(words[0] == "f" for words in lines))
+
+
+@pytest.fixture
+def told():
+    return []
+
+
+@pytest.fixture
+def cache(tmp_path, told):
+    return MeshCache(tmp_path / "cache", told.append)
+
+
+def bomb(path):
+    entities = "".join("<!ENTITY e%d '%s'>" % (k, ("&e%d;" % (k - 1) if k else "aaaaaaaaaa") * 10) for k in range(9))
+    path.write_text(COLLADA % ("<!DOCTYPE c [%s]>" % entities, "<extra>&e8;</extra>"))
+
+
+def outside(path):
+    path.write_text(COLLADA % ("<!DOCTYPE c [<!ENTITY a SYSTEM 'file:///etc/passwd'>]>", "<extra>&a;</extra>"))
+
+
+def archive(path):
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("a.dae", b" " * 50_000_000)
+
+
+def sparse(path):
+    with open(path, "wb") as file:
+        file.truncate(2**33)
+
+
+@pytest.mark.parametrize("name, make, message", [
+    ("bomb.dae", bomb, "declares the entit|entity reference loop|amplification"),
+    ("outside.dae", outside, "declares the entity a"),
+    ("archive.dae", archive, "cannot be used"),
+    ("archive.zae", archive, "in the format 'zae'; expected one of dae, stl, obj"),
+    ("pipe.stl", os.mkfifo, "a named pipe, not a file"),
+    ("device.stl", lambda path: path.symlink_to("/dev/zero"), "a device, not a file"),
+    ("empty.stl", lambda path: path.write_bytes(b""), "it is empty"),
+    ("lie.stl", lambda path: write_stl(path, *bumpy_ball(4), announced=2**32 - 1), "cannot be used"),
+    ("far.stl", lambda path: write_stl(path, 1e30 * bumpy_ball(4)[0], bumpy_ball(4)[1]), "corner is at .* most 1e.07"),
+    ("nan.stl", lambda path: write_stl(path, np.nan * bumpy_ball(4)[0], bumpy_ball(4)[1]), "cannot be used"),
+    ("sparse.stl", sparse, "expected at most 100000000"),
+    ("text.obj", lambda path: path.write_text("v 0 0 0\n" * 10), "cannot be used"),
+    ("x.exe", lambda path: path.write_text("MZ"), "in the format 'exe'"),
+])
+def test_what_is_hostile_is_refused_with_its_reason(tmp_path, cache, name, make, message):
+    make(tmp_path / name)
+    with pytest.raises(BulletSimError, match=message):
+        cache.wavefront(tmp_path / name)
+    assert not [file for file in (tmp_path / "cache").glob("*") if file.name.startswith("part_")]
+
+
+@pytest.mark.parametrize("name", ["http://example.org/a.stl", "https://example.org/a.dae"])
+def test_nothing_is_fetched(name):
+    with pytest.raises(BulletSimError, match="not fetched over the network"):
+        MeshFiles(lambda uri: None).wavefront(Mesh(name))
+
+
+@pytest.mark.parametrize("make, message", [(os.mkfifo, "a named pipe, not a file")])
+def test_what_is_drawn_must_be_a_file_too(tmp_path, make, message):
+    make(tmp_path / "a.stl")
+    with pytest.raises(BulletSimError, match=message):
+        MeshFiles(lambda uri: str(tmp_path / "a.stl")).path(Mesh("a.stl"))
+
+
+def test_materials_outside_of_the_folder_are_not_read(tmp_path, cache):
+    (tmp_path / "models").mkdir()
+    os.mkfifo(tmp_path / "secret.mtl")
+    vertices, faces = bumpy_ball(4)
+    lines = ["mtllib ../secret.mtl"] + ["v %g %g %g" % tuple(v) for v in vertices]
+    (tmp_path / "models" / "a.obj").write_text("\n".join(lines + ["f %d %d %d" % tuple(f) for f in faces + 1]))
+    assert points_of(cache.wavefront(tmp_path / "models" / "a.obj"))[1] > 20
+
+
+def test_a_large_mesh_is_thinned_out_and_says_so(tmp_path, cache, told):
+    path = write_stl(tmp_path / "large.stl", *bumpy_ball(354))  # 250,632 triangles
+    points, triangles = points_of(cache.wavefront(path))
+    assert 2_000 < triangles <= MOST_HOLLOW_TRIANGLES
+    assert np.abs(np.linalg.norm(points, axis=1) - 0.99).max() < 0.03
+    assert len(told) == 1 and "thinned out from 250632 triangles" in told[0]
+    hull, _ = points_of(cache.wavefront(path, hollow=False))
+    assert 700 < len(hull) <= 1_500
+    assert np.ptp(hull, axis=0) == pytest.approx([2.0, 2.0, 2.0], abs=0.02)
+
+
+def test_a_usual_mesh_stays_as_it_is(tmp_path, cache, told):
+    vertices, faces = bumpy_ball(40)
+    path = write_stl(tmp_path / "usual.stl", vertices, faces)
+    points, triangles = points_of(cache.wavefront(path))
+    assert triangles == len(faces) and told == []
+    assert cache.wavefront(path, hollow=False) == cache.wavefront(path)
+
+
+def test_a_hull_keeps_its_size():
+    points = np.random.default_rng(1).normal(size=(MOST_HULL_POINTS * 5, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    kept = hull_points(points)
+    assert len(kept) <= 1_500
+    for direction in np.random.default_rng(2).normal(size=(200, 3)):
+        direction = direction / np.linalg.norm(direction)
+        assert (kept @ direction).max() > 0.995 * (points @ direction).max()

@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Large and hostile descriptions are answered, with the limit that they came to, and the world goes on meanwhile."""
+import os
+import shutil
+import struct
+import tempfile
+import threading
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from gazebo_msgs import srv
+from geometry_msgs.msg import Point, Pose, Quaternion
+
+from lab_testing.waiting import wait_until
+
+BODY = """<robot name="m"><link name="l"><inertial><mass value="1"/>
+  <inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>
+  <collision><geometry>%s</geometry></collision></link></robot>"""
+MESH = BODY % '<mesh filename="%s"/>'
+BOX = BODY % '<box size="0.2 0.2 0.2"/>'
+COLLADA = """<?xml version="1.0"?><!DOCTYPE c [%s]>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><extra>&e8;</extra></COLLADA>"""
+DEADLINE_S = 60.0
+# As many ticks as pass while a large mesh is read, on any machine: reading it takes seconds, a tick 2 ms.
+TICKS = 20
+
+
+def write_ball(path, across, announced=None):
+    """A ball of 2 * ``across`` ** 2 triangles as a binary STL."""
+    u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, across + 1), np.linspace(0.01, 3.13, across + 1))
+    points = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1).reshape(-1, 3)
+    i = (np.arange(across)[:, None] * (across + 1) + np.arange(across)).ravel()
+    faces = np.concatenate([np.stack([i, i + 1, i + across + 1], 1),
+                            np.stack([i + 1, i + across + 2, i + across + 1], 1)])
+    records = np.zeros(len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+    records["corners"] = points[faces]
+    with open(path, "wb") as file:
+        file.write(b"\0" * 80 + struct.pack("<I", len(faces) if announced is None else announced) + records.tobytes())
+
+
+def chain(links):
+    return "<robot name='m'>%s%s</robot>" % ("".join("<link name='l%d'/>" % k for k in range(links)), "".join(
+        "<joint name='j%d' type='fixed'><parent link='l0'/><child link='l%d'/></joint>" % (k, k)
+        for k in range(1, links)))
+
+
+class GazeboHostile(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        for name, srv_class in (("spawn_urdf_model", srv.SpawnModel), ("delete_model", srv.DeleteModel),
+                                ("get_world_properties", srv.GetWorldProperties),
+                                ("get_model_state", srv.GetModelState)):
+            proxy = rospy.ServiceProxy("/gazebo/" + name, srv_class)
+            proxy.wait_for_service(DEADLINE_S)
+            setattr(cls, name, staticmethod(proxy))
+        cls.folder = tempfile.mkdtemp()
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def tearDown(self):
+        self.delete_model("m")
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def spawn(self, xml):
+        return self.spawn_urdf_model("m", xml, "", Pose(Point(5, 0, 0.5), Quaternion(0, 0, 0, 1)), "")
+
+    def sim_time(self):
+        return self.get_world_properties().sim_time
+
+    def stood_in_for(self, mesh, *words):
+        response = self.spawn(MESH % mesh)
+        self.assertTrue(response.success, response.status_message)
+        for word in ("stands in for it", *words):
+            self.assertIn(word, response.status_message)
+
+    def test_meshes_that_are_no_files(self):
+        os.mkfifo(self.path("pipe.stl"))
+        self.stood_in_for(self.path("pipe.stl"), "a named pipe, not a file")
+        self.delete_model("m")
+        self.stood_in_for("/dev/zero", "a device, not a file")
+        self.delete_model("m")
+        self.stood_in_for("http://10.255.255.1/a.stl", "not fetched over the network")
+
+    def test_meshes_that_lie(self):
+        with open(self.path("bomb.dae"), "w", encoding="utf-8") as file:
+            file.write(COLLADA % "".join("<!ENTITY e%d '%s'>" % (k, ("&e%d;" % (k - 1) if k else "aaaaaaaaaa") * 10)
+                                         for k in range(9)))
+        self.stood_in_for(self.path("bomb.dae"), "bomb.dae cannot be used")
+        self.delete_model("m")
+        write_ball(self.path("lie.stl"), 5, announced=2**32 - 1)
+        self.stood_in_for(self.path("lie.stl"), "lie.stl cannot be used")
+
+    def test_descriptions_without_end(self):
+        for xml, word in ((chain(100_000), "expected at most 4000000"), (chain(3_000), "expected at most 2000"),
+                          ("<robot name='m'>%s</robot>" % ("<a>" * 300), "not well-formed")):
+            response = self.spawn(xml)
+            self.assertFalse(response.success)
+            self.assertIn(word, response.status_message)
+
+    def test_the_world_goes_on_while_a_large_mesh_is_read(self):
+        write_ball(self.path("large.stl"), 548)  # 600,608 triangles
+        answers = []
+        before = self.sim_time()
+        thread = threading.Thread(target=lambda: answers.append(self.spawn(MESH % self.path("large.stl"))), daemon=True)
+        thread.start()
+        wait_until(lambda: answers or self.sim_time() > before + 0.002 * TICKS, "ticks", DEADLINE_S)
+        self.assertEqual(answers, [], "the answer came before %d ticks had passed" % TICKS)
+        thread.join(DEADLINE_S)
+        # A slow processor comes to the limit, where a sphere stands in for it.
+        self.assertTrue(answers and answers[0].success, answers)
+
+    def test_afterwards_all_is_as_before(self):
+        self.assertTrue(self.spawn(BOX).success)
+        wait_until(lambda: abs(self.get_model_state("m", "").pose.position.z - 0.1) < 0.005, "the box on the floor")
+
+
+if __name__ == "__main__":
+    rospy.init_node("gazebo_hostile_test")
+    rostest.rosrun("gazebo_ros", "gazebo_hostile", GazeboHostile)
