@@ -38,6 +38,7 @@ HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserve
 #: Nodes that come and go by themselves.
 TRANSIENT = frozenset(("/urdf_spawner",))
 _CALLER = "/lab_judge"
+_DEAD_NODE = re.compile(r"\[([\w./-]+)\] process has died \[pid \d+, exit code -?[1-9]")
 
 
 class LabFailed(Exception):
@@ -255,6 +256,8 @@ class Lab:
 
     def _run(self, command, environment):
         with open(self._folder / "output.txt", "ab") as output:
+            # It ends with the judge, however that ends.
+            command = ["setpriv", "--pdeathsig", "INT", "--", *command]
             self._processes.append(subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=output,
                                                     stderr=subprocess.STDOUT, start_new_session=True))
 
@@ -268,12 +271,16 @@ class Lab:
                 roots |= {pid} if mark in Path("/proc/%d/environ" % pid).read_bytes() else set()
         return children_of(roots)
 
+    def _dead_nodes(self):
+        """Names of nodes of which roslaunch says that they ended with an error: nothing starts them again."""
+        return _DEAD_NODE.findall((self._folder / "output.txt").read_text(errors="replace"))
+
     def _await(self, condition, what, deadline):
         while True:
             found = condition()
             if found:
                 return found
-            ended = [process.args[0] for process in self._processes if process.poll() is not None]
+            ended = ["roslaunch" for process in self._processes if process.poll() is not None] or self._dead_nodes()
             if ended or self._own_time.passed_s() > START_TIMEOUT_S:
                 reason = "%s ended" % ended[0] if ended else "not there after %g s" % START_TIMEOUT_S
                 raise LabFailed("the check's own lab does not start: waiting for %s: %s\n%s"

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The judge at work, on one lab of its own for all programs of a suite: exercises, wrong, adversaries."""
+"""The judge at work, on one lab of its own for all programs of a suite: exercises, wrong, adversaries; slow, busy."""
+import contextlib
+import json
 import sys
 import unittest
 from pathlib import Path
@@ -10,7 +12,13 @@ import rostest
 from rf_checks import report
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
 from rf_checks.judge import Judge
+from rf_checks.lab import Lab, robot_description
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from cpu_quota import QuotaUnavailable, cpu_quota
+
+# Keys of a report that hold times.
+TIMES = ("wall_s", "cpu_s", "simulated_s", "real_time_factor")
 PACKAGE = Path(__file__).resolve().parents[2]
 # Program -> the key of its fault, and words of which its sentence must have one.
 WRONG = {
@@ -68,6 +76,93 @@ class Judged(unittest.TestCase):
         raise AssertionError("%s is meant for no exercise" % path)
 
 
+def graded(result):
+    """What must not depend on the machine: the report without times."""
+    def without_times(value):
+        if isinstance(value, dict):
+            return {key: without_times(one) for key, one in value.items() if key not in TIMES}
+        return [without_times(one) for one in value] if isinstance(value, list) else value
+
+    found = without_times(json.loads(report.as_json(result)))
+    for run in found["runs"]:
+        # This criterion says how long it took.
+        run["criteria"] = [one for one in run["criteria"] if one["name"] != "time"] + \
+            [one["points"] for one in run["criteria"] if one["name"] == "time"]
+    return found
+
+
+class Loaded(unittest.TestCase):
+    """The same points on a machine that has something else to do, or none at all."""
+
+    def judge_all(self, programs):
+        """Program -> what it was graded with: dict. Programs: (folder, name)."""
+        judged = Judged()
+        judged.judge = Judge(wall_limit_s=3600.0)
+        try:
+            return {program: graded(judged.check(*program)) for program in programs}
+        finally:
+            judged.judge.close()
+
+    def compare(self, programs, loads, times=1):
+        expected = self.judge_all(programs)
+        for name, load in loads.items():
+            for _ in range(times):
+                try:
+                    with load():
+                        found = self.judge_all(programs)
+                except QuotaUnavailable as reason:
+                    print("not tested: %s: %s" % (name, reason), flush=True)
+                    self.skipTest(str(reason))
+                for program, result in found.items():
+                    if not result["graded"]:
+                        print("%s: %s: not graded: %s" % (name, program[1], result["not_graded"]), flush=True)
+                    else:
+                        self.assertEqual(result, expected[program], "%s, %s" % (name, program[1]))
+
+
+@contextlib.contextmanager
+def other_labs(count):
+    """So many other labs at work, in real time."""
+    with contextlib.ExitStack() as stack:
+        for _ in range(count):
+            stack.enter_context(Lab(robot_description())).start()
+        yield
+
+
+class Slow(Loaded):
+    """A solution and a wrong program at a fifth of a processor."""
+
+    def test_a_slow_machine_changes_no_points(self):
+        self.compare([("exercises/solutions", "joint_command"), ("test/wrong", "exits_early")],
+                     {"20 %": lambda: cpu_quota(20)})
+
+
+class Busy(Loaded):
+    """All solutions and all wrong programs, twice, on slow and on busy machines."""
+
+    PROGRAMS = [*(("exercises/solutions", exercise.name) for exercise in EXERCISES),
+                *(("test/wrong", name) for name in WRONG)]
+
+    def test_full_speed(self):
+        self.compare(self.PROGRAMS, {"full speed": contextlib.nullcontext})
+
+    def test_40_percent(self):
+        self.compare(self.PROGRAMS, {"40 %": lambda: cpu_quota(40)}, times=2)
+
+    def test_20_percent(self):
+        self.compare(self.PROGRAMS, {"20 %": lambda: cpu_quota(20)}, times=2)
+
+    def test_eight_other_labs(self):
+        self.compare(self.PROGRAMS, {"eight labs": lambda: other_labs(8)}, times=2)
+
+
+class Repeated(Loaded):
+    """Wrong programs get the same report each time."""
+
+    def test_five_times(self):
+        self.compare([("test/wrong", name) for name in WRONG], {"again": contextlib.nullcontext}, times=4)
+
+
 class Exercises(Judged):
     """Solutions and skeletons."""
 
@@ -117,7 +212,8 @@ for suite, programs in ((Wrong, WRONG), (Adversaries, ADVERSARIES)):
     for program, (key, *words) in programs.items():
         add(suite, program, fault(program, key, *words))
 
-SUITES = {"exercises": Exercises, "wrong": Wrong, "adversaries": Adversaries}
+SUITES = {"exercises": Exercises, "wrong": Wrong, "adversaries": Adversaries, "slow": Slow, "busy": Busy,
+          "repeated": Repeated}
 
 if __name__ == "__main__":
     name = next(word for word in sys.argv[1:] if word in SUITES)
