@@ -13,6 +13,7 @@ import errno
 import os
 import socket
 import struct
+import time
 from io import BytesIO
 
 _LENGTH = struct.Struct("<I")
@@ -30,16 +31,25 @@ _FULL = (errno.EAGAIN, errno.EWOULDBLOCK, errno.EINTR)
 SEND_BUFFER_BYTES = 128 * 1024
 
 
+# A subscriber that has taken nothing for so long has stopped [s]; from then on it is asked that often [s]. Hundreds of
+# them, asked at every tick, would take the loop more time than the world does.
+STOPPED_S = 0.05
+STOPPED_RETRY_S = 0.05
+
+
 class Peer:
     """The sending end of one subscriber's connection."""
 
-    __slots__ = ("transport", "dropped", "_socket", "_rest")
+    __slots__ = ("transport", "dropped", "_socket", "_rest", "_clock", "_full_since", "_retry_at")
 
-    def __init__(self, transport):
+    def __init__(self, transport, clock=time.perf_counter):
         """``transport``: rospy's connection object (``socket``, ``close()``, ``stat_bytes``, ``stat_num_msg``)."""
         self.transport = transport
         self.dropped = 0
         self._rest = None
+        self._clock = clock
+        self._full_since = None
+        self._retry_at = 0.0
         self._socket = transport.socket
         if self._socket is not None:
             # Small messages go out at once instead of waiting for the acknowledgement of the one before.
@@ -84,14 +94,26 @@ class Peer:
     def _send(self, data):
         if self._socket is None:
             raise OSError("connection closed")
+        if self._full_since is not None and self._clock() < self._retry_at:
+            return 0
         sent = _send(self._socket.fileno(), data, len(data), _FLAGS)
         if sent < 0:
             code = ctypes.get_errno()
             if code in _FULL:
+                self._note_full()
                 return 0
             raise OSError(code, os.strerror(code))
+        self._full_since = None
         self.transport.stat_bytes += sent
         return sent
+
+    def _note_full(self):
+        now = self._clock()
+        if self._full_since is None:
+            self._full_since = now
+            self._retry_at = 0.0
+        elif now - self._full_since >= STOPPED_S:
+            self._retry_at = now + STOPPED_RETRY_S
 
 
 class LoopPublisher:

@@ -6,7 +6,9 @@ import struct
 
 import pytest
 
-from gazebo_ros.loop_publisher import LoopPublisher, PublisherHub
+from gazebo_ros import loop_publisher
+from gazebo_ros.loop_publisher import STOPPED_RETRY_S, STOPPED_S, LoopPublisher, Peer, PublisherHub
+from lab_testing.waiting import wait_until
 
 
 class FakeTransport:
@@ -164,8 +166,8 @@ def test_a_full_peer_loses_the_newest_messages_and_stays_in_frame(hub, impl):
     assert slow.rest == b"" and 0 < len(slow_got) < 3000
     assert slow_got == [struct.pack("<I", number) * 500 for number in range(len(slow_got))]
     assert not hub.backlog
-    publisher.publish(FakeMessage(b"alive"))
-    assert slow.received() == [b"alive"]
+    # It had stopped for longer than a moment, and is not asked at once.
+    wait_until(lambda: publisher.publish(FakeMessage(b"alive")) or slow.received() == [b"alive"], "the slow one")
 
 
 def test_a_message_larger_than_the_socket_arrives_in_parts(hub, impl):
@@ -278,3 +280,36 @@ def test_two_publishers_of_one_topic_do_not_write_into_each_others_messages():
     second.publish(FakeMessage(b"c" * 100))
     got += transport.received()
     assert got == [large, b"c" * 100]
+
+
+@pytest.mark.parametrize("size", [8, 100_000])
+def test_a_peer_that_has_stopped_is_asked_now_and_then_and_served_when_it_reads_again(impl, monkeypatch, size):
+    now, asked, send = [0.0], [], loop_publisher._send
+    monkeypatch.setattr(loop_publisher, "_send", lambda *arguments: asked.append(now[0]) or send(*arguments))
+    transport = impl.connect()
+    peer = Peer(transport, clock=lambda: now[0])
+    message = struct.pack("<I", size) + bytes(size)
+    while not peer.dropped:
+        peer.send(message)
+    # A queue that is full for a moment costs nobody anything.
+    now[0] += 0.9 * STOPPED_S
+    before = len(asked)
+    for _ in range(10):
+        peer.send(message)
+    assert len(asked) == before + 10
+    now[0] += 0.2 * STOPPED_S
+    peer.send(message)
+    began, before = now[0], len(asked)
+    for tick in range(500):
+        now[0] = began + 0.002 * tick
+        peer.send(message)
+        peer.flush()
+    assert 1 <= len(asked) - before <= 1.0 / STOPPED_RETRY_S + 1
+    now[0] += STOPPED_RETRY_S
+    whole = len(transport.received())
+    for _ in range(3):
+        peer.flush()
+        whole += len(transport.received())
+    peer.send(message)
+    assert transport.received() == [bytes(size)]
+    assert whole > 0
