@@ -24,6 +24,9 @@ from sensor_renderer.sensor_element import SensorEntry
 # for [s].
 _LOOK_S, _IDLE_S, _SEEK_S = 0.004, 0.05, 0.25
 
+# A sensor that has failed so often within so long [s, simulated time] is not made anew once more.
+FAILURES, FAILURES_WITHIN_S = 3, 10.0
+
 
 class SensorRenderer:
     """Sensors of the world by name, and the loop that serves them."""
@@ -38,6 +41,7 @@ class SensorRenderer:
         self._mirror = Mirror(DrawingCache(), self._finder, rospy.logwarn)
         self._sensors = {}
         self._refused = set()
+        self._failed_at = {}  # of sensors that failed: simulation times [s]
         self._revision = None
         self._resets = None
         self._drawn_s = None
@@ -76,6 +80,7 @@ class SensorRenderer:
             self._revision = scene.revision
         if snapshot.resets != self._resets:
             self._resets, self._drawn_s = snapshot.resets, None
+            self._revive()
             for driver in self._sensors.values():
                 driver.time_was_reset()
         due = [driver for driver in list(self._sensors.values()) if driver.is_due(snapshot.time_s)]
@@ -94,10 +99,32 @@ class SensorRenderer:
         except rospy.ROSException:
             return  # the node is shutting down
         except Exception as error:  # noqa: BLE001  (one sensor that fails must not blind the others)
-            rospy.logerr("%s failed and is left out from now on: %s: %s" % (entry, type(error).__name__, error))
-            self._refused.update(key for key, other in self._sensors.items() if other is driver)
-            self._sensors = {key: other for key, other in self._sensors.items() if other is not driver}
-            driver.close()
+            self._begin_anew(driver, time_s, error)
+
+    def _begin_anew(self, driver, time_s, error):
+        """A sensor has failed: make it anew, or leave it out until the time is set back where that has not helped."""
+        entry, what = driver.entry, "%s: %s" % (type(error).__name__, error)
+        keys = [key for key, other in self._sensors.items() if other is driver]
+        for key in keys:
+            del self._sensors[key]
+        failed_at = [then for then in self._failed_at.get(keys[0], ()) if time_s - FAILURES_WITHIN_S < then] + [time_s]
+        self._failed_at[keys[0]] = failed_at
+        driver.close()
+        if len(failed_at) < FAILURES:
+            rospy.logerr("%s failed and begins anew: %s" % (entry, what))
+            # Its entry comes with the next look at the scene.
+            self._revision = None
+        else:
+            rospy.logerr("%s failed %d times within %g s and is left out until reset_simulation: %s"
+                         % (entry, FAILURES, FAILURES_WITHIN_S, what))
+            self._refused.update(keys)
+
+    def _revive(self):
+        """The time was set back: sensors that had failed get another chance."""
+        if self._failed_at:
+            self._refused -= self._failed_at.keys()
+            self._failed_at.clear()
+            self._revision = None
 
     def _draw(self, pinhole, pose, colour, depth):
         if self._renderer is None:

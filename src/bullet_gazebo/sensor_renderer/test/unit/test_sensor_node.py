@@ -82,3 +82,36 @@ def test_a_mesh_of_a_package_that_came_later_is_drawn(simulator, tmp_path, monke
     (tmp_path / "made_later" / "package.xml").write_text("<package><name>made_later</name></package>")
     (tmp_path / "made_later" / "part.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert corners(STAND.replace(box, '<mesh filename="package://made_later/part.obj" scale="2 2 2"/>')) == 3
+
+
+def test_a_sensor_that_fails_begins_anew_and_is_left_out_at_the_third_time_until_a_reset(simulator, monkeypatch):
+    made, failing = [], [True] * 4
+
+    class Weak(Eye):
+        def __init__(self, entry):
+            super().__init__(entry)
+            made.append(self)
+
+        def take(self, time_s, link_pose, draw):
+            super().take(time_s, link_pose, draw)
+            if failing and failing.pop():
+                raise RuntimeError("broken on purpose")
+
+    monkeypatch.setattr("importlib.import_module", lambda name: types.SimpleNamespace(Eye=Weak))
+    renderer, reader = SensorRenderer(lambda: None, {"libeye.so": "eyes:Eye"}), SnapshotReader(simulator.folder)
+
+    def go_on(ticks):
+        for tick in ticks:
+            simulator.write(tick, 0.002 * tick, [AT_ORIGIN])
+            for _ in range(3):
+                renderer._turn(reader)
+
+    go_on([100, 200])
+    assert len(made) == 3 and renderer._sensors, "made anew twice"
+    go_on([300, 400, 500])
+    assert len(made) == 3 and not renderer._sensors and len(failing) == 1, "left out"
+    simulator.resets += 1
+    go_on([10, 110])
+    assert len(made) == 5 and renderer._sensors and not failing, "made for the reset, failed once, made anew"
+    go_on([210])
+    assert made[-1].taken
