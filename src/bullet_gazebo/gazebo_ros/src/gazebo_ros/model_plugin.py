@@ -115,9 +115,10 @@ class PluginContext:
     """
 
     def __init__(self, world, model, robot, element, namespace, urdf_xml, log, ros, parameters,
-                 add_screen=None):
+                 add_screen=None, plugins=tuple):
         """``ros`` makes the communication objects (see :mod:`gazebo_ros.ros_objects`); ``parameters`` is the tree of
-        the parameter server at spawn time; ``add_screen``: what :meth:`screen` calls."""
+        the parameter server at spawn time; ``add_screen``, ``plugins``: what :meth:`screen` and :meth:`plugins` call.
+        """
         self.world = world
         self.model = model
         self.robot = robot
@@ -128,6 +129,7 @@ class PluginContext:
         self._ros = ros
         self._parameters = parameters
         self._add_screen = add_screen
+        self._plugins = plugins
         self._opened = []  # of (what it is: kind, name, type ..., the object)
         self._kept = []  # the same, of the plugin before; see `begin_anew`
         self._queues, self._noted = [], set()  # of the queues, the numbers of those that something came into
@@ -199,7 +201,23 @@ class PluginContext:
     def branch(self):
         """A context for a part of the plugin that opens topics and services, and closes them, on its own."""
         return PluginContext(self.world, self.model, self.robot, self.element, self.namespace, self.urdf_xml, self.log,
-                             self._ros, self._parameters, self._add_screen)
+                             self._ros, self._parameters, self._add_screen, self._plugins)
+
+    def plugins(self):
+        """Loop thread: the :class:`ModelPlugin` objects that the model has now, in the order of its description."""
+        return tuple(self._plugins())
+
+    def served(self):
+        """Absolute names of the services that the simulator serves now, this model's and all others: a list."""
+        return self._ros.served()
+
+    def withdraw(self, name):
+        """Loop thread: for good, no longer serve the service ``name`` nor listen to the topic of that name, whoever
+        opened it; for a plugin that guards what others may do in this world.
+
+        Returns the service's handler, for the caller's own requests; None where there is no such service.
+        """
+        return self._ros.withdraw(self.resolve(name))
 
     def screen(self, link, place, size_m, pixels):
         """A rectangle of the model that shows pictures to who draws the world; for a plugin's constructor.

@@ -32,6 +32,7 @@ class RosObjects:
         self._jobs = queue.SimpleQueue()
         self._inboxes = {}
         self._delivered_before = {}
+        self._services = {}
         threading.Thread(target=self._work, name="ros_registrar", daemon=True).start()
 
     def publisher(self, topic, msg_class, latch=False, greet=False):
@@ -67,26 +68,28 @@ class RosObjects:
 
     def service(self, name, srv_class, handler):
         """Advertise ``name``; ``handler(request)`` runs in the loop thread."""
-        return self.service_in_thread(name, srv_class, lambda request: self.call_in_loop(handler, request))
+        return self._serve(name, srv_class, lambda request: self.call_in_loop(handler, request), handler)
 
     def service_in_thread(self, name, srv_class, handler):
         """Advertise ``name``; ``handler(request)`` runs in rospy's thread for the request."""
-        service = _Service(self)
+        return self._serve(name, srv_class, handler, handler)
 
-        def answer(request):
-            try:
-                return handler(request)
-            except rospy.ServiceException:
-                raise
-            except SURVIVED as error:
-                self.faults.note(name, error, "the request is answered with an error")
-                raise rospy.ServiceException("%s failed: %s" % (name, described(error))) from error
+    def served(self):
+        """Names of the services that are advertised now: a list."""
+        return list(self._services)
 
-        def register():
-            service.registration = rospy.Service(name, srv_class, answer)
+    def withdraw(self, name):
+        """Loop thread: no longer serve the service ``name``, nor listen to the topic of that name, whoever opened it.
 
-        self._jobs.put(register)
-        return service
+        Returns the service's handler, which only the caller reaches from then on; None where there is no such service.
+        """
+        for inbox in self._inboxes.get(name, ()):
+            inbox.close()
+        service = self._services.get(name)
+        if service is None:
+            return None
+        service.close()
+        return service.handler
 
     def call_in_loop(self, function, *arguments):
         """Any thread but the loop's: have ``function(*arguments)`` called between two ticks and wait for it.
@@ -113,6 +116,24 @@ class RosObjects:
     def later(self, function):
         """Have ``function()`` called in the registration thread."""
         self._jobs.put(function)
+
+    def _serve(self, name, srv_class, answer_in_thread, handler):
+        service = self._services[name] = _Service(self, name, handler)
+
+        def answer(request):
+            try:
+                return answer_in_thread(request)
+            except rospy.ServiceException:
+                raise
+            except SURVIVED as error:
+                self.faults.note(name, error, "the request is answered with an error")
+                raise rospy.ServiceException("%s failed: %s" % (name, described(error))) from error
+
+        def register():
+            service.registration = rospy.Service(name, srv_class, answer)
+
+        self._jobs.put(register)
+        return service
 
     def _subscribe(self, inbox, msg_class):
         self._inboxes[inbox.topic] = [*self._inboxes.get(inbox.topic, ()), inbox]
@@ -232,11 +253,18 @@ class _Inbox:
 
 
 class _Service:
-    """An advertised service."""
+    """An advertised service. ``handler``: what answers a request."""
 
-    def __init__(self, objects):
+    def __init__(self, objects, name, handler):
         self.registration = None
-        self._objects = objects
+        self.handler = handler
+        self._objects, self._name = objects, name
+        self._is_closed = False
 
     def close(self):
+        if self._is_closed:
+            return
+        self._is_closed = True
+        if self._objects._services.get(self._name) is self:
+            del self._objects._services[self._name]
         self._objects.later(lambda: self.registration.shutdown("closed"))

@@ -218,7 +218,8 @@ class Spawner:
         model = simulation.world.models[model_name]
         context = PluginContext(simulation.world, model, prepared.robot, element, namespace, prepared.xml, self._log,
                                 self._ros, prepared.parameters,
-                                lambda *screen: self._add_screen(prepared, *screen))
+                                lambda *screen: self._add_screen(prepared, *screen),
+                                lambda: [h.plugin for h in simulation.plugins if h.model_name == model_name])
         try:
             plugin = plugin_class(context)
         except PluginError as error:

@@ -167,6 +167,7 @@ class Registrations:
         self.open, self.made, self.on_make = [], [], lambda: None
         monkeypatch.setattr(rospy, "Publisher", self._make)
         monkeypatch.setattr(rospy, "Subscriber", self._make)
+        monkeypatch.setattr(rospy, "Service", self._make)
 
     def _make(self, topic, *arguments, **options):
         self.open.append(topic)
@@ -174,7 +175,8 @@ class Registrations:
         impl = SimpleNamespace(set_queue_size=lambda size: None, add_subscriber_listener=lambda listener: None,
                                add_connection=lambda connection: True, connections=[])
         self.on_make()
-        return SimpleNamespace(impl=impl, unregister=lambda: self.open.remove(topic))
+        return SimpleNamespace(impl=impl, unregister=lambda: self.open.remove(topic),
+                               shutdown=lambda reason: self.open.remove(topic))
 
 
 @pytest.fixture
@@ -329,3 +331,26 @@ def test_a_plugin_that_begins_anew_keeps_its_topics_and_services(scene_of_faults
     context.end_anew()
     context.close()
     assert ros.flush() and registrations.open == [] and services == {}
+
+
+def test_a_service_that_is_withdrawn_is_the_withdrawers_alone(objects, registrations):
+    services = {name: objects.service(name, String, lambda request, name=name: (name, request))
+                for name in ("/a", "/b")}
+    services["/c"] = objects.service_in_thread("/c", String, lambda request: ("/c", request))
+    assert objects.flush() and registrations.open == objects.served() == ["/a", "/b", "/c"]
+    handlers = {name: objects.withdraw(name) for name in ("/a", "/c", "/nothing")}
+    assert objects.served() == ["/b"]
+    assert objects.flush() and registrations.open == ["/b"]
+    assert handlers["/a"](1) == ("/a", 1) and handlers["/c"](2) == ("/c", 2) and handlers["/nothing"] is None
+    for service in services.values():
+        service.close()  # closing twice harms nobody
+    assert objects.flush() and registrations.open == objects.served() == []
+
+
+def test_a_topic_that_is_withdrawn_is_no_longer_heard(objects, registrations):
+    queue = objects.queue("/states", String, depth=3)
+    objects.mailbox("/more", String)
+    assert objects.flush()
+    assert objects.withdraw("/states") is None
+    assert objects.flush() and registrations.open == ["/more"]
+    assert queue.drain() == []
