@@ -96,6 +96,8 @@ class BaxterPlugin(ModelPlugin):
         self._servo = self._servo_index = None  # joints that were driven to a position last, and which those are
         self._last_warning = {}
         self._has_started = before is not None
+        #: Called in the loop with (side, message, JointCommand or None where it was refused) for each joint command.
+        self.command_observers = []
 
     def _hold_other_joints(self, robot):
         """Head straight, fingers open, and nothing left to dangle."""
@@ -263,6 +265,17 @@ class BaxterPlugin(ModelPlugin):
     def _tell_of_reset(self):
         self._resets.publish(UInt32(next(_resets)))
 
+    @property
+    def is_enabled(self):
+        """Whether the arms obey commands."""
+        return self._baxter.state.enabled
+
+    def start_over(self, time_s):
+        """Disable; release and clear stops; speeds and time-outs as at the start. The joints stay where they are."""
+        for event in (Event.ESTOP_RELEASE, Event.RESET):
+            self._apply(event, time_s)
+        self._baxter.restore_settings()
+
     # -- in
 
     def _with_own_takers(self, takers):
@@ -317,6 +330,10 @@ class BaxterPlugin(ModelPlugin):
         except CommandRefused as refusal:
             kind = (side, self._baxter.state.enabled)
             self._warn(time_s, kind, "%s limb: joint command ignored: %s" % (side, refusal))
+            command = None
+        for observe in self.command_observers:
+            observe(side, msg, command)
+        if command is None:
             return
         if command.clamped:
             self._warn(time_s, (side, "clamped"), "%s limb: joint command clamped to the limits of %s" % (

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter's brain: who may move the arms, and what they do when nobody may."""
-from .arms import SPEED_RATIO, Arms
+from .arms import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
 from .errors import CommandRefused, HardwareError
 from .robot_state import RobotState
 
@@ -24,6 +24,7 @@ class Baxter:
         self.arms = Arms(limbs, limits, position, speed_ratio=SPEED_RATIO[profile], dt=dt)
         self.arms.stop(position, 0.0 * position, brakes=True)
         self._sinks = disabled == "sink"
+        self._speed_ratio = SPEED_RATIO[profile]
 
     def take_over(self, position, velocity):
         """Begin with arms that are moving, (n,) measured: forget every command, bring them to rest, and hold them."""
@@ -38,6 +39,12 @@ class Baxter:
             # Nothing that was commanded before counts any more.
             self.arms.stop(position, velocity, brakes=not self.state.enabled)
         return refusal
+
+    def restore_settings(self):
+        """Speed ratios and command time-outs of all limbs as they were at the start."""
+        for side in self.arms.sides:
+            self.arms.set_speed_ratio(side, self._speed_ratio)
+            self.arms.set_timeout(side, COMMAND_TIMEOUT_S)
 
     def command(self, side, mode, names, values, time_s, position, velocity):
         """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled."""

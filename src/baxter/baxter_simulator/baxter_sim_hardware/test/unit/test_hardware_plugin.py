@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from baxter_core_msgs.msg import JointCommand
-from std_msgs.msg import Bool, Empty, UInt16
+from std_msgs.msg import Bool, Empty, Float64, UInt16
 
 from baxter_sim_hardware import JOINT_SUFFIXES, ModelMismatch, interface
 from baxter_sim_hardware.limbs import limbs_of
+from baxter_sim_hardware.robot_state import State
 from gazebo_ros.model_plugin import PluginError
 from urdf_model import parse_urdf
 from urdf_model.transforms import matrix_from_quaternion
@@ -259,3 +260,35 @@ def test_a_thousand_malformed_commands_move_nothing(lab):
 def test_documentation_lists_the_table():
     text = (Path(__file__).resolve().parents[6] / "docs" / "interface.md").read_text(encoding="utf-8")
     assert interface.markdown_table() in text, "rosrun baxter_sim_hardware interface_table prints it"
+
+
+def test_an_observer_sees_each_joint_command_and_whether_it_was_obeyed(make_lab):
+    lab = make_lab()
+    seen = []
+    lab.plugin.command_observers.append(lambda side, message, command: seen.append((side, message, command)))
+    message = JointCommand(mode=1, names=["left_s0"], command=[0.3])
+    lab.send("limb/left/joint_command", message)
+    lab.run(0.002)
+    assert seen == [("left", message, None)] and not lab.plugin.is_enabled
+    lab.send("set_super_enable", Bool(True))
+    lab.run(0.002)
+    lab.send("limb/left/joint_command", message)
+    lab.run(0.002)
+    assert lab.plugin.is_enabled
+    side, _, command = seen[1]
+    assert (side, command.mode, list(command.values)) == ("left", 1, [0.3])
+
+
+def test_starting_over_leaves_nothing_of_what_was_set(make_lab):
+    lab = make_lab(parameters={"enable": True})
+    lab.send("limb/left/set_speed_ratio", Float64(0.1))
+    lab.send("limb/left/joint_command_timeout", Float64(9.0))
+    lab.send("set_super_stop", Empty())
+    lab.run(0.01)
+    lab.plugin.start_over(lab.world.time_s)
+    arms = lab.plugin._baxter.arms
+    assert (arms.speed_ratio("left"), arms.timeout("left")) == (1.0, 0.2)
+    assert lab.plugin._baxter.state.state is State.DISABLED
+    before = lab.model.read_joints()[0]
+    lab.run(0.5)
+    np.testing.assert_allclose(lab.model.read_joints()[0], before, atol=1e-3)
