@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command line of `./baxter.sh check`."""
 import argparse
+import os
 import shutil
 import signal
 import sys
+import tempfile
 from pathlib import Path
 
 import rospkg
 
 from rf_checks import report
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
+from rf_checks.isolation import NotIsolated
 from rf_checks.judge import WALL_LIMIT_S, Judge
 from rf_checks.lab import LabFailed
+from rf_checks.submission import BadSubmission
 
 PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
 
@@ -47,6 +51,9 @@ def _parser():
     parser.add_argument("--seed", type=int, default=0, help="seed of start postures and goals (default: %(default)s)")
     parser.add_argument("--wall-limit", type=float, default=WALL_LIMIT_S, metavar="SECONDS",
                         help="give up ungraded after so long; a slow or busy machine needs more (default: %(default)g)")
+    parser.add_argument("--trusted", action="store_true",
+                        help="where this machine allows no sandbox, run the program without one: your own program, or "
+                             "one whose author you trust as yourself")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write the result as JUnit XML")
     return parser
@@ -67,6 +74,9 @@ def _program_and_exercise(parser, options):
     for report_file in (options.json, options.junit):
         if report_file is not None and not report_file.absolute().parent.is_dir():
             parser.error("there is no folder %s to write %s into" % (report_file.absolute().parent, report_file.name))
+        if report_file is not None and report_file.is_symlink():
+            parser.error("%s is a link, to %s; give the report a file of its own" % (
+                report_file, os.readlink(report_file)))
     if not options.wall_limit > 0.0:
         parser.error("the wall limit is %g, expected a positive number of seconds" % options.wall_limit)
     if options.seed < 0:
@@ -94,6 +104,21 @@ def start(name):
     return PASSED
 
 
+def write_report(path, text):
+    """Put `text` in place of a file, whole or not at all. A link of that name is replaced, not followed."""
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.absolute().parent, prefix=".%s-" % path.name,
+                                     delete=False) as draft:
+        draft.write(text)
+    os.chmod(draft.name, 0o666 & ~_umask())
+    os.replace(draft.name, path)
+
+
+def _umask():
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
 def main(argv=None):
     """Returns the exit status."""
     parser = _parser()
@@ -108,8 +133,15 @@ def main(argv=None):
         signal.signal(number, lambda *_: sys.exit(130))
     print("Checking %s as %s %s; this takes up to a minute." % (program, exercise.lab, exercise.name), flush=True)
     try:
-        with Judge(options.wall_limit) as judge:
+        with Judge(options.wall_limit, options.trusted) as judge:
             result = judge.check(exercise, program, options.seed)
+    except NotIsolated as refusal:
+        print("a stranger's program is not run without walls around it, and this machine allows none: %s" % refusal,
+              file=sys.stderr)
+        return JUDGE_FAILED
+    except BadSubmission as refusal:
+        print("check: %s" % refusal, file=sys.stderr)
+        return WRONG_WORDS
     except (LabFailed, OSError) as error:
         print("the check itself failed, which is not your program's fault: %s" % error, file=sys.stderr)
         return JUDGE_FAILED
@@ -118,7 +150,7 @@ def main(argv=None):
     print(report.text(result))
     for path, write in ((options.json, report.as_json), (options.junit, report.as_junit)):
         if path is not None:
-            path.write_text(write(result) + "\n", encoding="utf-8")
+            write_report(path, write(result) + "\n")
     if result.not_graded:
         return NOT_GRADED
     return PASSED if report.has_passed(result) else NOT_PASSED

@@ -18,6 +18,8 @@ _ON_ITS_WAY_S = 0.15
 PYTHON2 = ("print statement", "Missing parentheses in call to 'print'",
            "multiple exception types must be parenthesized")
 _THREAD = re.compile(r"^(?:Current thread|Thread) 0x", re.MULTILINE)
+#: An arm that holds still wavers by less than this in all of a run [rad].
+STRAY_RAD = 0.05
 _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
 
 
@@ -91,10 +93,22 @@ def meddling(run):
         topic, nodes = next(iter(sorted(run.intruders.items())))
         return Fault("intruder", "%s publishes on %s, which belongs to the simulator; the check measures the robot "
                      "itself, so this gains nothing" % (" and ".join(sorted(nodes)), topic), 0.0)
-    jump = max((largest_jump(run.recording.arm(side)) for side in SIDES), default=0.0) if run.recording.records else 0.0
-    if jump > JUMP_RAD:
-        return Fault("teleport", "an arm jumped by %.1f rad within 10 ms: /gazebo/set_model_configuration or a reset "
-                     "puts it there, which no robot can; command its joints instead" % jump, 0.0)
+    return _moved_otherwise(run)
+
+
+def _moved_otherwise(run):
+    """A Fault for arms that something else than joint commands has moved, or None. Told from causes, not from jumps."""
+    recording = run.recording
+    if not recording.records:
+        return None
+    jump = max(largest_jump(recording.arm(side)) for side in SIDES)
+    if recording.placed_count() or jump > JUMP_RAD:
+        return Fault("teleport", "an arm was put elsewhere past its drives (/gazebo/set_model_configuration or a "
+                     "reset), which no robot can; command its joints instead", 0.0)
+    path = recording.path_without_cause()
+    if path > STRAY_RAD:
+        return Fault("moved_otherwise", "an arm moved by %.2f rad although the robot had not obeyed a single joint "
+                     "command: something else pushed it" % path, 0.0)
     return None
 
 
@@ -105,6 +119,9 @@ def behaviour(run, sides, limit_s):
                      "loop without a pause", 0.4)
     if run.ended == "processes":
         return Fault("processes", "the program started more and more processes and was stopped", 0.0)
+    if run.ended == "memory":
+        return Fault("memory", "the program took more than 2 GB of memory and was stopped: does a list grow for ever?",
+                     0.0)
     if run.ended == "flood" or is_flood(run.recording.command_counts()):
         return Fault("flood", "joint commands came faster than %d a second: the robot reads some 100; end the loop "
                      "with rate.sleep() of a rospy.Rate(100)" % FLOOD_COMMANDS, 0.4)
@@ -209,6 +226,6 @@ def diagnose(run, exercise, call, robot, share):
 def behaviour_that_hides(run, sides, limit_s):
     """Faults of behaviour that make every measurement meaningless: they come before the exercise's own."""
     fault = behaviour(run, sides, limit_s)
-    first = ("output", "processes", "flood", "busy", "crashed", "not_enabled", "wrong_arm", "repeated_names", "lengths",
-             "degrees")
+    first = ("output", "processes", "memory", "flood", "busy", "crashed", "not_enabled", "wrong_arm", "repeated_names",
+             "lengths", "degrees")
     return fault if fault and fault.key in first else None

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from rf_checks import diagnosis
+from rf_checks import diagnosis, isolation
 from rf_checks.lab import Lab, LabFailed, MasterSilent, TooSlow, robot_description, student_folder
 from rf_checks.observing import Observer
 from rf_checks.pacing import Tree
 from rf_checks.recording import RECORD_S, Criterion, Fault, Recording, Run
 from rf_checks.robot import Robot
 from rf_checks.run_clock import RunClock
-from rf_checks.sandbox import CPU_S, PROCESSES, Student, adopt_orphans, has_namespaces, python
+from rf_checks.sandbox import CPU_S, Startup, Student, adopt_orphans
 
 #: A check that is not done by then [s, wall] is given up, ungraded: the only limit in the time of the wall.
 WALL_LIMIT_S = 900.0
@@ -26,10 +26,9 @@ PAUSED_S = 10.0
 _LOOK_S = 0.05
 #: How a run ended -> in the report's words; other words stay as they are.
 ENDS = {"sim time": "simulated time limit", "satisfied": "seen enough", "output": "wrote too much",
-        "processes": "too many processes", "flood": "flood of commands", "busy": "computed without end",
-        "paused": "simulation paused", "meddled": "lab meddled with"}
+        "processes": "too many processes", "memory": "too much memory", "flood": "flood of commands",
+        "busy": "computed without end", "paused": "simulation paused", "meddled": "lab meddled with"}
 MASTER = "/rosout and with it the ROS master"
-OWN_TOPICS = ("/clock", "/robot/joint_states", "/robot/state")
 
 
 @dataclass(frozen=True)
@@ -73,9 +72,16 @@ class Result:
 class Judge:
     """Keeps one lab for any number of programs; a context manager."""
 
-    def __init__(self, wall_limit_s=WALL_LIMIT_S):
-        """`wall_limit_s`: a check that takes longer is given up, ungraded [s]."""
+    def __init__(self, wall_limit_s=WALL_LIMIT_S, trusted=False):
+        """`wall_limit_s`: a check that takes longer is given up, ungraded [s]. `trusted`: where this machine allows no
+        sandbox, run programs without. Raises isolation.NotIsolated.
+
+        `isolation.try_to_enter_network` is for the caller to call, before any thread starts.
+        """
         self._wall_limit_s = wall_limit_s
+        self.has_walls = not isolation.problem()
+        if not (self.has_walls or trusted):
+            raise isolation.NotIsolated(isolation.problem())
         self._description = robot_description()
         self.robot = Robot(self._description)
         self._lab = None
@@ -118,8 +124,8 @@ class Judge:
             if found and (found.cap < 0.9 or (found.key in REPEATED and share < 0.5)):
                 fault = found
                 not_run = (Criterion("as the run before", share, 100.0, "not run, for the fault below"),)
-        isolation = "namespaces" if has_namespaces() else "session"
-        return Result(exercise, str(program), seed, tuple(results), isolation, time.monotonic() - began, not_graded)
+        walls = "bubblewrap" if self.has_walls else "none: trusted"
+        return Result(exercise, str(program), seed, tuple(results), walls, time.monotonic() - began, not_graded)
 
     def run(self, program, exercise, call, deadline=float("inf")):
         """One run; returns a Run. Raises TooSlow at `deadline` (monotonic, s)."""
@@ -128,14 +134,13 @@ class Judge:
         observer = Observer(call, lambda output: self._is_satisfied(exercise, call, run, output),
                             lambda: self._look_at_graph(lab, run))
         clock = RunClock()
-        environment = {**os.environ, "ROS_MASTER_URI": lab.uri, "ROS_HOSTNAME": "localhost", **clock.environment,
-                       "PYTHONPATH": os.pathsep.join((str(student_folder()), os.environ.get("PYTHONPATH", "")))}
-        for name in ("ROS_IP", "ROS_NAMESPACE", "LAB_JUDGE_SOCKET"):
+        environment = {**os.environ, "ROS_MASTER_URI": lab.uri, "ROS_HOSTNAME": "localhost"}
+        for name in ("ROS_IP", "ROS_NAMESPACE"):
             environment.pop(name, None)
         lab.watch.helpers.roots = lab.helper_pids()
         began = time.monotonic()
-        student = observer.student = Student([python(), str(program), *call.arguments], environment, _workspace(),
-                                             lab.folder, pass_fds=(clock.descriptor,))
+        student = observer.student = Student(program, call.arguments, environment, self.has_walls,
+                                             Startup(student_folder(), clock.environment, (clock.descriptor,)))
         lab.watch.program = tree = Tree((student.pid,))
         lab.watch.gives_up = lambda: time.monotonic() > deadline
         lab.run_clock, lab.is_hurried = clock, True
@@ -170,7 +175,7 @@ class Judge:
                 self.close()
             try:
                 if self._lab is None:
-                    self._lab = Lab(self._description)
+                    self._lab = Lab(self._description, self.has_walls)
                     self._lab.start(deadline)
                 self._lab.reset(posture, deadline)
                 return self._lab
@@ -185,14 +190,13 @@ class Judge:
         """Wait for the end of a run, and end it where the records cannot: when there are none."""
         began = time.monotonic()
         while not observer.wait(_LOOK_S):
+            excess = observer.student.excess()
             if not lab.is_alive:
                 observer.end("simulator gone")
             elif lab.stood_still_s() > PAUSED_S:
                 observer.end("paused")
-            elif observer.student.wrote_too_much:
-                observer.end("output")
-            elif len(observer.student.family()) > PROCESSES:
-                observer.end("processes")
+            elif excess:
+                observer.end(excess)
             elif time.monotonic() > deadline:
                 simulated_s, wall_s = len(observer.records) * RECORD_S, time.monotonic() - began
                 raise TooSlow("the machine reached %s of real time (%.1f simulated s in %.0f s)"
@@ -208,10 +212,7 @@ class Judge:
         """Whether a node of the lab's is gone, or somebody else publishes the simulator's topics; `run` says who."""
         try:
             run.missing_nodes = lab.missing_nodes()
-            for topic in OWN_TOPICS:
-                strangers = lab.publishers(topic) - lab.own_nodes
-                if strangers:
-                    run.intruders[topic] = sorted(strangers)
+            run.intruders.update(lab.intruders())
         except MasterSilent:
             # A busy machine answers late; a master that was halted or ended does not answer at all.
             if lab.has_stopped_master():
@@ -247,7 +248,3 @@ def _with_exit(records):
     if ends:
         records[-1]["exited"] = ends[-1]
     return records
-
-
-def _workspace():
-    return os.environ.get("LAB_ROOT") or str(Path(__file__).resolve().parents[5])

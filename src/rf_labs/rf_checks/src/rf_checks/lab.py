@@ -21,8 +21,9 @@ from pathlib import Path
 
 import rospkg
 
+from rf_checks import isolation
 from rf_checks.pacing import OwnTime, Watch, children_of, direct_children
-from rf_checks.recorder_names import PLUGIN_ELEMENT, SOCKET_VARIABLE
+from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SERVED, SOCKETS_VARIABLE
 
 #: How long the lab may take to start, and to put the robot back [s], as OwnTime counts.
 START_TIMEOUT_S, RESET_TIMEOUT_S = 120.0, 30.0
@@ -36,7 +37,12 @@ _SHORTEST_RECORD_S = 0.0025
 #: meanwhile either.
 HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserver")
 #: Nodes that come and go by themselves.
-TRANSIENT = frozenset(("/urdf_spawner",))
+SPAWNER = "/urdf_spawner"
+TRANSIENT = frozenset((SPAWNER,))
+#: Topics that programs publish on, too.
+SHARED_TOPICS = frozenset(("/rosout", "/rosout_agg", "/tf", "/tf_static", "/diagnostics"))
+#: How the IK nodes tell the recorder what they were asked.
+OBSERVER = ("IK_OBSERVER", "rf_checks.ik_witness:Witness")
 _CALLER = "/lab_judge"
 _DEAD_NODE = re.compile(r"\[([\w./-]+)\] process has died \[pid \d+, exit code -?[1-9]")
 
@@ -65,9 +71,10 @@ def free_port():
 class Lab:
     """Start with :meth:`start`, end with :meth:`close`; a context manager."""
 
-    def __init__(self, description_xml):
-        """`description_xml`: the robot's URDF text."""
+    def __init__(self, description_xml, walls=True):
+        """`description_xml`: the robot's URDF text. `walls`: in a sandbox of its own, as isolation.py says."""
         self.uri = ""
+        self._walls = walls
         self.watch = Watch()
         #: Called with each record (dict), in the thread that lets the world go on: until it returns, the world waits.
         self.on_record = lambda record: None
@@ -92,8 +99,9 @@ class Lab:
         # Records that came, and how many of them when stood_still_s looked last.
         self._heard = self._looked_at = 0
         self._is_held = False
-        #: Names of the lab's own nodes.
-        self.own_nodes = frozenset()
+        #: Names of the lab's own nodes, and of the topics that they alone publish.
+        self.own_nodes = self.own_topics = frozenset()
+        self._is_closed_world = False
 
     def __enter__(self):
         return self
@@ -116,12 +124,16 @@ class Lab:
         self._folder = Path(tempfile.mkdtemp(prefix="lab-judge-"))
         port = free_port()
         self.uri = "http://localhost:%d" % port
-        environment = {**os.environ, "ROS_MASTER_URI": self.uri, "ROS_HOSTNAME": "localhost",
-                       "ROS_LOG_DIR": str(self._folder / "log"), SOCKET_VARIABLE: str(self._folder / "socket")}
+        (self._folder / "sockets").mkdir()
+        environment = isolation.environment_of(os.environ) if self._walls else dict(os.environ)
+        environment.update({"ROS_MASTER_URI": self.uri, "ROS_HOSTNAME": "localhost",
+                            "ROS_LOG_DIR": str(self._folder / "log"), SOCKETS_VARIABLE: str(self._folder / "sockets"),
+                            OBSERVER[0]: OBSERVER[1]})
         environment.pop("ROS_IP", None)
         self._ended = threading.Event()
+        self._is_closed_world = False
         with socket.socket(socket.AF_UNIX) as listener:
-            listener.bind(str(self._folder / "socket"))
+            listener.bind(str(self._folder / "sockets" / RECORDS))
             listener.listen(1)
             listener.settimeout(0.1)
             description = self._folder / "robot.urdf"
@@ -136,6 +148,7 @@ class Lab:
         threading.Thread(target=self._pace, args=(self._connection, self._ended), daemon=True).start()
         self._await(self._all_there, "the nodes around the robot", deadline)
         self.own_nodes = frozenset(self.nodes() - TRANSIENT)
+        self.own_topics = frozenset(topic for topic, _ in self._state()[0]) - SHARED_TOPICS
 
     def reset(self, posture, deadline=float("inf")):
         """Disable the robot, put its arms into `posture` (dict of joint to rad), and stop the time until go_on().
@@ -154,6 +167,15 @@ class Lab:
             if time.monotonic() > deadline:
                 self.go_on()
                 raise TooSlow("the robot was still being put back")
+        self._own_time.restart()
+        while not self._is_closed_world:
+            # Services leave the master's lists a moment after they are closed.
+            served = {name for name, _ in self._state()[2] if name.startswith("/gazebo/")} - SERVED
+            served = {name for name in served if not name.endswith(("logger_level", "loggers"))}
+            self._is_closed_world = not served
+            if served and self._own_time.passed_s() > RESET_TIMEOUT_S:
+                self.go_on()
+                raise LabFailed("the check's own lab serves what it must not: %s" % ", ".join(sorted(served)))
 
     def go_on(self):
         """Let time pass again after reset()."""
@@ -170,9 +192,11 @@ class Lab:
         """Names of all nodes that the master knows: a set. Raises LabFailed when there is no master."""
         return {name for kind in self._state() for _, names in kind for name in names} - {_CALLER}
 
-    def publishers(self, topic):
-        """Names of the nodes that publish `topic`."""
-        return {name for found, names in self._state()[0] if found == topic for name in names}
+    def intruders(self):
+        """Who else publishes on topics that are the lab's own: dict of topic to node names."""
+        strangers = {topic: sorted(set(names) - self.own_nodes - TRANSIENT) for topic, names in self._state()[0]
+                     if topic in self.own_topics}
+        return {topic: names for topic, names in strangers.items() if names}
 
     def missing_nodes(self):
         """The lab's own nodes that are no longer registered."""
@@ -249,12 +273,19 @@ class Lab:
         self.watch.close()
         self._own_time.close()
         self._still_time.close()
-        if self._folder is not None:
+        deadline = time.monotonic() + STOP_TIMEOUT_S
+        # What was killed may still be writing its last lines.
+        while self._folder is not None and self._folder.exists() and time.monotonic() < deadline:
             shutil.rmtree(self._folder, ignore_errors=True)
+            time.sleep(0.005)
 
     # -- below
 
     def _run(self, command, environment):
+        if self._walls:
+            binds = isolation.caches(os.environ, self._folder / "caches")
+            command = [*isolation.command(os.environ, [(self._folder, self._folder, True), *binds],
+                                          own_network=not isolation.has_own_network()), *command]
         with open(self._folder / "output.txt", "ab") as output:
             # It ends with the judge, however that ends.
             command = ["setpriv", "--pdeathsig", "INT", "--", *command]
@@ -265,7 +296,7 @@ class Lab:
         """All processes of this lab."""
         roots = {process.pid for process in self._processes if process.poll() is None}
         # What lost its parent is a child of the judge; a student's program does not have this variable.
-        mark = ("%s=%s" % (SOCKET_VARIABLE, self._folder)).encode()
+        mark = ("%s=%s" % (SOCKETS_VARIABLE, self._folder)).encode()
         for pid in direct_children(os.getpid()) - roots:
             with contextlib.suppress(OSError):
                 roots |= {pid} if mark in Path("/proc/%d/environ" % pid).read_bytes() else set()
@@ -304,7 +335,9 @@ class Lab:
         services = {name for name, _ in self._state()[2]}
         return (all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services
                     for side in ("left", "right"))
-                and "/robot_state_publisher" in self.nodes() and self.joint_names and self._has_time)
+                and "/robot_state_publisher" in self.nodes() and self.joint_names and self._has_time
+                # The spawner still waits for the answer of a service that the first reset withdraws.
+                and SPAWNER not in self.nodes())
 
     def _pace(self, connection, ended):
         """Read records, wait until the watched programs rest, let the world go on."""

@@ -6,7 +6,6 @@ import numpy as np
 
 from rf_checks import diagnosis
 from rf_checks.recording import RECORD_S, SIDES
-from rf_checks.sandbox import PROCESSES
 
 #: A program that hardly ever rests for so much of its own processor time computes without end [s]; this share of the
 #: records is hardly ever.
@@ -70,10 +69,9 @@ class Observer:
             return "meddled" if self._look_at_graph() else "exited"
         if count % _LOOK_AT_GRAPH == 0 and self._look_at_graph():
             return "meddled"
-        if self.student.wrote_too_much:
-            return "output"
-        if count % _LOOK_AT_FAMILY == 0 and len(self.student.family()) > PROCESSES:
-            return "processes"
+        excess = self.student.excess() if count % _LOOK_AT_FAMILY == 0 else ""
+        if excess:
+            return excess
         earlier = self.records[max(0, count - 1 - self._window)]
         if sum(record["counts"][side] - earlier["counts"][side] for side in SIDES) > diagnosis.FLOOD_COMMANDS:
             return "flood"

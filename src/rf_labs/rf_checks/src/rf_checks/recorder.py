@@ -1,35 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A model plugin that tells the judge what the simulated robot does, and lets time pass only as the judge agrees.
 
-It sits in the simulator's loop, so that it sees joints and contacts themselves and not what somebody publishes. The
-judge listens on the Unix socket that the environment variable LAB_JUDGE_SOCKET names. Every RECORD_TICKS ticks one line
-of JSON goes out (`Recording` in recording.py reads them), and the loop waits for one line back: empty, or an order.
-That is at the beginning of a tick, before any other plugin looks at its messages: whatever the program answers to the
-last tick's time and joint states is there when the tick begins.
+It sits in the simulator's loop: it sees joints and contacts themselves, which commands the robot was given, by whom,
+and whether it took them, and whether anything else put its joints somewhere. Nothing that it tells comes from a topic.
+The judge listens on a Unix socket in the folder that the environment variable LAB_JUDGE_SOCKETS names. Every
+RECORD_TICKS ticks one line of JSON goes out (`Recording` in recording.py reads them), and the loop waits for one line
+back: empty, or an order to put the robot back. That is at the beginning of a tick, before any other plugin looks at its
+messages: whatever the program answers to the last tick's time and joint states is there when the tick begins.
+
+With the first order it takes from everybody else the services by which the world is changed: from then on the simulator
+serves what reads.
 """
 import json
 import os
 import socket
-import threading
 
 import rospy
-from baxter_core_msgs.msg import AssemblyState, JointCommand
-from baxter_kinematics_msgs.msg import IKReport
-from gazebo_msgs.srv import SetModelConfiguration
-from std_msgs.msg import Bool, Empty, Float64
-from std_srvs.srv import Empty as EmptyService
+from gazebo_msgs.srv import SetModelConfigurationRequest
+from std_srvs.srv import EmptyRequest
 
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
-from rf_checks.recorder_names import SOCKET_VARIABLE
+from rf_checks.recorder_names import RECORDS, REQUESTS, SERVED, SILENCED, SOCKETS_VARIABLE
 
 RECORD_TICKS = 5  # 10 ms of simulation
 SIDES = ("left", "right")
-# Commands that are kept between two records; who sends more floods, and the rest is only counted.
-COMMANDS_KEPT = 200
-#: Commands written out in one record.
+#: Commands written out in one record; who sends more floods, and the rest is only counted.
 COMMANDS_TOLD = 3
-# For a service that was there from the start [s, wall].
-RESET_TIMEOUT_S = 60.0
+_DATAGRAM_BYTES = 1 << 18
+_RESET, _CONFIGURE = "/gazebo/reset_world", "/gazebo/set_model_configuration"
 
 
 class Recorder(ModelPlugin):
@@ -37,44 +35,79 @@ class Recorder(ModelPlugin):
 
     def __init__(self, context):
         super().__init__(context)
-        path = os.environ.get(SOCKET_VARIABLE)
-        if not path:
-            raise PluginError("%s is not set; this plugin works for `./baxter.sh check`" % SOCKET_VARIABLE)
+        folder = os.environ.get(SOCKETS_VARIABLE)
+        if not folder:
+            raise PluginError("%s is not set; this plugin works for `./baxter.sh check`" % SOCKETS_VARIABLE)
+        self._requests = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._requests.bind(os.path.join(folder, REQUESTS))
+        self._requests.setblocking(False)
         self._socket = socket.socket(socket.AF_UNIX)
-        self._socket.connect(path)
+        self._socket.connect(os.path.join(folder, RECORDS))
         self._answers = self._socket.makefile("r", encoding="utf-8")
         self._model = context.model
-        self._commands = [(side, context.queue("/robot/limb/%s/joint_command" % side, JointCommand, COMMANDS_KEPT))
-                          for side in SIDES]
-        self._reports = [(side, context.queue("/ExternalTools/%s/PositionKinematicsNode/IKReport" % side, IKReport, 50))
-                         for side in SIDES]
-        self._states = context.mailbox("/robot/state", AssemblyState)
-        self._enabled = False
+        self._robot = None
+        self._commands = {side: [] for side in SIDES}
         self._counts = dict.fromkeys(SIDES, 0)
+        self._accepted = dict.fromkeys(SIDES, 0)
+        self._placed = 0
+        self._is_ordered = False
         self._done = []
-        self._publishers = None
+        self._handlers = {}
         self._tell({"joints": list(self._model.joint_names)})
 
     def update(self, time_s, step_s):
         if round(time_s / step_s) % RECORD_TICKS or self._socket is None:
             return
-        state = self._states.take()
-        if state is not None:
-            self._enabled = bool(state.enabled)
+        self._watch_robot()
         record = {"t": round(time_s, 4), "q": [round(value, 6) for value in self._model.read_joints()[0]],
-                  "enabled": self._enabled, "contacts": self._contacts(), "commands": self._take_commands(),
-                  "counts": self._counts, "ik": self._take_reports()}
+                  "enabled": self._robot is not None and self._robot.is_enabled, "contacts": self._contacts(),
+                  "commands": self._take_commands(), "counts": dict(self._counts), "accepted": dict(self._accepted),
+                  "placed": self._placed, "ik": self._take_requests()}
         if self._done:
             record["done"] = self._done.pop()
         self._tell(record)
         answer = self._hear()
         if answer:
-            threading.Thread(target=self._obey, args=(answer,), daemon=True).start()
+            self._done.append(self._obey(answer, time_s))
+
+    def joints_set(self):
+        self._note_placed()
+
+    def reset(self):
+        self._note_placed()
 
     def close(self):
+        self._requests.close()
         if self._socket is not None:
             self._socket.close()
             self._socket = None
+
+    def _note_placed(self):
+        if not self._is_ordered:
+            self._placed += 1
+
+    def _watch_robot(self):
+        """Have the robot's plugin tell of its commands; it may be another object than before."""
+        robot = next((plugin for plugin in self.context.plugins() if hasattr(plugin, "command_observers")), None)
+        if robot is not self._robot and robot is not None:
+            robot.command_observers.append(self._on_command)
+        self._robot = robot
+
+    def _on_command(self, side, message, command):
+        """command: the checked command, None where the robot refused it."""
+        caller = (getattr(message, "_connection_header", None) or {}).get("callerid", "")
+        self._counts[side] += 1
+        self._accepted[side] += command is not None
+        told = self._commands[side]
+        told.append([side, message.mode, list(message.names), list(message.command), caller, command is not None])
+        # The last ones are what the robot obeys.
+        del told[:-COMMANDS_TOLD]
+
+    def _take_commands(self):
+        told = [command for side in SIDES for command in self._commands[side]]
+        for side in SIDES:
+            self._commands[side] = []
+        return told
 
     def _contacts(self):
         name = self._model.name
@@ -82,25 +115,14 @@ class Recorder(ModelPlugin):
                                      _link(name, contact.model_b, contact.link_b))))
                        for contact in self.context.world.contacts(self._model) if contact.distance < 0.0})
 
-    def _take_commands(self):
+    def _take_requests(self):
         told = []
-        for side, queue in self._commands:
-            messages = queue.drain()
-            self._counts[side] = queue.delivered
-            # The last ones are what the robot obeys.
-            told += [[side, msg.mode, list(msg.names), list(msg.command)] for msg in messages[-COMMANDS_TOLD:]]
-        return told
-
-    def _take_reports(self):
-        told = []
-        for side, queue in self._reports:
-            for report in queue.drain():
-                for verdict in report.verdicts:
-                    pose = verdict.target.pose
-                    told.append([side, verdict.target.header.frame_id,
-                                 [getattr(pose.position, axis) for axis in "xyz"],
-                                 [getattr(pose.orientation, axis) for axis in "xyzw"], verdict.verdict])
-        return told
+        while True:
+            try:
+                datagram = self._requests.recv(_DATAGRAM_BYTES)
+            except OSError:  # none is left
+                return told
+            told += json.loads(datagram)["poses"]
 
     def _tell(self, record):
         try:
@@ -122,30 +144,28 @@ class Recorder(ModelPlugin):
             self._judge_has_gone()
         return json.loads(line) if line.strip() else None
 
-    def _obey(self, order):
-        """A thread of its own: put the robot back, as clients can: `names`, `positions` [rad] of the arms."""
+    def _obey(self, order, time_s):
+        """Put the robot back, disabled: `names`, `positions` [rad] of the arms. Returns "", or why it cannot be."""
+        self._close_world()
+        if self._robot is None:
+            return "the robot's plugin is gone"
+        self._is_ordered = True
         try:
-            self._reset(order["names"], order["positions"])
-            self._done.append("")
-        except (rospy.ROSException, rospy.ServiceException) as error:
-            self._done.append(str(error))
+            self._robot.start_over(time_s)
+            self._handlers[_RESET](EmptyRequest())
+            answer = self._handlers[_CONFIGURE](SetModelConfigurationRequest(
+                self._model.name, "robot_description", order["names"], order["positions"]))
+        finally:
+            self._is_ordered = False
+        return "" if answer.success else answer.status_message
 
-    def _reset(self, names, positions):
-        if self._publishers is None:
-            self._publishers = [rospy.Publisher(topic, kind, queue_size=1, latch=True) for topic, kind in (
-                ("/robot/set_super_reset", Empty), ("/robot/set_super_enable", Bool))]
-            self._speeds = [rospy.Publisher("/robot/limb/%s/set_speed_ratio" % side, Float64, queue_size=1, latch=True)
-                            for side in SIDES]
-        for publisher, message in zip(self._publishers, (Empty(), Bool(False)), strict=True):
-            publisher.publish(message)
-        for publisher in self._speeds:
-            publisher.publish(Float64(1.0))
-        rospy.wait_for_service("/gazebo/reset_world", RESET_TIMEOUT_S)
-        rospy.ServiceProxy("/gazebo/reset_world", EmptyService)()
-        answer = rospy.ServiceProxy("/gazebo/set_model_configuration", SetModelConfiguration)(
-            self._model.name, "robot_description", names, positions)
-        if not answer.success:
-            raise rospy.ServiceException(answer.status_message)
+    def _close_world(self):
+        """Withdraw what a program under check has no use for; the handlers of the services stay here."""
+        for name in self.context.served():
+            if name.startswith("/gazebo/") and name not in SERVED:
+                self._handlers[name] = self.context.withdraw(name)
+        for topic in SILENCED:
+            self.context.withdraw(topic)
 
 
 def _link(own, model, link):

@@ -51,7 +51,27 @@ class Recording:
 
     def commands(self):
         """Joint commands that were written out: list of (side, mode, names, values)."""
-        return [tuple(command) for record in self.records for command in record["commands"]]
+        return [tuple(command[:4]) for record in self.records for command in record["commands"]]
+
+    def commanders(self):
+        """Who commanded the arms: sorted (node name, side, mode) of the commands that were written out and obeyed."""
+        return sorted({(command[4], command[0], command[1]) for record in self.records
+                       for command in record["commands"] if command[5]})
+
+    def accepted_count(self, side):
+        """How many joint commands the robot obeyed, of one arm, since the start."""
+        return self.records[-1]["accepted"][side] - self.records[0]["accepted"][side] if self.records else 0
+
+    def placed_count(self):
+        """How often something but the robot's drives put its joints elsewhere: a service, or a reset."""
+        return self.records[-1]["placed"] - self.records[0]["placed"] if self.records else 0
+
+    def path_without_cause(self):
+        """How far the arms' joints went, the one that went farthest [rad], before any command was obeyed."""
+        first = self.records[0]["accepted"] if self.records else {}
+        rows = next((row for row, record in enumerate(self.records) if record["accepted"] != first), len(self.records))
+        arms = np.hstack([self.arm(side)[:rows] for side in SIDES])
+        return float(np.abs(np.diff(arms, axis=0)).sum(axis=0).max()) if rows > 1 else 0.0
 
     def command_counts(self):
         """(n, 2): how many joint commands had come by then, left and right, since the start."""

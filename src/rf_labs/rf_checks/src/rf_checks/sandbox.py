@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A student's program in a process of its own: limited, unable to reach the judge, and gone when it is told to go.
 
-Where the kernel allows, it runs in namespaces of its own: it sees no process but its own, so it can neither stop the
-judge nor leave a child behind; the workspace is read-only and the judge's folder is hidden. Elsewhere (containers
-without the right to make namespaces) a session, limits and a search for descendants have to do. Free of ROS.
+It runs in a sandbox of bubblewrap's (isolation.py). Only where its author is trusted may it do without, on machines
+that allow no namespaces: there a session, limits and a search for descendants have to do. Free of ROS.
 """
 import collections
 import contextlib
 import ctypes
-import functools
 import os
 import shutil
 import signal
@@ -17,11 +15,16 @@ import sys
 import tempfile
 import threading
 import time
+from pathlib import Path
 
+from rf_checks import isolation, submission
 from rf_checks.pacing import children_of, direct_children
 
 CPU_S = 120
-MEMORY_BYTES = 8 << 30
+#: Of addresses, each process; numpy alone reserves some.
+ADDRESS_BYTES = 8 << 30
+#: Of memory, all processes together.
+MEMORY_BYTES = 2 << 30
 FILE_BYTES = 20 << 20
 PROCESSES = 100
 #: A program that writes more than this is stopped; the first and the last KEPT_BYTES are kept.
@@ -30,29 +33,8 @@ KEPT_BYTES = 200_000
 _DUMP_S = 1.0
 _KILL_ROUNDS = 20
 _SET_CHILD_SUBREAPER = 36  # linux/prctl.h
-
-# Run with the program's command as "$@", in new namespaces. $1: the workspace, $2: the judge's folder.
-_ENTER = r"""
-root=$1 hidden=$2; shift 2
-mount --bind "$root" "$root" && mount -o remount,bind,ro "$root" &&
-mount -t tmpfs -o size=4k,mode=0700 tmpfs "$hidden" || exit 125
-exec setpriv --bounding-set=-all --inh-caps=-all --ambient-caps=-all --no-new-privs -- "$@"
-"""
-
-
-def _unshare():
-    user = [] if os.geteuid() == 0 else ["--user", "--map-current-user", "--keep-caps"]
-    return ["unshare", *user, "--mount", "--pid", "--fork", "--kill-child=KILL", "--mount-proc", "--"]
-
-
-@functools.cache
-def has_namespaces():
-    """Whether this machine lets us make the namespaces."""
-    with tempfile.TemporaryDirectory(prefix="lab-probe-") as folder:
-        command = [*_unshare(), "sh", "-c", _ENTER, "sh", folder, folder, "true"]
-        with contextlib.suppress(OSError):
-            return subprocess.run(command, capture_output=True).returncode == 0
-    return False
+_STARTUP_FOLDER = "/run/startup"
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
 def adopt_orphans():
@@ -60,29 +42,62 @@ def adopt_orphans():
     ctypes.CDLL(None, use_errno=True).prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
+class Startup:
+    """What the judge has every program start with: a folder for PYTHONPATH, variables, and descriptors to inherit."""
+
+    def __init__(self, folder, environment, descriptors=()):
+        """folder: path; environment: dict; descriptors: keep their numbers."""
+        self.folder, self.environment, self.descriptors = str(folder), dict(environment), tuple(descriptors)
+
+
 class Student:
     """A running program. `output`, `errors`: what it wrote so far; `wrote_too_much`: that it was too much."""
 
-    def __init__(self, command, environment, workspace, hidden, namespaces=None, pass_fds=()):
-        """Start `command` (list). `workspace`: made read-only; `hidden`: folder that is not shown.
+    def __init__(self, program, arguments, environment, walls=True, startup=None):
+        """Start a Python program (path) with `arguments` (strings).
 
-        `pass_fds`: descriptors that it inherits, under their numbers.
+        environment: what ROS and the workspace need of it is passed on. walls: in a sandbox; False for the programs of
+        authors who are trusted. startup: Startup or None. Raises isolation.NotIsolated, submission.BadSubmission,
+        OSError.
         """
-        self.folder = tempfile.mkdtemp(prefix="lab-student-")
+        program = Path(program)
         self.survivors = 0
+        self._has_walls = walls
+        self.folder = tempfile.mkdtemp(prefix="lab-student-")
         self._before = direct_children(os.getpid())
-        limits = ["prlimit", "--cpu=%d" % CPU_S, "--as=%d" % MEMORY_BYTES, "--fsize=%d" % FILE_BYTES, "--core=0", "--"]
-        if namespaces is None:
-            namespaces = has_namespaces()
-        enter = [*_unshare(), "sh", "-c", _ENTER, "sh", str(workspace), str(hidden)] if namespaces else []
-        # Its folders are its own; the fault handler tells the judge where it was when it is stopped.
-        own = {"HOME": self.folder, "TMPDIR": self.folder, "ROS_HOME": self.folder, "ROS_LOG_DIR": self.folder + "/log",
-               "PYTHONFAULTHANDLER": "1", "PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1",
-               "NUMBA_CACHE_DIR": self.folder}
-        self._process = subprocess.Popen(
-            [*enter, *limits, *command], env={**environment, **own}, cwd=self.folder, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True, pass_fds=pass_fds)
+        try:
+            self._process = self._start(program, arguments, environment, walls, startup)
+        except BaseException:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            raise
         self._streams = [_Stream(self._process.stdout), _Stream(self._process.stderr)]
+
+    def _start(self, program, arguments, environment, walls, startup):
+        home = isolation.HOME if walls else self.folder
+        names = submission.copy(program, self.folder)
+        # The fault handler tells the judge where the program was when it is stopped.
+        own = {"PYTHONFAULTHANDLER": "1", "PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+        if walls:
+            # A package beside the program counts as one; each file would need its folders made first.
+            tops = sorted({name.split("/")[0] for name in names})
+            binds = [(Path(self.folder) / top, "%s/%s" % (home, top), False) for top in tops]
+            if startup is not None:
+                binds.append((startup.folder, _STARTUP_FOLDER, False))
+            enter = isolation.command(environment, binds, (*isolation.SOLVED, *isolation.JUDGE),
+                                      not isolation.has_own_network())
+            own.update(isolation.environment_of(environment))
+        else:
+            enter = []
+            own = {**environment, **own, "HOME": home, "TMPDIR": home, "ROS_HOME": home, "ROS_LOG_DIR": home + "/log",
+                   "NUMBA_CACHE_DIR": home}
+        if startup is not None:
+            folder = _STARTUP_FOLDER if walls else startup.folder
+            own.update(startup.environment, PYTHONPATH=os.pathsep.join((folder, environment.get("PYTHONPATH", ""))))
+        limits = ["prlimit", "--cpu=%d" % CPU_S, "--as=%d" % ADDRESS_BYTES, "--fsize=%d" % FILE_BYTES, "--core=0", "--"]
+        return subprocess.Popen([*enter, *limits, python(), "%s/%s" % (home, program.name), *arguments], env=own,
+                                cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                stderr=subprocess.PIPE, start_new_session=True,
+                                pass_fds=startup.descriptors if startup else ())
 
     @property
     def pid(self):
@@ -90,8 +105,10 @@ class Student:
 
     @property
     def exit_code(self):
-        """None while it runs."""
-        return self._process.poll()
+        """None while it runs; of a program that a signal ended, minus the signal's number."""
+        code = self._process.poll()
+        # Bubblewrap says it as shells do.
+        return 128 - code if self._has_walls and code is not None and 128 < code <= 192 else code
 
     @property
     def output(self):
@@ -113,6 +130,15 @@ class Student:
             roots.add(self.pid)
         return children_of(roots)
 
+    def excess(self):
+        """What the program has too much of: "output", "processes", "memory", or "" when it keeps within its limits."""
+        if self.wrote_too_much:
+            return "output"
+        family = self.family()
+        if len(family) > PROCESSES:
+            return "processes"
+        return "memory" if _memory_bytes(family) > MEMORY_BYTES else ""
+
     def dump(self):
         """Have Python say where it is, which also ends it; what it says is in `errors` afterwards."""
         before = self._streams[1].total
@@ -121,8 +147,8 @@ class Student:
                 os.kill(pid, signal.SIGABRT)
         if self.pid in self.family():
             with contextlib.suppress(ProcessLookupError, PermissionError):
-                # Without namespaces this is the program; with them it is `unshare`, which is ended by end().
-                if not self._is_unshare():
+                # Without walls this is the program; with them it is bubblewrap, which is ended by end().
+                if not self._is_bubblewrap():
                     os.kill(self.pid, signal.SIGABRT)
         deadline = time.monotonic() + _DUMP_S
         while self._streams[1].total == before and time.monotonic() < deadline:
@@ -131,7 +157,8 @@ class Student:
 
     def end(self):
         """Kill what is left and count what outlived the program. To be called once."""
-        if self.exit_code is not None:
+        # What is left in a sandbox ends with it.
+        if self.exit_code is not None and not self._has_walls:
             self.survivors = len(self.family())
         for _ in range(_KILL_ROUNDS):
             family = self.family()
@@ -149,10 +176,20 @@ class Student:
             stream.close()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _is_unshare(self):
+    def _is_bubblewrap(self):
         with contextlib.suppress(OSError), open("/proc/%d/comm" % self.pid, encoding="utf-8") as file:
-            return file.read().strip() == "unshare"
+            return file.read().strip() == "bwrap"
         return True
+
+
+def _memory_bytes(pids):
+    """What processes hold in memory for themselves: pages that they share with files do not count."""
+    total = 0
+    for pid in pids:
+        with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/%d/statm" % pid, "rb") as file:
+            words = file.read().split()
+            total += max(0, int(words[1]) - int(words[2])) * _PAGE_BYTES
+    return total
 
 
 def _reap(pids):

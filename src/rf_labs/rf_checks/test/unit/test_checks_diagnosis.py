@@ -21,19 +21,30 @@ TRACEBACK = ('Traceback (most recent call last):\n  File "/x/me.py", line 12, in
 ROTATE = next(exercise for exercise in EXERCISES if exercise.name == "rotate_gripper")
 
 
-def records(seconds=2.0, left=0.0, right=0.0, enabled=True, commands=0, names=JOINTS[:1], values=(0.1,), exited=None):
-    """A trace: `left`, `right`: how far those arms' first joints go [rad]; `commands`: how many a record, left."""
+def records(seconds=2.0, left=0.0, right=0.0, enabled=True, commands=0, names=JOINTS[:1], values=(0.1,), exited=None,
+            placed=0):
+    """A trace: `left`, `right`: how far those arms' first joints go [rad]; `commands`: how many a record, left;
+    `placed`: how often something else put the joints somewhere. Arms that move obey somebody's command."""
     count = round(seconds / 0.01)
     result = []
     for k in range(count):
         q = np.zeros(14)
         q[0], q[7] = left * k / count, right * k / count
         result.append({"t": 0.01 * k, "q": q.tolist(), "enabled": enabled, "contacts": [], "ik": [],
-                       "commands": [["left", 1, list(names), list(values)]] if commands else [],
-                       "counts": {"left": commands * k, "right": 0}})
+                       "commands": [["left", 1, list(names), list(values), "/me", True]] if commands else [],
+                       "counts": {"left": commands * k, "right": 0}, "placed": placed if k else 0,
+                       "accepted": {"left": k if left else 0, "right": k if right else 0}})
     if exited is not None:
         result[-1]["exited"] = exited
     return Recording(JOINTS, result)
+
+
+def pushed():
+    """A trace in which an arm moves without a command."""
+    trace = records(left=0.4)
+    for record in trace.records:
+        record["accepted"] = {"left": 0, "right": 0}
+    return trace
 
 
 def run(recording, **fields):
@@ -46,6 +57,8 @@ def run(recording, **fields):
     (run(records(), missing_nodes=["/rosout"]), "killed_nodes", ["/rosout"]),
     (run(records(), intruders={"/clock": ["/me"]}), "intruder", ["/me", "/clock"]),
     (run(records(seconds=0.05, left=3.0)), "teleport", ["set_model_configuration"]),
+    (run(records(left=0.4, placed=60)), "teleport", ["set_model_configuration"]),
+    (run(pushed()), "moved_otherwise", ["0.40 rad", "joint command"]),
 ])
 def test_meddling_is_told(case, key, words):
     fault = diagnosis.meddling(case)
@@ -58,9 +71,20 @@ def test_an_honest_run_meddles_with_nothing():
     assert diagnosis.meddling(run(records(left=1.0))) is None
 
 
+def test_a_recording_knows_who_commanded_the_arms():
+    recording = records(left=1.0, commands=1)
+    assert recording.commanders() == [("/me", "left", 1)]
+    assert recording.commands()[0] == ("left", 1, [JOINTS[0]], [0.1])
+    assert (recording.accepted_count("left"), recording.accepted_count("right")) == (199, 0)
+    for record in recording.records:
+        record["commands"][0][5] = False  # refused
+    assert recording.commanders() == []
+
+
 @pytest.mark.parametrize(("case", "key", "words"), [
     (run(records(), ended="output"), "output", ["megabytes"]),
     (run(records(), ended="processes"), "processes", []),
+    (run(records(), ended="memory"), "memory", ["2 GB"]),
     (run(records(left=1.0, commands=20)), "flood", ["rospy.Rate"]),
     (run(records(), ended="busy", stuck_at=9, exit_code=None), "busy", ["line 9"]),
     (run(records(), exit_code=1, errors=TRACEBACK), "crashed", ["line 12", "NameError"]),

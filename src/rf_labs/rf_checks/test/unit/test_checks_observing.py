@@ -13,7 +13,7 @@ from rf_checks.tasks import Call
 
 
 def student(**fields):
-    usual = {"exit_code": None, "wrote_too_much": False, "output": "", "family": lambda: {1}}
+    usual = {"exit_code": None, "excess": lambda: "", "output": ""}
     return SimpleNamespace(**{**usual, **fields})
 
 
@@ -70,8 +70,9 @@ def test_the_world_stands_still_from_the_end_of_a_run_on():
 
 
 @pytest.mark.parametrize(("fields", "words", "ended"), [
-    ({"wrote_too_much": True}, {}, "output"),
-    ({"family": lambda: set(range(500))}, {}, "processes"),
+    ({"excess": lambda: "output"}, {}, "output"),
+    ({"excess": lambda: "processes"}, {}, "processes"),
+    ({"excess": lambda: "memory"}, {}, "memory"),
     ({}, {"is_meddled": lambda: True}, "meddled"),
     ({"output": "yes"}, {"is_satisfied": lambda output: output == "yes"}, "satisfied"),
     ({}, {"make_record": lambda k: record(k, commands=11)}, "flood"),

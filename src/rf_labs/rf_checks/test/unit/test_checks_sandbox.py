@@ -2,38 +2,52 @@
 """The process that a student's program runs in: its limits, its end, and what it cannot reach. No master."""
 import os
 import subprocess
-import sys
 
 import pytest
 
 from lab_testing.waiting import wait_until
-from rf_checks import pacing
-from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Student, adopt_orphans, has_namespaces
+from rf_checks import isolation, pacing, sandbox
+from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Student, adopt_orphans
 
-WAIT_S = 30.0
-KINDS = [False, pytest.param(True, marks=pytest.mark.skipif(
-    not has_namespaces(), reason="this machine lets nobody make namespaces"))]
+WALLS = pytest.param(True, marks=pytest.mark.skipif(bool(isolation.problem()), reason=isolation.problem()))
 
 
-@pytest.fixture(params=KINDS, ids=["session", "namespaces"])
-def start(request, tmp_path):
-    """Start a program (text) in the sandbox; ended afterwards."""
-    (tmp_path / "workspace").mkdir()
-    (tmp_path / "judge").mkdir()
-    (tmp_path / "judge" / "secret").write_text("42")
+@pytest.fixture(params=[False, WALLS], ids=["trusted", "walls"])
+def start(request, tmp_path, monkeypatch):
+    """Start a program (text) beside which there may be others; ended afterwards."""
+    workspace = tmp_path / "workspace"
+    for name in (*isolation.SOLVED, *isolation.JUDGE):
+        path = workspace / name
+        if path.suffix == ".py":
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text("secret")
+        else:
+            path.mkdir(parents=True, exist_ok=True)
+            (path / "secret").write_text("42")
+    monkeypatch.setenv("LAB_ROOT", str(workspace))
+    monkeypatch.setenv("A_TOKEN", "secret")
     adopt_orphans()
     students = []
 
     def run(text, *words):
-        environment = {**os.environ, "JUDGE": str(tmp_path / "judge"), "WORKSPACE": str(tmp_path / "workspace")}
-        students.append(Student([sys.executable, "-c", text, *words], environment, tmp_path / "workspace",
-                                tmp_path / "judge", request.param))
+        folder = tmp_path / ("submission_%d" % len(students))
+        folder.mkdir()
+        (folder / "program.py").write_text(text)
+        students.append(Student(folder / "program.py", words, dict(os.environ), request.param))
         return students[-1]
 
-    run.has_namespaces = request.param
+    run.has_walls = request.param
+    run.workspace = workspace
     yield run
     for student in students:
         student.end()
+
+
+@pytest.fixture
+def walled(start):
+    if not start.has_walls:
+        pytest.skip("needs walls")
+    return start
 
 
 def finished(student):
@@ -48,6 +62,7 @@ def test_words_output_and_exit_code_come_through(start):
     assert student.output == "['a', 'b c']\n"
     assert student.errors == "oh\n"
     assert student.survivors == 0
+    assert not os.path.exists(student.folder)
 
 
 def test_what_outlives_the_program_is_found_and_ended(start):
@@ -56,16 +71,31 @@ def test_what_outlives_the_program_is_found_and_ended(start):
             "env={}, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)"
     before = pacing.children_of([os.getpid()])
     student = finished(start(child))
-    # In a process namespace of its own the child dies with its parent.
-    assert student.survivors == (0 if start.has_namespaces else 1)
-    assert pacing.children_of([os.getpid()]) - before == set()
+    # In a sandbox the child dies with its parent.
+    assert student.survivors == (0 if start.has_walls else 1)
+    wait_until(lambda: pacing.children_of([os.getpid()]) - before == set(), "the end of what it left behind")
 
 
 def test_endless_output_neither_fills_memory_nor_stops_the_judge(start):
     student = start("while True: print('x' * 1000)")
-    wait_until(lambda: student.wrote_too_much, "%d bytes" % OUTPUT_BYTES)
+    wait_until(lambda: student.excess() == "output", "%d bytes" % OUTPUT_BYTES)
     student.end()
     assert len(student.output) <= 2 * KEPT_BYTES + 8192
+
+
+def test_memory_of_all_processes_together_has_a_limit(start, monkeypatch):
+    monkeypatch.setattr(sandbox, "MEMORY_BYTES", 200 << 20)
+    student = start("import os, time\n[os.fork() for _ in range(2)]\nheld = b'x' * (60 << 20)\ntime.sleep(1000)")
+    wait_until(lambda: student.excess() == "memory", "four processes with 60 MB each")
+
+
+def test_processes_have_a_limit(start, monkeypatch):
+    monkeypatch.setattr(sandbox, "PROCESSES", 10)
+    before = pacing.children_of([os.getpid()])
+    student = start("import os, time\nfor _ in range(12):\n    if os.fork() == 0: time.sleep(1000)\ntime.sleep(1000)")
+    wait_until(lambda: student.excess() == "processes", "the thirteenth process")
+    student.end()
+    wait_until(lambda: pacing.children_of([os.getpid()]) - before == set(), "the end of all of them")
 
 
 def test_a_program_that_loops_says_where_it_is(start):
@@ -79,19 +109,100 @@ def test_a_program_that_loops_says_where_it_is(start):
     assert student.exit_code is not None
 
 
-def test_the_judge_is_out_of_reach(start):
-    if not start.has_namespaces:
-        pytest.skip("needs namespaces")
-    student = finished(start(
-        "import os\nprint(os.listdir(os.environ['JUDGE']))\n"
-        "print(sorted(int(n) for n in os.listdir('/proc') if n.isdigit()))\n"
-        "try:\n    open(os.environ['WORKSPACE'] + '/x', 'w')\nexcept OSError as error:\n    print(error.strerror)"))
-    assert student.output.splitlines() == ["[]", "[1]", "Read-only file system"], student.errors
-
-
 def test_files_have_a_limit(start):
     student = finished(start("open('big', 'wb').write(bytes(50 << 20))"))
     assert "File too large" in student.errors
+
+
+def test_modules_beside_the_program_come_along_and_nothing_else(start, tmp_path):
+    folder = tmp_path / "submission_0"
+    program = "import helper, os\nfrom parts import wheel\nprint(helper.NAME, wheel.NAME, sorted(os.listdir(" \
+              "os.path.dirname(os.path.abspath(__file__)))))"
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "wheel.py").write_text("NAME = 'wheel'")
+    (tmp_path / "helper.py").write_text("import hub\nNAME = hub.NAME")
+    (tmp_path / "hub.py").write_text("NAME = 'hub'")
+    (tmp_path / "another_students.py").write_text("NAME = 'secret'")
+    (tmp_path / "program.py").write_text(program)
+    assert not folder.exists()
+    student = finished(Student(tmp_path / "program.py", [], dict(os.environ), start.has_walls))
+    assert student.output == "hub wheel ['helper.py', 'hub.py', 'parts', 'program.py']\n", student.errors
+
+
+def test_the_judge_its_files_and_the_solutions_are_out_of_sight(walled, tmp_path):
+    (tmp_path / "planted").write_text("42")
+    student = finished(walled(
+        "import os\nfound = []\n"
+        "for folder, _, files in os.walk(os.environ['LAB_ROOT']):\n"
+        "    for name in files:\n"
+        "        try:\n"
+        "            found += [name] if open(os.path.join(folder, name)).read() else []\n"
+        "        except OSError:\n"
+        "            pass\n"
+        "print(found)\n"
+        "print(os.path.exists(%r), os.path.exists('/etc/shadow'), os.listdir('/dev/shm'))\n"
+        "print('A_TOKEN' in os.environ)\n"
+        "print(sorted(int(n) for n in os.listdir('/proc') if n.isdigit()))" % str(tmp_path / "planted")))
+    assert student.output.splitlines() == ["[]", "False False []", "False", "[1, 2]"], student.errors
+
+
+def test_nothing_but_its_own_folders_can_be_written(walled):
+    student = finished(walled(
+        "import os, sys\n"
+        "for path in (os.environ['LAB_ROOT'], '/usr', '/etc', '/', '/dev', '/opt', sys.prefix, '/proc/sys/kernel'):\n"
+        "    try:\n"
+        "        open(path + '/planted', 'w')\n"
+        "        print('wrote below', path)\n"
+        "    except OSError:\n"
+        "        pass\n"
+        "for path in ('.bashrc', '.profile', '.local/lib/python3/site-packages/usercustomize.py'):\n"
+        "    path = os.path.expanduser('~/' + path)\n"
+        "    os.makedirs(os.path.dirname(path), exist_ok=True)\n"
+        "    open(path, 'w').write('planted')\n"
+        "print('done')"))
+    assert student.output == "done\n", student.errors
+    assert finished(walled("import os; print(os.listdir(os.path.expanduser('~')))")).output == "['program.py']\n"
+
+
+def test_what_it_writes_has_a_limit(walled):
+    student = finished(walled(
+        "import os\n"
+        "for folder in (os.path.expanduser('~'), '/tmp', '/dev/shm', '/var/tmp', '/run'):\n"
+        "    total = 0\n"
+        "    try:\n"
+        "        for k in range(40):\n"
+        "            total += open('%s/%d' % (folder, k), 'wb', buffering=0).write(bytes(10 << 20))\n"
+        "    except OSError as error:\n"
+        "        pass\n"
+        "    print(total <= 64 << 20)"))
+    assert student.output == "True\n" * 5, student.errors
+
+
+def test_no_capability_and_no_way_to_more(walled):
+    student = finished(walled(
+        "import ctypes, os, subprocess\n"
+        "status = dict(line.split(':', 1) for line in open('/proc/self/status'))\n"
+        "print(status['CapEff'].strip(), status['CapPrm'].strip(), status['NoNewPrivs'].strip())\n"
+        "libc = ctypes.CDLL(None, use_errno=True)\n"
+        "print(libc.mount(b'none', b'/usr', b'tmpfs', 0, None), libc.umount(b'/usr'), libc.chroot(b'/tmp'))"))
+    assert student.output == "0000000000000000 0000000000000000 1\n-1 -1 -1\n", student.errors
+
+
+def test_a_program_that_stops_its_own_sandbox_is_ended(walled):
+    before = pacing.children_of([os.getpid()])
+    student = walled("import ctypes\nctypes.CDLL(None).ptrace(16, 1, 0, 0)\nprint('attached', flush=True)\n"
+                     "import time\ntime.sleep(1000)")
+    wait_until(lambda: student.output, "the first process of the sandbox to be stopped")
+    student.end()
+    wait_until(lambda: pacing.children_of([os.getpid()]) - before == set(), "the end of the sandbox")
+
+
+def test_its_network_ends_at_the_loopback(walled):
+    student = finished(walled(
+        "import os, socket\nprint(sorted(name for _, name in socket.if_nameindex()))\n"
+        "try:\n    socket.create_connection(('192.0.2.1', 80), 5)\n"
+        "except OSError as error:\n    print(error.strerror)"))
+    assert student.output == "['lo']\nNetwork is unreachable\n", student.errors
 
 
 def test_a_watch_tells_work_from_rest(start):
@@ -120,3 +231,52 @@ def test_a_process_that_got_the_number_of_an_ended_program_is_a_stranger(start):
         assert student.survivors == 0
         assert stranger.poll() is None
         stranger.kill()
+
+
+def test_a_walled_program_does_not_outlive_a_judge_that_is_killed(walled):
+    code = "import os, sys\nfrom rf_checks.sandbox import Student\n" \
+           "s = Student(sys.argv[1], [], dict(os.environ))\nprint(s.pid, flush=True)\nimport time; time.sleep(1000)"
+    program = walled.workspace / "sleeps.py"
+    program.write_text("import time\ntime.sleep(1000)")
+    with subprocess.Popen([sandbox.python(), "-c", code, str(program)], stdout=subprocess.PIPE, text=True) as judge:
+        root = int(judge.stdout.readline())
+        wait_until(lambda: any(_command(pid).startswith("python") for pid in pacing.children_of([root])),
+                   "the program to run")
+        family = pacing.children_of([root])
+        judge.kill()
+    wait_until(lambda: not any(_lives(pid) for pid in family), "the end of %s" % family)
+
+
+def _command(pid):
+    try:
+        with open("/proc/%d/comm" % pid, encoding="utf-8") as file:
+            return file.read()
+    except OSError:
+        return ""
+
+
+def _lives(pid):
+    try:
+        with open("/proc/%d/stat" % pid, encoding="ascii") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_a_refusal_says_why_and_what_to_do(monkeypatch):
+    for name, words in (("kernel/apparmor_restrict_unprivileged_userns", "apparmor_restrict_unprivileged_userns=0"),
+                        ("kernel/unprivileged_userns_clone", "unprivileged_userns_clone=1"),
+                        ("user/max_user_namespaces", "max_user_namespaces=10000"), ("", "most containers")):
+        monkeypatch.setattr(isolation, "_switched_off", lambda asked, _, name=name: asked == name)
+        reason = isolation._reason("Operation not permitted")
+        assert words in reason
+        assert "Operation not permitted" in reason
+        assert "--trusted" in reason
+
+
+def test_a_machine_without_walls_is_asked_for_trust(monkeypatch, tmp_path):
+    from rf_checks.judge import Judge
+
+    monkeypatch.setattr(isolation, "problem", lambda: "this kernel refuses. Add --trusted")
+    with pytest.raises(isolation.NotIsolated, match="--trusted"):
+        Judge()

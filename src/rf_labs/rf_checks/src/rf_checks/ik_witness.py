@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tells the recorder what the IK service was really asked and answered: an observer of position_kinematics.
+
+The topic IKReport, on which the node says the same, is open to everybody; the socket is in the lab's sandbox only.
+"""
+import contextlib
+import json
+import os
+import socket
+
+from rf_checks.recorder_names import REQUESTS, SOCKETS_VARIABLE
+
+#: Poses of one request that are told; a datagram holds many more.
+POSES_TOLD = 100
+# The recorder reads once in 10 ms of simulation, which may stand still for a while [s].
+_PATIENCE_S = 2.0
+
+
+class Witness:
+    """Called with each request's caller (node name) and report (IKReport), before the client has its answer."""
+
+    def __init__(self):
+        self._path = os.path.join(os.environ[SOCKETS_VARIABLE], REQUESTS)
+
+    def __call__(self, caller, report):
+        told = []
+        for verdict in report.verdicts[:POSES_TOLD]:
+            pose = verdict.target.pose
+            told.append([report.limb, verdict.target.header.frame_id,
+                         [getattr(pose.position, axis) for axis in "xyz"],
+                         [getattr(pose.orientation, axis) for axis in "xyzw"], verdict.verdict])
+        with contextlib.suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+            sender.settimeout(_PATIENCE_S)
+            sender.sendto(json.dumps({"caller": caller, "poses": told}).encode(), self._path)

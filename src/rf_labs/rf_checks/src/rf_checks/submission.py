@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What belongs to a student's program: the file, and the modules beside it that it imports. Free of ROS."""
+import ast
+import os
+import stat
+from pathlib import Path
+
+#: More than this is no exercise [bytes, files].
+LARGEST_BYTES, MOST_FILES = 1 << 20, 50
+
+
+class BadSubmission(Exception):
+    """The program cannot be taken; the text says why."""
+
+
+def read(path):
+    """The bytes of a regular file that is no link. Raises BadSubmission, OSError."""
+    # A pipe must not be waited for, and a link could lead to what only the judge may read.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(descriptor, "rb") as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise BadSubmission("%s is no file" % path)
+        if status.st_size > LARGEST_BYTES:
+            raise BadSubmission("%s has %d bytes; no more than %d are taken" % (path, status.st_size, LARGEST_BYTES))
+        return file.read(LARGEST_BYTES)
+
+
+def files(program):
+    """{name below the program's folder: bytes} of the program (Path) and of the modules beside it that it imports.
+
+    Raises BadSubmission, OSError.
+    """
+    folder, found = program.parent, {program.name: read(program)}
+    to_read = [program.name]
+    while to_read:
+        name = to_read.pop()
+        for module in sorted(imported(found[name])):
+            top = module.split(".")[0]
+            package = folder / top
+            is_package = package.is_dir() and not package.is_symlink()
+            beside = [folder / (top + ".py"), *(sorted(package.glob("**/*.py")) if is_package else ())]
+            for path in beside:
+                relative = str(path.relative_to(folder))
+                if relative in found or path.is_symlink() or not path.is_file():
+                    continue
+                if len(found) >= MOST_FILES:
+                    raise BadSubmission("%s imports more than %d files beside it" % (program, MOST_FILES))
+                found[relative] = read(path)
+                to_read.append(relative)
+    return found
+
+
+def imported(source):
+    """Names of the modules that a program (bytes) imports, as far as they can be read off it."""
+    try:
+        tree = ast.parse(source)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return set()
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+    return names
+
+
+def copy(program, folder):
+    """Copy `files` into an empty folder; returns the names. Raises BadSubmission, OSError."""
+    found = files(program)
+    for name, content in found.items():
+        target = Path(folder) / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+        target.chmod(0o755)
+    return tuple(found)
