@@ -23,6 +23,7 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
   test [NAMES] [--long] lint, unit tests and rostests. NAMES: packages, test files, or pytest arguments such as -k
   notebook [NAME]       the labs' notebooks in a browser: starts Jupyter on this machine alone and prints the address
   check LAB PROGRAM     run a student's program in a lab of its own and say how well it does its exercise; --list, --help
+  handout FOLDER        make the students' copy of this workspace: without solutions, and without what reveals them
   bench [NAMES]         measure where the stack stands, beside its peers; --list says which suites there are
   doctor [HOST]         look for what is wrong with master, network, clock, build, Python and robot, and say the fix
   help                  this text
@@ -88,6 +89,9 @@ main() {
             use_loopback
             use_build || exit
             exec python3 "$LAB_ROOT/src/rf_labs/rf_checks/scripts/check" "$@"
+            ;;
+        handout)
+            PYTHONPATH=$LAB_ROOT/src/rf_labs/rf_checks/src exec python3 -m rf_checks.handout "$@"
             ;;
         bench)
             bring_up_to_date || exit

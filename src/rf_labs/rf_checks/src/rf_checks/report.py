@@ -28,6 +28,7 @@ def text(result):
         "%g are due" % PASS_MARK, result.seed, result.lasted_s))
     if result.fault:
         lines.append("Hint: %s." % result.fault.sentence.rstrip("."))
+    lines += ["Note for the instructor (it changes no points): %s." % note for note in result.notes]
     return "\n".join(lines)
 
 
@@ -39,7 +40,7 @@ def as_json(result):
         "points": None if result.not_graded else round(result.points, 2), "pass_mark": PASS_MARK,
         "passed": has_passed(result),
         "fault": result.fault.key if result.fault else None, "hint": result.fault.sentence if result.fault else None,
-        "isolation": result.isolation, "wall_s": round(result.lasted_s, 2),
+        "notes": list(result.notes), "isolation": result.isolation, "wall_s": round(result.lasted_s, 2),
         "runs": [{"arguments": list(run.arguments), "points": round(run.points, 2),
                   "fault": run.fault.key if run.fault else None, "end": run.end,
                   "criteria": [{"name": one.name, "points": round(one.share * one.weight, 2), "of": one.weight,

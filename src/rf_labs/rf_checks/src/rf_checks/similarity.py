@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How much of a program's own code is also in a reference program. Free of ROS.
+
+Programs are compared by fingerprints: every run of SPAN tokens, after what a copyist changes first is levelled (names
+that the program itself gives, numbers, texts, comments, docstrings, annotations, formatting, order of functions). Names
+of libraries and their methods stay. What everybody was handed out (skeletons, notebooks) counts on neither side, so
+that an untouched skeleton is no copy of the solution that was made from it.
+"""
+import ast
+import functools
+import hashlib
+import io
+import json
+import keyword
+import tokenize
+from dataclasses import dataclass
+from pathlib import Path
+
+#: Tokens of a fingerprint: about two lines of code.
+SPAN = 14
+#: From this share of a program's own fingerprints, or of a reference's, on, it is called a copy.
+COPY_SHARE = 0.5
+#: A program with fewer fingerprints of its own says nothing.
+LEAST_OWN = 40
+#: Calls that run what cannot be read off the program.
+_OPAQUE = ("exec", "eval", "compile", "__import__")
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """name: of the reference. of_program, of_reference: which share of either's own code is in the other (0 to 1)."""
+
+    name: str
+    of_program: float
+    of_reference: float
+
+    @property
+    def is_copy(self):
+        return max(self.of_program, self.of_reference) >= COPY_SHARE
+
+
+class _Level(ast.NodeTransformer):
+    """Level what a copyist changes first. Names that come from imports count as what they stand for."""
+
+    def __init__(self, tree):
+        self._own, self._imported = set(), {}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store | ast.Del):
+                self._own.add(node.id)
+            elif isinstance(node, ast.arg):
+                self._own.add(node.arg)
+            elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+                self._own.add(node.name)
+            elif isinstance(node, ast.ExceptHandler) and node.name:
+                self._own.add(node.name)
+            elif isinstance(node, ast.Import | ast.ImportFrom):
+                for alias in node.names:
+                    self._imported[alias.asname or alias.name.split(".")[0]] = alias.name.split(".")[-1]
+
+    def visit_Name(self, node):
+        node.id = "v" if node.id in self._own else self._imported.get(node.id, node.id)
+        return node
+
+    def visit_arg(self, node):
+        node.arg, node.annotation = "v", None
+        return node
+
+    def visit_Attribute(self, node):
+        self.generic_visit(node)
+        if node.attr in self._own:
+            node.attr = "v"
+        return node
+
+    def visit_keyword(self, node):
+        self.generic_visit(node)
+        if node.arg in self._own:
+            node.arg = "v"
+        return node
+
+    def visit_ExceptHandler(self, node):
+        self.generic_visit(node)
+        node.name = "v" if node.name else None
+        return node
+
+    def visit_AnnAssign(self, node):
+        self.generic_visit(node)
+        return None if node.value is None else ast.Assign([node.target], node.value, lineno=node.lineno)
+
+    def visit_JoinedStr(self, node):
+        return ast.Constant("s")
+
+    def visit_Constant(self, node):
+        if isinstance(node.value, str | bytes):
+            return ast.Constant("s")
+        return ast.Constant(0) if isinstance(node.value, int | float | complex) and not isinstance(
+            node.value, bool) else node
+
+    def visit_Import(self, node):
+        return None
+
+    visit_ImportFrom = visit_Import
+
+    def visit_Expr(self, node):
+        if isinstance(node.value, ast.Constant):  # a docstring
+            return None
+        self.generic_visit(node)
+        return node
+
+    def visit_FunctionDef(self, node):
+        node.returns = None
+        return self._definition(node)
+
+    visit_AsyncFunctionDef = visit_FunctionDef
+
+    def visit_ClassDef(self, node):
+        return self._definition(node)
+
+    def _definition(self, node):
+        self.generic_visit(node)
+        node.name = "v"
+        node.body = node.body or [ast.Pass()]
+        return node
+
+
+@functools.cache
+def fingerprints(text):
+    """The set of hashes of a program's runs of tokens; empty for what Python cannot read."""
+    try:
+        tree = ast.parse(text)
+        levelled = ast.unparse(ast.fix_missing_locations(_Level(tree).visit(tree)))
+        tokens = [token.string for token in tokenize.generate_tokens(io.StringIO(levelled).readline)
+                  if token.type in (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)]
+    except (SyntaxError, ValueError, RecursionError, MemoryError, tokenize.TokenError):
+        return frozenset()
+    return frozenset(hashlib.blake2b("\0".join(tokens[k:k + SPAN]).encode(), digest_size=8).digest()
+                     for k in range(len(tokens) - SPAN + 1))
+
+
+def compare(text, references, handed_out):
+    """Likenesses of a program to each reference, the most alike first.
+
+    text: the program. references: {name: text}. handed_out: texts that everybody has.
+    """
+    common = frozenset().union(*map(fingerprints, handed_out))
+    own = fingerprints(text) - common
+    if len(own) < LEAST_OWN:
+        return []
+    found = []
+    for name, reference in references.items():
+        theirs = fingerprints(reference) - common
+        if len(theirs) >= LEAST_OWN:
+            both = len(own & theirs)
+            found.append(Likeness(name, both / len(own), both / len(theirs)))
+    return sorted(found, key=lambda one: max(one.of_program, one.of_reference), reverse=True)
+
+
+def opaque_calls(text):
+    """(line, name) of calls that run code which is not in the program to be read."""
+    try:
+        tree = ast.parse(text)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return []
+    return sorted({(node.lineno, node.func.id) for node in ast.walk(tree) if isinstance(node, ast.Call)
+                   and isinstance(node.func, ast.Name) and node.func.id in _OPAQUE})
+
+
+def notebook_code(path):
+    """The Python code of a notebook's cells, as one text."""
+    cells = json.loads(Path(path).read_text(encoding="utf-8"))["cells"]
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    return "\n".join(text for text in code if _is_python(text))
+
+
+def _is_python(text):
+    try:
+        ast.parse(text)
+    except SyntaxError:
+        return False
+    return not keyword.iskeyword(text.strip())
+
+
+class Library:
+    """The references and what is handed out, as a workspace has them; a students' copy has no references."""
+
+    def __init__(self, workspace):
+        """workspace: its folder."""
+        root = Path(workspace)
+        checks, lab = root / "src/rf_labs/rf_checks/exercises", root / "src/rf_labs/rf_lab2"
+        solutions = [*sorted((checks / "solutions").glob("*.py")),
+                     *(path for path in (lab / "nodes/tf_listener.py", lab / "nodes/wave.py") if path.is_file())]
+        self.references = {str(path.relative_to(root)): _text(path) for path in solutions}
+        self.handed_out = [_text(path) for path in sorted((checks / "skeletons").glob("*.py"))]
+        #: How many of handed_out, the first ones, are skeletons.
+        self.skeleton_count = len(self.handed_out)
+        self.handed_out += [notebook_code(path) for path in sorted(root.glob("src/*/*/notebooks/*.ipynb"))]
+
+    def notes(self, text):
+        """What an instructor should know about a program (text): a list of sentences. They change no points."""
+        notes = []
+        likely = [one for one in compare(text, self.references, self.handed_out) if one.is_copy]
+        if likely:
+            one = likely[0]
+            notes.append("%.0f %% of the program's own code is also in %s, and %.0f %% of that one's in the program, "
+                         "whatever the names: compare the two"
+                         % (100 * one.of_program, one.name, 100 * one.of_reference))
+        for line, name in opaque_calls(text)[:3]:
+            notes.append("line %d calls %s(), which runs code that cannot be read off the program" % (line, name))
+        return notes
+
+
+def _text(path):
+    return path.read_text(encoding="utf-8", errors="replace")
