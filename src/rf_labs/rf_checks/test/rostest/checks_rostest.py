@@ -101,7 +101,7 @@ class Loaded(unittest.TestCase):
     def judge_all(self, programs):
         """Program -> what it was graded with: dict. Programs: (folder, name)."""
         judged = Judged()
-        judged.judge = Judge(wall_limit_s=3600.0)
+        judged.judge = Judge(wall_limit_s=3600.0, trusted=True)
         try:
             return {program: graded(judged.check(*program)) for program in programs}
         finally:

@@ -14,7 +14,7 @@ from rf_checks.lab import Lab, LabFailed, TooSlow
 @pytest.fixture
 def lab(tmp_path):
     """A lab that is a process which does nothing."""
-    lab = Lab("<robot/>")
+    lab = Lab("<robot/>", walls=False)
     lab._folder = tmp_path
     (tmp_path / "output.txt").write_text("")
     lab._run([sys.executable, "-c", "import time; time.sleep(1000)"], None)
@@ -39,7 +39,8 @@ def test_a_node_that_is_done_ends_nothing(lab, line):
 
 
 def test_a_lab_ends_with_its_judge(tmp_path):
-    text = ("import os, sys\nfrom pathlib import Path\nfrom rf_checks.lab import Lab\nlab = Lab('<robot/>')\n"
+    text = ("import os, sys\nfrom pathlib import Path\nfrom rf_checks.lab import Lab\n"
+            "lab = Lab('<robot/>', walls=False)\n"
             "lab._folder = Path(sys.argv[1])\nlab._run([sys.executable, '-c', 'import time; print(1, flush=True); "
             "time.sleep(1000)'], None)\n"
             "print(lab._processes[0].pid, flush=True)\nsys.stdin.read()\n")
