@@ -108,6 +108,9 @@ class FakeRobot:
         with self._lock:
             if self._state.enabled and message.mode in (JointCommand.POSITION_MODE, JointCommand.RAW_POSITION_MODE):
                 self._targets.update(zip(message.names, message.command, strict=True))
+            elif self._state.enabled and message.mode == JointCommand.VELOCITY_MODE and not any(message.command):
+                # Of velocities it knows none but zero: stop, and hold.
+                self._targets.update((name, self._angles[name]) for name in message.names)
 
     def _on_enable(self, message):
         with self._lock:
@@ -121,7 +124,8 @@ class FakeRobot:
 
     def _on_stop(self, _message):
         with self._lock:
-            self._state = AssemblyState(stopped=True, estop_source=AssemblyState.ESTOP_SOURCE_UNKNOWN)
+            self._state = AssemblyState(stopped=True, estop_button=AssemblyState.ESTOP_BUTTON_UNKNOWN,
+                                        estop_source=AssemblyState.ESTOP_SOURCE_UNKNOWN)
 
 
 def main():

@@ -23,6 +23,8 @@ from std_msgs.msg import Empty, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 
+from baxter_sim_hardware.cameras import CameraRefused, Rack, Settings
+
 RATE_HZ = 20.0
 SIDES = ("left", "right")
 JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
@@ -113,7 +115,10 @@ class FakeServices:
         self._steppers = [FakeProcedure(side, name, kind) for side in SIDES
                           for name, kind in (("Tare", TareEnable), ("CalibrateArm", CalibrateArmEnable))]
         self._steppers.append(FakeUpdater())
-        self._images = {}
+        # What a camera may be asked is decided by the simulated robot's own code.
+        self._rack, self._images = Rack(most_open=3), {}
+        for name in KNOBS["cameras"]:
+            self._rack.add(name, None)
         self._opened = rospy.Publisher("~opened", OpenCamera._request_class, queue_size=10, latch=True)
         self._services = [
             rospy.Service("/cameras/list", ListCameras, lambda request: [knob("cameras")]),
@@ -134,14 +139,22 @@ class FakeServices:
     def _on_open(self, request):
         if request.name not in knob("cameras") or knob("refuse_cameras"):
             return errno.ENODEV
+        asked = request.settings
+        try:
+            self._rack.open_camera(request.name, Settings(
+                asked.width, asked.height, asked.fps, {control.id: control.value for control in asked.controls}))
+        except CameraRefused as refusal:
+            return refusal.code
         self._opened.publish(request)
         if request.name not in self._images:
             self._images[request.name] = rospy.Publisher("/cameras/%s/image" % request.name, Image, queue_size=1)
         return 0
 
     def _on_close(self, request):
-        if request.name not in self._images:
-            return errno.EINVAL
+        try:
+            self._rack.close_camera(request.name)
+        except CameraRefused as refusal:
+            return refusal.code
         self._images.pop(request.name).unregister()
         return 0
 
