@@ -115,6 +115,38 @@ def test_bash_has_the_rosbash_functions(workspace):
     assert run(script, workspace).startswith(f"{workspace}/src/foo\n")
 
 
+PACKAGE = """<package format="2"><name>{0}</name><version>0.1.0</version><description>Mine.</description>
+<maintainer email="me@example.org">me</maintainer><license>BSD</license><buildtool_depend>catkin</buildtool_depend>
+<depend>{1}</depend></package>"""
+
+
+def test_own_packages_are_built_alone_in_their_order(workspace):
+    """mine_a needs the messages of mine_msgs; a second run has nothing to do, and a broken one is named."""
+    messages = "\nadd_message_files(FILES Bar.msg)\ngenerate_messages()"
+    for name, needs, more in (("mine_a", "mine_msgs", ""), ("mine_msgs", "message_generation", messages)):
+        folder = workspace / "src" / name
+        folder.mkdir()
+        (folder / "package.xml").write_text(PACKAGE.format(name, needs))
+        (folder / "CMakeLists.txt").write_text(
+            f"cmake_minimum_required(VERSION 3.5)\nproject({name})\nfind_package(catkin REQUIRED COMPONENTS {needs})"
+            f"{more}\ncatkin_package()\n")
+    (workspace / "src/mine_msgs/msg").mkdir()
+    (workspace / "src/mine_msgs/msg/Bar.msg").write_text("float64 x\n")
+    space = {file: file.read_bytes() for file in (workspace / "devel").iterdir() if file.is_file()}
+    tool = f"/usr/bin/python3 {ROOT}/tools/own_packages.py {workspace} mine_a mine_msgs"
+    build = f"source devel/setup.bash && {tool} 2>&1"
+    assert run(build, workspace).splitlines() == ["building mine_msgs …", "building mine_a …"]
+    assert run(build, workspace) == ""
+    assert {file: file.read_bytes() for file in space} == space
+    use = "source devel/setup.bash && python3 -c 'from mine_msgs.msg import Bar; print(Bar(x=2.0))'"
+    assert run(use, workspace) == "x: 2.0\n"
+    (workspace / "src/mine_a/CMakeLists.txt").write_text("nonsense(\n")
+    said = run(f"source devel/setup.bash; {tool} 2>&1; echo $?", workspace)
+    assert "the package mine_a does not build" in said and said.endswith("\n1\n") and "own-mine_a.log" in said
+    for name in ("mine_a", "mine_msgs"):
+        shutil.rmtree(workspace / "src" / name)
+
+
 def test_install_space_works_too(workspace):
     run("source devel/setup.bash && catkin_make install", workspace)
     imports = "python3 -c 'import rospy, pybullet'"

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What every Python of the lab's environment reads at its start amends rospy, costs others nothing, hides nothing."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+OURS = Path(__file__).resolve().parents[2] / "src"
+
+
+def run(program, *folders):
+    path = ":".join(str(folder) for folder in (OURS, *folders))
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,
+                          env={"PYTHONPATH": path, "PATH": "/usr/bin:/bin"})
+
+
+def a_rospy(folder):
+    """A package that looks as much like rospy as the hook reads."""
+    (folder / "rospy").mkdir()
+    (folder / "rospy/__init__.py").write_text("from .client import init_node\n")
+    (folder / "rospy/client.py").write_text("def init_node(name):\n    return name\n")
+    return folder
+
+
+def test_programs_without_rospy_load_nothing_of_ours():
+    done = run("import sys; print([name for name in sys.modules if name.startswith(('lab_environment', 'rospy'))])")
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+def test_init_node_is_amended_wherever_it_is_taken_from(tmp_path):
+    program = "import rospy; from rospy import init_node; print(rospy.init_node is init_node, init_node.__wrapped__)"
+    done = run(program, a_rospy(tmp_path))
+    assert done.stdout.startswith("True <function init_node") and done.stderr == ""
+
+
+def test_an_amendment_that_fails_leaves_the_module_as_it_is(tmp_path):
+    a_rospy(tmp_path)
+    (tmp_path / "rospy/client.py").write_text("def start():\n    pass\n")
+    (tmp_path / "rospy/__init__.py").write_text("from .client import start\n")
+    done = run("import rospy; print(rospy.start)", tmp_path)
+    assert done.stdout.startswith("<function start") and "not amended" in done.stderr
+
+
+def test_the_sitecustomize_that_is_hidden_runs_once(tmp_path):
+    (tmp_path / "sitecustomize.py").write_text("print('the next,', __name__, __file__)\n")
+    done = run("pass", tmp_path)
+    assert done.stdout == f"the next, sitecustomize {tmp_path}/sitecustomize.py\n"
