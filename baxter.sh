@@ -20,7 +20,8 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
                         ROS_IP or ROS_HOSTNAME, if you have set one, wins.
   setup                 install and build what is missing; runs by itself the first time anything is used
   setup --with FILE     also fetch the packages of a rosinstall file, and prefer them to ours: rosinstall/README.md
-  test [NAMES] [--long] lint, unit tests and rostests. NAMES: packages, test files, or pytest arguments such as -k
+  test [NAMES] [--long] lint, unit tests and rostests. NAMES: packages, test files, or pytest arguments such as -k;
+                        --busy[=PERCENT]: with that share of one core (default 40), the main flows
   notebook [NAME]       the labs' notebooks in a browser: starts Jupyter on this machine alone and prints the address
   check LAB PROGRAM     run a student's program in a lab of its own and say how well it does its exercise; --list, --help
   handout FOLDER        make the students' copy of this workspace: without solutions, and without what reveals them

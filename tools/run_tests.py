@@ -1,6 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""`./baxter.sh test`: lint, unit tests, unit tests under a comma-decimal locale, rostests; one line of counts last."""
+"""`./baxter.sh test`: lint, unit tests, unit tests under a comma-decimal locale, rostests; one line of counts last.
+
+With --busy[=PERCENT] everything gets that share of one core, and without names the suites of the main flows run.
+"""
 
 import argparse
 import concurrent.futures
@@ -16,6 +19,7 @@ from pathlib import Path
 
 from lab_tests import comma_locale, rostests
 from lab_tests.discovery import SelectionError, select, take_inventory
+from lab_tests.quota import Quota, QuotaError
 from lab_tests.results import Tally, failure, read_junit
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -26,6 +30,24 @@ LINT_COMMANDS = {
     "catkin_lint": ["catkin_lint", "--offline", "--strict", "--quiet", "-W1", str(ROOT / "src")],
 }
 PYTEST_NO_TESTS_COLLECTED = 5
+# What --busy runs without names, each the test of a main flow: it has to pass on a fifth of a two-core machine, too.
+MAIN_FLOWS = (
+    "enable_robot.test",
+    "tools_world.test",  # enabling and moving in the simulator
+    "lab2_nodes.test",  # Glasgow's lab: move_baxter and its other nodes
+    "position_kinematics.test",
+    "trajectory_server.test",
+    "trajectory_controller.test",
+    "cwru_world.test",
+    "traj_streamer_world.test",  # Case Western's lab
+    "probot_anno_bringup.test",
+    "probot_anno.test",  # ros_control's lab
+    "checks_exercises.test",  # the judge
+)
+BUSY_PERCENT = 40.0
+# Limits are for a machine of two cores.
+WHOLE_MACHINE_PERCENT = 200.0
+EXIT_SKIPPED = 77
 
 
 def run_linter(name: str) -> Tally:
@@ -93,7 +115,7 @@ def start_unit_under_comma_locale(targets):
     return UnitRun("unit-comma-locale", targets, arguments, environment, WORK / "unit-comma-locale.txt")
 
 
-def layers(selection, long: bool, ending: contextlib.ExitStack):
+def layers(selection, long: bool, stretch: float, ending: contextlib.ExitStack):
     """(title, function that runs it) of everything chosen, fastest first. What `ending` holds ends with the tests."""
     for name in selection.linters:
         yield name, functools.partial(run_linter, name)
@@ -111,10 +133,10 @@ def layers(selection, long: bool, ending: contextlib.ExitStack):
         for title, run in runs.items():
             yield title, run.tally
     alone = [test for test in selection.rostests if not test.is_beside_others]
-    beside = Beside([test for test in selection.rostests if test.is_beside_others])
+    beside = Beside([test for test in selection.rostests if test.is_beside_others], stretch)
     ending.callback(beside.end)
     for test in alone:
-        yield title_of(test), functools.partial(rostests.run, test, folder_of(test))
+        yield title_of(test), functools.partial(rostests.run, test, folder_of(test), stretch=stretch)
     for test in beside.tests:
         yield f"{title_of(test)}, meanwhile", functools.partial(beside.tally, test)
 
@@ -130,8 +152,8 @@ def folder_of(test: rostests.Rostest) -> Path:
 class Beside:
     """Runs rostests that start no simulator, one after the other, while others run."""
 
-    def __init__(self, tests):
-        self.tests = tests
+    def __init__(self, tests, stretch: float = 1.0):
+        self.tests, self._stretch = tests, stretch
         self._ending = threading.Event()
         self._executor = concurrent.futures.ThreadPoolExecutor(max_workers=1)
         self._tallies = {test: self._executor.submit(self._run, test) for test in tests}
@@ -139,7 +161,7 @@ class Beside:
     def _run(self, test):
         if self._ending.is_set():
             raise rostests.Ended
-        return rostests.run(test, folder_of(test), ending=self._ending)
+        return rostests.run(test, folder_of(test), ending=self._ending, stretch=self._stretch)
 
     def tally(self, test) -> Tally:
         """Wait for its end."""
@@ -151,11 +173,11 @@ class Beside:
         self._executor.shutdown(cancel_futures=True)
 
 
-def run_layers(selection, long: bool) -> Tally:
+def run_layers(selection, long: bool, stretch: float = 1.0) -> Tally:
     """Run everything chosen and tell of each."""
     total = Tally()
     with contextlib.ExitStack() as ending:
-        for title, run in layers(selection, long, ending):
+        for title, run in layers(selection, long, stretch, ending):
             print(f"=== {title}", flush=True)
             started = time.monotonic()
             tally = run()
@@ -168,20 +190,44 @@ def run_layers(selection, long: bool) -> Tally:
     return total
 
 
+def run_with_share(selection, options) -> Tally:
+    """Run everything chosen, with --busy on a share of one core. Raises ValueError, QuotaError."""
+    if options.busy is None:
+        return run_layers(selection, options.long)
+    with Quota(options.busy):
+        print(f"--busy: {options.busy:g} % of one core", flush=True)
+        return run_layers(selection, options.long, max(1.0, WHOLE_MACHINE_PERCENT / options.busy))
+
+
+def separate_busy(words: list[str]) -> list[str]:
+    """`--busy NAME` is a share left out and a name, not a share called NAME."""
+    return [f"--busy={BUSY_PERCENT:g}" if word == "--busy" else word for word in words]
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="./baxter.sh test", allow_abbrev=False, add_help=False)
     parser.add_argument("--long", action="store_true")
-    options, arguments = parser.parse_known_args()
+    parser.add_argument("--busy", type=float, metavar="PERCENT")
+    options, arguments = parser.parse_known_args(separate_busy(sys.argv[1:]))
     WORK.mkdir(parents=True, exist_ok=True)
     # Started in the background of a script, Ctrl-C is ignored, by every child too; the tests press it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        selection = select(take_inventory(ROOT), arguments, options.long)
+        names = arguments or list(() if options.busy is None else MAIN_FLOWS)
+        selection = select(take_inventory(ROOT), names, options.long)
     except SelectionError as error:
         print(error, file=sys.stderr)
         return 2
 
-    total = run_layers(selection, options.long)
+    try:
+        total = run_with_share(selection, options)
+    except ValueError as error:
+        print(f"--busy: {error}", file=sys.stderr)
+        return 2
+    except QuotaError as error:
+        print(f"--busy: skipped. A share of a core takes root, or control groups that users may make: {error}")
+        print("0 passed, 0 failed")
+        return EXIT_SKIPPED
     if total.passed + total.failed == 0:
         print("No test ran.")
     print(f"{total.passed} passed, {total.failed} failed", flush=True)

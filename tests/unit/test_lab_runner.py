@@ -191,3 +191,9 @@ def test_comma_locale_is_in_force(tmp_path):
     program = "import locale; locale.setlocale(locale.LC_ALL, ''); print(locale.format_string('%.1f', 0.5))"
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
     assert done.stdout == "0,5\n"
+
+
+def test_a_long_test_may_take_what_its_file_says(tmp_path):
+    text = "<launch><test time-limit='2000'/><group><test time-limit='500'/></group></launch>"
+    (tmp_path / "a.test").write_text(text)
+    assert rostests.declared_s(tmp_path / "a.test") == 2560.0

@@ -13,6 +13,7 @@ import threading
 import time
 import uuid
 from pathlib import Path
+from xml.etree import ElementTree
 
 from lab_tests import processes
 from lab_tests.discovery import Rostest
@@ -25,6 +26,9 @@ STOP_TIMEOUT_S = 20.0
 LEFTOVER_GRACE_S = 2.0
 ENDING_POLL_S = 0.5
 OUTPUT_LINES_SHOWN = 80
+# What time limits are multiplied with, for rostest and for the tests' own deadlines (lab_testing.waiting).
+STRETCH_VARIABLE = "LAB_TEST_STRETCH"
+STRETCHED_ROSTEST = Path(__file__).with_name("stretched_rostest.py")
 
 
 def free_port() -> int:
@@ -36,17 +40,29 @@ def free_port() -> int:
             return port
 
 
+def declared_s(path: Path) -> float:
+    """What the tests of a file may take together by their own time limits, and a minute for what is around them."""
+    return 60.0 + sum(float(test.get("time-limit", 60.0)) for test in ElementTree.parse(path).getroot().iter("test"))
+
+
 class Ended(Exception):
     """The run was told to end before the test did."""
 
 
-def run(test: Rostest, work_folder: Path, time_limit_s: float | None = None, ending: threading.Event | None = None):
+def run(
+    test: Rostest,
+    work_folder: Path,
+    time_limit_s: float | None = None,
+    ending: threading.Event | None = None,
+    stretch: float = 1.0,
+):
     """Run it and return a Tally. work_folder is emptied first; logs and results stay in it for who wants to look.
 
-    Where `ending` is given and becomes set, the test is stopped and Ended is raised.
+    Where `ending` is given and becomes set, the test is stopped and Ended is raised. stretch: what all time limits,
+    those in the file too, are multiplied with, because the processes get only a part of the machine.
     """
     if time_limit_s is None:
-        time_limit_s = LONG_TIME_LIMIT_S if test.is_long else TIME_LIMIT_S
+        time_limit_s = (max(LONG_TIME_LIMIT_S, declared_s(test.path)) if test.is_long else TIME_LIMIT_S) * stretch
     shutil.rmtree(work_folder, ignore_errors=True)
     (work_folder / "results").mkdir(parents=True)
     run_id = uuid.uuid4().hex
@@ -59,13 +75,15 @@ def run(test: Rostest, work_folder: Path, time_limit_s: float | None = None, end
         "ROS_HOSTNAME": "localhost",
         "ROS_LOG_DIR": str(work_folder / "log"),
         "ROS_TEST_RESULTS_DIR": str(work_folder / "results"),
+        STRETCH_VARIABLE: f"{stretch:g}",
     }
+    command = ["rostest"] if stretch == 1.0 else [sys.executable, str(STRETCHED_ROSTEST)]
     output = work_folder / "output.txt"
     timed_out = False
     with output.open("wb") as stream:
         # The results of rostest --text are not to be trusted (it exits 0 when tests fail), the XML files are.
         child = subprocess.Popen(
-            ["rostest", str(test.path)],
+            [*command, str(test.path)],
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=stream,

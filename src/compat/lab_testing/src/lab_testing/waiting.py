@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Waiting for something with a deadline: the one place where a test's clock ticks."""
+import os
 import threading
 import time
 
 POLL_S = 0.01
+# `./baxter.sh test --busy` gives the tests a part of one core, and says by how much more time they need.
+STRETCH = float(os.environ.get("LAB_TEST_STRETCH", "1"))
 
 
 def wait_until(condition, what="the condition", timeout_s=20.0, interval_s=POLL_S):
@@ -11,8 +14,9 @@ def wait_until(condition, what="the condition", timeout_s=20.0, interval_s=POLL_
 
     what: what is awaited, for the error; a function is called then, to say how far it has come.
     Raises AssertionError after ``timeout_s`` [s] of wall time; the last question is asked after the deadline, so that a
-    process that stood still meanwhile is not blamed.
+    process that stood still meanwhile is not blamed. Under `./baxter.sh test --busy` it waits STRETCH times as long.
     """
+    timeout_s *= STRETCH
     deadline = time.monotonic() + timeout_s
     while True:
         is_last = time.monotonic() > deadline
@@ -51,7 +55,7 @@ def wait_for_message(topic, message_class, wanted=lambda message: True, timeout_
 
     subscriber = rospy.Subscriber(topic, message_class, take, queue_size=1, buff_size=1 << 24)
     try:
-        if not done.wait(timeout_s):
+        if not done.wait(timeout_s * STRETCH):
             raise AssertionError("no message that fits on %s within %g s" % (topic, timeout_s))
     finally:
         subscriber.unregister()

@@ -38,6 +38,12 @@ def test_the_condition_is_asked_once_more_after_the_deadline(monkeypatch):
         wait_until(lambda: asked.append(1) or len(asked) == 5, timeout_s=1.0)
 
 
+def test_a_share_of_the_machine_makes_deadlines_longer(monkeypatch):
+    asked = []
+    monkeypatch.setattr(waiting, "STRETCH", 100.0)
+    assert wait_until(lambda: asked.append(1) or len(asked) == 5, timeout_s=0.01, interval_s=0.02)
+
+
 def test_publishers_are_told_by_their_names():
     subscriber = SimpleNamespace(name="/rosout", impl=SimpleNamespace(
         connections=[SimpleNamespace(callerid_pub=node) for node in ("/rosout", "/gazebo", "/other")]))
