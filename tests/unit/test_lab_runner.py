@@ -193,7 +193,7 @@ def test_comma_locale_is_in_force(tmp_path):
     assert done.stdout == "0,5\n"
 
 
-def test_a_long_test_may_take_what_its_file_says(tmp_path):
+def test_a_test_may_take_what_its_file_says(tmp_path):
     text = "<launch><test time-limit='2000'/><group><test time-limit='500'/></group></launch>"
     (tmp_path / "a.test").write_text(text)
     assert rostests.declared_s(tmp_path / "a.test") == 2560.0

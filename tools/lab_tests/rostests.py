@@ -62,7 +62,7 @@ def run(
     those in the file too, are multiplied with, because the processes get only a part of the machine.
     """
     if time_limit_s is None:
-        time_limit_s = (max(LONG_TIME_LIMIT_S, declared_s(test.path)) if test.is_long else TIME_LIMIT_S) * stretch
+        time_limit_s = stretch * max(LONG_TIME_LIMIT_S if test.is_long else TIME_LIMIT_S, declared_s(test.path))
     shutil.rmtree(work_folder, ignore_errors=True)
     (work_folder / "results").mkdir(parents=True)
     run_id = uuid.uuid4().hex

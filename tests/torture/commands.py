@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which messages may move an arm and which must not: what docs/interface.md says of them, in code. No ROS needed."""
+import math
+import re
+
+JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+MODES = (1, 2, 3, 4)
+_LIMB = re.compile(r"/robot/limb/(left|right)/(\w+)$")
+# Whatever they say, it is not for the arms; a world that is changed, started anew or paused is another matter.
+_WORLD = re.compile(r"^/gazebo/|/goal$|^/robot/sim/|^/robot/set_super_|/set_(parameters|physics)")
+
+
+def is_refused(side, value):
+    """Whether a baxter_core_msgs/JointCommand must be refused as a whole, or says nothing."""
+    names, command = value["names"], value["command"]
+    known = {"%s_%s" % (side, joint) for joint in JOINTS}
+    return (value["mode"] not in MODES or len(names) != len(command) or len(set(names)) != len(names)
+            or not set(names) <= known or not all(map(math.isfinite, command)) or not names)
+
+
+def may_move(name, value, style):
+    """Whether a message or request may move an arm, as far as can be told from it.
+
+    name: of the topic or service; value: the message, None where it cannot be read; style: "damaged" where its bytes
+    say something else than value.
+    """
+    if _WORLD.search(name):
+        return True
+    limb = _LIMB.match(name)
+    if limb is None:
+        return False
+    side, what = limb.groups()
+    if what not in ("joint_command", "command_twist_stamped"):
+        return False
+    if style == "damaged" or value is None:
+        return True
+    if what == "joint_command":
+        return not is_refused(side, value)
+    twist = value["twist"]
+    if value["header"]["frame_id"] not in ("", "base", "/base", "%s_gripper" % side):
+        return False
+    return all(math.isfinite(twist[part][axis]) for part in ("linear", "angular") for axis in "xyz")
+
+
+# Values that make sense, by the name of their field.
+WORDS = {
+    "names": tuple("%s_%s" % (side, joint) for side in ("left", "right") for joint in JOINTS),
+    "mode": MODES,
+    "frame_id": ("base", "", "left_gripper", "world"),
+    "model_name": ("torture_box", "ground_plane", "nobody"),
+    "link_name": ("torture_box::link", "baxter::left_hand", "nobody"),
+    "body_name": ("torture_box::link", "nobody"),
+    "joint_name": ("left_s0", "nobody"),
+    "reference_frame": ("world", "", "nobody"),
+    "command": ("go", "grip", "release", "calibrate", "configure", "set", "stop", "reset", "reboot", "no_op"),
+    "sender": ("/torture",),
+    "args": ("{}", '{"position": 50.0}', '{"velocity": 50.0, "moving_force": 40}', '{"grip_attempt_seconds": 1}'),
+    "name": ("torso_left_outer_light", "torso_fan", "left_hand_camera", "head_camera"),
+    "encoding": ("rgb8", "bgr8", "mono8", "16UC1"),
+    "model_xml": ("<robot name='torture_box'><link name='link'><inertial><mass value='1'/><inertia ixx='1' ixy='0'"
+                  " ixz='0' iyy='1' iyz='0' izz='1'/></inertial><collision><geometry><box size='.1 .1 .1'/></geometry>"
+                  "</collision></link></robot>",),
+    "urdf": ("<robot name='piece'><link name='piece'/></robot>",),
+    "*": ("", "left", "torture"),
+}

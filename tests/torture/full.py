@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Small file systems that are full: what a lab does on them."""
+import contextlib
+import os
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+from journal import Skip
+from robot import LabError, Robot
+
+BLOCK = 1 << 16
+
+
+def require_root():
+    """Raises Skip where file systems cannot be mounted."""
+    if os.geteuid() != 0 or not shutil.which("unshare"):
+        raise Skip("mounting a small file system takes root")
+    if subprocess.run(["unshare", "--mount", "true"], capture_output=True).returncode:
+        raise Skip("this machine does not let even root mount anything (a container?)")
+
+
+def fill(folder):
+    """Write a file until nothing more goes in; returns its path."""
+    path = Path(folder) / "filler"
+    with path.open("wb", buffering=0) as stream, contextlib.suppress(OSError):
+        while stream.write(b"\0" * BLOCK) == BLOCK:
+            pass
+        while stream.write(b"\0"):
+            pass
+    return path
+
+
+def bear(lab, watch, options, journal, minutes):
+    """Have the arms follow commands, again and again, with every node alive; failures go to the journal."""
+    robot, processes = Robot(watch), lab.processes()
+    until = time.monotonic() + 60.0 * minutes
+    number = 0
+    while number < 3 or time.monotonic() < until:
+        journal.note(number, "the arms", "follow", "")
+        try:
+            robot.follow()
+            dead = [node for node, pid in processes.items() if lab.pid(node) != pid]
+            problems = watch.take_found() + ["%s died or does not answer" % node for node in dead]
+        except (LabError, OSError) as error:
+            problems = [*watch.take_found(), "%s: %s" % (type(error).__name__, error)]
+        if problems:
+            journal.fail("; ".join(problems[:5]), options.seed, number, 1)
+            if any("died" in text for text in problems):
+                return
+        number += 1

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""torture.py machine"""
+import time
+
+import hypothesis
+from hypothesis.stateful import run_state_machine_as_test
+from lab import Lab
+from limits import arm_limits
+from lockstep import LockStep
+from machine import Machine
+from robot import init_node
+from watch import Watch
+
+STILL_RAD = 0.001
+# Of a round. The first example of hypothesis is always the plainest there is: one and the same step, again and again.
+EXAMPLES, STEPS = 6, 15
+
+
+def run(options, journal):
+    """Rounds of examples, each with a seed of its own, until the steps or the time are used up."""
+    with Lab(options.out) as lab:
+        init_node()
+        with Watch(lab, arm_limits(), STILL_RAD, options.seed) as watch:
+            return {"also": machine(lab, watch, options, journal), "simulated_s": watch.simulated_s}
+
+
+def machine(lab, watch, options, journal):
+    """The same with a lab that stands, and a Watch."""
+    lockstep = LockStep(watch)
+    Machine.watch, Machine.lockstep = watch, lockstep
+    Machine.journal_step = staticmethod(lambda text: journal.note(journal.sent, "step", "", text))
+    relaunches, seed, begin = 0, options.seed, journal.sent
+    while journal.sent - begin < options.messages and (options.until is None or time.monotonic() < options.until):
+        first = journal.sent
+        try:
+            run_state_machine_as_test(hypothesis.seed(seed)(Machine), settings=settings(min(STEPS, options.messages)))
+        except Exception as error:  # whatever it is, it is what the round found
+            count = journal.sent - first
+            steps = "; ".join(journal.last(min(count, 12)))
+            journal.fail("%s: %s\n  last steps: %s" % (type(error).__name__, error, steps), seed, 0, count)
+            watch.still.disarm()
+            watch.stamps.announce_reset()
+            relaunches += 1
+            lab.relaunch()
+            watch.take_found()
+        seed += 1
+    return {"rounds": seed - options.seed, "ticks_in_lock_step": lockstep.ticks, "labs_started_anew": relaunches,
+            "messages_read_and_checked": sum(watch.counts.values())}
+
+
+def settings(steps):
+    """Examples of at most that many steps. Shrinking would repeat steps on a lab that is broken by now; the journal
+    has what they were."""
+    return hypothesis.settings(
+        max_examples=EXAMPLES, stateful_step_count=steps, deadline=None, database=None,
+        phases=[hypothesis.Phase.generate], suppress_health_check=list(hypothesis.HealthCheck))

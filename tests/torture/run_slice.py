@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""torture.py slice: hostile messages, then a round of the state machine, on one lab."""
+from lab import Lab
+from limits import arm_limits
+from robot import init_node
+from run_fuzz import STILL_RAD, fuzz
+from run_machine import STEPS, machine
+from watch import Watch
+
+
+def run(options, journal):
+    """Returns figures for the result."""
+    with Lab(options.out) as lab:
+        init_node()
+        with Watch(lab, arm_limits(), STILL_RAD, options.seed) as watch:
+            fuzzed = fuzz(lab, watch, options, journal)
+            options.messages, watch.checks_limits = STEPS, True
+            return {"also": {**fuzzed, **machine(lab, watch, options, journal)}, "simulated_s": watch.simulated_s}
