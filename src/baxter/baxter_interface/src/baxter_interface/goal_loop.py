@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One goal after the other for an action server whose work is a step, 20 times a second."""
+import io
 import threading
 import time
 import traceback
@@ -162,11 +163,39 @@ class GoalLoop:
         return "" if state.enabled else "the robot is not enabled: rosrun baxter_tools enable_robot.py -e"
 
 
+def can_be_answered(goal_id):
+    """Whether an actionlib_msgs/GoalID that came in can be sent back; says in the log why not.
+
+    genpy reads stamps that it cannot write. Such an id in the list of states would leave all of them unsent, and half
+    of a message to be sent with the next one.
+    """
+    try:
+        goal_id.serialize(io.BytesIO())
+    except Exception as error:  # whatever the generated code raises
+        rospy.logwarn("a goal or cancel request is dropped, because its id cannot be sent back: %s", error)
+        return False
+    return True
+
+
 def start(server):
     """Start an actionlib.ActionServer whose status goes on when simulated time goes back, as at a restart.
 
     actionlib's own timer would end then, for good. When it fires while Ctrl-C closes its topic, nobody need know.
+    Goals and cancel requests with an id that cannot be answered are dropped.
     """
+    take_goal, take_cancel = server.internal_goal_callback, server.internal_cancel_callback
+
+    def on_goal(goal):
+        # A server that takes the bytes of its goals looks at the id by itself.
+        if not hasattr(goal, "goal_id") or can_be_answered(goal.goal_id):
+            take_goal(goal)
+
+    def on_cancel(goal_id):
+        if can_be_answered(goal_id):
+            take_cancel(goal_id)
+
+    # Before the server subscribes to its topics with them.
+    server.internal_goal_callback, server.internal_cancel_callback = on_goal, on_cancel
 
     def publish_status(event):
         try:

@@ -6,6 +6,8 @@ from actionlib.status_tracker import StatusTracker
 from actionlib_msgs.msg import GoalID, GoalStatus
 from std_msgs.msg import Header
 
+from baxter_interface.goal_loop import can_be_answered
+
 from .msg import trajAction, trajActionGoal
 
 # Size of a Header on the wire without its frame_id [bytes]: seq, stamp, length.
@@ -39,11 +41,14 @@ class TrajServer(actionlib.ActionServer):
             goal = trajActionGoal()
             goal.deserialize(message._buff)
             goal._connection_header = header
-            super().internal_goal_callback(goal)
+            if can_be_answered(goal.goal_id):
+                super().internal_goal_callback(goal)
             return
         # Whatever the version, a goal begins with these two, and states of goals are the same in all.
         start = _HEADER_SIZE + len(Header().deserialize(message._buff).frame_id.encode())
         goal_id = GoalID().deserialize(message._buff[start:])
+        if not can_be_answered(goal_id):
+            return
         tracker = StatusTracker(goal=trajActionGoal(goal_id=goal_id))
         tracker.status.status = GoalStatus.REJECTED
         self._told.add(header["callerid"])

@@ -5,6 +5,7 @@ It does what ``actionlib.ActionServer`` does on the wire, with other means: goal
 queues and are handled when the loop calls :meth:`ActionServer.spin`; status, feedback and results go out through
 publishers that never wait. One thread; time is an argument. Without rospy.
 """
+import io
 import itertools
 
 import genpy
@@ -142,6 +143,7 @@ class ActionServer:
 
     def _take_goal(self, message):
         goal_id = message.goal_id
+        _require_answerable(goal_id)
         for handle in self._handles:
             if handle.status.goal_id.id == goal_id.id:
                 # Sent twice, or cancelled before it came.
@@ -175,6 +177,7 @@ class ActionServer:
             raise
 
     def _take_cancel(self, message):
+        _require_answerable(message)
         everything = not message.id and not message.stamp
         known = False
         for handle in list(self._handles):
@@ -224,6 +227,11 @@ class ActionServer:
 
     def _now(self):
         return genpy.Time(*divmod(round(self._time_s * 1e9), 10**9))
+
+
+def _require_answerable(goal_id):
+    """Raise where an id cannot be sent back: genpy reads stamps that it cannot write, and no status would go out."""
+    goal_id.serialize(io.BytesIO())
 
 
 def _numbered(msg_class):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The action protocol, without a master: states of goals, cancel requests of every kind, what is published when."""
 import io
+import struct
 
 import genpy
 import pytest
@@ -335,3 +336,14 @@ def test_a_cancel_request_that_the_owner_fails_on_ends_the_goal(served):
     served.server.spin(10.1)
     assert served.results == [("a", GoalStatus.ABORTED)]
     assert isinstance(served.topics.ros.inboxes["act/cancel"].faults[0], ZeroDivisionError)
+
+
+@pytest.mark.parametrize("topic", ["goal", "cancel"])
+def test_an_id_that_cannot_be_sent_back_is_dropped_and_others_go_on(served, topic):
+    """As it is read from the wire: its stamp does not fit any more once the nanoseconds have been carried over."""
+    goal_id = GoalID().deserialize(struct.pack("<III1s", 0xFFFFFFFF, 0xFFFFFFFF, 1, b"x"))
+    message = goal_id if topic == "cancel" else FollowJointTrajectoryActionGoal(goal_id=goal_id)
+    served.topics.ros.inboxes["act/" + topic].put(message)
+    served.send("a")
+    served.server.spin(10.0)
+    assert served.statuses == {"a": GoalStatus.ACTIVE}
