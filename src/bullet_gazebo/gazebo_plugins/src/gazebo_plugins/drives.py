@@ -66,15 +66,16 @@ class Drive(ModelPlugin):
     # -- the loop ----------------------------------------------------------------------------------------------------
 
     def update(self, time_s, dt):
-        message = self._commands.take()
-        if message is not None:
-            wanted = (message.linear.x, message.linear.y, message.angular.z)
-            if all(map(math.isfinite, wanted)):
-                self._wanted = wanted
-            else:
-                self.context.log.warn_throttle(5.0, "%s: a command of %g, %g m/s and %g rad/s is no number and ignored"
-                                               % (self.what, *wanted))
+        self._commands.handle(self._take)
         self.drive(*self._wanted, dt)
+
+    def _take(self, message):
+        wanted = (message.linear.x, message.linear.y, message.angular.z)
+        if all(map(math.isfinite, wanted)):
+            self._wanted = wanted
+        else:
+            self.context.log.warn_throttle(5.0, "%s: a command of %g, %g m/s and %g rad/s is no number and ignored"
+                                           % (self.what, *wanted))
 
     def publish(self, time_s):
         self.moved(time_s, self.context.world.time_step_s)
