@@ -60,9 +60,8 @@ def height(model):
 
 def break_world(model):
     """Past all checks: the push that makes NaN of everything that it touches."""
-    pybullet.applyExternalForce(model.body, -1, [1e308] * 3, [0, 0, 0], pybullet.WORLD_FRAME)
-    pybullet.applyExternalForce(model.body, -1, [-1e308] * 3, [0, 0, 1], pybullet.WORLD_FRAME)
-    pybullet.applyExternalForce(model.body, -1, [1e308] * 3, [0, 1, 0], pybullet.WORLD_FRAME)
+    for force, place in (([1e308] * 3, [0, 0, 0]), ([-1e308] * 3, [0, 0, 1]), ([1e308] * 3, [0, 1, 0])):
+        pybullet.applyExternalForce(model.body, -1, force, place, pybullet.WORLD_FRAME, physicsClientId=model._client)
     model.wake()
 
 
@@ -71,7 +70,7 @@ def test_pybullet_itself_breaks(world, boxes, monkeypatch):
     monkeypatch.setattr(world._watch, "look", lambda: None)
     break_world(boxes[0])
     step(world, 2)
-    assert math.isnan(pybullet.getBasePositionAndOrientation(boxes[0].body)[0][0])
+    assert math.isnan(pybullet.getBasePositionAndOrientation(boxes[0].body, physicsClientId=world._client)[0][0])
 
 
 def test_a_state_that_cannot_be_is_put_back_before_anybody_sees_it(world, boxes, told):
@@ -105,7 +104,8 @@ def test_an_arm_goes_on_from_where_it_was(world, told, direct):
     for _ in range(500):
         arm.drive_position(BOTH, target, STRONG)
         world.step()
-    pybullet.setJointMotorControlArray(arm.body, [0, 1], pybullet.TORQUE_CONTROL, forces=[1e308, -1e308])
+    pybullet.setJointMotorControlArray(arm.body, [0, 1], pybullet.TORQUE_CONTROL, forces=[1e308, -1e308],
+                                       physicsClientId=world._client)
     world.step()
     position, velocity, effort = arm.read_joints()
     np.testing.assert_allclose(position, target, atol=1e-3)
@@ -122,7 +122,7 @@ def test_an_arm_goes_on_from_where_it_was(world, told, direct):
 
 
 def test_what_is_absurd_but_finite_is_put_back_too(world, boxes, told):
-    pybullet.resetBasePositionAndOrientation(boxes[2].body, [0, 0, 1e9], [0, 0, 0, 1])
+    pybullet.resetBasePositionAndOrientation(boxes[2].body, [0, 0, 1e9], [0, 0, 0, 1], physicsClientId=world._client)
     world.step()
     assert height(boxes[2]) == pytest.approx(0.05, abs=1e-3)
     assert "the position of link 'box' is (0, 0, 1e+09) m; expected -1e+07 to 1e+07 m" in told[0]
