@@ -31,10 +31,11 @@ def machine(lab, watch, options, journal):
     Machine.journal_step = staticmethod(lambda text: journal.note(journal.sent, "step", "", text))
     relaunches, seed, begin = 0, options.seed, journal.sent
     while journal.sent - begin < options.messages and (options.until is None or time.monotonic() < options.until):
-        first = journal.sent
+        first, Machine.first_error = journal.sent, None
         try:
             run_state_machine_as_test(hypothesis.seed(seed)(Machine), settings=settings(min(STEPS, options.messages)))
         except Exception as error:  # whatever it is, it is what the round found
+            error = Machine.first_error or error
             count = journal.sent - first
             steps = "; ".join(journal.last(min(count, 12)))
             journal.fail("%s: %s\n  last steps: %s" % (type(error).__name__, error, steps), seed, 0, count)
