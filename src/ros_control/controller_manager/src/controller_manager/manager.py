@@ -71,9 +71,7 @@ class ControllerManager:
         self._running = []
         self._idle = []  # loaded, not running, with something to do all the same
         self._switch = None
-        self._has_updated = False
         self._closed = False
-        self._after_update = []
 
     @property
     def loaded(self):
@@ -157,17 +155,6 @@ class ControllerManager:
                     loaded.state = ABORTED
             self._switch = None
 
-    def after_next_update(self):
-        """A ``Future`` that ends with the next update, or at once as long as there has been none."""
-        future = Future()
-        if self._closed:
-            future.cancel()
-        elif self._has_updated:
-            self._after_update.append(future)
-        else:
-            future.set_result(None)
-        return future
-
     def restart(self, time_s):
         """Stop and start every running controller at control time ``time_s`` [s]: what they were about ends."""
         for loaded in self._running:
@@ -205,18 +192,13 @@ class ControllerManager:
                 self._go_on_switching(time_s)
             except _SURVIVED as error:  # a driver is anybody's code, too
                 self._give_up_switch(error)
-        self._has_updated = True
-        if self._after_update:
-            waiting, self._after_update = self._after_update, []
-            for future in waiting:
-                _finish(future)
 
     def close(self):
-        """Close all controllers and release who waits (their futures are cancelled)."""
+        """Close all controllers; who waits for a switch is released (the future is cancelled)."""
         self._closed = True
-        for future in [*self._after_update, *([self._switch.future] if self._switch else ())]:
-            future.cancel()
-        self._switch, self._after_update, self._running, self._idle = None, [], [], []
+        if self._switch is not None:
+            self._switch.future.cancel()
+        self._switch, self._running, self._idle = None, [], []
         while self._loaded:
             self._close(self._loaded.popitem()[1])
 

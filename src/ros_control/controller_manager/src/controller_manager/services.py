@@ -33,10 +33,10 @@ _GRACE_S = 1.0
 
 
 class ControllerManagerServices:
-    """Serves ``<namespace>/controller_manager/...``, one request after the other.
+    """Serves ``<namespace>/controller_manager/...``, changes one after the other.
 
-    Loading, unloading and switching end with the loop's next update; while physics is paused they wait for it. The
-    only loads that do not are those before the very first update.
+    A switch ends with an update of the loop; while physics is paused it waits for one, and changes that come after it
+    wait behind it. Listing waits for nobody: it shows what is waited for.
     """
 
     def __init__(self, manager, find_table, host, robot):
@@ -50,23 +50,24 @@ class ControllerManagerServices:
         self._log = host.log
         self._closed = False
         self._one_at_a_time = threading.Lock()
-        for name, srv_class, handler in (
-                ("list_controllers", ListControllers, self._list),
-                ("list_controller_types", ListControllerTypes, self._list_types),
-                ("load_controller", LoadController, self._load),
-                ("unload_controller", UnloadController, self._unload),
-                ("switch_controller", SwitchController, self._switch),
-                ("reload_controller_libraries", ReloadControllerLibraries, self._reload)):
-            host.service_in_thread("controller_manager/" + name, srv_class, self._serialised(handler))
+        for name, srv_class, handler, changes in (
+                ("list_controllers", ListControllers, self._list, False),
+                ("list_controller_types", ListControllerTypes, self._list_types, False),
+                ("load_controller", LoadController, self._load, True),
+                ("unload_controller", UnloadController, self._unload, True),
+                ("switch_controller", SwitchController, self._switch, True),
+                ("reload_controller_libraries", ReloadControllerLibraries, self._reload, True)):
+            turn = self._one_at_a_time if changes else contextlib.nullcontext()
+            host.service_in_thread("controller_manager/" + name, srv_class, self._guarded(handler, turn))
 
     def close(self):
         """Loop thread: refuse what comes and release who waits."""
         self._closed = True
         self._manager.close()
 
-    def _serialised(self, handler):
+    def _guarded(self, handler, turn):
         def answer(request):
-            with self._one_at_a_time:
+            with turn:
                 if self._closed:
                     raise rospy.ServiceException("the controller manager of this robot has ended")
                 try:
@@ -139,16 +140,14 @@ class ControllerManagerServices:
             raise Refused("cannot load controller '%s': %s" % (name, error)) from error
         self._in_loop(manager.load, name, kind, controller_class, context)
         host.flush()
-        self._await_update()
 
     def _do_unload(self, name):
         self._in_loop(self._manager.unload, name)
-        self._await_update()
 
     def _do_switch(self, start, stop, strictness, start_asap, timeout_s):
         future = self._in_loop(self._manager.switch, start, stop, strictness, start_asap, timeout_s)
         try:
-            future.result(timeout_s + _GRACE_S if timeout_s > 0.0 else None)
+            future.result(min(timeout_s + _GRACE_S, threading.TIMEOUT_MAX) if timeout_s > 0.0 else None)
         except FutureTimeout:
             with contextlib.suppress(CancelledError):
                 self._in_loop(self._manager.abandon_switch, future)
@@ -168,9 +167,6 @@ class ControllerManagerServices:
             self._find_table().reload()
         except Exception as error:  # noqa: BLE001  (anybody's source)
             raise Refused("cannot reload the controller libraries: %s: %s" % (type(error).__name__, error)) from error
-
-    def _await_update(self):
-        self._in_loop(self._manager.after_next_update).result()
 
 
 def _parameters(namespace):

@@ -227,15 +227,6 @@ def test_without_updates_a_switch_waits(robot):
     assert future.done()
 
 
-def test_after_the_first_update_loading_waits_for_the_next(robot):
-    assert robot.manager.after_next_update().done()
-    robot.update()
-    future = robot.manager.after_next_update()
-    assert not future.done()
-    robot.update()
-    assert future.done()
-
-
 def test_strict_refuses_unknown_names(robot):
     robot.load("one")
     assert "'two'" in robot.refused(start=["one", "two"])
@@ -454,12 +445,11 @@ def test_hardware_that_fails_in_a_change_is_an_error_of_that_change(robot):
 def test_close_releases_who_waits(robot):
     robot.load("one")
     robot.update()
-    switch, update = robot.manager.switch(["one"], [], STRICT), robot.manager.after_next_update()
+    switch = robot.manager.switch(["one"], [], STRICT)
     robot.manager.close()
-    assert switch.cancelled() and update.cancelled() and robot.contexts["one"].closed
+    assert switch.cancelled() and robot.contexts["one"].closed
     with pytest.raises(Refused, match="ended"):
         robot.load("two")
-    assert robot.manager.after_next_update().cancelled()
 
 
 # -- parameters -----------------------------------------------------------------------------------------------------

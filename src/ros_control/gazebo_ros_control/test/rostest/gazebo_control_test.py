@@ -83,9 +83,18 @@ class GazeboControl(ControlCase):
         thread.start()
         thread.join(0.7)
         self.assertTrue(thread.is_alive())
+        self.assertEqual(self.one.states(), {"both": "initialized"})
         self.unpause_physics()
         thread.join(DEADLINE_S)
         self.assertEqual(answers, [True])
+        self.assertEqual(self.one.states(), {"both": "running"})
+
+    def test_while_physics_is_paused_controllers_are_loaded_and_unloaded(self):
+        self.start("both")
+        self.pause_physics()
+        self.assertTrue(self.one.load("shoulder"))
+        self.assertEqual(self.one.states(), {"both": "running", "shoulder": "initialized"})
+        self.assertTrue(self.one.unload("shoulder"))
         self.assertEqual(self.one.states(), {"both": "running"})
 
     def test_a_switch_with_a_timeout_gives_up(self):
