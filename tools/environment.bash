@@ -3,7 +3,7 @@
 
 DEFAULT_MASTER_URI=http://localhost:11311
 # The folders of src whose packages are the lab's; all others are somebody's own.
-LAB_FOLDERS=(baxter bullet_gazebo compat cwru_baxter lab_tools overlay probot rf_labs ros_control workspace_tests)
+LAB_FOLDERS=(baxter bullet_gazebo compat cwru_baxter lab_testing lab_tools overlay probot rf_labs ros_control workspace_tests)
 
 # host_of URI: the host in http://host:port/
 host_of() {
@@ -108,10 +108,10 @@ fingerprint() {
     for folder in "${LAB_FOLDERS[@]}"; do
         if [[ -d $LAB_ROOT/src/$folder ]]; then folders+=("src/$folder"); fi
     done
-    # The order of the files must not depend on the language of whoever asks.
+    # The order of the files must not depend on the language of whoever asks. -H: some folders of src are links.
     {
         echo "$LAB_ROOT"
-        cd "$LAB_ROOT" && find requirements*.txt tools/*.txt tools/setup.bash ${folders[@]+"${folders[@]}"} $([[ -d src_overlay ]] && echo src_overlay) \
+        cd "$LAB_ROOT" && find -H requirements*.txt tools/*.txt tools/setup.bash ${folders[@]+"${folders[@]}"} $([[ -d src_overlay ]] && echo src_overlay) \
             \( -name meshes -o -name __pycache__ -o -name .git \) -prune -o \
             -type f \( -name package.xml -o -name CMakeLists.txt -o -name setup.py -o -name '*.msg' -o -name '*.srv' \
                 -o -name '*.action' -o -name '*.cfg' -o -name '*.xacro' -o -path '*/env-hooks/*' \

@@ -50,7 +50,7 @@ def run(script, cwd, shell="bash", **variables):
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory):
     folder = tmp_path_factory.mktemp("student")
-    shutil.copytree(ROOT / "src/compat/lab_environment", folder / "src/compat/lab_environment")
+    shutil.copytree(ROOT / "src/lab_tools/lab_environment", folder / "src/lab_tools/lab_environment")
     (folder / ".venv").symlink_to(ROOT / ".venv")
     configure = f"catkin_make -DPYTHON_EXECUTABLE={folder}/.venv/bin/python3"
     session = f"""
