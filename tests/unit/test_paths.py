@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Paths that pages, comments and tools name exist, and each package lies where docs/architecture.md says."""
+
+import re
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+TOPS = "src|docs|tests|tools|docker|rosinstall"
+PATTERN = r"(?<![\w./~$}{*+-])((?:%s)/[\w./-]*[\w/])"
+PATH = re.compile(PATTERN % TOPS)
+# A package's README also names what lies in its own folder.
+README_PATH = re.compile(PATTERN % (TOPS + "|test|nodes|scripts|launch|config|urdf"))
+# A reader's own package, which pages speak of.
+READERS_OWN = "src/my_lab"
+# Names that stand for any file or folder of their kind.
+GENERAL = {"rosinstall/FILE", "test/unit", "test/rostest"}
+NOT_READ = (".rst", ".ipynb", ".png", ".jpg", ".svg", ".stl", ".dae", ".rosinstall")
+
+
+def own_files():
+    """The workspace's files, relative to it: what git tracks or would track. Links are left out."""
+    command = ["git", "-C", str(ROOT), "ls-files", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n")
+    return sorted(name for name in listed if (ROOT / name).is_file() and not (ROOT / name).is_symlink())
+
+
+def is_in_tests(name):
+    """Whether a file belongs to tests: those make up files of their own."""
+    return name.startswith("tests/") or "/test/" in name
+
+
+def stale_paths(name, text):
+    """(line, path) of what the text of file `name` says and is not there: from the root, its folder or its package."""
+    bases = [ROOT, *(ROOT / name).parents[:3]]
+    pattern = README_PATH if name.endswith("/README.md") else PATH
+    found = []
+    for number, line in enumerate(text.split("\n"), 1):
+        for path in pattern.findall(line):
+            if path in GENERAL or path.startswith(READERS_OWN):
+                continue
+            # A decision may be named by its number alone.
+            if not any((base / path).exists() or next(base.glob(path + "-*"), None) for base in bases):
+                found.append((number, path))
+    return found
+
+
+def ignored(paths):
+    """Those of the paths that git ignores: what set-up makes."""
+    done = subprocess.run(["git", "-C", str(ROOT), "check-ignore", "--stdin"], input="\n".join(paths), text=True,
+                          capture_output=True)
+    return set(done.stdout.split("\n"))
+
+
+def test_paths_in_pages_comments_and_tools_exist():
+    stale = []
+    for file in own_files():
+        if file.endswith(NOT_READ) or (is_in_tests(file) and not file.endswith(".md")):
+            continue
+        text = (ROOT / file).read_bytes()
+        stale += [(file, *where) for where in stale_paths(file, text.decode(errors="replace"))]
+    made_by_set_up = ignored([path for _, _, path in stale])
+    assert [where for where in stale if where[2] not in made_by_set_up] == []
+
+
+def test_a_stale_path_is_noticed():
+    text = "see `src/nowhere/`, docs/architecture.md,\ntest/unit, and docs/decisions/0007; tools/gone.py"
+    assert stale_paths("README.md", text) == [(1, "src/nowhere/"), (2, "tools/gone.py")]
+    assert stale_paths("src/lab_tools/live_plot/README.md", "`src/live_plot/`, `src/rqt_plot/`, `config/a.yaml`") == [
+        (1, "src/rqt_plot/"), (1, "config/a.yaml")]
+
+
+def house():
+    """Package name to folder, as the drawing on the architecture page has it: `folder/  packages`."""
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    found, groups = {}, [(0, Path("src"))]  # groups: (indentation, folder), from the outermost in
+    for line in page.partition("\n    src/\n")[2].partition("\n\n")[0].split("\n"):
+        indentation, (folder, _, names) = len(line) - len(line.lstrip()), line.strip().rpartition("/")
+        if folder:
+            groups = [group for group in groups if group[0] < indentation]
+            groups.append((indentation, groups[-1][1] / folder))
+        found |= {name: groups[-1][1] / name for name in re.findall(r"\w+", names.rpartition(":")[2])}
+    return found
+
+
+def packages():
+    """Package name to folder, of all packages below src."""
+    return {Path(name).parent.name: Path(name).parent for name in own_files()
+            if name.startswith("src/") and name.endswith("/package.xml")}
+
+
+def test_each_package_lies_where_the_architecture_page_says():
+    assert house() == packages()
+
+
+def test_each_package_has_a_row_on_the_architecture_page():
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = [name for row in re.findall(r"^\| ([\w, ]+) \|", page, flags=re.MULTILINE) for name in row.split(", ")]
+    assert set(packages()) - set(named) == set()
+
+
+def test_compat_holds_stand_ins_alone():
+    listed = subprocess.run(["bash", "-c", 'source "$1"; printf "%s\\n" "${STAND_INS[@]}"', "x",
+                             str(ROOT / "tools" / "stand_ins.bash")], capture_output=True, text=True, check=True)
+    stand_ins = {Path(path).name for path in listed.stdout.split() if path.startswith("src/compat/")}
+    assert {name for name, folder in packages().items() if folder.parent == Path("src/compat")} == stand_ins
