@@ -6,7 +6,6 @@ import json
 import os
 import secrets
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ import urllib.request
 import uuid
 from pathlib import Path
 
+from lab_environment import ports
 from lab_tests import processes
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -73,15 +73,11 @@ def environment(state: Path) -> dict[str, str]:
 
 
 def free_port(first: int) -> int:
-    """The first port from there on that nobody listens on."""
-    for port in range(first, first + 100):
-        with socket.socket() as probe:
-            try:
-                probe.bind(("127.0.0.1", port))
-                return port
-            except OSError:
-                continue
-    raise NotebookError(f"no port from {first} to {first + 99} is free; --port names another one")
+    """The first port from there on that nobody listens on. Raises NotebookError."""
+    try:
+        return ports.free_port(range(first, first + 100))
+    except OSError as error:
+        raise NotebookError(f"{error.strerror}, or name another one by --port") from error
 
 
 def command(port: int) -> list[str]:

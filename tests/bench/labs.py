@@ -16,7 +16,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
-from lab_testing.ports import free_port
+from lab_environment.ports import free_port
 from lab_testing.virtual_screen import VirtualScreen
 from lab_testing.waiting import wait_until
 

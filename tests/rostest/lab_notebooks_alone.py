@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 from notebook_runs import CELL_TIMEOUT_S, MOVING, OWN_LAB, ROOT, WATCHING, faults_of, is_blank, prepare, tool
 
+from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 from lab_tests import processes
-from lab_tests.rostests import free_port
 
 # Set for one server and all that it starts.
 MARKER = "LAB_NOTEBOOK_TEST"

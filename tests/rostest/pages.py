@@ -14,7 +14,7 @@ from pathlib import Path
 
 import rostest
 
-from lab_testing.ports import free_port
+from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 
 ROOT = Path(__file__).resolve().parents[2]

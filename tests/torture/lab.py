@@ -13,7 +13,7 @@ import roslib.message
 import tcpros
 from invariants import Usage
 
-from lab_testing.ports import free_port
+from lab_environment.ports import free_port
 from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
 

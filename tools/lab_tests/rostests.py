@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Run one .test file through rostest: own master, own log and result folders, a time limit, nothing left behind."""
 
-import contextlib
 import os
-import random
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -15,6 +12,7 @@ import uuid
 from pathlib import Path
 from xml.etree import ElementTree
 
+from lab_environment.ports import free_port
 from lab_tests import processes
 from lab_tests.discovery import Rostest
 from lab_tests.results import Tally, failure, read_rostest_results
@@ -29,15 +27,6 @@ OUTPUT_LINES_SHOWN = 80
 # What time limits are multiplied with, for rostest and for the tests' own deadlines (lab_testing.waiting).
 STRETCH_VARIABLE = "LAB_TEST_STRETCH"
 STRETCHED_ROSTEST = Path(__file__).with_name("stretched_rostest.py")
-
-
-def free_port() -> int:
-    """A port that nobody listens on, below those (32768 up) that the kernel could hand to another lab meanwhile."""
-    while True:
-        port = random.randrange(20000, 30000)
-        with socket.socket() as probe, contextlib.suppress(OSError):
-            probe.bind(("127.0.0.1", port))
-            return port
 
 
 def declared_s(path: Path) -> float:

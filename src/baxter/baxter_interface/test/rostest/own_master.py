@@ -9,7 +9,7 @@ import unittest
 
 import rosgraph
 
-from lab_testing.ports import free_port
+from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 
 DEADLINE_S = 60.0

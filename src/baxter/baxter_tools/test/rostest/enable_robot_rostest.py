@@ -10,7 +10,7 @@ import unittest
 import rospy
 from std_srvs.srv import Trigger
 
-from lab_testing.ports import free_port
+from lab_environment.ports import free_port
 
 DEADLINE_S = 60.0
 LAUNCH_FILE = pathlib.Path(__file__).with_name("enable_with_launch.launch")

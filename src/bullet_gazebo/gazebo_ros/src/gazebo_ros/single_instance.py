@@ -14,19 +14,14 @@ from urllib.parse import urlsplit
 
 import rosgraph
 
+from lab_environment import master_calls
+
 # Until a connection is made, and from there to an answer [s]. Who is dead refuses at once; who is alive may be busy.
 _CONNECT_S = 2.0
 _ANSWER_S = 10.0
 # How often and how far apart [s] one tries to take what nobody seems to have.
 _TRIES, _TRY_S = 20, 0.05
 _PEER = struct.Struct("3i")  # struct ucred: process, user, group
-
-
-class _Transport(xmlrpc.client.Transport):
-    def make_connection(self, host):
-        connection = super().make_connection(host)
-        connection.timeout = _ANSWER_S
-        return connection
 
 
 def running_instance(node_name, caller_id="/gazebo_ros_look_up", master_uri=None):
@@ -41,7 +36,7 @@ def running_instance(node_name, caller_id="/gazebo_ros_look_up", master_uri=None
     except rosgraph.MasterError:
         return None
     address = urlsplit(uri)
-    node = xmlrpc.client.ServerProxy(uri, transport=_Transport())
+    node = master_calls.proxy(uri, _ANSWER_S)
     try:
         socket.create_connection((address.hostname, address.port), timeout=_CONNECT_S).close()
     except OSError:

@@ -14,7 +14,7 @@ import rostest
 from gazebo_msgs.srv import GetWorldProperties
 
 from gazebo_ros import snapshot
-from lab_testing.ports import free_port
+from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 
 DEADLINE_S = 60.0

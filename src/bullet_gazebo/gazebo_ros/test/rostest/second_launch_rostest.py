@@ -12,7 +12,7 @@ from xmlrpc.client import ServerProxy
 import rosgraph
 import rostest
 
-from lab_testing.ports import free_port
+from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 
 DEADLINE_S = 60.0

@@ -13,6 +13,8 @@ import xml.parsers.expat
 import xmlrpc.client
 from urllib.parse import urlparse
 
+from . import master_calls
+
 # Gazebo's own name, which launch files give its node.
 SIMULATOR = "/gazebo"
 CLOCK = "/clock"
@@ -75,7 +77,7 @@ class Graph:
 
     def __init__(self, uri, caller):
         self._caller = caller
-        self._master = proxy(uri)
+        self._master = master_calls.proxy(uri, ANSWER_TIMEOUT_S)
         self.published, subscribed, services = (
             dict(part) for part in _value(self._master.getSystemState(caller)))
         self.nodes = {node for part in (self.published, subscribed, services) for nodes in part.values()
@@ -90,7 +92,7 @@ class Graph:
         for uri in launches.values() if isinstance(launches, dict) else ():
             # One that has ended leaves its parameter behind.
             try:
-                running, _ended = _value(proxy(uri).list_processes())
+                running, _ended = _value(master_calls.proxy(uri, ANSWER_TIMEOUT_S).list_processes())
                 names = ["/" + name.rpartition("-")[0] for name, _starts in running]
             except (*NO_ANSWER, TypeError):
                 continue
@@ -104,18 +106,6 @@ class Graph:
         except NO_ANSWER:
             return False
         return True
-
-
-class _Transport(xmlrpc.client.Transport):
-    def make_connection(self, host):
-        connection = super().make_connection(host)
-        connection.timeout = ANSWER_TIMEOUT_S
-        return connection
-
-
-def proxy(uri):
-    """An XML-RPC client that waits ANSWER_TIMEOUT_S for each answer and no longer."""
-    return xmlrpc.client.ServerProxy(uri, transport=_Transport())
 
 
 def _value(answer):

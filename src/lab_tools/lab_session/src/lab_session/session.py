@@ -2,10 +2,8 @@
 """Finds the simulator on this master, or starts one that ends with this process."""
 import atexit
 import contextlib
-import errno
 import fcntl
 import os
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +15,7 @@ import rospy
 
 from baxter_interface import startup
 from baxter_interface.patience import Condition, wait_in_order
+from lab_environment.ports import free_port
 
 from . import keeper
 from .labs import LABS
@@ -198,7 +197,7 @@ def _find_or_start(lab):
                 raise LabError("the lab at %s has no %s: %s. Stop it, or restart this notebook's kernel to work beside "
                                "it." % (rosgraph.get_master_uri(), lab._topic, error.strerror)) from error
         _say("the simulator at %s has no %s; starting another one beside it" % (rosgraph.get_master_uri(), lab._topic))
-        port = _free_port()
+        port = free_port(FURTHER_PORTS)
         os.environ["ROS_MASTER_URI"] = "http://localhost:%d" % port
         os.environ["ROS_HOSTNAME"] = "localhost"
     _say("starting roslaunch %s ..." % " ".join(lab._command))
@@ -268,15 +267,6 @@ def _master_port():
     if port is None:
         raise LabError("ROS_MASTER_URI is %r; it should look like http://localhost:11311" % uri)
     return port
-
-
-def _free_port():
-    for port in FURTHER_PORTS:
-        with socket.socket() as probe, contextlib.suppress(OSError):
-            probe.bind(("127.0.0.1", port))
-            return port
-    raise OSError(errno.EADDRINUSE, "no port from %d to %d is free: that many labs run already"
-                  % (FURTHER_PORTS[0], FURTHER_PORTS[-1]))
 
 
 def _say(text):

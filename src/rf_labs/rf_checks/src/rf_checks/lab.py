@@ -2,12 +2,11 @@
 """A lab of the judge's own: master, simulator and the nodes around it, on a port that nobody uses.
 
 The judge itself is no ROS node: what the robot does comes through the recorder's socket, and who else is there from the
-master's XML-RPC interface.
+master, through rosgraph.
 """
 import contextlib
 import json
 import os
-import random
 import re
 import shutil
 import signal
@@ -19,8 +18,11 @@ import time
 import xmlrpc.client
 from pathlib import Path
 
+import rosgraph
 import rospkg
 
+from lab_environment import master_calls
+from lab_environment.ports import free_port
 from rf_checks import isolation
 from rf_checks.pacing import OwnTime, Watch, children_of, direct_children
 from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SERVED, SOCKETS_VARIABLE
@@ -44,6 +46,9 @@ SHARED_TOPICS = frozenset(("/rosout", "/rosout_agg", "/tf", "/tf_static", "/diag
 #: How the IK nodes tell the recorder what they were asked.
 OBSERVER = ("IK_OBSERVER", "rf_checks.ik_witness:Witness")
 _CALLER = "/lab_judge"
+# How long a master may take to answer: one that was stopped never does.
+_ANSWER_S = 5.0
+_NO_ANSWER = (OSError, xmlrpc.client.Error, rosgraph.MasterException)
 _DEAD_NODE = re.compile(r"\[([\w./-]+)\] process has died \[pid \d+, exit code -?[1-9]")
 
 
@@ -57,15 +62,6 @@ class MasterSilent(LabFailed):
 
 class TooSlow(Exception):
     """This machine, as busy as it is, did not get done before the deadline; the text says how slow it was."""
-
-
-def free_port():
-    """A port that nobody listens on, below those (32768 up) that the kernel could hand to somebody else meanwhile."""
-    while True:
-        port = random.randrange(20000, 30000)
-        with socket.socket() as probe, contextlib.suppress(OSError):
-            probe.bind(("127.0.0.1", port))
-            return port
 
 
 class Lab:
@@ -211,22 +207,22 @@ class Lab:
 
     def forget_strangers(self):
         """Take nodes that are gone, and were not the lab's, off the master's lists, as `rosnode cleanup` does."""
-        with contextlib.suppress(LabFailed, OSError, xmlrpc.client.Error):
-            master = self._master()
+        with contextlib.suppress(LabFailed, *_NO_ANSWER):
             publishers, subscribers, services = self._state()
             for node in self.nodes() - self.own_nodes - TRANSIENT:
-                code, _, uri = master.lookupNode(_CALLER, node)
-                if code != 1:
+                master = self._master(node)  # a node is taken off in its own name
+                try:
+                    uri = master.lookupNode(node)
+                except rosgraph.MasterError:
                     continue
                 for kind, unregister in ((publishers, master.unregisterPublisher),
                                          (subscribers, master.unregisterSubscriber)):
                     for topic, names in kind:
                         if node in names:
-                            unregister(node, topic, uri)
+                            unregister(topic, uri)
                 for service, names in services:
                     if node in names:
-                        unregister_uri = master.lookupService(_CALLER, service)[2]
-                        master.unregisterService(node, service, unregister_uri)
+                        master.unregisterService(service, master.lookupService(service))
 
     def helper_pids(self):
         """Process ids of HELPERS in this lab."""
@@ -320,15 +316,15 @@ class Lab:
                 raise TooSlow("the check's own lab was still starting, waiting for %s" % what)
             time.sleep(0.05)
 
-    def _master(self):
-        return xmlrpc.client.ServerProxy(self.uri, transport=_Impatient())
+    def _master(self, caller=_CALLER):
+        return master_calls.master(caller, self.uri, _ANSWER_S)
 
     def _state(self):
         try:
-            return self._master().getSystemState(_CALLER)[2]
+            return self._master().getSystemState()
         except TimeoutError as error:
             raise MasterSilent("the ROS master does not answer") from error
-        except (OSError, xmlrpc.client.Error) as error:
+        except _NO_ANSWER as error:
             raise LabFailed("the ROS master is gone: %s" % error) from error
 
     def _all_there(self):
@@ -372,15 +368,6 @@ class Lab:
             pass  # the simulator has gone: that is what is_alive says
         finally:
             ended.set()
-
-
-class _Impatient(xmlrpc.client.Transport):
-    """XML-RPC that does not wait for ever for a master that is stopped."""
-
-    def make_connection(self, host):
-        connection = super().make_connection(host)
-        connection.timeout = 5.0
-        return connection
 
 
 def _accept(listener):

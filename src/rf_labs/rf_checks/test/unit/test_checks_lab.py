@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The judge's own lab, as far as it needs no simulator: how a start that fails is told."""
-import contextlib
 import subprocess
 import sys
 import time
 
 import pytest
+from rosmaster.master import Master
 
+from lab_environment import master_calls
+from lab_environment.ports import free_port
+from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
 from rf_checks.lab import Lab, LabFailed, TooSlow
 
@@ -53,7 +56,29 @@ def test_a_lab_ends_with_its_judge(tmp_path):
     wait_until(lambda: not is_alive(pid), "the end of the lab")
 
 
-def is_alive(pid):
-    with contextlib.suppress(OSError), open("/proc/%d/stat" % pid, encoding="utf-8") as file:
-        return file.read().rsplit(")", 1)[1].split()[0] != "Z"
-    return False
+@pytest.fixture
+def master():
+    """A ROS master, in a thread of this process."""
+    master = Master(port=free_port())
+    master.start()
+    yield master
+    master.stop()
+
+
+def test_strangers_that_are_gone_are_taken_off_the_masters_lists(lab, master):
+    lab.uri, lab.own_nodes = master.uri, frozenset(("/gazebo",))
+    for node in ("/gazebo", "/student"):
+        entry = master_calls.master(node, master.uri, 10.0)
+        entry.registerPublisher("/shared", "std_msgs/Empty", "http://127.0.0.1:1/" + node)
+        entry.registerSubscriber("/heard", "std_msgs/Empty", "http://127.0.0.1:1/" + node)
+        entry.registerService(node + "/service", "rosrpc://127.0.0.1:1", "http://127.0.0.1:1/" + node)
+    assert lab.nodes() == {"/gazebo", "/student"}
+    lab.forget_strangers()
+    assert lab.nodes() == {"/gazebo"}
+    assert lab._state() == [[["/shared", ["/gazebo"]]], [["/heard", ["/gazebo"]]], [["/gazebo/service", ["/gazebo"]]]]
+
+
+def test_a_master_that_is_gone_is_named(lab):
+    lab.uri = "http://127.0.0.1:%d" % free_port()
+    with pytest.raises(LabFailed, match="the ROS master is gone"):
+        lab.nodes()
