@@ -11,7 +11,7 @@ import re
 import sys
 import time
 
-from . import simulator_start
+from . import master_calls, simulator_start
 from .waiting_line import WaitingLine
 
 # So long is /clock waited for if nobody publishes it and no simulator is on its way up [s, wall].
@@ -117,7 +117,7 @@ def _master_answers():
     import rosgraph
 
     try:
-        simulator_start.proxy(rosgraph.get_master_uri()).getPid("/first_clock")
+        master_calls.proxy(rosgraph.get_master_uri(), simulator_start.ANSWER_TIMEOUT_S).getPid("/first_clock")
     except simulator_start.NO_ANSWER:
         return False
     return True
