@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Processes that a bench sets beside a lab: lab_part.py swing | press | client | busy | boxes N | empty | posture |
-latency N | lockstep TICKS.
+latency N | lockstep TICKS | hostile.
 
 Each prints "up" when it is at work.
 """
@@ -11,17 +11,20 @@ import math
 import statistics
 import struct
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import rospy
 from baxter_core_msgs.msg import JointCommand
 from bullet_sim_msgs.srv import AdvanceTicks
-from gazebo_msgs.srv import SpawnModel
-from geometry_msgs.msg import Point, Pose
+from gazebo_msgs.srv import DeleteModel, SpawnModel
+from geometry_msgs.msg import Point, Pose, Quaternion
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, UInt16
 from std_srvs.srv import Empty
 
+from lab_testing.hostile_descriptions import chain, write_ball, write_entity_bomb
 from lab_testing.waiting import wait_until
 
 SIDES = ("left", "right")
@@ -34,6 +37,9 @@ BOX = """<sdf version="1.6"><model name="box"><link name="link"><inertial><mass>
 <box><size>0.1 0.1 0.1</size></box></geometry></collision></link></model></sdf>"""
 BUSY_MODEL = """<robot name="busy"><link name="world"/>
 <gazebo><plugin name="busy" filename="libbench_busy.so"/></gazebo></robot>"""
+OF_MESH = """<robot name="hostile"><link name="l"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/>
+</inertial><visual><geometry><mesh filename="%s"/></geometry></visual>
+<collision><geometry><mesh filename="%s"/></geometry></collision></link></robot>"""
 TICK_S = 0.002
 COMMAND_TICKS = 5
 FIRST_TICK = 500  # by then whoever listens has connected, and the robot stands
@@ -198,10 +204,33 @@ def lockstep(ticks):
     print(json.dumps({"digest": digest.hexdigest(), "states": len(counted)}), flush=True)
 
 
+def hostile():
+    """Spawn and delete what is too large, endless or not what it says. Prints the time to each answer [s] as JSON."""
+    spawn = rospy.ServiceProxy("/gazebo/spawn_urdf_model", SpawnModel)
+    delete = rospy.ServiceProxy("/gazebo/delete_model", DeleteModel)
+    spawn.wait_for_service(60)
+    with tempfile.TemporaryDirectory() as folder:
+        large, lie, bomb = (str(Path(folder) / name) for name in ("large.stl", "lie.stl", "bomb.dae"))
+        write_ball(large, 548)
+        write_ball(lie, 5, announced=2**32 - 1)
+        write_entity_bomb(bomb)
+        descriptions = {"600,000 triangles": OF_MESH % (large, large), "a header that lies": OF_MESH % (lie, lie),
+                        "an entity bomb": OF_MESH % (bomb, bomb), "a device": OF_MESH % ("/dev/zero", "/dev/zero"),
+                        "100,000 links": chain(100_000), "3,000 links": chain(3_000)}
+        up()
+        found = {}
+        for what, description in descriptions.items():
+            begin = time.monotonic()
+            spawn("hostile", description, "", Pose(Point(5.0, 0.0, 0.5), Quaternion(0.0, 0.0, 0.0, 1.0)), "")
+            found[what] = time.monotonic() - begin
+            delete("hostile")
+    print(json.dumps(found), flush=True)
+
+
 def main():
     name, *arguments = rospy.myargv(sys.argv)[1:]  # without what roslaunch adds
     rospy.init_node("bench_" + name, anonymous=True, disable_rostime=name not in ("client",))
-    parts = (swing, press, client, boxes, busy, empty, posture, latency, lockstep)
+    parts = (swing, press, client, boxes, busy, empty, posture, latency, lockstep, hostile)
     {function.__name__: function for function in parts}[name](*arguments)
 
 

@@ -37,6 +37,7 @@ SUITES = {
     "physics": ("world_bench", "the whole stack flat out beside bare steps: alone, with objects, clients, in contact"),
     "loop": ("loop_bench", "real time: CPU, joint_states jitter, latency, with 0, 5 and 20 subscribers"),
     "keeps_up": ("keeps_up_bench", "real time with the window, rviz, a stopped reader, a busy thread in /gazebo"),
+    "hostile": ("hostile_bench", "hostile descriptions spawned: the longest gap in joint_states, the longest answer"),
     "lockstep": ("lockstep_bench", "two fresh labs in lock-step, the same commands: joint states bit for bit"),
     "services": ("service_bench", "IK service beside an empty service"),
     "tracking": ("tracking_bench", "trajActionServer: evenness of its commands, how closely the arm follows"),

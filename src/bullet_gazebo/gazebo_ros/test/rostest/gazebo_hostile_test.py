@@ -3,17 +3,16 @@
 """Large and hostile descriptions are answered, with the limit that they came to, and the world goes on meanwhile."""
 import os
 import shutil
-import struct
 import tempfile
 import threading
 import unittest
 
-import numpy as np
 import rospy
 import rostest
 from gazebo_msgs import srv
 from geometry_msgs.msg import Point, Pose, Quaternion
 
+from lab_testing.hostile_descriptions import chain, write_ball, write_entity_bomb
 from lab_testing.waiting import wait_until
 
 BODY = """<robot name="m"><link name="l"><inertial><mass value="1"/>
@@ -21,30 +20,9 @@ BODY = """<robot name="m"><link name="l"><inertial><mass value="1"/>
   <collision><geometry>%s</geometry></collision></link></robot>"""
 MESH = BODY % '<mesh filename="%s"/>'
 BOX = BODY % '<box size="0.2 0.2 0.2"/>'
-COLLADA = """<?xml version="1.0"?><!DOCTYPE c [%s]>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><extra>&e8;</extra></COLLADA>"""
 DEADLINE_S = 60.0
 # As many ticks as pass while a large mesh is read, on any machine: reading it takes seconds, a tick 2 ms.
 TICKS = 20
-
-
-def write_ball(path, across, announced=None):
-    """A ball of 2 * ``across`` ** 2 triangles as a binary STL."""
-    u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, across + 1), np.linspace(0.01, 3.13, across + 1))
-    points = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1).reshape(-1, 3)
-    i = (np.arange(across)[:, None] * (across + 1) + np.arange(across)).ravel()
-    faces = np.concatenate([np.stack([i, i + 1, i + across + 1], 1),
-                            np.stack([i + 1, i + across + 2, i + across + 1], 1)])
-    records = np.zeros(len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
-    records["corners"] = points[faces]
-    with open(path, "wb") as file:
-        file.write(b"\0" * 80 + struct.pack("<I", len(faces) if announced is None else announced) + records.tobytes())
-
-
-def chain(links):
-    return "<robot name='m'>%s%s</robot>" % ("".join("<link name='l%d'/>" % k for k in range(links)), "".join(
-        "<joint name='j%d' type='fixed'><parent link='l0'/><child link='l%d'/></joint>" % (k, k)
-        for k in range(1, links)))
 
 
 class GazeboHostile(unittest.TestCase):
@@ -89,9 +67,7 @@ class GazeboHostile(unittest.TestCase):
         self.stood_in_for("http://10.255.255.1/a.stl", "not fetched over the network")
 
     def test_meshes_that_lie(self):
-        with open(self.path("bomb.dae"), "w", encoding="utf-8") as file:
-            file.write(COLLADA % "".join("<!ENTITY e%d '%s'>" % (k, ("&e%d;" % (k - 1) if k else "aaaaaaaaaa") * 10)
-                                         for k in range(9)))
+        write_entity_bomb(self.path("bomb.dae"))
         self.stood_in_for(self.path("bomb.dae"), "bomb.dae cannot be used")
         self.delete_model("m")
         write_ball(self.path("lie.stl"), 5, announced=2**32 - 1)
