@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""`./baxter.sh test`: lint, unit tests, unit tests under a comma-decimal locale, rostests; one line of counts last.
+"""`./baxter.sh test`: lint, unit tests, unit tests under a comma-decimal locale, rostests.
+
+At the end stands what did not run and why, and one line of counts last.
 
 With --busy[=PERCENT] everything gets that share of one core, and without names the suites of the main flows run.
 """
@@ -20,7 +22,7 @@ from pathlib import Path
 from lab_tests import comma_locale, rostests
 from lab_tests.discovery import SelectionError, select, take_inventory
 from lab_tests.quota import Quota, QuotaError
-from lab_tests.results import Tally, failure, read_junit
+from lab_tests.results import Tally, failure, read_junit, summary
 
 ROOT = Path(__file__).resolve().parent.parent
 WORK = ROOT / ".baxter" / "tests"
@@ -62,9 +64,14 @@ class UnitRun:
 
     def __init__(self, title: str, targets, arguments, environment=None, output: Path | None = None):
         self._title, self._output = title, output
-        self._report = WORK / f"{title}.xml"
+        self._report, self._left_out = WORK / f"{title}.xml", WORK / f"{title}-left-out.txt"
         self._report.unlink(missing_ok=True)
+        self._left_out.unlink(missing_ok=True)
         options = ["-q", "--continue-on-collection-errors", f"--junitxml={self._report}", *arguments]
+        if "lab_tests.long_tests" in arguments:
+            options.append(f"--leave-out-long={self._left_out}")
+        environment = {**(environment or os.environ)}
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT / "tools"), environment.get("PYTHONPATH")]))
         command = [sys.executable, "-m", "pytest", *options, *targets]
         with contextlib.nullcontext() if output is None else output.open("wb") as stream:
             self._child = subprocess.Popen(command, cwd=ROOT, env=environment, stdout=stream, stderr=stream)
@@ -72,13 +79,15 @@ class UnitRun:
     def tally(self) -> Tally:
         """Wait for its end and count."""
         code = self._child.wait()
+        long = self._left_out.read_text(encoding="utf-8").splitlines() if self._left_out.is_file() else []
         if code == PYTEST_NO_TESTS_COLLECTED:
-            return Tally()
+            return Tally(long=long)
         if not self._report.is_file():
             said = self._output.read_text(errors="replace") if self._output else ""
             died = f"{self._title}: pytest died with exit code {code} before it wrote its report"
             return failure(f"{died}\n{said}".rstrip())
         tally = read_junit(self._report)
+        tally.long = long
         if self._output is None:
             tally.details.clear()  # pytest has shown them
         if code != 0 and tally.failed == 0:
@@ -109,7 +118,6 @@ def start_unit_under_comma_locale(targets):
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", None) or ""
         return FailedStart(f"cannot make the locale {comma_locale.NAME}: {error}\n{detail}")
-    environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT / "tools"), environment.get("PYTHONPATH")]))
     # What takes long or builds has nothing to do with decimal points. Two pytests share no cache.
     arguments = ["-p", "lab_tests.comma_locale", "-p", "no:cacheprovider", "-m", "not long and not build"]
     return UnitRun("unit-comma-locale", targets, arguments, environment, WORK / "unit-comma-locale.txt")
@@ -122,7 +130,7 @@ def layers(selection, long: bool, stretch: float, ending: contextlib.ExitStack):
     if selection.unit_targets:
         # Whoever names a single test means it, long or not; a -m of the user's own comes later and wins.
         is_single = any("::" in target for target in selection.unit_targets)
-        marker = [] if long or is_single else ["-m", "not long"]
+        marker = [] if long or is_single else ["-p", "lab_tests.long_tests"]
         runs = {"unit tests": UnitRun("unit", selection.unit_targets, marker + selection.pytest_arguments)}
         ending.callback(runs["unit tests"].kill)
         if selection.is_whole_suite:
@@ -175,12 +183,13 @@ class Beside:
 
 def run_layers(selection, long: bool, stretch: float = 1.0) -> Tally:
     """Run everything chosen and tell of each."""
-    total = Tally()
+    total = Tally(long=[name for test in selection.left_out for name in rostests.names(test, ROOT)])
     with contextlib.ExitStack() as ending:
         for title, run in layers(selection, long, stretch, ending):
             print(f"=== {title}", flush=True)
             started = time.monotonic()
             tally = run()
+            tally.refuse_bare_skips()
             for detail in tally.details:
                 print(detail)
             verdict = "FAILED" if tally.failed else "ok" if tally.passed else "nothing to run"
@@ -226,11 +235,11 @@ def main() -> int:
         return 2
     except QuotaError as error:
         print(f"--busy: skipped. A share of a core takes root, or control groups that users may make: {error}")
-        print("0 passed, 0 failed")
+        print(summary(Tally()))
         return EXIT_SKIPPED
     if total.passed + total.failed == 0:
         print("No test ran.")
-    print(f"{total.passed} passed, {total.failed} failed", flush=True)
+    print(summary(total), flush=True)
     return 0 if total.passed and not total.failed else 1
 
 

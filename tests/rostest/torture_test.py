@@ -12,6 +12,8 @@ from pathlib import Path
 
 import rostest
 
+from lab_testing.skipping import skip
+
 PROGRAM = Path(__file__).resolve().parents[1] / "torture" / "torture.py"
 SKIPPED = 77
 SLICE_SEED, SLICE_MESSAGES = 16, 500
@@ -26,7 +28,7 @@ class Torture(unittest.TestCase):
             done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
             print(done.stdout, flush=True)
             if done.returncode == SKIPPED:
-                self.skipTest(done.stdout)
+                skip(self, done.stdout.strip().rpartition("skipped: ")[2])
             self.assertEqual(done.returncode, 0, done.stdout[-6000:])
             return json.loads((Path(folder) / "result.json").read_text(encoding="utf-8"))
 

@@ -40,13 +40,17 @@ class Inventory:
 
 @dataclass
 class Selection:
-    """What one run does. unit_targets are pytest's own arguments: files or node ids."""
+    """What one run does. unit_targets are pytest's own arguments: files or node ids.
+
+    left_out: the long rostests that belong to what was named and do not run.
+    """
 
     linters: list[str]
     unit_targets: list[str]
     rostests: list[Rostest]
     pytest_arguments: list[str]
     is_whole_suite: bool
+    left_out: list[Rostest] = field(default_factory=list)
 
 
 def take_inventory(root: Path) -> Inventory:
@@ -104,14 +108,20 @@ def select(inventory: Inventory, arguments: list[str], long: bool) -> Selection:
         unit_targets = [str(path) for path in inventory.all_unit_files()]
         if pytest_arguments:
             return Selection([], unit_targets, [], pytest_arguments, False)
-        return Selection(list(LINTERS), unit_targets, rostests, [], True)
+        return Selection(list(LINTERS), unit_targets, rostests, [], True, _without(inventory.rostests, rostests))
     selection = Selection([], [], [], pytest_arguments, False)
     for name in names:
-        _add_named(selection, inventory, rostests, name)
+        _add_named(selection, inventory, long, name)
     # A package and one of its files may both have been named.
     selection.unit_targets = list(dict.fromkeys(selection.unit_targets))
-    selection.rostests = list(dict.fromkeys(selection.rostests))
+    chosen = list(dict.fromkeys(selection.rostests))
+    selection.rostests = chosen
+    selection.left_out = _without(dict.fromkeys(selection.left_out), chosen)
     return selection
+
+
+def _without(tests, others):
+    return [test for test in tests if test not in others]
 
 
 def _split(arguments):
@@ -127,13 +137,15 @@ def _split(arguments):
     return names, pytest_arguments
 
 
-def _add_named(selection, inventory, rostests, name):
+def _add_named(selection, inventory, long, name):
     if name in LINTERS:
         selection.linters.append(name)
         return
     if name in inventory.packages | set(inventory.unit_files):
         selection.unit_targets += [str(path) for path in inventory.unit_files.get(name, [])]
-        selection.rostests += [test for test in rostests if test.package == name]
+        for test in inventory.rostests:
+            if test.package == name:
+                (selection.left_out if test.is_long and not long else selection.rostests).append(test)
         return
     file_name, _, test_id = name.partition("::")
     unit = [path for path in inventory.all_unit_files() if _means(file_name, path, ".py")]

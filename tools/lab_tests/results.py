@@ -1,29 +1,68 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Counting: what JUnit files say, summed over every layer of tests."""
+"""Counting: what JUnit files say, summed over every layer of tests, and what did not run."""
 
+import collections
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
+# What pytest writes where nobody gave a reason.
+BARE = ("", "unconditional skip")
+
 
 @dataclass
 class Tally:
-    """Tests passed, failed and skipped; details holds one text for each failure."""
+    """Tests passed and failed, and those that did not run.
+
+    details: one text for each failure; skips: (test, reason) of what was skipped; long: the long tests left out.
+    """
 
     passed: int = 0
     failed: int = 0
-    skipped: int = 0
     details: list[str] = field(default_factory=list)
+    skips: list[tuple[str, str]] = field(default_factory=list)
+    long: list[str] = field(default_factory=list)
 
     def add(self, other: "Tally"):
         self.passed += other.passed
         self.failed += other.failed
-        self.skipped += other.skipped
         self.details += other.details
+        self.skips += other.skips
+        self.long += other.long
+
+    def refuse_bare_skips(self):
+        """Skips without a reason count as failures from here on."""
+        for name, reason in self.skips:
+            if reason in BARE:
+                self.add(failure(f"{name}: skipped without a reason; say what this machine lacks"))
+        self.skips = [skip for skip in self.skips if skip[1] not in BARE]
+
+    @property
+    def skipped(self) -> int:
+        return len(self.skips)
 
     @property
     def total(self) -> int:
         return self.passed + self.failed + self.skipped
+
+
+def summary(tally: Tally) -> str:
+    """What is printed last. The words up to `failed` stay as they are: continuous integration reads them."""
+    counts = f"{tally.passed} passed, {tally.failed} failed, {tally.skipped} skipped, {len(tally.long)} long not run"
+    return "\n".join([*_not_run(tally), counts])
+
+
+def _not_run(tally):
+    by_reason = {}
+    for name, reason in tally.skips:
+        by_reason.setdefault(reason, []).append(name)
+    for reason, names in by_reason.items():
+        yield f"skipped: {reason}"
+        yield from (f"    {name}" for name in dict.fromkeys(names))
+    if tally.long:
+        by_file = collections.Counter(name.partition("::")[0] for name in tally.long)
+        yield "long, not run (--long, or by name):"
+        yield from (f"    {file}{f', {count} tests' if count > 1 else ''}" for file, count in sorted(by_file.items()))
 
 
 def failure(detail: str) -> Tally:
@@ -40,13 +79,14 @@ def read_junit(path: Path) -> Tally:
     tally = Tally()
     for case in root.iter("testcase"):
         problems = [child for child in case if child.tag in ("failure", "error")]
+        name = f"{case.get('classname', '')}.{case.get('name', '')}"
+        skip = case.find("skipped")
         if problems:
             tally.failed += 1
-            name = f"{case.get('classname', '')}.{case.get('name', '')}"
             texts = [(child.get("message") or "") + "\n" + (child.text or "") for child in problems]
             tally.details.append("\n".join([name, *texts]).strip())
-        elif case.find("skipped") is not None:
-            tally.skipped += 1
+        elif skip is not None:
+            tally.skips.append((name, " ".join((skip.get("message") or "").split())))
         else:
             tally.passed += 1
     return tally
@@ -57,13 +97,16 @@ def read_rostest_results(folder: Path) -> Tally:
 
     rostest writes a file of its own, `rostest-*.xml`, in which a case says whether a test node ran to its end, and each
     test node writes its own cases. Only the latter count as tests; the former count where they failed (a crash).
+    rosunit knows no skips: to it a skipped test has passed. `lab_testing.skipping` writes a `skipped-*.xml` beside it.
     No test at all is a failure.
     """
     tally = Tally()
     for path in sorted(folder.rglob("*.xml")):
         one = read_junit(path)
         if path.name.startswith("rostest-"):
-            one.passed = one.skipped = 0
+            one.passed, one.skips = 0, []
+        if path.name.startswith("skipped-"):
+            one.passed -= one.skipped
         tally.add(one)
     if tally.total == 0:
         return failure("rostest found no test in this file, or none of its test nodes wrote results")

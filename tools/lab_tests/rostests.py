@@ -34,6 +34,12 @@ def declared_s(path: Path) -> float:
     return 60.0 + sum(float(test.get("time-limit", 60.0)) for test in ElementTree.parse(path).getroot().iter("test"))
 
 
+def names(test: Rostest, root: Path) -> list[str]:
+    """The tests of a file, by names relative to the workspace."""
+    file = test.path.relative_to(root)
+    return [f"{file}::{one.get('test-name')}" for one in ElementTree.parse(test.path).getroot().iter("test")]
+
+
 class Ended(Exception):
     """The run was told to end before the test did."""
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A screen that nobody sees, and what is on it."""
 import os
+import shutil
 import struct
 import subprocess
 import tempfile
@@ -9,8 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
+from lab_testing.skipping import skip
+
 WIDTH, HEIGHT = 1200, 800
+#: Why a test of windows is skipped.
+MISSING = "Xvfb, a virtual screen, is not installed"
 _XWD_FIELDS = 25  # of 4 bytes each, at the start of an X window dump
+
+
+def open_for(case):
+    """A VirtualScreen until the test of a ``unittest.TestCase`` ends; skips the test where Xvfb is missing."""
+    if shutil.which("Xvfb") is None:
+        skip(case, MISSING)
+    screen = VirtualScreen()
+    case.addCleanup(screen.close)
+    return screen
 
 
 class VirtualScreen:

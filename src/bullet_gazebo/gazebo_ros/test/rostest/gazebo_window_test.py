@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The window shows what is in the world: looked at in the frame buffer of a virtual display."""
 import functools
-import shutil
 import subprocess
 import unittest
 
@@ -14,8 +13,7 @@ from gazebo_msgs.srv import DeleteModel, GetWorldProperties, SetModelConfigurati
 from geometry_msgs.msg import Point, Pose, Quaternion
 from std_srvs.srv import Empty
 
-from lab_testing import waiting
-from lab_testing.virtual_screen import VirtualScreen
+from lab_testing import virtual_screen, waiting
 
 BOX = """<robot name="box"><link name="body">
   <inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -39,11 +37,9 @@ DEADLINE_S = 60.0
 wait_until = functools.partial(waiting.wait_until, timeout_s=DEADLINE_S, interval_s=0.2)
 
 
-@unittest.skipUnless(shutil.which("Xvfb"), "needs Xvfb, a virtual display")
 class GazeboWindow(unittest.TestCase):
     def setUp(self):
-        self._screen = VirtualScreen()
-        self.addCleanup(self._screen.close)
+        self._screen = virtual_screen.open_for(self)
 
     def open_window(self):
         window = subprocess.Popen(["rosrun", "gazebo_ros", "gazebo_gui"], env=self._screen.environment)

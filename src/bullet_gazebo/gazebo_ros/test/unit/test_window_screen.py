@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gazebo_ros.shared_picture import PictureWriter
-from lab_testing.virtual_screen import VirtualScreen
+from lab_testing import virtual_screen
 from lab_testing.waiting import wait_until
 
 # The screen stands upright and looks along x, where the window's camera is.
@@ -29,12 +29,12 @@ for line in sys.stdin:
 """
 
 
-@pytest.mark.skipif(not shutil.which("Xvfb"), reason="needs Xvfb, a virtual display")
+@pytest.mark.skipif(not shutil.which("Xvfb"), reason=virtual_screen.MISSING)
 def test_pictures_are_seen_the_right_way_round(tmp_path):
     picture = PictureWriter(tmp_path / "picture", 1024, 600)
     body = {**BODY, "screens": [{"link": "l", "offset": np.ravel(LEAN).tolist(), "size": [0.9, 0.53],
                                  "picture": str(picture.path)}]}
-    screen = VirtualScreen()
+    screen = virtual_screen.VirtualScreen()
     window = subprocess.Popen([sys.executable, "-c", WINDOW, json.dumps(body)], env=screen.environment, text=True,
                               stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     try:

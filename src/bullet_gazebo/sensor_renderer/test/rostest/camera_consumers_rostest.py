@@ -13,7 +13,7 @@ from gazebo_msgs.srv import SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
 from sensor_msgs.msg import Image, PointCloud2
 
-from lab_testing.virtual_screen import VirtualScreen
+from lab_testing import virtual_screen
 from lab_testing.waiting import wait_until
 
 RIG = """<sdf version="1.6"><model name="rig"><static>true</static><link name="post"><pose>0 0 1 0 0.3 0</pose>
@@ -91,8 +91,7 @@ class CameraConsumersTest(unittest.TestCase):
     def test_image_view_shows_the_picture(self):
         sent = red_box(self.picture())
         self.assertGreater(sent[2], 500)
-        screen = VirtualScreen()
-        self.addCleanup(screen.close)
+        screen = virtual_screen.open_for(self)
         command = ["rosrun", "image_view", "image_view", "image:=/deep/rgb/image_raw", "_autosize:=true"]
         viewer = subprocess.Popen(command, env=screen.environment, start_new_session=True)
         self.addCleanup(viewer.wait, 20.0)

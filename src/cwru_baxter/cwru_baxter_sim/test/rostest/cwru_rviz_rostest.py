@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import rospy
 
-from lab_testing.virtual_screen import VirtualScreen
+from lab_testing import virtual_screen
 from lab_testing.waiting import wait_until
 
 SCENE_COLUMNS = slice(380, 1150)  # right of the panels
@@ -30,8 +30,7 @@ class Seen(NamedTuple):
 
 class CwruRvizTest(unittest.TestCase):
     def setUp(self):
-        self.screen = VirtualScreen()
-        self.addCleanup(self.screen.close)
+        self.screen = virtual_screen.open_for(self)
         self.lab = subprocess.Popen(["roslaunch", "cwru_baxter_sim", "baxter_world.launch", "gui:=false", "rviz:=true"],
                                     env=self.screen.environment, start_new_session=True)
         self.addCleanup(self.end_lab)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import rostest
 
+from lab_testing.skipping import skip
 from rf_checks import isolation
 
 isolation.try_to_enter_network()  # before any library starts threads
@@ -115,8 +116,7 @@ class Loaded(unittest.TestCase):
                     with load():
                         found = self.judge_all(programs)
                 except QuotaUnavailable as reason:
-                    print("not tested: %s: %s" % (name, reason), flush=True)
-                    self.skipTest(str(reason))
+                    skip(self, "%s: %s" % (name, reason))
                 for program, result in found.items():
                     if not result["graded"]:
                         print("%s: %s: not graded: %s" % (name, program[1], result["not_graded"]), flush=True)

@@ -12,9 +12,9 @@ from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Student, adopt_orphans
 WALLS = pytest.param(True, marks=pytest.mark.skipif(bool(isolation.problem()), reason=isolation.problem()))
 
 
-@pytest.fixture(params=[False, WALLS], ids=["trusted", "walls"])
-def start(request, tmp_path, monkeypatch):
-    """Start a program (text) beside which there may be others; ended afterwards."""
+@pytest.fixture
+def starter(tmp_path, monkeypatch):
+    """A function that starts a program (text), with walls if its `has_walls` is set to True; ended afterwards."""
     workspace = tmp_path / "workspace"
     for name in (*isolation.SOLVED, *isolation.JUDGE):
         path = workspace / name
@@ -33,21 +33,25 @@ def start(request, tmp_path, monkeypatch):
         folder = tmp_path / ("submission_%d" % len(students))
         folder.mkdir()
         (folder / "program.py").write_text(text)
-        students.append(Student(folder / "program.py", words, dict(os.environ), request.param))
+        students.append(Student(folder / "program.py", words, dict(os.environ), run.has_walls))
         return students[-1]
 
-    run.has_walls = request.param
     run.workspace = workspace
     yield run
     for student in students:
         student.end()
 
 
-@pytest.fixture
-def walled(start):
-    if not start.has_walls:
-        pytest.skip("needs walls")
-    return start
+@pytest.fixture(params=[False, WALLS], ids=["trusted", "walls"])
+def start(request, starter):
+    starter.has_walls = request.param
+    return starter
+
+
+@pytest.fixture(params=[WALLS], ids=["walls"])
+def walled(request, starter):
+    starter.has_walls = request.param
+    return starter
 
 
 def finished(student):

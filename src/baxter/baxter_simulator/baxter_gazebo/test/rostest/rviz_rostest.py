@@ -15,7 +15,7 @@ import tf2_ros
 import yaml
 from robot_client import Robot, joints
 
-from lab_testing.virtual_screen import VirtualScreen
+from lab_testing import virtual_screen
 
 # Links of the moving arm, torso to tip; each is thinner than THICKNESS_M around the line to the next.
 ARM = ("left_upper_shoulder", "left_lower_shoulder", "left_upper_elbow", "left_lower_elbow", "left_upper_forearm",
@@ -30,8 +30,7 @@ END_LIMIT_S, PATIENCE_S = 40.0, 120.0
 
 class RvizTest(unittest.TestCase):
     def setUp(self):
-        self.screen = VirtualScreen()
-        self.addCleanup(self.screen.close)
+        self.screen = virtual_screen.open_for(self)
         self.lab = subprocess.Popen(
             ["roslaunch", "--sigint-timeout", str(PATIENCE_S), "baxter_gazebo", "baxter_world.launch", "gui:=false",
              "rviz:=true", "enable:=true", "pose:=neutral"], env=self.screen.environment, start_new_session=True)
