@@ -37,7 +37,7 @@ def may_move(name, value, style):
     if what == "joint_command":
         return not is_refused(side, value)
     twist = value["twist"]
-    if value["header"]["frame_id"] not in ("", "base", "/base", "%s_gripper" % side):
+    if value["header"]["frame_id"] not in ("", "base", "/base", "%s_gripper" % side, "/%s_gripper" % side):
         return False
     return all(math.isfinite(twist[part][axis]) for part in ("linear", "angular") for axis in "xyz")
 

@@ -107,11 +107,13 @@ class StatusTopics:
         pose, jacobian = chain.fk_and_jacobian(position[joints])
         linear, angular = msg.twist.linear, msg.twist.angular
         twist = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
-        frame = msg.header.frame_id.lstrip("/")
+        # tf's old names begin with a slash; a slash alone names nothing.
+        frame = msg.header.frame_id.removeprefix("/")
         if frame == tip_of(side):
             twist = np.concatenate([pose[:3, :3] @ twist[:3], pose[:3, :3] @ twist[3:]])
-        elif frame not in ("", BASE_FRAME):
-            raise CommandRefused("twist in frame '%s'; it must be in %s or %s" % (frame, BASE_FRAME, tip_of(side)))
+        elif msg.header.frame_id and frame != BASE_FRAME:
+            raise CommandRefused("twist in frame '%s'; it must be in %s or %s"
+                                 % (msg.header.frame_id, BASE_FRAME, tip_of(side)))
         if not np.isfinite(twist).all():
             raise CommandRefused("twist is %s; it must be finite numbers" % twist.tolist())
         self._baxter.command(side, Mode.VELOCITY, chain.joint_names,

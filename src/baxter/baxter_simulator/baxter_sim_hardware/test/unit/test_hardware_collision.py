@@ -285,10 +285,16 @@ def test_a_twist_moves_the_tip(lab, side, frame, axis):
     np.testing.assert_allclose(angular, 0.0, atol=0.03)
     lab.run(0.6)  # it expires
     assert np.abs(lab.velocity).max() < 1e-3
-    message.header.frame_id = "head"
-    lab.send("limb/%s/command_twist_stamped" % side, message)
-    lab.run(0.01)
-    assert "twist in frame 'head'" in lab.log.lines[-1]
+
+
+@pytest.mark.parametrize("frame", ["head", "/", "//base"])
+def test_a_twist_in_another_frame_is_refused(lab, frame):
+    message = TwistStamped(header=Header(frame_id=frame))
+    message.twist.linear.x = 0.1
+    lab.send("limb/left/command_twist_stamped", message)
+    lab.run(0.1)
+    assert "twist in frame '%s'" % frame in lab.log.lines[-1]
+    assert np.abs(lab.velocity).max() < 1e-3
 
 
 def test_velocity_to_zero_stops_one_limb(lab):
