@@ -9,6 +9,7 @@ from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndE
 from baxter_dataflow import Signal, wait_for
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, is_unlimited
+from rospy_limits.json_object import JsonRefused, read_object
 
 from . import startup
 from .gripper_types import TYPES
@@ -57,12 +58,11 @@ class GripperLink:
 
     @property
     def details(self):
-        """The JSON object in the state, empty if there is none."""
+        """The JSON object in the state, empty if there is none that can be read."""
         try:
-            details = json.loads(self.state.state)
-        except ValueError:
+            return read_object(self.state.state)
+        except JsonRefused:
             return {}
-        return details if isinstance(details, dict) else {}
 
     def command(self, command, block=False, test=None, timeout_s=0.0, args=None, delay_s=0.0):
         """Send a command. Returns True if not `block`; otherwise whether `test()` came true in `timeout_s`.

@@ -2,8 +2,9 @@
 """What every kind of gripper does with a command message: check it, echo it, hand it on."""
 import math
 
+from rospy_limits.json_object import JsonRefused, read_object
+
 from .errors import CommandRefused
-from .json_object import read_object
 from .robot import ENABLE_HINT
 
 #: A sender's name, which goes out with every state of the gripper, is no longer than this [characters].
@@ -35,7 +36,7 @@ class Gripper:
     def take(self, command, args, sender, sequence, enabled):
         """One command message.
 
-        args: JSON object (see json_object) or empty. sender, sequence: a client's own mark; with the same mark,
+        args: JSON object (see rospy_limits.json_object) or empty. sender, sequence: a client's mark; with the same one,
         commands of ONCE are one command that is sent again, as the SDK does until it sees the effect. Raises
         CommandRefused for an unknown command, for senseless arguments, and for what needs power while the robot is not
         enabled.
@@ -50,7 +51,10 @@ class Gripper:
         self.command, self.sender, self.sequence = command, sender, sequence
         if is_repeated and command in self.ONCE:
             return
-        values = read_object(args)
+        try:
+            values = read_object(args)
+        except JsonRefused as error:
+            raise CommandRefused("args must be a JSON object: %s" % error) from None
         if needs_power and not enabled:
             raise CommandRefused(ENABLE_HINT)
         getattr(self, method)(values)

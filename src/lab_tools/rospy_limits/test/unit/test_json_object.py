@@ -5,8 +5,7 @@ import time
 
 import pytest
 
-from baxter_sim_hardware import CommandRefused
-from baxter_sim_hardware.json_object import DEEPEST, LONGEST, read_object
+from rospy_limits.json_object import DEEPEST, LONGEST, JsonRefused, read_object
 
 
 @pytest.mark.parametrize("text, values", [
@@ -24,8 +23,8 @@ def test_what_python_writes_for_no_number_is_read():
 
 
 @pytest.mark.parametrize("text, found", [
-    ("5", "must be a JSON object"), ("[]", "must be a JSON object"), ("{", "must be a JSON object"),
-    ("\0", "must be a JSON object"), ('{"a": 1}x', "must be a JSON object"), ("nul", "must be a JSON object"),
+    ("5", "is no JSON object"), ("[]", "is no JSON object"), ("{", "is no JSON object"),
+    ("\0", "is no JSON object"), ('{"a": 1}x', "is no JSON object"), ("nul", "is no JSON object"),
     ('{"a":' * 5000, "25000 characters"), ('{"a":' * 1900, "nested deeper than %d" % DEEPEST),
     ("[" * 9000, "nested deeper than"),
     ('{"a":' * 9 + "1" + "}" * 9, "nested deeper than"),
@@ -33,7 +32,7 @@ def test_what_python_writes_for_no_number_is_read():
     ('{"velocity": 1e999}', "magnitude may be up to 1e"), ('{"velocity": -1e308}', "magnitude may be up to 1e"),
     ('{"velocity": 1e15}' + " " * LONGEST, "%d characters" % (LONGEST + 18)), ("x" * 10**6, "1000000 characters")])
 def test_what_is_refused_says_why_and_in_short(text, found):
-    with pytest.raises(CommandRefused, match=found) as refusal:
+    with pytest.raises(JsonRefused, match=found) as refusal:
         read_object(text)
     assert len(str(refusal.value)) < 400
 
@@ -42,6 +41,6 @@ def test_what_is_refused_says_why_and_in_short(text, found):
 def test_no_text_takes_long(unit):
     began = time.process_time()
     for text in (unit * (LONGEST // len(unit)), '{"a": %s' % (unit * (9000 // len(unit)))):
-        with pytest.raises(CommandRefused):
+        with pytest.raises(JsonRefused):
             read_object(text)
     assert time.process_time() - began < 0.5

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""JSON objects that come in by message: read within limits, so that no text of anybody's costs more than an error.
+"""JSON objects that come in by message, read within limits: no text of anybody's costs more than an error. ROS-free.
 
 Python's own reader fails in its own ways on what JSON allows: brackets a thousand deep, integers of any length.
 """
 import json
 import re
 
-from .errors import CommandRefused
-
-LONGEST = 10000  # characters of a text; the SDK's longest is about 100
-DEEPEST = 8  # objects and lists within each other; no command has more than one
+LONGEST = 10000  # characters of a text; the robot's longest is about 100
+DEEPEST = 8  # objects and lists within each other; no message of the robot's has more than one
 MOST_DIGITS = 18  # of an integer: what 64 bits hold
 LARGEST = 1e15  # magnitude of a number
 SHOWN = 100  # characters of a text that an error quotes
@@ -19,33 +17,37 @@ _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"?|[][{}]', re.DOTALL)
 _BRACKETS = {"{": 1, "[": 1, "}": -1, "]": -1}
 
 
-def read_object(text):
-    """The JSON object in `text` as a dict, an empty one where there is nothing but white space.
+class JsonRefused(ValueError):
+    """A text is no JSON object, or one beyond the limits; says what was found and what is allowed."""
 
-    NaN and Infinity are read, as Python writes them. Raises CommandRefused with what was found and what is allowed.
+
+def read_object(text):
+    """The JSON object in ``text`` as a dict, an empty one where there is nothing but white space.
+
+    NaN and Infinity are read, as Python writes them. Raises :class:`JsonRefused`.
     """
     if not text.strip():
         return {}
     fault = _fault(text)
     if fault:
-        raise CommandRefused("args are %s; %s" % (_quoted(text), fault))
+        raise JsonRefused("%s: %s" % (_quoted(text), fault))
     try:
         values = json.loads(text, parse_int=_integer, parse_float=_number)
     except (ValueError, RecursionError) as error:
-        raise CommandRefused("args are %s; they must be a JSON object (%s)" % (_quoted(text), error)) from None
+        raise JsonRefused("%s is no JSON object (%s)" % (_quoted(text), error)) from None
     if not isinstance(values, dict):
-        raise CommandRefused("args are %s; they must be a JSON object" % _quoted(text))
+        raise JsonRefused("%s is no JSON object" % _quoted(text))
     return values
 
 
 def _fault(text):
     if len(text) > LONGEST:
-        return "they have %d characters, and at most %d are read" % (len(text), LONGEST)
+        return "%d characters, and at most %d are read" % (len(text), LONGEST)
     depth = 0
     for token in _TOKEN.findall(text):
         depth += _BRACKETS.get(token, 0)
         if depth > DEEPEST:
-            return "they are nested deeper than %d, and one object is all that a command needs" % DEEPEST
+            return "nested deeper than %d, which is all that is read" % DEEPEST
     return ""
 
 
