@@ -11,6 +11,8 @@ import numpy as np
 
 from urdf_model import bounds, read_file, refuse_entities
 
+from .thinning import outermost, thin_out
+
 #: What of a mesh is read.
 MOST_BYTES = 100_000_000
 MOST_TRIANGLES = 2_000_000
@@ -27,7 +29,6 @@ MOST_HULL_POINTS = 6_000
 # Directions in which a hull with more points keeps its outermost one: neighbours are 0.09 rad apart, so that at most
 # 0.1 % of its size is cut off (1 - cos 0.045).
 _HULL_DIRECTIONS = 1_500
-_GRIDS = (128, 96, 64, 48, 32, 24, 16, 12, 8)
 
 
 class MeshError(ValueError):
@@ -111,8 +112,8 @@ def to_wavefront(path, target, planes):
         return ""
     remark = ""
     if len(faces) > MOST_HOLLOW_TRIANGLES:
-        _write(target + ".hull", _cloud(hull_points(_outer(np.asarray(mesh.vertices)))))
-        vertices, thinned = thinned_out(np.asarray(mesh.vertices), faces, MOST_HOLLOW_TRIANGLES)
+        _write(target + ".hull", _cloud(hull_points(outermost(np.asarray(mesh.vertices)))))
+        vertices, thinned = thin_out(np.asarray(mesh.vertices), faces, MOST_HOLLOW_TRIANGLES)
         remark = "it is thinned out from %d triangles to %d to collide with" % (len(faces), len(thinned))
         faces = thinned
     else:
@@ -145,41 +146,6 @@ def hull_points(points):
         better = reach > best
         best[better], outermost[better] = reach[better], start + here[better]
     return points[np.unique(outermost)]
-
-
-def thinned_out(vertices, faces, most):
-    """Return (vertices, faces) of about the same shape with at most ``most`` triangles.
-
-    Vertices that share a cell of a cubic grid become one, their mean; the finest of a few grids that will do is taken.
-    """
-    low, size = vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), 1e-12)
-    for cells in _GRIDS:
-        cluster = _clusters(vertices, low, cells / size)
-        count = np.bincount(cluster)
-        merged = np.stack([np.bincount(cluster, vertices[:, axis]) / count for axis in range(3)], axis=1)
-        corners = cluster[faces]
-        whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 0] != corners[:, 2])
-        vertices, faces = merged, np.unique(corners[whole], axis=0)
-        if len(faces) <= most:
-            break
-    return vertices, faces
-
-
-def _clusters(vertices, low, cells_per_m):
-    """Return for each of ``vertices`` (n, 3) the number of the cell that it lies in; empty cells have none."""
-    cell = np.floor((vertices - low) * cells_per_m).astype(np.int64) @ np.array([1, 1024, 1024**2])
-    return np.unique(cell, return_inverse=True)[1]
-
-
-def _outer(vertices):
-    """Return of the vertices in each cell of a fine grid the one that is farthest out."""
-    low, size = vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), 1e-12)
-    cluster = _clusters(vertices, low, _GRIDS[0] / size)
-    away = np.linalg.norm(vertices - vertices.mean(axis=0), axis=1)
-    farthest = np.zeros(cluster.max() + 1, dtype=int)
-    order = np.argsort(away)
-    farthest[cluster[order]] = order  # of several the last one stays
-    return vertices[farthest]
 
 
 def parts_as_wavefront(parts):

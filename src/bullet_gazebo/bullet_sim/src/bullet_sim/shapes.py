@@ -22,7 +22,7 @@ from .mesh_loading import MOST_BYTES, to_wavefront
 
 NO_SHAPE = -1
 # Part of what cached files are named by: raise it when the same mesh would come out differently.
-_VERSION = b"2"
+_VERSION = b"3"
 # A plane that is tilted, or one of several shapes, becomes a slab of this size [m]: Bullet's own plane goes alone.
 _SLAB_M = (200.0, 200.0, 1.0)
 

@@ -119,7 +119,7 @@ def test_materials_outside_of_the_folder_are_not_read(tmp_path, cache):
 def test_a_large_mesh_is_thinned_out_and_says_so(tmp_path, cache, told):
     path = write_stl(tmp_path / "large.stl", *bumpy_ball(354))  # 250,632 triangles
     points, triangles = points_of(cache.wavefront(path))
-    assert 2_000 < triangles <= MOST_HOLLOW_TRIANGLES
+    assert 0.8 * MOST_HOLLOW_TRIANGLES < triangles <= MOST_HOLLOW_TRIANGLES
     assert np.abs(np.linalg.norm(points, axis=1) - 0.99).max() < 0.03
     assert len(told) == 1 and "thinned out from 250632 triangles" in told[0]
     hull, _ = points_of(cache.wavefront(path, hollow=False))

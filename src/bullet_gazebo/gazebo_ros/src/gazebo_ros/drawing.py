@@ -12,6 +12,7 @@ import numpy as np
 
 from bullet_sim.limited import MESHES, LimitError
 from bullet_sim.mesh_loading import MOST_BYTES, load_scene
+from bullet_sim.thinning import thin_out
 from urdf_model import read_file
 
 #: Triangles that a mesh of :data:`USUAL_M` [m, its longest side] keeps; a robot of thirty links then draws in some
@@ -20,9 +21,7 @@ TRIANGLES = 800
 USUAL_M = 0.35
 _LEAST, _MOST = 0.5, 2.5
 # Part of the name of cached files: raise it when the same mesh would come out differently.
-_VERSION = 3
-_FINEST_GRID = 512
-_MANY = 100_000
+_VERSION = 4
 
 
 class MeshPart(NamedTuple):
@@ -34,45 +33,6 @@ class MeshPart(NamedTuple):
 
 class DrawingError(Exception):
     """A mesh cannot be read."""
-
-
-def thin_out(vertices, faces, target):
-    """Fewer triangles of about the same shape, at most ``target`` where that is possible at all.
-
-    Vertices (n, 3) that share a cell of a cubic grid become their mean; triangles (m, 3) that lose a corner go. The
-    finest grid that meets the target is taken. Returns (vertices, faces).
-    """
-    if len(faces) <= target:
-        return vertices, faces
-    low, size = vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), 1e-9)
-    coarse, fine = 2, _FINEST_GRID
-    if len(faces) > _MANY:
-        # A first pass on the finest grid, so that the others have little left to do.
-        vertices, faces = _cluster(vertices, faces, np.floor((vertices - low) * (_FINEST_GRID / size)).astype(np.int64))
-        if len(faces) <= target:
-            return vertices, faces
-    best = None
-    while fine - coarse > 1:
-        cells = (coarse + fine) // 2
-        thinned = _cluster(vertices, faces, np.floor((vertices - low) * (cells / size)).astype(np.int64))
-        if len(thinned[1]) <= target:
-            coarse, best = cells, thinned
-        else:
-            fine = cells
-    return best if best is not None else (vertices, faces)
-
-
-def _cluster(vertices, faces, cells):
-    _, cluster = np.unique(cells @ np.array([1, 4096, 4096 ** 2]), return_inverse=True)
-    count = np.bincount(cluster)
-    merged = np.stack([np.bincount(cluster, vertices[:, k]) / count for k in range(3)], axis=1)
-    corners = cluster[faces]
-    whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 0] != corners[:, 2])
-    corners = corners[whole]
-    # Smallest corner first, the sense of rotation kept: thin walls have two triangles that face apart.
-    start = corners.argmin(axis=1)[:, None]
-    corners = np.take_along_axis(corners, (start + np.arange(3)) % 3, axis=1)
-    return merged, np.unique(corners, axis=0)
 
 
 class DrawingCache:

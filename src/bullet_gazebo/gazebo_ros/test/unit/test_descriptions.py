@@ -125,22 +125,6 @@ def sphere(rings):
     return grid, np.array(faces)
 
 
-def test_thinning_out_keeps_the_shape_and_the_outside():
-    vertices, faces = sphere(60)
-    thin_vertices, thin_faces = drawing.thin_out(vertices, faces, 1000)
-    assert 300 < len(thin_faces) <= 1000
-    corners = thin_vertices[thin_faces]
-    assert np.abs(np.linalg.norm(thin_vertices[np.unique(thin_faces)], axis=1) - 1.0).max() < 0.1
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    outward = (normals * corners.mean(axis=1)).sum(axis=1)
-    assert (outward > 0.0).mean() > 0.98
-
-
-def test_a_small_mesh_is_left_as_it_is():
-    vertices, faces = sphere(5)
-    assert drawing.thin_out(vertices, faces, 1000)[1] is faces
-
-
 @pytest.mark.parametrize(("size_m", "least", "most"), [
     (0.05, 100, 250), (drawing.USUAL_M, 250, 500), (3.0, 750, 1250)])
 def test_a_mesh_is_thinned_by_its_size_once_and_then_found_again(tmp_path, size_m, least, most):
