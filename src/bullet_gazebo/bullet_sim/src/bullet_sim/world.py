@@ -177,23 +177,6 @@ class World:
         static = merged.root == "world" if static is None else static
         self._shapes.compound(merged.links[link].collisions, static and link == merged.root, mesh_cuts)
 
-    def respawn(self, name, static):
-        """Replace a model by itself, fixed in the world or free, where it stands; return the new Model.
-
-        For a plugin that knows more of a robot than its description says, such as that it is bolted to the floor.
-        """
-        old = self._model(name)
-        if old.static == static:
-            return old
-        pose, position = old.base_pose(), old.read_joints()[0]
-        order = list(self.models)
-        self.delete(name)
-        model = self.spawn(old.robot, name, pose, static)
-        model.set_joint_positions(np.arange(len(position)), position)
-        model.mark_start()
-        self.models = {key: self.models[key] for key in order}
-        return model
-
     def add_ground_plane(self, name="ground_plane"):
         """Add the half space below z = 0; return its Model (one link, "link", as Gazebo's has)."""
         link = Link("link", collisions=[Shape(Plane(), np.eye(4), "collision", None, "link")])

@@ -272,16 +272,6 @@ def test_rays_find_shapes_and_the_floor(world, arm):
     np.testing.assert_allclose(fractions, (0.95 / 2, 0.5, 1.0), atol=1e-3)
 
 
-def test_respawn_fixes_a_robot_where_it_stands(world):
-    robot = parse_urdf(ARM)
-    first, second = world.spawn(robot, "a", Pose((1, 1, 1))), world.spawn(robot, "b")
-    first.set_joint_positions(BOTH, np.array([0.1, 0.2]))
-    fixed = world.respawn("a", static=True)
-    assert fixed.static and list(world.models) == ["a", "b"] and world.models["b"] is second
-    np.testing.assert_allclose(fixed.read_joints()[0], (0.1, 0.2))
-    assert fixed.base_pose().position == pytest.approx((1, 1, 1))
-
-
 def run_and_hash():
     with_arm = World(seed=3)
     with_arm.add_ground_plane()
