@@ -133,11 +133,7 @@ def hull_points(points):
     points = np.asarray(points, dtype=float)
     if len(points) <= MOST_HULL_POINTS:
         return points
-    # Directions evenly over the sphere: a Fibonacci lattice.
-    k = np.arange(_HULL_DIRECTIONS) + 0.5
-    height, turn = 1.0 - 2.0 * k / _HULL_DIRECTIONS, np.pi * (1.0 + 5.0**0.5) * k
-    level = np.sqrt(1.0 - height * height)
-    directions = np.stack([level * np.cos(turn), level * np.sin(turn), height], axis=1)
+    directions = even_directions(_HULL_DIRECTIONS)
     best, outermost = np.full(_HULL_DIRECTIONS, -np.inf), np.zeros(_HULL_DIRECTIONS, dtype=int)
     for start in range(0, len(points), 4096):
         reach = directions @ points[start : start + 4096].T
@@ -146,6 +142,14 @@ def hull_points(points):
         better = reach > best
         best[better], outermost[better] = reach[better], start + here[better]
     return points[np.unique(outermost)]
+
+
+def even_directions(count):
+    """Return ``count`` directions (count, 3) evenly over the sphere: a Fibonacci lattice."""
+    k = np.arange(count) + 0.5
+    height, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + 5.0**0.5) * k
+    level = np.sqrt(1.0 - height * height)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), height], axis=1)
 
 
 def parts_as_wavefront(parts):

@@ -17,12 +17,15 @@ from urdf_model.files import kind_of
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 from .errors import BulletSimError
+from .gathered import Part, gathered
 from .limited import MESHES, LimitError
 from .mesh_loading import MOST_BYTES, to_wavefront
 
 NO_SHAPE = -1
 # Part of what cached files are named by: raise it when the same mesh would come out differently.
 _VERSION = b"3"
+#: Of one body; with more, making it takes the loop more than 50 ms.
+_MOST_SHAPES_OF_BODY = 1000
 # A plane that is tilted, or one of several shapes, becomes a slab of this size [m]: Bullet's own plane goes alone.
 _SLAB_M = (200.0, 200.0, 1.0)
 
@@ -59,14 +62,33 @@ class MeshCache:
         hull = self._known[key].with_suffix(".hull.obj")
         return str(hull if not hollow and hull.exists() else self._known[key])
 
-    def _convert(self, path, target, planes):
+    def keep(self, key, lines):
+        """Return the path of a file with what ``lines()`` returns; one that was made for the same ``key`` is kept."""
+        name = hashlib.sha256(key.encode() + _VERSION).hexdigest()[:32] + ".obj"
+        target = self.folder / name
+        if not target.exists():
+            self._make_folder()
+            target = self.folder / name
+            with self._draft_folder() as draft:
+                part = Path(draft) / "gathered"
+                part.write_text("\n".join(lines()) + "\n", encoding="ascii")
+                os.replace(part, target)
+        return str(target)
+
+    def _make_folder(self):
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError:
             self.folder = Path(tempfile.mkdtemp(prefix="bullet_sim_meshes_"))
-            target = self.folder / target.name
-        # Another simulator may be converting the same mesh: write beside, then rename, which is atomic.
-        with tempfile.TemporaryDirectory(dir=str(self.folder), prefix="part_") as draft:
+
+    def _draft_folder(self):
+        """Return where to write beside and rename from, which is atomic: another simulator may make the same file."""
+        return tempfile.TemporaryDirectory(dir=str(self.folder), prefix="part_")
+
+    def _convert(self, path, target, planes):
+        self._make_folder()
+        target = self.folder / target.name
+        with self._draft_folder() as draft:
             part = Path(draft) / "mesh"
             try:
                 remark = MESHES.call(to_wavefront, str(path), str(part), planes)
@@ -124,6 +146,26 @@ class MeshFiles:
         """
         return self._cache.wavefront(self.path(mesh), planes, hollow)
 
+    def parts(self, shapes, concave, mesh_cuts=None):
+        """Return what PyBullet makes of ``shapes`` (urdf_model.Shape): a list of at most ``gathered.MOST_SHAPES`` Part.
+
+        ``concave``, ``mesh_cuts``: as for ``ShapeStore.compound``. Raises BulletSimError for too many shapes, and for a
+        mesh that cannot be found or read.
+        """
+        if len(shapes) > _MOST_SHAPES_OF_BODY:
+            raise BulletSimError("link '%s', with what is fixed to it, has %d collision shapes; expected at most %d"
+                                 % (shapes[0].link, len(shapes), _MOST_SHAPES_OF_BODY))
+        parts = []
+        for shape in shapes:
+            geometry, origin, file, planes = shape.geometry, shape.origin, None, ()
+            if isinstance(geometry, Mesh):
+                planes = (mesh_cuts or {}).get(shape.link, ())
+                file = self.wavefront(geometry, planes, concave)
+            elif isinstance(geometry, Plane) and (len(shapes) > 1 or not np.allclose(origin, np.eye(4), atol=1e-12)):
+                geometry, origin = Box(_SLAB_M), origin @ pose_matrix((0.0, 0.0, -_SLAB_M[2] / 2.0))
+            parts.append(Part(geometry, file, origin, bool(file and concave and not planes)))
+        return gathered(parts, self._cache.keep)
+
 
 class ShapeStore:
     """The collision shapes of one physics client, one compound for each set of geometries."""
@@ -138,17 +180,9 @@ class ShapeStore:
 
         ``concave`` keeps meshes as triangles (only for bodies that never move); otherwise they are their convex hull.
         ``mesh_cuts``: as for ``World.spawn``; such a mesh becomes the convex hulls of its parts in either case.
-        Raises BulletSimError for a mesh that cannot be found or read.
+        Raises BulletSimError as ``MeshFiles.parts`` does, which may have been asked before: that takes the time.
         """
-        parts = []
-        for shape in shapes:
-            geometry, origin, file, planes = shape.geometry, shape.origin, None, ()
-            if isinstance(geometry, Mesh):
-                planes = (mesh_cuts or {}).get(shape.link, ())
-                file = self._mesh_files.wavefront(geometry, planes, concave)
-            elif isinstance(geometry, Plane) and (len(shapes) > 1 or not np.allclose(origin, np.eye(4), atol=1e-12)):
-                geometry, origin = Box(_SLAB_M), origin @ pose_matrix((0.0, 0.0, -_SLAB_M[2] / 2.0))
-            parts.append((geometry, file, origin, concave and not planes))
+        parts = self._mesh_files.parts(shapes, concave, mesh_cuts)
         if not parts:
             return NO_SHAPE
         key = tuple((geometry, file, origin.tobytes(), hollow) for geometry, file, origin, hollow in parts)
@@ -177,7 +211,7 @@ class ShapeStore:
             columns["lengths"].append(getattr(geometry, "length", 0.0))
             columns["fileNames"].append(file or "")
             columns["meshScales"].append(list(getattr(geometry, "scale", (1.0, 1.0, 1.0))))
-            columns["flags"].append(pybullet.GEOM_FORCE_CONCAVE_TRIMESH if hollow and file else 0)
+            columns["flags"].append(pybullet.GEOM_FORCE_CONCAVE_TRIMESH if hollow else 0)
             columns["collisionFramePositions"].append(origin[:3, 3].tolist())
             columns["collisionFrameOrientations"].append(quaternion_from_matrix(origin).tolist())
         with _points_in_numbers():

@@ -23,6 +23,11 @@ def plain_path(uri):
     return path if os.path.isfile(path) else None
 
 
+def is_fixed(root, static=None):
+    """Whether a robot with this root link stands fast in the world; ``static``: as for ``World.spawn``."""
+    return root == "world" if static is None else static
+
+
 def _has_mesh(link):
     """Whether a link is missing altogether, or has a mesh to collide with."""
     return link is None or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)
@@ -138,7 +143,7 @@ class World:
         if name in self.models:
             raise BulletSimError("model '%s' exists already; delete it first or choose another name" % name)
         pose = (pose or Pose()).checked()
-        static = robot.root == "world" if static is None else static
+        static = is_fixed(robot.root, static)
         if merged is None:
             try:
                 check_robot(robot)
@@ -174,7 +179,7 @@ class World:
         One costs up to 20 ms: a robot with many need not bring them all in one tick. ``static``, ``mesh_cuts``: as for
         :meth:`spawn`.
         """
-        static = merged.root == "world" if static is None else static
+        static = is_fixed(merged.root, static)
         self._shapes.compound(merged.links[link].collisions, static and link == merged.root, mesh_cuts)
 
     def add_ground_plane(self, name="ground_plane"):

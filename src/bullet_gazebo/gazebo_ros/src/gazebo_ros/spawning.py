@@ -12,6 +12,8 @@ import numpy as np
 from lxml import etree
 
 from bullet_sim import BulletSimError, Pose, with_stand_ins
+from bullet_sim.gathered import MOST_SHAPES
+from bullet_sim.world import is_fixed
 from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
 from gazebo_ros.faults import SURVIVED, described
@@ -129,11 +131,10 @@ class Spawner:
         if mended or drawing is None:
             drawing = None if is_floor(robot) else drawing_urdf(merged)
         options = {"static": urdf_extras.is_static(robot), **options}
-        for link in _with_meshes(merged):
-            for shape in merged.links[link].collisions:
-                cuts = (options.get("mesh_cuts") or {}).get(shape.link)
-                if cuts and isinstance(shape.geometry, Mesh):
-                    self._mesh_files.wavefront(shape.geometry, cuts)
+        stands_fast = is_fixed(merged.root, options["static"])
+        for link in _that_take_time(merged):
+            self._mesh_files.parts(merged.links[link].collisions, stands_fast and link == merged.root,
+                                   options.get("mesh_cuts"))
         prepared = Prepared(name, xml, drawing, merged, robot, namespace, start, plugins, sensors,
                             parameters() if plugins else {}, options)
         prepared.mended = mended
@@ -145,7 +146,7 @@ class Spawner:
         Raises ``BulletSimError``.
         """
         static, cuts = prepared.options.get("static"), prepared.options.get("mesh_cuts")
-        for link in _with_meshes(prepared.merged):
+        for link in _that_take_time(prepared.merged):
             self._simulation.board.call(self._simulation.world.make_shape, prepared.merged, link, static, cuts)
 
     def spawn(self, prepared, pose):
@@ -283,10 +284,10 @@ class Spawner:
             raise SpawnRefused("entity already exists: delete the model '%s' first or choose another name" % name)
 
 
-def _with_meshes(merged):
-    """The names of the bodies that collide by a mesh."""
-    return [link.name for link in merged.links.values()
-            if any(isinstance(shape.geometry, Mesh) for shape in link.collisions)]
+def _that_take_time(merged):
+    """The names of the bodies that collide by a file: a mesh, or what shapes too many for PyBullet are gathered in."""
+    return [link.name for link in merged.links.values() if len(link.collisions) > MOST_SHAPES
+            or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)]
 
 
 def _drawn(robot, plugin, namespace):

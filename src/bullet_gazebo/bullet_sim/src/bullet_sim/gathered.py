@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Links with more shapes than PyBullet takes for one: those that are too many are gathered in files.
+
+PyBullet has room for 16 shapes of a body and writes beyond it, which ends the process. A file holds any number: of
+convex bodies, one object each, or of triangles. Meshes lose nothing by that, boxes their sharp edges (by a millimetre),
+and cylinders and balls, of which as many as possible stay what they are, become bodies with flat faces, inside of the
+round ones by at most half a per cent of the radius.
+"""
+
+import itertools
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from urdf_model import Box, Cylinder, Mesh, Sphere
+
+from .mesh_loading import even_directions, parts_as_wavefront
+
+#: What PyBullet takes for one body (MAX_COMPOUND_COLLISION_SHAPES).
+MOST_SHAPES = 16
+# Bullet keeps this distance around convex bodies that come from a file [m]; bodies that have none are made smaller.
+_MARGIN_M = 0.001
+# Of a cylinder's ends, and of a ball: 1 - cos(pi / 32) = 0.5 %, and no direction is more than 0.1 rad from a point.
+_CORNERS = 32
+_BALL_POINTS = 800
+# Those that lose most by being gathered come first.
+_ORDER = (Sphere, Cylinder, Box, Mesh)
+
+
+class Part(NamedTuple):
+    """A shape as PyBullet takes it."""
+
+    geometry: Any  # of urdf_model; of a mesh only the scale counts here
+    file: str | None  # Wavefront file of a mesh, [m] before the scale
+    origin: np.ndarray  # (4, 4)
+    hollow: bool  # triangles, instead of convex bodies
+
+
+def gathered(parts, keep):
+    """Return a list of at most MOST_SHAPES Parts that is to collide with as ``parts`` are.
+
+    ``keep(key, lines)`` returns the path of a file with what ``lines()`` returns, or has returned for the same ``key``.
+    """
+    if len(parts) <= MOST_SHAPES:
+        return parts
+    order = sorted(parts, key=lambda part: _ORDER.index(type(part.geometry)))
+    few, many = order[: MOST_SHAPES - 2], order[MOST_SHAPES - 2 :]
+    for hollow, lines in ((True, _triangles), (False, _bodies)):
+        chosen = [part for part in many if part.hollow == hollow]
+        if chosen:
+            key = repr([(part.geometry, part.file, part.origin.tolist()) for part in chosen] + [hollow])
+            file = keep(key, lambda lines=lines, chosen=chosen: lines(chosen))
+            few.append(Part(Mesh(file), file, np.eye(4), hollow))
+    return few
+
+
+def _bodies(parts):
+    """Return the lines of a Wavefront file with one object for each convex body."""
+    return parts_as_wavefront(
+        [
+            [tuple(point) for point in _placed(points, part.origin).tolist()]
+            for part in parts
+            for points in _convex(part)
+        ]
+    )
+
+
+def _convex(part):
+    """Return for each convex body of a Part its points (n, 3), in the Part's own axes."""
+    geometry = part.geometry
+    if isinstance(geometry, Mesh):
+        return [points * geometry.scale for points, _ in _objects(part.file)]
+    if isinstance(geometry, Box):
+        halves = np.array([_less(side / 2.0) for side in geometry.size])
+        return [halves * list(itertools.product((-1.0, 1.0), repeat=3))]
+    if isinstance(geometry, Cylinder):
+        turn = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
+        ring = _less(geometry.radius) * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+        top = np.array([0.0, 0.0, _less(geometry.length / 2.0)])
+        return [np.concatenate([ring + top, ring - top])]
+    return [_less(geometry.radius) * even_directions(_BALL_POINTS)]
+
+
+def _less(half_m):
+    """Return half a size without the margin that Bullet adds; what is thinner than that stays as it is."""
+    return half_m - _MARGIN_M if half_m > 2.0 * _MARGIN_M else half_m
+
+
+def _triangles(parts):
+    """Return the lines of a Wavefront file with all triangles of ``parts``."""
+    vertices, faces, first = [], [], 1
+    for part in parts:
+        for points, triangles in _objects(part.file):
+            placed = _placed(points * part.geometry.scale, part.origin)
+            vertices += ["v %.9g %.9g %.9g" % tuple(point) for point in placed]
+            faces += ["f %d %d %d" % tuple(triangle) for triangle in triangles + first]
+            first += len(points)
+    return ["o mesh", *vertices, *faces]
+
+
+def _objects(path):
+    """Return (points (n, 3), triangles (m, 3) from 0) of each object of a Wavefront file of ours."""
+    found, first = [], 1
+    with open(path, encoding="ascii") as file:
+        for kind, lines in itertools.groupby((line.split() for line in file), key=lambda words: words[0]):
+            values = [words[1:] for words in lines]
+            if kind == "v":
+                found.append([np.array(values, dtype=float), np.zeros((0, 3), dtype=int)])
+            elif kind == "f":
+                found[-1][1] = np.array(values, dtype=int) - first
+                first += len(found[-1][0])
+    return found
+
+
+def _placed(points, origin):
+    return points @ origin[:3, :3].T + origin[:3, 3]
