@@ -5,12 +5,12 @@ import sys
 
 import rospy
 from baxter_examples.cfg import JointSpringsExampleConfig
-from dynamic_reconfigure.server import Server
 from std_msgs.msg import Empty
 
 from baxter_examples.arguments import add_limb, new_parser, parse
 from baxter_examples.springs import spring_torques
 from baxter_interface import Limb
+from baxter_interface.dynamic_parameters import ParameterServer
 from baxter_interface.joint_checks import JOINTS
 from baxter_interface.programs import EnabledRobot, expect, run
 
@@ -27,7 +27,7 @@ class Springs:
         self._gains = {}
         # While somebody holds the cuff the robot ignores torques; here the arm is meant to be held.
         self._cuff = rospy.Publisher("robot/limb/%s/suppress_cuff_interaction" % side, Empty, queue_size=1)
-        self._server = Server(JointSpringsExampleConfig, self._on_gains)
+        self._server = ParameterServer(JointSpringsExampleConfig, self._on_gains)
 
     def hold(self, robot):
         """Pull the arm to neutral while `robot` is there. Raises ProgramFailed, RobotLost."""

@@ -7,9 +7,9 @@ import sys
 
 import rospy
 from baxter_interface.cfg import GripperActionServerConfig
-from dynamic_reconfigure.server import Server
 
 from baxter_interface import programs
+from baxter_interface.dynamic_parameters import ParameterServer
 from baxter_interface.joint_checks import SIDES
 from baxter_interface.serving import serve
 from gripper_action.gripper_action import GripperActionServer
@@ -22,7 +22,7 @@ def main():
     sides = SIDES if arguments.gripper == "both" else (arguments.gripper,)
 
     def body():
-        config = Server(GripperActionServerConfig, lambda config, level: config)
+        config = ParameterServer(GripperActionServerConfig, lambda config, level: config)
         serve([functools.partial(GripperActionServer, side, config) for side in sides],
               "gripper action server, grippers: %s" % " ".join(sides))
 

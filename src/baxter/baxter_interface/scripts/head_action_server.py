@@ -7,9 +7,9 @@ import sys
 
 import rospy
 from baxter_interface.cfg import HeadActionServerConfig
-from dynamic_reconfigure.server import Server
 
 from baxter_interface import programs
+from baxter_interface.dynamic_parameters import ParameterServer
 from baxter_interface.serving import serve
 from head_action.head_action import HeadActionServer
 
@@ -18,7 +18,7 @@ def main():
     argparse.ArgumentParser(description=__doc__).parse_args(rospy.myargv()[1:])
 
     def body():
-        config = Server(HeadActionServerConfig, lambda config, level: config)
+        config = ParameterServer(HeadActionServerConfig, lambda config, level: config)
         serve([functools.partial(HeadActionServer, config)], "head action server")
 
     return programs.run("rsdk_head_action_server", body)

@@ -11,9 +11,9 @@ from baxter_interface.cfg import (
     PositionJointTrajectoryActionServerConfig,
     VelocityJointTrajectoryActionServerConfig,
 )
-from dynamic_reconfigure.server import Server
 
 from baxter_interface import programs
+from baxter_interface.dynamic_parameters import ParameterServer
 from baxter_interface.joint_checks import SIDES
 from baxter_interface.serving import serve
 from joint_trajectory_action.joint_trajectory_action import JointTrajectoryActionServer
@@ -42,7 +42,7 @@ def main():
     limbs = SIDES if arguments.limb == "both" else (arguments.limb,)
 
     def body():
-        config = Server(CONFIGS[arguments.mode], lambda config, level: config)
+        config = ParameterServer(CONFIGS[arguments.mode], lambda config, level: config)
         serve([functools.partial(JointTrajectoryActionServer, limb, config, arguments.rate, arguments.mode)
                for limb in limbs], "trajectory server, %s, arms: %s" % (arguments.mode, " ".join(limbs)))
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Every way in which a trajectory goal can end, and that nothing moves where nothing should."""
+import math
 import os
 import signal
 import threading
@@ -13,6 +14,8 @@ from actionlib_msgs.msg import GoalStatus
 from baxter_core_msgs.msg import AssemblyState, DigitalIOState, JointCommand
 from control_msgs.msg import FollowJointTrajectoryResult, JointTolerance
 from dynamic_reconfigure.client import Client as ParameterClient
+from dynamic_reconfigure.msg import Config, DoubleParameter
+from dynamic_reconfigure.srv import Reconfigure
 from std_srvs.srv import Trigger
 from trajectory_client import TrajectoryClient
 from trajectory_msgs.msg import JointTrajectoryPoint
@@ -228,6 +231,23 @@ class TrajectoryServerTest(unittest.TestCase):
         parameters.update_configuration({"left_e1_trajectory": 0.1})
         self.assert_aborts(self.client.go([(3.0, AWAY)]), FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
                            "left_e1 path error 0.", "tolerance 0.1)")
+
+    def test_what_no_parameter_can_be_does_not_get_in(self):
+        updates = []
+        listener = rospy.Subscriber("/server/parameter_updates", Config, updates.append)
+        self.addCleanup(listener.unregister)
+        set_parameters = rospy.ServiceProxy("/server/set_parameters", Reconfigure)
+        self.addCleanup(set_parameters, Config(doubles=[DoubleParameter("left_e1_trajectory", 0.35)]))
+        for name, value, text in (("left_e1_trajectory", math.nan, "left_e1_trajectory is nan, expected -1 to 1"),
+                                  ("left_e7_trajectory", math.inf, "there is no parameter 'left_e7_trajectory'")):
+            with self.assertRaisesRegex(rospy.ServiceException, text):
+                set_parameters(Config(doubles=[DoubleParameter(name, value)]))
+        answer = set_parameters(Config(doubles=[DoubleParameter("left_e1_trajectory", math.inf)]))
+        self.wait_for(lambda: updates and updates[-1] == answer.config, "the update")
+        values = {parameter.name: parameter.value for parameter in answer.config.doubles}
+        self.assertEqual(values["left_e1_trajectory"], 1.0)
+        self.assertEqual([name for name, value in values.items() if not math.isfinite(value)], [])
+        self.assertNotIn("left_e7_trajectory", values)
 
     def test_disabled_or_stopped_on_the_way_and_nothing_moves_afterwards(self):
         for interrupt, text in ((self.robot.disable, "the robot was disabled"),
