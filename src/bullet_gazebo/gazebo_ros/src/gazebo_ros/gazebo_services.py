@@ -176,9 +176,9 @@ class GazeboServices:
         return EmptyResponse()
 
     def _reset(self, time_too):
-        if time_too:
-            # Their times are of a past that is gone.
-            self._bodies.forget()
+        # What pushes was asked for in the world that was; after a reset nothing moves without a new command. Gazebo
+        # goes on pushing.
+        self._bodies.forget()
         self._changes.take_back()
         self._settings.show(**self._physics())
         self._simulation.reset(time_too)

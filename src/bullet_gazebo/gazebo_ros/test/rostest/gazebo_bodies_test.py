@@ -237,6 +237,26 @@ class GazeboBodies(unittest.TestCase):
         self.advance(ticks=100)
         self.assertAlmostEqual(speed(), 1.0, places=4)
 
+    def test_a_reset_ends_wrenches_and_efforts_also_those_that_have_not_begun(self):
+        self.spawn_box()
+        com = self.get_link_properties("box::body").com
+        for reset in self.reset_world, self.reset_simulation:
+            self.set_link_properties("box::body", com, False, 2.0, 0.1, 0, 0, 0.1, 0, 0.1)
+            later = rospy.Time.from_sec(self.get_world_properties().sim_time + 0.1)
+            wrench = Wrench(Vector3(2, 0, 0), Vector3())
+            for start in NOW, later:
+                self.accepted(self.apply_body_wrench("box::body", "", Point(), wrench, start, ALWAYS))
+                self.accepted(self.apply_joint_effort("hinge", 1.0, start, ALWAYS))
+            self.advance(ticks=10)
+            self.assertGreater(self.get_link_state("box::body", "").link_state.twist.linear.x, 0.01)
+            reset()
+            # Its weight has come back with the reset.
+            self.set_link_properties("box::body", com, False, 2.0, 0.1, 0, 0, 0.1, 0, 0.1)
+            before = self.get_joint_properties("hinge").position[0]
+            self.advance(ticks=200)
+            self.assertEqual(self.get_link_state("box::body", "").link_state.twist.linear.x, 0.0)
+            self.assertAlmostEqual(self.get_joint_properties("hinge").position[0], before, delta=1e-4)
+
     def test_a_wrench_may_be_given_in_the_frame_of_a_turned_link(self):
         quarter = Quaternion(0, 0, math.sqrt(0.5), math.sqrt(0.5))
         self.spawn_box(pose=Pose(Point(5, 0, 1), quarter))
