@@ -189,3 +189,37 @@ def test_a_drive_gives_no_more_than_there_is(world, told):
         world.step()
         assert np.isfinite(arm.read_joints()).all()
     assert told == []
+
+
+@pytest.mark.parametrize("direct", [False, True])
+@pytest.mark.parametrize("push", [
+    lambda arm, effort: arm.add_effort(BOTH[:1], np.array([effort])),
+    lambda arm, effort: arm.add_effort(BOTH[1:], np.array([effort])),
+    lambda arm, effort: arm.apply_wrench("lower", (effort, 0.0, 0.0), (0.0, effort, 0.0))],
+    ids=["shoulder", "elbow", "wrench"])
+@pytest.mark.parametrize("effort", [1e3, 1e5, 1e7, -1e7])
+def test_no_force_pushes_a_joint_through_its_limit(world, told, push, effort, direct):
+    arm = world.spawn(parse_urdf(ARM), "arm", Pose((0.0, 0.0, 2.0)), static=True)
+    if direct:
+        arm.call_directly()
+    turned = 0.0
+    for tick in range(200):
+        if tick < 20:
+            push(arm, effort)
+        world.step()
+        position = arm.read_joints()[0]
+        assert abs(position[0]) < 2.0 + 0.01, tick
+        turned = max(turned, abs(position[1]))
+    assert turned > 1.0  # the elbow has no limits, and was moved
+    assert not told
+
+
+def test_what_turns_quickly_without_limits_is_left_alone(world):
+    arm = world.spawn(parse_urdf(ARM), "arm", Pose((0.0, 0.0, 2.0)), static=True)
+    world.set_gravity((0.0, 0.0, 0.0))
+    for _ in range(500):
+        arm.drive_position(BOTH[:1], np.zeros(1), STRONG[:1])
+        arm.drive_velocity(BOTH[1:], np.array([30.0]), STRONG[1:])
+        world.step()
+    position, velocity, _ = arm.read_joints()
+    assert velocity[1] == pytest.approx(30.0, abs=0.1) and position[1] > 25.0
