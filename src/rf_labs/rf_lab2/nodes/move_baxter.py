@@ -11,18 +11,15 @@ from baxter_core_msgs.srv import SolvePositionIK, SolvePositionIKRequest
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Header
 
-from baxter_interface import CHECK_VERSION, Limb, RobotEnable, startup
+from baxter_interface import CHECK_VERSION, Limb, RobotEnable
 from rf_lab2.poses import pose_difference, unit_quaternion
+from rf_lab2.programs import ProgramFailed, run
 
 SIDES = ("left", "right")
 # The lab's pose of the left gripper in `base`.
 LAB_POINT = (0.644, 0.0, 0.066)
 LAB_QUATERNION = (-0.381, 0.923, -0.015, 0.052)
 SERVICE_TIMEOUT_S = 30.0
-
-
-class MoveFailed(Exception):
-    """The arm is not where it was to go; the text says why."""
 
 
 def finite_number(word):
@@ -49,17 +46,17 @@ def parse_arguments(argv):
 
 
 def move_to_neutral(limbs):
-    """Move all limbs at the same time. Raises MoveFailed."""
+    """Move all limbs at the same time. Raises ProgramFailed."""
     with ThreadPoolExecutor(len(limbs)) as pool:
         arrived = list(pool.map(Limb.move_to_neutral, limbs))
     if not all(arrived):
-        raise MoveFailed("not every arm reached neutral; the lines above say why")
+        raise ProgramFailed("not every arm reached neutral; the lines above say why")
 
 
 def solve_ik(arm, point, quaternion):
     """Ask the robot for joint angles (dict of name to rad) that put the gripper of `arm` at a pose in `base`.
 
-    Raises MoveFailed if there are none, rospy.ServiceException or rospy.ROSException if the service does not answer.
+    Raises ProgramFailed if there are none, rospy.ServiceException or rospy.ROSException if the service does not answer.
     """
     name = "/ExternalTools/%s/PositionKinematicsNode/IKService" % arm
     rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
@@ -67,7 +64,7 @@ def solve_ik(arm, point, quaternion):
                        pose=Pose(position=Point(*point), orientation=Quaternion(*quaternion)))
     response = rospy.ServiceProxy(name, SolvePositionIK)(SolvePositionIKRequest(pose_stamp=[pose]))
     if not response.isValid or not response.isValid[0]:
-        raise MoveFailed("no joint angles put the %s gripper at %s, quaternion %s: out of reach, or against a joint "
+        raise ProgramFailed("no joint angles put the %s gripper at %s, quaternion %s: out of reach, or against a joint "
                          "limit (the log of the IK node says which)" % (arm, list(point), list(quaternion)))
     return dict(zip(response.joints[0].name, response.joints[0].position, strict=True))
 
@@ -83,7 +80,7 @@ def move_baxter(arm, point, quaternion):
     print(angles, flush=True)
     rospy.loginfo("moving the %s arm to the pose", arm)
     if not limbs[arm].move_to_joint_positions(angles):
-        raise MoveFailed("the %s arm did not get to the pose; the line above says why" % arm)
+        raise ProgramFailed("the %s arm did not get to the pose; the line above says why" % arm)
     reached = limbs[arm].endpoint_pose()
     rospy.loginfo("the %s gripper is %.1f mm and %.4f rad from the pose", arm,
                   *scaled_difference(reached, point, quaternion))
@@ -98,15 +95,7 @@ def scaled_difference(reached, point, quaternion):
 
 def main():
     arguments = parse_arguments(rospy.myargv()[1:])
-    try:
-        startup.init_node("move_baxter")
-        move_baxter(arguments.arm, arguments.point, arguments.quaternion)
-    except (MoveFailed, OSError, ValueError, rospy.ROSException, rospy.ServiceException) as error:
-        print("move_baxter.py: %s" % (getattr(error, "strerror", None) or error), file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
-    return 0
+    return run("move_baxter", lambda: move_baxter(arguments.arm, arguments.point, arguments.quaternion))
 
 
 if __name__ == "__main__":

@@ -7,16 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 import rospy
 
-from baxter_interface import CHECK_VERSION, Limb, RobotEnable, startup
+from baxter_interface import CHECK_VERSION, Limb, RobotEnable
+from rf_lab2.programs import ProgramFailed, run
 from rf_lab2.waving import Swing, hands_up, shifts
 
 SIDES = ("left", "right")
 POINTS = 24
 RATE_HZ = 50
-
-
-class WaveFailed(Exception):
-    """The robot does not wave; the text says why."""
 
 
 def parse_arguments(argv):
@@ -50,7 +47,7 @@ def wave(arguments):
     with ThreadPoolExecutor(len(limbs)) as pool:
         arrived = list(pool.map(lambda limb: limb.move_to_joint_positions(hands_up(limb.name)), limbs))
     if not all(arrived):
-        raise WaveFailed("not every arm got up; the lines above say why")
+        raise ProgramFailed("not every arm got up; the lines above say why")
     plans = [plan(limb, arguments) for limb in limbs]
     rospy.loginfo("waving for %g s", arguments.seconds)
     rate, begin_s, elapsed_s = rospy.Rate(RATE_HZ, reset=True), rospy.get_time(), 0.0
@@ -65,15 +62,7 @@ def wave(arguments):
 
 def main():
     arguments = parse_arguments(rospy.myargv()[1:])
-    try:
-        startup.init_node("wave")
-        wave(arguments)
-    except (WaveFailed, OSError, ValueError, rospy.ROSException, rospy.ServiceException) as error:
-        print("wave.py: %s" % (getattr(error, "strerror", None) or error), file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
-    return 0
+    return run("wave", lambda: wave(arguments))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How the lab's programs begin and end."""
+import os
+import sys
+
+import rospy
+
+from baxter_interface import startup
+
+
+class ProgramFailed(Exception):
+    """The program's aim was not reached; the text says why."""
+
+
+def run(node_name, body):
+    """Wait for the robot, become the node `node_name`, call `body()`; return the exit status.
+
+    0 after success; 1 after ProgramFailed, OSError, ValueError or an error of ROS, with one line on stderr; 130 after
+    Ctrl-C.
+    """
+    try:
+        startup.init_node(node_name)
+        body()
+    except (ProgramFailed, OSError, ValueError, rospy.ROSException, rospy.ServiceException) as error:
+        print("%s: %s" % (os.path.basename(sys.argv[0]), getattr(error, "strerror", None) or error), file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
