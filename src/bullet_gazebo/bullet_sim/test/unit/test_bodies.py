@@ -27,13 +27,6 @@ ASLEEP_AFTER = 2500  # ticks
 
 
 @pytest.fixture
-def world():
-    world = World()
-    yield world
-    world.close()
-
-
-@pytest.fixture
 def sleeping_box(world):
     world.add_ground_plane()
     box = world.spawn(parse_urdf(BOX % ""), "box", Pose((0, 0, 0.05)))

@@ -46,13 +46,6 @@ BOTH = np.arange(2)
 
 
 @pytest.fixture
-def world():
-    world = World()
-    yield world
-    world.close()
-
-
-@pytest.fixture
 def arm(world):
     return world.spawn(parse_urdf(ARM), "arm", static=True)
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from bullet_sim import Pose, World
+from bullet_sim import Pose
 from urdf_model import parse_urdf
 
 FINGER = """<link name="%(n)s"><inertial><mass value="0.02"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial>
@@ -19,13 +19,6 @@ BOX = """<robot name="box"><link name="box"><inertial><mass value="0.2"/>
   <inertia ixx="1e-4" iyy="1e-4" izz="1e-4"/></inertial>
   <collision><geometry><box size="0.04 0.04 0.04"/></geometry></collision></link></robot>"""
 OPEN = np.array([0.04, -0.04])
-
-
-@pytest.fixture
-def world():
-    world = World()
-    yield world
-    world.close()
 
 
 @pytest.fixture
