@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from urdf_model.transforms import rotation_angle
+
 # Below this speed of its fastest joint an arm stands [rad/s].
 STANDS_RAD_S = 0.02
 # Only from here on it moves again: at a turning point the speed wavers about the bound above [rad/s].
@@ -20,13 +22,6 @@ def ramp(value, full, none):
 def pose_error(pose, target):
     """(distance [m], angle [rad]) between two (4, 4) poses."""
     return float(np.linalg.norm(pose[:3, 3] - target[:3, 3])), rotation_angle(pose[:3, :3].T @ target[:3, :3])
-
-
-def rotation_angle(rotation):
-    """Angle of a (3, 3) rotation, 0 to pi [rad]."""
-    sine = np.linalg.norm((rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0],
-                           rotation[1, 0] - rotation[0, 1]))
-    return math.atan2(sine, np.trace(rotation) - 1.0)
 
 
 def speeds(times, positions):

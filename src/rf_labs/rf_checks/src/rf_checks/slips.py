@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
-from rf_checks.measures import pose_error, rotation_angle
+from rf_checks.measures import pose_error
 from rf_checks.recording import arm_joints
+from urdf_model.transforms import matrix_from_quaternion, rotation_angle
 
 # Near enough to say that a wrong answer is that wrong answer [m], [rad].
 NEAR_M, NEAR_RAD = 0.02, 0.06
@@ -20,11 +21,11 @@ SHEET_ROTATE = ("the sheet's listing of rotate_pose puts w first in the line tha
 
 
 def rotation_of(w, x, y, z):
-    """(3, 3) rotation of four numbers that are taken as a quaternion w x y z, of any length."""
-    w, x, y, z = np.array((w, x, y, z)) / np.linalg.norm((w, x, y, z))
-    return np.array(((1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-                     (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-                     (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y))))
+    """(3, 3) rotation of four numbers that are taken as a quaternion w x y z, of any length; NaN for length 0."""
+    try:
+        return matrix_from_quaternion((x, y, z, w))
+    except ValueError:
+        return np.full((3, 3), np.nan)  # near to nothing
 
 
 def quaternion_of(rotation):

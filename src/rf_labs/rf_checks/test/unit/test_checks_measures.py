@@ -26,7 +26,7 @@ def test_rotations_and_quaternions_agree(axis, angle):
     rotation = slips.about(axis, angle)
     x, y, z, w = slips.quaternion_of(rotation)
     assert np.allclose(slips.rotation_of(w, x, y, z), rotation, atol=1e-9)
-    assert measures.rotation_angle(rotation) == pytest.approx(abs(angle), abs=1e-9)
+    assert slips.rotation_angle(rotation) == pytest.approx(abs(angle), abs=1e-9)
     expected = math.sin(angle / 2.0) * (1.0 if math.cos(angle / 2.0) >= 0.0 else -1.0)
     assert abs("xyz".index(axis) - int(np.argmax(np.abs((x, y, z))))) == 0 or angle == 0.0
     assert abs((x, y, z)["xyz".index(axis)]) == pytest.approx(abs(expected), abs=1e-9)

@@ -13,6 +13,7 @@ import numpy as np
 
 from baxter_sim_kinematics.batch import solve_batch
 from baxter_sim_kinematics.errors import KinematicsError
+from urdf_model.transforms import matrix_from_quaternion
 
 # Cells that are computed, saved and counted together: about a second's work.
 _CHUNK = 32
@@ -67,7 +68,8 @@ class Settings:
         """Return the orientations (orientations, 3, 3) tried in every cell: the same for the same settings."""
         if self.tool is None:
             # Normalised normal deviates are spread evenly over the rotations.
-            return np.array([_from_quaternion(q) for q in np.random.default_rng(0).normal(size=(self.orientations, 4))])
+            quaternions = np.random.default_rng(0).normal(size=(self.orientations, 4))
+            return np.array([matrix_from_quaternion((x, y, z, w)) for w, x, y, z in quaternions])
         z = np.array(self.tool) / np.linalg.norm(self.tool)
         x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
         x /= np.linalg.norm(x)
@@ -188,10 +190,3 @@ def _work(first):
     chain, settings, parts = _task
     parts.save(first, *cell_values(chain, settings, settings.centres()[first:first + _CHUNK]))
     return first
-
-
-def _from_quaternion(q):
-    w, x, y, z = q / np.linalg.norm(q)
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])

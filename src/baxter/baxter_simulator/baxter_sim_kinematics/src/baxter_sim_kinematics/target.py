@@ -6,6 +6,7 @@ import numpy as np
 
 from baxter_sim_kinematics import kernels
 from baxter_sim_kinematics.errors import InvalidTarget
+from urdf_model.transforms import matrix_from_quaternion, rigid
 
 # Off by less than this a rotation is taken for a rounded one and normalised (the labs' quaternion is off by 9e-4).
 ROUNDED = 1e-2
@@ -34,13 +35,7 @@ def pose_from_quaternion(position, quaternion_xyzw):
         hint = "; the identity is 0 0 0 1" if length == 0.0 else ""
         raise InvalidTarget("quaternion (x y z w) %s has length %.6g, a rotation needs length 1%s"
                             % (numbers[3:], length, hint), numbers)
-    x, y, z, w = (number / length for number in numbers[3:])
-    return np.array([
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w), numbers[0]],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w), numbers[1]],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y), numbers[2]],
-        [0.0, 0.0, 0.0, 1.0],
-    ])
+    return rigid(matrix_from_quaternion(numbers[3:]), numbers[:3])
 
 
 class Target:
