@@ -12,10 +12,11 @@ import mmap
 import struct
 
 import llvmlite.binding
-import numba
 import numpy as np
 import pybullet
 from numba import types
+
+from numba_cache import compiler
 
 from .errors import BulletSimError
 
@@ -39,6 +40,8 @@ _FUNCTIONS = {
     _request_state, _submit, _get_state, _get_joint_state, _control,
     _set_position, _set_velocity, _set_kp, _set_kd, _set_force,
 ) = (types.ExternalFunction(name, signature) for name, signature in _FUNCTIONS.items())
+
+_compiled = compiler("bullet_sim", [__file__])
 
 # Where ELF files (64 bits, little-endian) keep their symbols: System V ABI, chapters "Sections" and "Symbol Table".
 _ELF64 = b"\x7fELF\x02\x01"
@@ -141,13 +144,6 @@ def _values_in_table(path, names):
     # An index that fails is a ValueError: the name is not among the texts.
     found = [functions["value"][functions["name"] == text.index(b"\0%s\0" % name.encode()) + 1] for name in names]
     return [int(values[0]) for values in found] if all(len(values) == 1 for values in found) else None
-
-
-def _compiled(function):
-    try:
-        return numba.njit(cache=True)(function)
-    except RuntimeError:  # numba finds no folder that it may write to: compiled anew in each process
-        return numba.njit(function)
 
 
 @_compiled

@@ -4,12 +4,9 @@ import math
 
 import numpy as np
 
-# Makes sure that numba has a place for its cache; numba looks for one when it is imported.
-import baxter_sim_kinematics  # noqa: F401  isort: skip
-import numba  # isort: skip
+from numba_cache import compiler
 
-# All that is compiled stands in one file: numba's cache notices a change of that file alone.
-_compiled = numba.njit(cache=True, error_model="numpy")
+_compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
 
 @_compiled

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from baxter_sim_kinematics import compile_cache
+import baxter_sim_kinematics
+import numba_cache
+import urdf_model
 
 # A kernel that calls some of other files; how far its tip is from the base; how often it came from the cache.
 _POSE_ERROR = """
@@ -28,7 +30,9 @@ def copy(tmp_path):
     """A copy of the package that may be changed; run(code) -> the lines that it prints."""
     site = tmp_path / "site"
     package = site / "baxter_sim_kinematics"
-    shutil.copytree(Path(compile_cache.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
+    for module in (baxter_sim_kinematics, numba_cache, urdf_model):
+        shutil.copytree(Path(module.__file__).parent, site / module.__name__,
+                        ignore=shutil.ignore_patterns("__pycache__"))
 
     def run(code=_POSE_ERROR, **environment):
         # Python's own cache of byte code looks at times and lengths alone.
@@ -63,7 +67,7 @@ def test_change_of_a_called_kernel_compiles_the_callers_again(copy):
 
 def test_kernels_find_a_cache_when_neither_source_nor_home_can_be_written(copy, tmp_path):
     """As in an installed package of a user without a home directory."""
-    (copy.package / "__pycache__").write_text("a file is in the way of the cache")
+    (copy.package / "kernels" / "__pycache__").write_text("a file is in the way of the cache")
     (tmp_path / "home").write_text("so is this")
     (tmp_path / "tmp").mkdir()
     code = ("from baxter_sim_kinematics import kernels; print(kernels.__file__); "
@@ -73,30 +77,3 @@ def test_kernels_find_a_cache_when_neither_source_nor_home_can_be_written(copy, 
     # A cache that cannot be written is as good as none.
     cache, = copy(code, HOME=str(tmp_path), NUMBA_CACHE_DIR=str(tmp_path / "home" / "cache"))
     assert cache.startswith(str(tmp_path / ".cache" / "numba" / "baxter_sim_kinematics-"))
-
-
-def test_folder_is_named_after_all_of_the_sources(tmp_path):
-    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    one, two = tmp_path / "one.py", tmp_path / "two.py"
-    names = set()
-    for first, second in (("a", "b"), ("ab", ""), ("", "ab"), ("a", "c"), ("a", "b")):
-        one.write_text(first)
-        two.write_text(second)
-        path = Path(compile_cache.folder("some", [two, one], environment))
-        assert path.is_dir() and path.parent == tmp_path / "cache"
-        assert path == Path(compile_cache.folder("some", [one, two], environment))
-        names.add(path.name)
-    assert len(names) == 4
-
-
-def test_folders_of_old_states_go_and_nothing_else(tmp_path):
-    environment, source = {"NUMBA_CACHE_DIR": str(tmp_path)}, tmp_path / "one.py"
-    (tmp_path / "some-thing").mkdir()
-    paths = []
-    for k in range(8):
-        source.write_text(str(k))
-        paths.append(Path(compile_cache.folder("some", [source], environment)))
-        os.utime(paths[-1], (k, k))
-    left = [path for path in paths if path.exists()]
-    assert left == paths[-len(left):] and 2 <= len(left) <= 5
-    assert (tmp_path / "some-thing").exists()

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where what numba compiles is kept between runs. Free of ROS."""
+import hashlib
+import os
+import shutil
+import stat
+import tempfile
+from pathlib import Path
+
+# Folders of other states of the sources that are left in place: a second checkout may use the same cache.
+_KEPT = 3
+
+
+def compiler(name, sources, **options):
+    """Return a decorator that compiles functions with ``numba.njit(cache=True, **options)`` and keeps the result.
+
+    name: what the folder's name begins with, the package's; sources: the files whose functions call each other. numba
+    itself looks for a change of the file that a function is in, but not of the functions that it calls; here a change
+    of any of them leads to another folder. Raises ImportError where numba is missing.
+    """
+    import numba  # who only asks for a folder need not have it
+
+    place = folder(name, sources)
+
+    def compiled(function):
+        before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, place
+        try:
+            return numba.njit(cache=True, **options)(function)
+        finally:
+            numba.config.CACHE_DIR = before
+
+    return compiled
+
+
+def folder(name, sources, environment=os.environ):
+    """Return the folder for what is compiled from ``sources``, paths of files.
+
+    It lies in the first of these that can be written: ``NUMBA_CACHE_DIR``, ``__pycache__`` beside the first source, the
+    user's cache, a folder of this user's own among the temporary ones. Its name holds what the files hold, so that a
+    change of any of them leads to another, empty folder. Those of older states beside it go but for the newest.
+    """
+    sources = sorted(map(Path, sources))
+    digest = hashlib.sha256()
+    for source in sources:
+        text = source.read_bytes()
+        digest.update(b"%s %d\n" % (source.name.encode(), len(text)) + text)
+    places = filter(_writable, _places(sources[0], environment))
+    place = Path(next(places, None) or _private_temporary_directory(name))
+    path = place / ("%s-%s" % (name, digest.hexdigest()[:16]))
+    if not path.is_dir():
+        for old in sorted(place.glob(name + "-" + 16 * "[0-9a-f]"), key=_age)[_KEPT:]:
+            shutil.rmtree(old, ignore_errors=True)
+        path.mkdir(exist_ok=True)
+    return str(path)
+
+
+def _places(source, environment):
+    beside_source = os.path.join(os.path.dirname(os.path.abspath(source)), "__pycache__")
+    per_user = os.path.join(environment.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "numba")
+    return filter(None, (environment.get("NUMBA_CACHE_DIR"), beside_source, per_user))
+
+
+def _age(path):
+    """Sorts the newest first; what another process deletes meanwhile comes last."""
+    try:
+        return -path.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _writable(directory):
+    try:
+        os.makedirs(directory, exist_ok=True)
+        with tempfile.TemporaryFile(dir=directory):
+            return True
+    except OSError:
+        return False
+
+
+def _private_temporary_directory(name):
+    """A directory that only this user can write: what lies in it is executed."""
+    path = os.path.join(tempfile.gettempdir(), "%s-%d" % (name, os.getuid()))
+    try:
+        os.mkdir(path, 0o700)
+    except FileExistsError:
+        pass
+    found = os.lstat(path)
+    if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022:
+        return path
+    return tempfile.mkdtemp(prefix="%s-" % name)
