@@ -11,9 +11,9 @@ from tf2_msgs.msg import TFMessage
 from bullet_sim import Pose
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.urdf_extras import unscoped
-from ros_controllers.convert import stamp
-from ros_controllers.due import Due
 from ros_controllers.wheel_odometry import WheelOdometry
+from sim_time.pace import Pace
+from sim_time.stamps import stamp
 
 # Variances of x, y, z [m2], roll, pitch, yaw [rad2]: what the plane does not tell is as good as unknown.
 _UNKNOWN = 1e12
@@ -36,7 +36,7 @@ class Drive(ModelPlugin):
         self.what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         self.model = context.model
         rate = self.number(self.rate_tag, self.rate)
-        self._due = Due(1.0 / rate if rate > 0.0 else 0.0)
+        self._pace = Pace(max(0.0, rate))
         self._odometry_frame = context.element_text("odometryFrame", "odom")
         self._base_frame = context.element_text("robotBaseFrame", "base_footprint")
         self._wanted = (0.0, 0.0, 0.0)
@@ -79,7 +79,7 @@ class Drive(ModelPlugin):
 
     def publish(self, time_s):
         self.moved(time_s, self.context.world.time_step_s)
-        if not self._due.is_due(time_s):
+        if not self._pace.take(time_s):
             return
         wanted = self._odometry.has_listeners, self._tf is not None and self._tf.has_listeners
         if any(wanted):
@@ -103,7 +103,7 @@ class Drive(ModelPlugin):
     def reset(self):
         self._wanted = (0.0, 0.0, 0.0)
         self._commands.take()
-        self._due.restart()
+        self._pace.restart()
 
     def _message(self, now, place, turned, linear, angular):
         message = Odometry(child_frame_id=self._base_frame)

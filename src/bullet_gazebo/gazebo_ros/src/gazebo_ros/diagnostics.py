@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What /gazebo says of itself on /diagnostics: messages and requests that it could not digest, plugins that failed."""
-import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from gazebo_ros.pacing import ticks_between
+from sim_time.stamps import stamp_ns
 
 RATE_HZ = 1.0
 #: What the names of the statuses begin with.
@@ -28,7 +28,7 @@ class Diagnostics:
         simulation = self._simulation
         if simulation.tick % self._divisor == 0 and self._publisher.has_listeners:
             message = DiagnosticArray(status=self.statuses())
-            message.header.stamp = rospy.Time(*divmod(simulation.time_ns, 10**9))
+            message.header.stamp = stamp_ns(simulation.time_ns)
             self._publisher.publish(message)
 
     def statuses(self):

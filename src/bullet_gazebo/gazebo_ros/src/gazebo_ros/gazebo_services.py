@@ -42,6 +42,7 @@ from gazebo_ros.simulation import AdvanceRefused
 from gazebo_ros.spawning import SpawnRefused
 from gazebo_ros.urdf_extras import unscoped
 from loop_reconfigure import Setting, SettingsServer
+from sim_time.stamps import stamp_ns
 from urdf_model import bounds
 
 _ROOT_ELEMENT = re.compile(r"<\s*([A-Za-z_][\w.:-]*)")
@@ -217,7 +218,7 @@ class GazeboServices:
             return response
         count = self._state_requests[request.model_name] = self._state_requests.get(request.model_name, 0) + 1
         response.header.seq = count
-        response.header.stamp = rospy.Time(*divmod(self._simulation.time_ns, 10**9))
+        response.header.stamp = stamp_ns(self._simulation.time_ns)
         response.header.frame_id = request.relative_entity_name
         response.pose = msg_from_pose(pose)
         response.twist = msg_from_twist(linear, angular)

@@ -10,6 +10,7 @@ from rosgraph_msgs.msg import Clock
 
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
 from gazebo_ros.pacing import RateMeter, SlownessWatch, slowness_line, ticks_between
+from sim_time.stamps import stamp_ns
 
 _CLOCK_MESSAGE = struct.Struct("<III")
 _CLOCK_BYTES = 8
@@ -135,7 +136,7 @@ class Publications:
         simulation = self._simulation
         if self._metrics.has_listeners:
             metrics = PerformanceMetrics(real_time_factor=factor)
-            metrics.header.stamp = rospy.Time(*divmod(simulation.time_ns, 10**9))
+            metrics.header.stamp = stamp_ns(simulation.time_ns)
             self._metrics.publish(metrics)
         wanted = simulation.real_time_factor
         news = None if simulation.paused else self._watch.news(factor, wanted)

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gazebo's sensor plugins that measure without pictures: laser, range finder, IMU, bumper, pose, joint states."""
-import math
 
 import numpy as np
-import rospy
 from gazebo_msgs.msg import ContactsState, ContactState
 from geometry_msgs.msg import Vector3, Wrench
 from nav_msgs.msg import Odometry
@@ -14,9 +12,9 @@ from gazebo_ros.convert import msg_from_pose, msg_from_twist
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.ray_pattern import RayPattern, RayPatternError, Sweep
 from gazebo_ros.urdf_extras import sensor_of, unscoped
+from sim_time.pace import Pace
+from sim_time.stamps import stamp
 from urdf_model.transforms import pose_matrix
-
-_TOLERANCE_S = 1e-6
 
 
 class PacedSensor(ModelPlugin):
@@ -32,8 +30,7 @@ class PacedSensor(ModelPlugin):
         self.what = "sensor plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
         own = self.number("updateRate", 0.0)
         rate = own if own > 0.0 or self.sensor is None else self.number_in(self.sensor, "update_rate", 0.0)
-        self._period_s = 1.0 / rate if rate > 0.0 else 0.0
-        self._next_s = -math.inf
+        self._pace = Pace(max(0.0, rate))
         topic = context.element_text(self.topic_tag, self.default_topic)
         if topic is None:
             raise PluginError("%s names no topic; expected <%s>" % (self.what, self.topic_tag))
@@ -75,20 +72,16 @@ class PacedSensor(ModelPlugin):
 
     def is_due(self, time_s):
         """Whether the next measurement is wanted; reckons that it is taken."""
-        if not self.publisher.has_listeners or time_s < self._next_s - _TOLERANCE_S:
-            return False
-        following = self._next_s + self._period_s
-        self._next_s = following if following > time_s else time_s + self._period_s
-        return True
+        return self.publisher.has_listeners and self._pace.take(time_s)
 
     def stamped(self, message, time_s, frame):
         """``message`` with its header filled."""
-        message.header.stamp = rospy.Time(*divmod(round(time_s * 1e9), 10**9))
+        message.header.stamp = stamp(time_s)
         message.header.frame_id = frame
         return message
 
     def reset(self):
-        self._next_s = -math.inf
+        self._pace.restart()
 
 
 class _RaySensor(PacedSensor):
@@ -148,7 +141,7 @@ class Laser(_RaySensor):
         pattern = self.pattern
         row = ranges.reshape(pattern.rows, pattern.columns)[pattern.rows // 2]
         return LaserScan(angle_min=pattern.angle_min, angle_max=pattern.angle_max, angle_increment=pattern.increment,
-                         scan_time=self._period_s, range_min=pattern.range_min, range_max=pattern.range_max,
+                         scan_time=self._pace.period_s, range_min=pattern.range_min, range_max=pattern.range_max,
                          ranges=row.tolist(), intensities=self._intensities)
 
 

@@ -3,10 +3,10 @@
 import sys
 
 import numpy as np
-import rospy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, PointField
 
 from sensor_renderer.pictures import Cloud, encoded
+from sim_time.stamps import stamp
 
 _BIG_ENDIAN = sys.byteorder == "big"
 #: image_transport's own default.
@@ -15,7 +15,7 @@ JPEG_QUALITY = 80
 
 def header(message, time_s, frame):
     """``message`` with its header filled: simulation time [s] and frame."""
-    message.header.stamp = rospy.Time.from_sec(time_s)
+    message.header.stamp = stamp(time_s)
     message.header.frame_id = frame
     return message
 

@@ -14,8 +14,8 @@ from loop_reconfigure import Setting, SettingsServer
 from sensor_renderer import convert
 from sensor_renderer.errors import SensorError
 from sensor_renderer.pictures import Cloud, Noise, millimetres, within
+from sim_time.pace import Pace
 
-_SMALLEST_TIME_S = 1e-6
 _FASTEST_HZ = 1000.0
 
 
@@ -82,38 +82,6 @@ class Settings:
         """Take topics and service back."""
         while self._opened:
             self._opened.pop()()
-
-
-class Pace:
-    """Tells when the next picture is due, in simulation time."""
-
-    def __init__(self, rate):
-        """``rate`` [Hz]; 0: at every new state."""
-        self.rate = rate
-
-    @property
-    def rate(self):
-        """Pictures a second [Hz]; 0: at every new state."""
-        return self._rate
-
-    @rate.setter
-    def rate(self, rate):
-        self._rate = rate
-        self.period_s = 1.0 / rate if rate > 0.0 else _SMALLEST_TIME_S
-        self._next_s = None
-
-    def restart(self):
-        """The next picture is due at once: the time has been set back."""
-        self._next_s = None
-
-    def is_due(self, time_s):
-        """Whether a picture of the state at ``time_s`` is wanted."""
-        return self._next_s is None or time_s >= self._next_s - _SMALLEST_TIME_S
-
-    def took(self, time_s):
-        """A picture of ``time_s`` was taken. Being late does not make the pictures that follow come faster."""
-        following = (self._next_s if self._next_s is not None else time_s) + self.period_s
-        self._next_s = following if following > time_s else time_s + self.period_s
 
 
 class ColourTopics:

@@ -7,7 +7,6 @@ from dynamic_reconfigure.srv import ReconfigureRequest
 from sensor_msgs.msg import PointField
 
 from sensor_renderer import convert, drivers, node
-from sensor_renderer.drivers import Pace
 from sensor_renderer.errors import RenderingError, SensorError
 from sensor_renderer.pictures import Cloud, Noise, encoded, millimetres, within
 from sensor_renderer.pinhole import Pinhole
@@ -47,22 +46,6 @@ def test_a_camera_as_it_is_written():
 def test_what_cannot_be_used_is_said(options, text):
     with pytest.raises(SensorError, match=text):
         entry(**options).cameras()
-
-
-def test_pictures_are_due_at_their_rate_and_after_a_reset():
-    pace, taken = Pace(10.0), []
-    for time_s in np.arange(0.0, 1.0, 0.01):
-        if pace.is_due(time_s):
-            pace.took(time_s)
-            taken.append(time_s)
-    assert taken == pytest.approx(np.arange(0.0, 1.0, 0.1))
-    assert not pace.is_due(0.02)
-    pace.restart()  # time has gone back
-    assert pace.is_due(0.02)
-    pace.took(0.02)
-    assert not pace.is_due(0.03)
-    pace.took(5.0)  # nobody looked for a while: one picture, not fifty
-    assert not pace.is_due(5.05)
 
 
 def test_encodings_and_noise():

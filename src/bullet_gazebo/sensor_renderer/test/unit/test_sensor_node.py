@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gazebo_ros.snapshot import SnapshotReader, SnapshotWriter
-from sensor_renderer.drivers import Pace
 from sensor_renderer.node import SensorRenderer
+from sim_time.pace import Pace
 
 STAND = """<robot name="stand"><link name="eye"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
 </robot>"""

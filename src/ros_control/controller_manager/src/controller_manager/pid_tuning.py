@@ -5,6 +5,7 @@ from control_msgs.msg import PidState
 
 from controller_manager.errors import ControllerError
 from loop_reconfigure import Setting, SettingsServer
+from sim_time.stamps import stamp
 
 # How far a slider goes: gains, and ends of the integral term.
 _GAIN, _CLAMP = 1e5, 1e6
@@ -54,7 +55,7 @@ class TunablePids:
         pid = self._pid
         error, error_dot = float(pid.last_error[k]), float(pid.last_error_dot[k])
         message = PidState()
-        message.header.stamp = genpy.Time(*divmod(round(time_s * 1e9), 10**9))
+        message.header.stamp = stamp(time_s)
         message.timestep = genpy.Duration(*divmod(round(dt * 1e9), 10**9))
         message.error, message.error_dot = error, error_dot
         message.p_error, message.i_error, message.d_error = error, float(pid.integral[k]), error_dot

@@ -11,6 +11,8 @@ import itertools
 import genpy
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
+from sim_time.stamps import stamp
+
 #: How often the status goes out while nothing changes, and how long the status of a goal that has ended is told [s].
 STATUS_PERIOD_S = 0.2
 REMEMBERED_S = 5.0
@@ -226,7 +228,7 @@ class ActionServer:
         self._handles = [handle for handle in self._handles if handle.ended_s is None]
 
     def _now(self):
-        return genpy.Time(*divmod(round(self._time_s * 1e9), 10**9))
+        return stamp(self._time_s)
 
 
 def _require_answerable(goal_id):

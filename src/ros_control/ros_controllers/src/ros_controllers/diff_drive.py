@@ -4,8 +4,8 @@ import numpy as np
 from control_msgs.msg import JointTrajectoryControllerState
 
 from controller_manager import VELOCITY, ControllerError
-from ros_controllers.convert import stamp
 from ros_controllers.vehicle import VehicleController
+from sim_time.stamps import stamp
 
 
 class DiffDriveController(VehicleController):

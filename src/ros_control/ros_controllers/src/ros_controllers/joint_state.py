@@ -4,8 +4,8 @@ import numpy as np
 from sensor_msgs.msg import JointState
 
 from controller_manager import JOINT_STATE, Controller, ControllerError
-from ros_controllers.convert import stamp
-from ros_controllers.due import Due
+from sim_time.pace import Pace
+from sim_time.stamps import stamp
 
 
 class JointStateController(Controller):
@@ -29,15 +29,15 @@ class JointStateController(Controller):
         extra = self._extra_joints()
         self._names = joints + [row[0] for row in extra]
         self._extra = np.array([row[1:] for row in extra], dtype=float).reshape(len(extra), 3).T
-        self._due = Due(1.0 / rate)
+        self._pace = Pace(rate)
         self._publisher = context.publisher(context.in_root("joint_states"), JointState)
 
     def starting(self, time_s):
         # The first update publishes at once.
-        self._due.restart()
+        self._pace.restart()
 
     def update(self, time_s, dt):
-        if not self._due.is_due(time_s) or not self._publisher.has_listeners:
+        if not self._pace.take(time_s) or not self._publisher.has_listeners:
             return
         hardware, index = self.hardware, self._index
         columns = [values[index].tolist() for values in (hardware.position, hardware.velocity, hardware.effort)]

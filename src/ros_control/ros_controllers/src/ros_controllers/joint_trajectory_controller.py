@@ -3,7 +3,6 @@
 
 What a trajectory means is decided in the package ``joint_trajectory``; here its messages meet the joints.
 """
-import math
 
 import numpy as np
 import rospy
@@ -30,7 +29,8 @@ from joint_trajectory import (
     merge_tolerances,
 )
 from ros_controllers.action_server import ActionServer
-from ros_controllers.convert import stamp
+from sim_time.pace import Pace
+from sim_time.stamps import stamp
 
 _ERROR_CODES = {
     Outcome.SUCCEEDED: FollowJointTrajectoryResult.SUCCESSFUL,
@@ -68,8 +68,8 @@ class JointTrajectoryController(Controller):
         self._follower = Follower(self._joints, self._continuous(), self._not_negative("stop_trajectory_duration", 0.0),
                                   self._allow_partial)
         self._tolerances = self._default_tolerances()
-        self._state_timer = _Timer(self._not_negative("state_publish_rate", 50.0))
-        self._feedback_timer = _Timer(self._not_negative("action_monitor_rate", 20.0))
+        self._state_pace = Pace(self._not_negative("state_publish_rate", 50.0))
+        self._feedback_pace = Pace(self._not_negative("action_monitor_rate", 20.0))
         self._runs = False
         self._time_s = 0.0  # control time of the last update
         self._uptime = 0.0
@@ -121,7 +121,7 @@ class JointTrajectoryController(Controller):
         self._time_s, self._uptime, self._began = time_s, 0.0, 0.0
         self._measure()
         self._follower.start(0.0, self._position, self._velocity)
-        self._state_timer.reset()
+        self._state_pace.restart()
         self._start_adapter()
         self._runs = True
 
@@ -182,7 +182,7 @@ class JointTrajectoryController(Controller):
             if before is not None:
                 before.cancel(text="another goal took its place")
             handle.accept()
-            self._feedback_timer.reset()
+            self._feedback_pace.restart()
 
     def _reject(self, handle, code, text):
         self.log.error("%s: goal rejected: %s" % (self.context.namespace, text))
@@ -234,10 +234,10 @@ class JointTrajectoryController(Controller):
     # -- what is told -----------------------------------------------------------------------------------------------
 
     def _publish(self, time_s):
-        if self._state_timer.is_due(self._uptime) and self._state.has_listeners:
+        if _take(self._state_pace, self._uptime) and self._state.has_listeners:
             self._state.publish(self._filled(JointTrajectoryControllerState(), time_s))
         goal = self._follower.goal
-        if goal is not None and self._feedback_timer.is_due(self._uptime) and self._server.feedback_is_heard:
+        if goal is not None and _take(self._feedback_pace, self._uptime) and self._server.feedback_is_heard:
             goal.publish_feedback(self._filled(FollowJointTrajectoryFeedback(), time_s))
 
     def _filled(self, message, time_s):
@@ -318,24 +318,9 @@ class EffortJointTrajectoryController(_PidTrajectoryController):
     interface = EFFORT
 
 
-class _Timer:
-    """Says when something that happens ``rate`` times a second is due; never for rate 0."""
-
-    def __init__(self, rate):
-        self._period_s = 1.0 / rate if rate > 0.0 else math.inf
-        self.reset()
-
-    def reset(self):
-        """Begin anew, with the next question."""
-        self._due_s = -math.inf if self._period_s < math.inf else math.inf
-
-    def is_due(self, time_s):
-        # Half a nanosecond: multiples of a tick and of the period meet in rounding only.
-        if time_s < self._due_s - 5e-10:
-            return False
-        following = self._due_s + self._period_s
-        self._due_s = following if following > time_s else time_s + self._period_s
-        return True
+def _take(pace, time_s):
+    """Whether it is due; a rate of 0 Hz means never here."""
+    return pace.rate > 0.0 and pace.take(time_s)
 
 
 def _rows(tolerances):

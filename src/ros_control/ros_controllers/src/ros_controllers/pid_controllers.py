@@ -8,7 +8,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from controller_manager import EFFORT, VELOCITY, Controller, ControllerError, Gains, Pid
 from controller_manager.pid_tuning import TunablePids
-from ros_controllers.convert import stamp
+from sim_time.stamps import stamp
 
 # A state message goes out with every tenth update.
 STATE_EVERY = 10

@@ -8,10 +8,10 @@ from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
 from controller_manager import Controller, ControllerError
-from ros_controllers.convert import stamp
-from ros_controllers.due import Due
 from ros_controllers.speed_limits import read_speed_limits
 from ros_controllers.wheel_odometry import WheelOdometry
+from sim_time.pace import Pace
+from sim_time.stamps import stamp
 from urdf_model import Cylinder, Sphere
 
 
@@ -28,7 +28,7 @@ class VehicleController(Controller):
 
     def __init__(self, name, hardware, context):
         super().__init__(name, hardware, context)
-        self._due = Due(1.0 / self._positive("publish_rate", 50.0, "Hz"))
+        self._pace = Pace(self._positive("publish_rate", 50.0, "Hz"))
         self._timeout_s = self._positive("cmd_vel_timeout", 0.5, "s")
         self._base_frame = self._frame("base_frame_id", "base_link")
         self._odom_frame = self._frame("odom_frame_id", "odom")
@@ -75,7 +75,7 @@ class VehicleController(Controller):
         self._commands.take()
         self._halt(time_s)
         self._odometry.rest()
-        self._due.restart()
+        self._pace.restart()
         self._note_wheels()
 
     def stopping(self, time_s):
@@ -94,7 +94,7 @@ class VehicleController(Controller):
             history[:] = speed, history[0]
             speeds.append(speed)
         self._drive(*speeds)
-        if self._due.is_due(time_s):
+        if self._pace.take(time_s):
             self._publish(time_s)
         if self._out_publisher is not None and self._out_publisher.has_listeners:
             message = TwistStamped()

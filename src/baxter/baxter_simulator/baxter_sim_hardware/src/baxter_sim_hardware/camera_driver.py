@@ -15,7 +15,8 @@ from std_srvs.srv import Empty, EmptyResponse
 
 from baxter_sim_hardware.cameras import FLIP, MIRROR, CameraRefused, Rack, Settings
 from sensor_renderer import convert
-from sensor_renderer.drivers import ColourTopics, Driver, Pace
+from sensor_renderer.drivers import ColourTopics, Driver
+from sim_time.pace import Pace
 
 # Two of the robot's three cameras can have power (baxter_interface 1.1.0).
 _ROBOT_POWERS, _ALL = 2, 3

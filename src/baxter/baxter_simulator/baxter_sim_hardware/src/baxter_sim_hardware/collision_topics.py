@@ -4,11 +4,11 @@ from baxter_core_msgs.msg import CollisionAvoidanceState, CollisionDetectionStat
 from std_msgs.msg import Header
 
 from baxter_sim_hardware import collision
-from baxter_sim_hardware.convert import stamp
 from baxter_sim_hardware.limbs import BASE_FRAME
-from baxter_sim_hardware.schedule import Schedule
 from baxter_sim_hardware.self_collision import BODY
 from baxter_sim_hardware.sides import SIDES
+from sim_time.pace import Schedule
+from sim_time.stamps import stamp
 
 CHECK_RATE_HZ = 100.0  # how often the arms look what they touch, and what is suppressed
 

@@ -2,22 +2,16 @@
 """The one place where ROS messages meet the core's types."""
 import struct
 
-import genpy
 from baxter_core_msgs.msg import AssemblyState, EndpointState, SEAJointState
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from sim_time.stamps import stamp
 from urdf_model.transforms import quaternion_from_matrix
 
 _UINT32 = struct.Struct("<I")
 _HEADER = struct.Struct("<IIII")  # sequence number, seconds, nanoseconds, length of an empty frame_id
-
-
-def stamp(time_s):
-    """Simulation time [s] as a ROS time, to the nanosecond."""
-    seconds, nanoseconds = divmod(round(time_s * 1e9), 1000000000)
-    return genpy.Time(seconds, nanoseconds)
 
 
 class JointStates:

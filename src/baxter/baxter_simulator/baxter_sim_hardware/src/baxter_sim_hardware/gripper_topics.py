@@ -4,7 +4,6 @@ import copy
 
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 
-from baxter_sim_hardware.convert import stamp
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.gripper import ElectricGripper
 from baxter_sim_hardware.gripper_commands import CustomGripper
@@ -13,6 +12,7 @@ from baxter_sim_hardware.panel import BLOWERS, PUMPS, VACUUM_SENSORS
 from baxter_sim_hardware.robot import ENABLE_HINT
 from baxter_sim_hardware.sides import SIDES
 from baxter_sim_hardware.suction import SuctionGripper
+from sim_time.stamps import stamp
 
 _MAKER = {"manufacturer": "Rethink Research Robot", "product": "SDK End Effector"}
 _PROPERTIES = {

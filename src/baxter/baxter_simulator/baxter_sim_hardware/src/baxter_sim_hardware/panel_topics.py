@@ -11,9 +11,9 @@ from baxter_core_msgs.msg import (
 from bullet_sim_msgs.srv import Press, PressRequest, PressResponse
 from std_msgs.msg import UInt32
 
-from baxter_sim_hardware.convert import stamp
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.panel import ANALOG, BUTTONS, DIGITAL, ESTOP, LIGHTS, NAVIGATORS, Panel, navigator_name
+from sim_time.stamps import stamp
 
 PRESS_SERVICE = "sim/press"
 

@@ -19,7 +19,6 @@ from baxter_sim_hardware.panel_topics import PanelTopics
 from baxter_sim_hardware.procedure_topics import ProcedureTopics
 from baxter_sim_hardware.robot import Baxter
 from baxter_sim_hardware.robot_state import Event, State
-from baxter_sim_hardware.schedule import Schedule
 from baxter_sim_hardware.screen_topics import ScreenTopics
 from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_hardware.sensor_topics import SensorTopics
@@ -27,6 +26,7 @@ from baxter_sim_hardware.sides import SIDES
 from baxter_sim_hardware.status_topics import StatusTopics
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
+from sim_time.pace import Schedule
 
 PARAMETERS = "/baxter_sim_hardware/"
 QUEUE_DEPTH = 200  # messages between two ticks: 2 ms of a client that writes at 100 kHz

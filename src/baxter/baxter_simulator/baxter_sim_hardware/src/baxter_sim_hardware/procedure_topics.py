@@ -6,8 +6,8 @@ from std_msgs.msg import Bool, Int32
 
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.procedures import PROCEDURES, STATUS_RATE_HZ, Procedure, Updater
-from baxter_sim_hardware.schedule import Schedule
 from baxter_sim_hardware.sides import SIDES
+from sim_time.pace import Schedule
 
 
 class ProcedureTopics:

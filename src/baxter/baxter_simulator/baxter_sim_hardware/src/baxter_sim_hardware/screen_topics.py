@@ -3,8 +3,8 @@
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
-from baxter_sim_hardware.convert import stamp
 from baxter_sim_hardware.screen import GLASS_LINK, HEIGHT, WIDTH, Screen, on_glass
+from sim_time.stamps import stamp
 
 SCREEN_FRAME = "screen"
 

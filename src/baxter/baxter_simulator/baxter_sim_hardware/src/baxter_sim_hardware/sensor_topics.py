@@ -8,11 +8,11 @@ from sensor_msgs.msg import ChannelFloat32, Imu, LaserScan, PointCloud, Range
 from std_msgs.msg import Float32, Header, UInt16
 
 from baxter_sim_hardware import sensors
-from baxter_sim_hardware.convert import stamp
 from baxter_sim_hardware.limbs import BASE_FRAME
 from baxter_sim_hardware.panel import RANGE_SENSORS
 from baxter_sim_hardware.sides import SIDES
 from baxter_sim_kinematics import Chain
+from sim_time.stamps import stamp
 
 SONAR_FRAME = "sonar_ring"
 _UNKNOWN = [-1.0] + [0.0] * 8  # the covariance of what an Imu does not measure

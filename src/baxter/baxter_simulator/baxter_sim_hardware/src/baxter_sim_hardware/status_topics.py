@@ -10,6 +10,7 @@ from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.joint_command import Mode
 from baxter_sim_hardware.limbs import BASE_FRAME, tip_of
 from baxter_sim_hardware.robot import ENABLE_HINT
+from sim_time.stamps import stamp
 
 AGGREGATE = "/Baxter"
 
@@ -90,7 +91,7 @@ class StatusTopics:
 
     @staticmethod
     def _array(time_s, statuses):
-        return DiagnosticArray(Header(stamp=convert.stamp(time_s)), statuses)
+        return DiagnosticArray(Header(stamp=stamp(time_s)), statuses)
 
     def _publish_urdf(self, publisher):
         self._urdf = publisher

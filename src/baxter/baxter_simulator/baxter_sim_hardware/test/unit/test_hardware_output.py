@@ -7,7 +7,8 @@ import pytest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from baxter_sim_hardware.convert import JointStates, stamp
+from baxter_sim_hardware.convert import JointStates
+from sim_time.stamps import stamp
 
 
 def written(message):

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import pytest
 
-from baxter_sim_hardware.schedule import Schedule
+from sim_time.pace import Schedule
 
 
 def due_at(schedule, times_s):

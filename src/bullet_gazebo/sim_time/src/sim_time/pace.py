@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""When something that happens at a rate is due, in simulation time. Free of ROS."""
+import math
+
+# Times of ticks and multiples of a period meet in rounding only [s].
+_TOLERANCE_S = 1e-6
+
+
+class Pace:
+    """Due every period from the first time on that it is asked; at once where time has gone back.
+
+    rate [Hz]: 0 for every time that it is asked.
+    """
+
+    def __init__(self, rate):
+        self.rate = rate
+
+    @property
+    def rate(self):
+        """How many times a second [Hz]; 0: every time that it is asked. Setting it begins anew."""
+        return self._rate
+
+    @rate.setter
+    def rate(self, rate):
+        self._rate = rate
+        self.period_s = 1.0 / rate if rate > 0.0 else 0.0
+        self.restart()
+
+    def restart(self):
+        """It is due at once, whatever the time."""
+        self._last_s, self._next_s = -math.inf, -math.inf
+
+    def is_due(self, time_s):
+        """Whether it is due at ``time_s`` [s]. Says so until :meth:`took`."""
+        return time_s >= self._next_s - _TOLERANCE_S or time_s < self._last_s
+
+    def took(self, time_s):
+        """It was done at ``time_s`` [s]. Who was late does not catch up."""
+        following = self._next_s + self.period_s
+        latest = time_s + self.period_s
+        self._next_s = following if time_s < following <= latest + _TOLERANCE_S else latest
+        self._last_s = time_s
+
+    def take(self, time_s):
+        """Whether it is due at ``time_s`` [s]; if so, it counts as done."""
+        # Asked at every tick, and nearly always in vain.
+        if self._last_s <= time_s < self._next_s - _TOLERANCE_S:
+            return False
+        self.took(time_s)
+        return True
+
+
+class Schedule:
+    """True once per period, on the period's own grid, so that rates do not drift.
+
+    rate_hz: > 0. The first call is always due, whatever the time.
+    """
+
+    def __init__(self, rate_hz):
+        self.set_rate(rate_hz)
+
+    def set_rate(self, rate_hz):
+        if not (math.isfinite(rate_hz) and rate_hz > 0.0):
+            raise ValueError("rate is %s Hz; it must be greater than 0" % rate_hz)
+        self.rate_hz = float(rate_hz)
+        self._last = None
+        self._begin_s = math.inf
+        #: Until when nothing is due [s], if the clock does not go back.
+        self.next_s = -math.inf
+
+    def due(self, time_s):
+        """Whether a new period has begun at time_s [s]; a clock that went back begins anew."""
+        # Asked at every tick, and nearly always in vain.
+        if self._begin_s <= time_s < self.next_s:
+            return False
+        period = math.floor(time_s * self.rate_hz + 1e-6)
+        if period == self._last:
+            return False
+        self._last = period
+        # Twice the margin of the line above, so that rounding cannot make it late.
+        self._begin_s, self.next_s = period / self.rate_hz, (period + 1 - 2e-6) / self.rate_hz
+        return True
