@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """In a program under judgement the wall's clock is the simulation's: `time.sleep(1)` lasts one simulated second.
 
-Python reads this module when it starts, because the judge puts its folder into PYTHONPATH. A simulation that runs
-faster or slower than real time thus changes nothing for a program that waits with `time` rather than with rospy, nor
-for rospy's own time-outs. rf_checks/run_clock.py has the other side and the layout of the page.
+lab_environment's sitecustomize runs this module when Python starts, because the judge puts its folder into PYTHONPATH
+right behind. A simulation that runs faster or slower than real time thus changes nothing for a program that waits with
+`time` rather than with rospy, nor for rospy's own time-outs. rf_checks/run_clock.py has the other side and the layout
+of the page.
 """
 import contextlib
 import ctypes

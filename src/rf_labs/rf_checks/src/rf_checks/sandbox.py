@@ -17,6 +17,7 @@ import threading
 import time
 from pathlib import Path
 
+import lab_environment
 from rf_checks import isolation, submission
 from rf_checks.pacing import children_of, direct_children
 
@@ -48,6 +49,14 @@ class Startup:
     def __init__(self, folder, environment, descriptors=()):
         """folder: path; environment: dict; descriptors: keep their numbers."""
         self.folder, self.environment, self.descriptors = str(folder), dict(environment), tuple(descriptors)
+
+    @staticmethod
+    def python_path(folder, python_path):
+        """PYTHONPATH of a program: with `folder` in front of what it was, behind the lab's own environment.
+
+        Python runs the first sitecustomize.py of all folders. The lab's runs the next one after its own work.
+        """
+        return os.pathsep.join(filter(None, (str(Path(lab_environment.__file__).parents[1]), folder, python_path)))
 
 
 class Student:
@@ -92,7 +101,8 @@ class Student:
                    "NUMBA_CACHE_DIR": home}
         if startup is not None:
             folder = _STARTUP_FOLDER if walls else startup.folder
-            own.update(startup.environment, PYTHONPATH=os.pathsep.join((folder, environment.get("PYTHONPATH", ""))))
+            own.update(startup.environment,
+                       PYTHONPATH=startup.python_path(folder, environment.get("PYTHONPATH", "")))
         limits = ["prlimit", "--cpu=%d" % CPU_S, "--as=%d" % ADDRESS_BYTES, "--fsize=%d" % FILE_BYTES, "--core=0", "--"]
         return subprocess.Popen([*enter, *limits, python(), "%s/%s" % (home, program.name), *arguments], env=own,
                                 cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,

@@ -12,6 +12,7 @@ import pytest
 from lab_testing.waiting import wait_until
 from rf_checks import pacing
 from rf_checks.run_clock import VARIABLE, RunClock
+from rf_checks.sandbox import Startup
 
 STUDENT = Path(__file__).resolve().parents[2] / "student"
 STEP_S = 0.01
@@ -24,10 +25,10 @@ def clock():
     clock.close()
 
 
-def start(clock, text, **environment):
+def start(clock, text, python_path="", **environment):
     return subprocess.Popen([sys.executable, "-c", text], stdout=subprocess.PIPE, text=True,
-                            env={**os.environ, "PYTHONPATH": str(STUDENT), **clock.environment, **environment},
-                            pass_fds=(clock.descriptor,))
+                            env={**os.environ, "PYTHONPATH": Startup.python_path(str(STUDENT), str(python_path)),
+                                 **clock.environment, **environment}, pass_fds=(clock.descriptor,))
 
 
 def at_rest(watch):
@@ -77,10 +78,33 @@ def test_a_program_without_the_page_has_the_clock_of_the_wall(clock, environment
         assert program.wait() == 0
 
 
+def test_the_labs_own_environment_is_there_as_well(clock, tmp_path):
+    (tmp_path / "rospy").mkdir()
+    (tmp_path / "rospy/__init__.py").write_text("from .client import init_node\n")
+    (tmp_path / "rospy/client.py").write_text("def init_node(name):\n    return name\n")
+    # Somebody's own must not be in the way of either.
+    (tmp_path / "sitecustomize.py").write_text("print('not this one')\n")
+    text = ("import time, rospy, lab_environment.first_clock as first_clock\n"
+            "print(rospy.init_node.__wrapped__.__module__, type(time.sleep).__name__, first_clock.time is time)")
+    with start(clock, text, tmp_path) as program:
+        assert program.stdout.read() == "rospy.client method True\n"
+
+
 def test_a_program_cannot_write_to_the_clock(clock):
     text = "import os\ntry:\n    os.write(%d, b'x')\nexcept OSError as error:\n    print(error.strerror)"
     with start(clock, text % clock.descriptor) as program:
         assert program.stdout.read() == "Bad file descriptor\n"
+
+
+def test_nor_may_it_open_the_page_anew_to_write_or_to_cut(clock):
+    text = ("import mmap, os\npage = os.open('/proc/self/fd/%d', os.O_RDWR)\n"
+            "for harm in (lambda: os.write(page, b'x'), lambda: os.ftruncate(page, 0),\n"
+            "             lambda: mmap.mmap(page, mmap.PAGESIZE)):\n"
+            "    try:\n        harm()\n        print('done')\n"
+            "    except PermissionError:\n        print('refused')")
+    with start(clock, text % clock.descriptor) as program:
+        assert program.stdout.read() == "refused\n" * 3
+    clock.advance(STEP_S)
 
 
 def test_own_time_is_wall_time_of_who_rests_and_processor_time_of_who_computes():
