@@ -10,12 +10,11 @@ from pathlib import Path
 
 import rospkg
 
-from rf_checks import report
+from rf_checks import report, submission
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
 from rf_checks.isolation import NotIsolated
 from rf_checks.judge import WALL_LIMIT_S, Judge
 from rf_checks.lab import LabFailed
-from rf_checks.submission import BadSubmission
 
 PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
 
@@ -74,17 +73,22 @@ def _program_and_exercise(parser, options):
     for report_file in (options.json, options.junit):
         if report_file is not None and not report_file.absolute().parent.is_dir():
             parser.error("there is no folder %s to write %s into" % (report_file.absolute().parent, report_file.name))
-        if report_file is not None and report_file.is_symlink():
-            parser.error("%s is a link, to %s; give the report a file of its own" % (
-                report_file, os.readlink(report_file)))
+        link = _link_in(report_file) if report_file is not None else None
+        if link is not None:
+            parser.error("%s is a link, to %s; give the report a file of its own" % (link, os.readlink(link)))
     if not options.wall_limit > 0.0:
         parser.error("the wall limit is %g, expected a positive number of seconds" % options.wall_limit)
     if options.seed < 0:
         parser.error("the seed is %d, expected 0 or more" % options.seed)
     try:
-        return path, choose(options.lab, name, path.name, path.read_bytes().decode("utf-8", errors="replace"))
-    except UnknownExercise as error:
+        return path, choose(options.lab, name, path.name, submission.texts(path)[path.name])
+    except (UnknownExercise, submission.BadSubmission) as error:
         parser.error(str(error))
+
+
+def _link_in(path):
+    """The first part of a path, as it was given, that is a link; or None."""
+    return next((part for part in [*reversed(path.parents), path] if part.is_symlink()), None)
 
 
 def start(name):
@@ -94,7 +98,7 @@ def start(name):
     if name not in [exercise.name for exercise in EXERCISES]:
         print("there is no exercise '%s'; --list shows them" % name, file=sys.stderr)
         return WRONG_WORDS
-    if target.exists():
+    if os.path.lexists(target):
         print("%s is there already; it stays as it is" % target, file=sys.stderr)
         return WRONG_WORDS
     shutil.copy(source, target)
@@ -139,7 +143,7 @@ def main(argv=None):
         print("a stranger's program is not run without walls around it, and this machine allows none: %s" % refusal,
               file=sys.stderr)
         return JUDGE_FAILED
-    except BadSubmission as refusal:
+    except submission.BadSubmission as refusal:
         print("check: %s" % refusal, file=sys.stderr)
         return WRONG_WORDS
     except (LabFailed, OSError) as error:

@@ -75,6 +75,8 @@ def make(workspace, target):
     Raises HandoutFailed, OSError.
     """
     workspace, target = Path(workspace).resolve(), Path(target).absolute()
+    if target.is_symlink():
+        raise HandoutFailed("%s is a link, to %s; name a folder" % (target, os.readlink(target)))
     if target.resolve() == workspace or workspace in target.resolve().parents:
         raise HandoutFailed("%s lies in the workspace itself; name a folder elsewhere" % target)
     if target.exists() and (not target.is_dir() or any(target.iterdir())):

@@ -27,6 +27,11 @@ SOLVED = (".git", "src/rf_labs/rf_checks/exercises/solutions", "src/rf_labs/rf_c
           "src/rf_labs/rf_lab2/notebooks")
 #: What a student's program has no use for: the judge itself.
 JUDGE = ("src/rf_labs/rf_checks",)
+# The same in an install space, which may be the workspace's or stand alone.
+_INSTALLED = ("share/rf_checks/exercises/solutions", "lib/rf_lab2/tf_listener.py", "lib/rf_lab2/wave.py",
+              "share/rf_lab2/notebooks")
+SOLVED += tuple(place + name for place in ("", "install/") for name in _INSTALLED)
+JUDGE += tuple(place + name for place in ("", "install/") for name in ("share/rf_checks", "lib/rf_checks"))
 # Of /etc, what programs need to start; a file with passwords is none of it.
 _ETC = ("alternatives", "fonts", "group", "host.conf", "hosts", "ld.so.cache", "ld.so.conf", "ld.so.conf.d",
         "localtime", "machine-id", "mime.types", "nsswitch.conf", "OpenCL", "passwd", "protocols", "python3", "ros",

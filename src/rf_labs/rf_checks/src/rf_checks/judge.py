@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rf_checks import diagnosis, isolation
+from rf_checks import diagnosis, isolation, submission
 from rf_checks.lab import Lab, LabFailed, MasterSilent, TooSlow, robot_description, student_folder
 from rf_checks.observing import Observer
 from rf_checks.pacing import Tree
@@ -102,12 +102,16 @@ class Judge:
             self._lab = None
 
     def check(self, exercise, program, seed=0):
-        """Run `program` (path) through the Exercise; returns a Result. Raises LabFailed, OSError."""
+        """Run `program` (path) through the Exercise; returns a Result.
+
+        Raises LabFailed, submission.BadSubmission, OSError.
+        """
         began = time.monotonic()
-        program = Path(program).resolve()
+        program = Path(program)
+        program = program.parent.resolve() / program.name
         calls = exercise.task.calls(np.random.default_rng(seed))
-        text = program.read_bytes().decode("utf-8", errors="replace")
-        fault = diagnosis.check_syntax(text, program.name)
+        texts = submission.texts(program)
+        fault = diagnosis.check_syntax(texts[program.name], program.name)
         results, not_graded = [], ""
         not_run = (Criterion("not run", 0.0, 100.0, "for the fault below"),)
         for call in calls:
@@ -130,7 +134,7 @@ class Judge:
                 not_run = (Criterion("as the run before", share, 100.0, "not run, for the fault below"),)
         walls = "bubblewrap" if self.has_walls else "none: trusted"
         return Result(exercise, str(program), seed, tuple(results), walls, time.monotonic() - began, not_graded,
-                      tuple(Library(_workspace()).notes(text)))
+                      tuple(Library(_workspace()).notes(texts)))
 
     def run(self, program, exercise, call, deadline=float("inf")):
         """One run; returns a Run. Raises TooSlow at `deadline` (monotonic, s)."""

@@ -12,6 +12,7 @@ import hashlib
 import io
 import json
 import keyword
+import re
 import tokenize
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,8 +23,14 @@ SPAN = 14
 COPY_SHARE = 0.5
 #: A program with fewer fingerprints of its own says nothing.
 LEAST_OWN = 40
-#: Calls that run what cannot be read off the program.
-_OPAQUE = ("exec", "eval", "compile", "__import__")
+#: Calls that run what cannot be read off the program, with the module that they belong to.
+_OPAQUE = {"": ("exec", "eval", "compile", "__import__"), "runpy": ("run_path", "run_module"),
+           "importlib": ("import_module",), "util": ("spec_from_file_location",), "machinery": ("SourceFileLoader",),
+           "subprocess": ("Popen", "run", "call", "check_call", "check_output", "getoutput"),
+           "os": ("system", "popen", "execv", "execve", "execvp", "execl", "execlp", "posix_spawn", "spawnv", "spawnl"),
+           "ctypes": ("CDLL", "PyDLL")}
+#: In a program's texts: where the judge and the solutions are.
+_JUDGES_OWN = re.compile(r"rf_checks|exercises.solutions|lab-judge-|LAB_JUDGE|LAB_RUN_CLOCK")
 
 
 @dataclass(frozen=True)
@@ -156,12 +163,40 @@ def compare(text, references, handed_out):
 
 def opaque_calls(text):
     """(line, name) of calls that run code which is not in the program to be read."""
+    tree = _parsed(text)
+    modules, functions = {}, {}
+    for node in ast.walk(tree):
+        for alias in node.names if isinstance(node, ast.Import | ast.ImportFrom) else ():
+            modules[alias.asname or alias.name] = alias.name
+            if isinstance(node, ast.ImportFrom) and node.module:
+                functions[alias.asname or alias.name] = node.module.split(".")[-1], alias.name
+    found = set()
+    for call in (node.func for node in ast.walk(tree) if isinstance(node, ast.Call)):
+        module, name = "", ""
+        if isinstance(call, ast.Name):
+            module, name = functions.get(call.id, ("", call.id))
+        elif isinstance(call, ast.Attribute):
+            # A module, or the last part of a dotted one.
+            owner = getattr(call.value, "id", getattr(call.value, "attr", None))
+            module, name = modules.get(owner, owner), call.attr
+        if name in _OPAQUE.get(module, ()):
+            found.add((call.lineno, "%s.%s" % (module, name) if module else name))
+    return sorted(found)
+
+
+def judges_own(text):
+    """(line, text) of the texts in a program that name the judge's files."""
+    constants = [node for node in ast.walk(_parsed(text)) if isinstance(node, ast.Constant)]
+    return sorted({(node.lineno, node.value[:80]) for node in constants
+                   if isinstance(node.value, str) and _JUDGES_OWN.search(node.value)})
+
+
+def _parsed(text):
+    """The tree of a program; an empty one for what Python cannot read."""
     try:
-        tree = ast.parse(text)
+        return ast.parse(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return []
-    return sorted({(node.lineno, node.func.id) for node in ast.walk(tree) if isinstance(node, ast.Call)
-                   and isinstance(node.func, ast.Name) and node.func.id in _OPAQUE})
+        return ast.Module([], [])
 
 
 def notebook_code(path):
@@ -194,17 +229,25 @@ class Library:
         self.skeleton_count = len(self.handed_out)
         self.handed_out += [notebook_code(path) for path in sorted(root.glob("src/*/*/notebooks/*.ipynb"))]
 
-    def notes(self, text):
-        """What an instructor should know about a program (text): a list of sentences. They change no points."""
+    def notes(self, texts):
+        """What an instructor should know about a program: a list of sentences. They change no points.
+
+        texts: {name: text} of the program's files, the program itself first.
+        """
         notes = []
-        likely = [one for one in compare(text, self.references, self.handed_out) if one.is_copy]
-        if likely:
-            one = likely[0]
-            notes.append("%.0f %% of the program's own code is also in %s, and %.0f %% of that one's in the program, "
-                         "whatever the names: compare the two"
-                         % (100 * one.of_program, one.name, 100 * one.of_reference))
-        for line, name in opaque_calls(text)[:3]:
-            notes.append("line %d calls %s(), which runs code that cannot be read off the program" % (line, name))
+        for place, (name, text) in enumerate(texts.items()):
+            what, where = ("the program", "") if place == 0 else (name, " of %s" % name)
+            likely = [one for one in compare(text, self.references, self.handed_out) if one.is_copy]
+            if likely:
+                one = likely[0]
+                notes.append("%.0f %% of %s's own code is also in %s, and %.0f %% of that one's in %s, whatever the "
+                             "names: compare the two"
+                             % (100 * one.of_program, what, one.name, 100 * one.of_reference, what))
+            for line, call in opaque_calls(text)[:3]:
+                notes.append("line %d%s calls %s(), which runs code that cannot be read off the program"
+                             % (line, where, call))
+            for line, said in judges_own(text)[:3]:
+                notes.append("line %d%s names what belongs to the check: %s" % (line, where, said))
         return notes
 
 

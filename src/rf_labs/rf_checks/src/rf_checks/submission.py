@@ -16,6 +16,8 @@ class BadSubmission(Exception):
 def read(path):
     """The bytes of a regular file that is no link. Raises BadSubmission, OSError."""
     # A pipe must not be waited for, and a link could lead to what only the judge may read.
+    if os.path.islink(path):
+        raise BadSubmission("%s is a link, to %s; a program is a file of its own" % (path, os.readlink(path)))
     descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(file.fileno())
@@ -49,6 +51,11 @@ def files(program):
                 found[relative] = read(path)
                 to_read.append(relative)
     return found
+
+
+def texts(program):
+    """As `files`, decoded; what is no UTF-8 is replaced."""
+    return {name: content.decode("utf-8", errors="replace") for name, content in files(program).items()}
 
 
 def imported(source):

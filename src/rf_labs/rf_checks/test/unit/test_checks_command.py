@@ -57,6 +57,30 @@ def test_wrong_words_are_answered_in_a_sentence(words, expected, capsys):
     assert "usage:" not in said
 
 
+def test_links_are_not_followed(capsys):
+    Path("elsewhere").mkdir()
+    Path("elsewhere/theirs.py").write_text("print('theirs')\n")
+    Path("folder").symlink_to("elsewhere")
+    Path("report.json").symlink_to("elsewhere/report.json")
+    Path("wave.py").symlink_to("elsewhere/wave.py")
+    Path("theirs.py").symlink_to("elsewhere/theirs.py")
+    check = ["lab2", "wave", "my_node.py"]
+    for words, link in (([*check, "--json", "report.json"], "report.json is a link, to elsewhere/report.json"),
+                        ([*check, "--junit", "folder/report.xml"], "folder is a link, to elsewhere"),
+                        ([*check, "--json", str(Path("folder/x.json").absolute())], "folder is a link, to elsewhere"),
+                        (["lab2", "wave", "theirs.py"], "theirs.py is a link, to elsewhere/theirs.py")):
+        with pytest.raises(SystemExit) as end:
+            command.main(words)
+        assert end.value.code == command.WRONG_WORDS
+        assert link in capsys.readouterr().err
+    assert command.main(["--start", "wave"]) == command.WRONG_WORDS
+    assert sorted(os.listdir("elsewhere")) == ["theirs.py"]
+    # One that was made only while the program ran is replaced.
+    command.write_report(Path("report.json"), "{}")
+    assert not Path("report.json").is_symlink()
+    assert sorted(os.listdir("elsewhere")) == ["theirs.py"]
+
+
 @pytest.mark.parametrize("kind", ["skeletons", "solutions"])
 def test_every_exercise_has_both_programs(kind):
     files = {path.stem: path.read_text(encoding="utf-8") for path in (EXERCISE_FOLDERS / kind).glob("*.py")}

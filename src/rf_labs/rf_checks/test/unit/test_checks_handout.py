@@ -53,7 +53,7 @@ def test_the_copy_has_everything_but_what_solves(workspace, tmp_path):
     assert [one["source"] for one in cells[1:]] == [["a = 1"], [handout._YOUR_TURN]]
     assert [one["outputs"] for one in cells[1:]] == [[], []]
     # In it, the judge finds no reference and says nothing of copies.
-    assert similarity.Library(target).notes(SOLUTION) == []
+    assert similarity.Library(target).notes({"mine.py": SOLUTION}) == []
 
 
 def test_a_copy_that_would_reveal_a_solution_is_not_made(workspace, tmp_path):
@@ -71,6 +71,10 @@ def test_it_goes_into_an_empty_folder_elsewhere(workspace, tmp_path, monkeypatch
     (tmp_path / "full" / "mine").write_text("mine")
     assert handout.main([str(tmp_path / "full")]) == 1
     assert "not an empty folder" in capsys.readouterr().err
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "elsewhere")
+    assert handout.main([str(tmp_path / "link")]) == 1
+    assert "is a link, to" in capsys.readouterr().err
     assert handout.main([]) == 2
     assert handout.main([str(tmp_path / "students")]) == 0
     assert "check --list" in capsys.readouterr().out

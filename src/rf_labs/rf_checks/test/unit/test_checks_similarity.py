@@ -14,6 +14,10 @@ NAMES = sorted(path.name for path in (EXERCISES / "solutions").glob("*.py"))
 LIBRARY = similarity.Library(WORKSPACE)
 
 
+def notes(text):
+    return LIBRARY.notes({"program.py": text})
+
+
 def solution(name):
     return (EXERCISES / "solutions" / name).read_text(encoding="utf-8")
 
@@ -36,16 +40,16 @@ def disguised(text):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_copy_is_named_also_in_disguise(name):
     for text in (solution(name), disguised(solution(name))):
-        note, = LIBRARY.notes(text)
+        note, = notes(text)
         assert "exercises/solutions/" + name in note
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_an_untouched_skeleton_is_no_copy(name):
     skeleton = (EXERCISES / "skeletons" / name).read_text(encoding="utf-8")
-    assert LIBRARY.notes(skeleton) == []
+    assert notes(skeleton) == []
     # Nor is one with a little work in it.
-    assert LIBRARY.notes(skeleton + "\n\ndef extra(a, b):\n    return [x * a + b for x in range(10) if x > a]\n") == []
+    assert notes(skeleton + "\n\ndef extra(a, b):\n    return [x * a + b for x in range(10) if x > a]\n") == []
 
 
 @pytest.mark.parametrize("folder", ["src/rf_labs/rf_checks/test/wrong", "src/baxter/baxter_examples/scripts"])
@@ -58,15 +62,33 @@ def test_programs_of_other_people_are_no_copies(folder):
 def test_what_notebooks_show_may_be_used():
     shown = similarity.notebook_code(WORKSPACE / "src/rf_labs/rf_lab2/notebooks/7_waving.ipynb")
     assert len(similarity.fingerprints(shown)) > similarity.LEAST_OWN
-    assert LIBRARY.notes(shown) == []
+    assert notes(shown) == []
 
 
 def test_what_cannot_be_read_is_noted():
-    notes = LIBRARY.notes("import base64\nexec(base64.b64decode('cHJpbnQoMSk='))\n")
-    assert notes == ["line 2 calls exec(), which runs code that cannot be read off the program"]
+    for call in ("exec(c)", "runpy.run_path(p)", "importlib.util.spec_from_file_location('m', p)", "os.system('x')",
+                 "subprocess.run(['x'])"):
+        assert notes("import runpy, os, subprocess\n%s\n" % call) == [
+            "line 2 calls %s(), which runs code that cannot be read off the program"
+            % call.split("(")[0].removeprefix("importlib.")]
+    for text in ("from runpy import run_path as load\nload(p)\n", "import runpy as r\nr.run_path(p)\n"):
+        assert notes(text) == ["line 2 calls runpy.run_path(), which runs code that cannot be read off the program"]
+    assert notes("import re\nre.compile('x')\nrunner.run(1)\n") == []
+
+
+def test_the_files_of_the_check_are_none_of_a_programs_business():
+    note, = notes("import os\nprint(os.listdir(os.environ['LAB_ROOT'] + '/src/rf_labs/rf_checks/exercises'))\n")
+    assert note == "line 2 names what belongs to the check: /src/rf_labs/rf_checks/exercises"
+
+
+@pytest.mark.parametrize("name", NAMES[:1])
+def test_a_module_beside_the_program_is_looked_at_as_well(name):
+    note, = LIBRARY.notes({"mine.py": "import helper\nhelper.main()\n", "helper.py": disguised(solution(name))})
+    assert "of helper.py's own code is also in" in note
+    assert "exercises/solutions/" + name in note
 
 
 @pytest.mark.parametrize("text", ["", "print 'old'", "\0", "(" * 500])
 def test_what_python_cannot_read_has_no_likeness(text):
     assert similarity.fingerprints(text) == frozenset()
-    assert LIBRARY.notes(text) == []
+    assert notes(text) == []
