@@ -85,6 +85,7 @@ class Lab:
         self._order = None
         self._done = None
         self._connection = None
+        self._pacer = None
         self._ended = threading.Event()
         self._has_time = False
         self._may_go = threading.Event()
@@ -141,7 +142,8 @@ class Lab:
             self._own_time.restart()
             self._connection = self._await(lambda: _accept(listener), "the simulator", deadline)
         self._connection.settimeout(None)
-        threading.Thread(target=self._pace, args=(self._connection, self._ended), daemon=True).start()
+        self._pacer = threading.Thread(target=self._pace, args=(self._connection, self._ended), daemon=True)
+        self._pacer.start()
         self._await(self._all_there, "the nodes around the robot", deadline)
         self.own_nodes = frozenset(self.nodes() - TRANSIENT)
         self.own_topics = frozenset(topic for topic, _ in self._state()[0]) - SHARED_TOPICS
@@ -266,6 +268,10 @@ class Lab:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
         self._processes = []
+        if self._pacer is not None:
+            # It may be in the middle of a look at the processes.
+            self.watch.gives_up = lambda: True
+            self._pacer.join(STOP_TIMEOUT_S)
         self.watch.close()
         self._own_time.close()
         self._still_time.close()

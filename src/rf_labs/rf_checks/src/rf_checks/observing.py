@@ -31,12 +31,18 @@ class Observer:
         self._busy_since, self._busy_cpu_s = 0, 0.0
         self._exited_at = None
         self._over, self._released = threading.Event(), threading.Event()
+        # Records come in one thread, an end from outside in another: the first end counts.
+        self._lock = threading.Lock()
 
     def on_record(self, record, cpu_s):
         """One record, and the processor time that the program has used so far [s]."""
+        with self._lock:
+            if not self._over.is_set():
+                self._take(record, cpu_s)
         if self._over.is_set():
             self._released.wait()
-            return
+
+    def _take(self, record, cpu_s):
         self.records.append(record)
         if self._exited_at is None:
             self.ended = self._end(record, cpu_s)
@@ -45,7 +51,6 @@ class Observer:
                 self._exited_at = len(self.records)
         if self.ended and (self.ended != "exited" or self._has_settled()):
             self._over.set()
-            self._released.wait()
 
     def wait(self, timeout_s):
         """Whether the run is over; waits so long for that."""
@@ -53,9 +58,10 @@ class Observer:
 
     def end(self, how):
         """End the run from outside."""
-        if not self._over.is_set():
-            self.ended = how
-            self._over.set()
+        with self._lock:
+            if not self._over.is_set():
+                self.ended = how
+                self._over.set()
 
     def release(self):
         """Let the world go on; to be called once the run is dealt with."""

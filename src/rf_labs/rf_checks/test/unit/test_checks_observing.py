@@ -95,3 +95,26 @@ def test_after_a_programs_end_the_arms_come_to_rest(observe, moves_until, expect
     assert observer.ended == "exited"
     assert observer.records[0]["exited"] == 100.0
     assert len(observer.records) == pytest.approx(expected, abs=2)
+
+
+def test_an_end_from_outside_is_not_lost_on_a_record_that_comes_at_the_same_time():
+    inside, go_on = threading.Event(), threading.Event()
+
+    def look(output):
+        inside.set()
+        go_on.wait(10.0)
+        return False
+
+    observer = Observer(Call((), {}, 2.0), look, lambda: False)
+    observer.student = student()
+    records = threading.Thread(target=observer.on_record, args=(record(0), 0.0))
+    records.start()
+    inside.wait(10.0)
+    end = threading.Thread(target=observer.end, args=("output",))
+    end.start()
+    end.join(0.2)  # as far as it gets
+    go_on.set()
+    end.join()
+    observer.release()
+    records.join()
+    assert observer.ended == "output"
