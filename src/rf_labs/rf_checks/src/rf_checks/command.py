@@ -12,9 +12,9 @@ import rospkg
 
 from rf_checks import report, submission
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
+from rf_checks.graph import LabFailed
 from rf_checks.isolation import NotIsolated
 from rf_checks.judge import WALL_LIMIT_S, Judge
-from rf_checks.lab import LabFailed
 
 PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
 

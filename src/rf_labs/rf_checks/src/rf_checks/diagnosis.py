@@ -32,6 +32,8 @@ def check_syntax(text, name):
         if any(word in str(error.msg) for word in PYTHON2):
             hint = ("; this is Python 2, as in the sheet's listings: in Python 3 print(...) has brackets, and it is "
                     "`except Error as e`")
+        elif "'return' outside function" in str(error.msg):
+            hint = "; the sheet's `generate_posemsg` has its `return` at the margin: indent the line"
         return Fault("syntax", "line %s cannot be read by Python: %s%s" % (error.lineno or "?", error.msg, hint), 0.0)
     except ValueError as error:  # null bytes
         return Fault("syntax", "the file is no Python program: %s" % error, 0.0)
@@ -79,21 +81,33 @@ def is_flood(counts):
 
 def meddling(run):
     """A Fault for a program that touched the world around the robot rather than the robot, or None."""
-    if run.ended == "simulator gone" or "/gazebo" in run.missing_nodes:
+    changes = run.changes
+    if run.ended == "simulator gone" or "/gazebo" in changes.missing_nodes:
         return Fault("killed_simulator", "the simulator ended while the program ran: it was shut down or killed "
                      "(rosnode kill, os.kill, a second node named /gazebo, the robot deleted); a program must "
                      "leave it running", 0.0)
     if run.ended == "paused":
         return Fault("paused", "the simulation stood still: the program called /gazebo/pause_physics, and without time "
                      "nothing moves", 0.0)
-    if run.missing_nodes:
-        return Fault("killed_nodes", "the node %s was shut down or unregistered by the program; leave the lab's nodes "
-                     "alone, and give your own node a name of its own" % ", ".join(run.missing_nodes), 0.0)
-    if run.intruders:
-        topic, nodes = next(iter(sorted(run.intruders.items())))
+    if changes.missing_nodes:
+        return Fault("killed_nodes", "the program shut down, unregistered or replaced %s; leave the lab's nodes alone, "
+                     "and give your own node a name of its own" % _few(changes.missing_nodes), 0.0)
+    if changes.intruders:
+        topic, nodes = next(iter(sorted(changes.intruders.items())))
         return Fault("intruder", "%s publishes on %s, which belongs to the simulator; the check measures the robot "
                      "itself, so this gains nothing" % (" and ".join(sorted(nodes)), topic), 0.0)
+    if changes.withdrawn:
+        return Fault("withdrawn", "the program took %s of the lab's nodes off the ROS master's lists; leave what you "
+                     "have not registered yourself" % _few(changes.withdrawn), 0.0)
+    if changes.parameters:
+        return Fault("parameters", "the program changed or deleted the lab's parameter %s; the check does not go by "
+                     "parameters, so this gains nothing" % _few(changes.parameters), 0.0)
     return _moved_otherwise(run)
+
+
+def _few(names):
+    """Three names at most, in words."""
+    return ", ".join(names[:3]) + (" and %d more" % (len(names) - 3) if len(names) > 3 else "")
 
 
 def _moved_otherwise(run):

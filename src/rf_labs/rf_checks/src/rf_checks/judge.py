@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from rf_checks import diagnosis, isolation, submission
-from rf_checks.lab import Lab, LabFailed, MasterSilent, TooSlow, robot_description, student_folder
+from rf_checks.graph import LabFailed, MasterSilent
+from rf_checks.lab import Lab, TooSlow, robot_description, student_folder
 from rf_checks.observing import Observer
 from rf_checks.pacing import Tree
-from rf_checks.recording import RECORD_S, Criterion, Fault, Recording, Run
+from rf_checks.recording import RECORD_S, Changes, Criterion, Fault, Recording, Run
 from rf_checks.robot import Robot
 from rf_checks.run_clock import RunClock
 from rf_checks.sandbox import CPU_S, Startup, Student, adopt_orphans
@@ -157,6 +158,8 @@ class Judge:
         try:
             lab.go_on()
             self._watch(lab, observer, deadline)
+            if lab.is_alive and not run.changes:
+                self._look_at_graph(lab, run, with_parameters=True)
             run.wall_s, run.ended, run.exit_code = time.monotonic() - began, observer.ended, student.exit_code
             if run.ended in ("busy", "sim time"):
                 student.dump()
@@ -175,7 +178,7 @@ class Judge:
         if run.ended == "paused":
             self.close()
         else:
-            lab.forget_strangers()
+            lab.graph.forget_strangers()
         return run
 
     def _fresh_lab(self, posture, deadline):
@@ -217,18 +220,17 @@ class Judge:
         return exercise.task.is_satisfied(call, run)
 
     @staticmethod
-    def _look_at_graph(lab, run):
-        """Whether a node of the lab's is gone, or somebody else publishes the simulator's topics; `run` says who."""
+    def _look_at_graph(lab, run, with_parameters=False):
+        """Whether something of the lab's is gone, or somebody else publishes its topics; `run.changes` says what."""
         try:
-            run.missing_nodes = lab.missing_nodes()
-            run.intruders.update(lab.intruders())
+            run.changes = lab.graph.changes(with_parameters)
         except MasterSilent:
             # A busy machine answers late; a master that was halted or ended does not answer at all.
             if lab.has_stopped_master():
-                run.missing_nodes = [MASTER]
+                run.changes = Changes([MASTER])
         except LabFailed:
-            run.missing_nodes = [MASTER]
-        return bool(run.missing_nodes or run.intruders)
+            run.changes = Changes([MASTER])
+        return bool(run.changes)
 
 
 def how_it_ended(run):

@@ -2,9 +2,10 @@
 """A lab of the judge's own: master, simulator and the nodes around it, on a port that nobody uses.
 
 The judge itself is no ROS node: what the robot does comes through the recorder's socket, and who else is there from the
-master, through rosgraph.
+master (graph.py).
 """
 import contextlib
+import functools
 import json
 import os
 import re
@@ -15,17 +16,15 @@ import subprocess
 import tempfile
 import threading
 import time
-import xmlrpc.client
 from pathlib import Path
 
-import rosgraph
 import rospkg
 
-from lab_environment import master_calls
 from lab_environment.ports import free_port
 from rf_checks import isolation
-from rf_checks.pacing import OwnTime, Watch, children_of, direct_children
-from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SERVED, SOCKETS_VARIABLE
+from rf_checks.graph import Graph, LabFailed
+from rf_checks.pacing import OwnTime, Watch, children_of, direct_children, is_running
+from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SERVED, SILENCED, SOCKETS_VARIABLE
 
 #: How long the lab may take to start, and to put the robot back [s], as OwnTime counts.
 START_TIMEOUT_S, RESET_TIMEOUT_S = 120.0, 30.0
@@ -38,26 +37,12 @@ _SHORTEST_RECORD_S = 0.0025
 #: Programs on whose answers a student's program waits, or that have yet to take in what it sent: time must not run away
 #: meanwhile either.
 HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserver")
-#: Nodes that come and go by themselves.
+#: The node that puts the robot into the world, and ends then.
 SPAWNER = "/urdf_spawner"
-TRANSIENT = frozenset((SPAWNER,))
-#: Topics that programs publish on, too.
-SHARED_TOPICS = frozenset(("/rosout", "/rosout_agg", "/tf", "/tf_static", "/diagnostics"))
 #: How the IK nodes tell the recorder what they were asked.
 OBSERVER = ("IK_OBSERVER", "rf_checks.ik_witness:Witness")
-_CALLER = "/lab_judge"
-# How long a master may take to answer: one that was stopped never does.
-_ANSWER_S = 5.0
-_NO_ANSWER = (OSError, xmlrpc.client.Error, rosgraph.MasterException)
+_NAME = b"__name:="
 _DEAD_NODE = re.compile(r"\[([\w./-]+)\] process has died \[pid \d+, exit code -?[1-9]")
-
-
-class LabFailed(Exception):
-    """The judge's own lab does not come up or is gone; the text says why."""
-
-
-class MasterSilent(LabFailed):
-    """The ROS master takes connections, but does not answer in time."""
 
 
 class TooSlow(Exception):
@@ -70,6 +55,8 @@ class Lab:
     def __init__(self, description_xml, walls=True):
         """`description_xml`: the robot's URDF text. `walls`: in a sandbox of its own, as isolation.py says."""
         self.uri = ""
+        #: The lab's Graph, once it has started.
+        self.graph = None
         self._walls = walls
         self.watch = Watch()
         #: Called with each record (dict), in the thread that lets the world go on: until it returns, the world waits.
@@ -96,8 +83,6 @@ class Lab:
         # Records that came, and how many of them when stood_still_s looked last.
         self._heard = self._looked_at = 0
         self._is_held = False
-        #: Names of the lab's own nodes, and of the topics that they alone publish.
-        self.own_nodes = self.own_topics = frozenset()
         self._is_closed_world = False
 
     def __enter__(self):
@@ -121,6 +106,7 @@ class Lab:
         self._folder = Path(tempfile.mkdtemp(prefix="lab-judge-"))
         port = free_port()
         self.uri = "http://localhost:%d" % port
+        self.graph = Graph(self.uri)
         (self._folder / "sockets").mkdir()
         environment = isolation.environment_of(os.environ) if self._walls else dict(os.environ)
         environment.update({"ROS_MASTER_URI": self.uri, "ROS_HOSTNAME": "localhost",
@@ -145,8 +131,6 @@ class Lab:
         self._pacer = threading.Thread(target=self._pace, args=(self._connection, self._ended), daemon=True)
         self._pacer.start()
         self._await(self._all_there, "the nodes around the robot", deadline)
-        self.own_nodes = frozenset(self.nodes() - TRANSIENT)
-        self.own_topics = frozenset(topic for topic, _ in self._state()[0]) - SHARED_TOPICS
 
     def reset(self, posture, deadline=float("inf")):
         """Disable the robot, put its arms into `posture` (dict of joint to rad), and stop the time until go_on().
@@ -168,12 +152,13 @@ class Lab:
         self._own_time.restart()
         while not self._is_closed_world:
             # Services leave the master's lists a moment after they are closed.
-            served = {name for name, _ in self._state()[2] if name.startswith("/gazebo/")} - SERVED
-            served = {name for name in served if not name.endswith(("logger_level", "loggers"))}
-            self._is_closed_world = not served
-            if served and self._own_time.passed_s() > RESET_TIMEOUT_S:
+            open_ways = {name for kind, name, _ in self.graph.state() if _changes_the_world(kind, name)}
+            if open_ways and self._own_time.passed_s() > RESET_TIMEOUT_S:
                 self.go_on()
-                raise LabFailed("the check's own lab serves what it must not: %s" % ", ".join(sorted(served)))
+                raise LabFailed("the check's own lab serves what it must not: %s" % ", ".join(sorted(open_ways)))
+            self._is_closed_world = not open_ways
+            if self._is_closed_world:
+                self.graph.remember(self._node_processes())
 
     def go_on(self):
         """Let time pass again after reset()."""
@@ -186,45 +171,12 @@ class Lab:
             self._still_time.restart()
         return self._still_time.passed_s()
 
-    def nodes(self):
-        """Names of all nodes that the master knows: a set. Raises LabFailed when there is no master."""
-        return {name for kind in self._state() for _, names in kind for name in names} - {_CALLER}
-
-    def intruders(self):
-        """Who else publishes on topics that are the lab's own: dict of topic to node names."""
-        strangers = {topic: sorted(set(names) - self.own_nodes - TRANSIENT) for topic, names in self._state()[0]
-                     if topic in self.own_topics}
-        return {topic: names for topic, names in strangers.items() if names}
-
-    def missing_nodes(self):
-        """The lab's own nodes that are no longer registered."""
-        return sorted(self.own_nodes - self.nodes())
-
     def is_as_it_was(self):
-        """Whether another program can be judged here: everything alive, and nobody else there."""
+        """Whether another program can be judged here: everything alive and as it was, and nobody else there."""
         try:
-            return self.is_alive and self.nodes() - TRANSIENT == self.own_nodes
+            return self.is_alive and self.graph.is_as_it_was()
         except LabFailed:
             return False
-
-    def forget_strangers(self):
-        """Take nodes that are gone, and were not the lab's, off the master's lists, as `rosnode cleanup` does."""
-        with contextlib.suppress(LabFailed, *_NO_ANSWER):
-            publishers, subscribers, services = self._state()
-            for node in self.nodes() - self.own_nodes - TRANSIENT:
-                master = self._master(node)  # a node is taken off in its own name
-                try:
-                    uri = master.lookupNode(node)
-                except rosgraph.MasterError:
-                    continue
-                for kind, unregister in ((publishers, master.unregisterPublisher),
-                                         (subscribers, master.unregisterSubscriber)):
-                    for topic, names in kind:
-                        if node in names:
-                            unregister(topic, uri)
-                for service, names in services:
-                    if node in names:
-                        master.unregisterService(service, master.lookupService(service))
 
     def helper_pids(self):
         """Process ids of HELPERS in this lab."""
@@ -322,24 +274,24 @@ class Lab:
                 raise TooSlow("the check's own lab was still starting, waiting for %s" % what)
             time.sleep(0.05)
 
-    def _master(self, caller=_CALLER):
-        return master_calls.master(caller, self.uri, _ANSWER_S)
-
-    def _state(self):
-        try:
-            return self._master().getSystemState()
-        except TimeoutError as error:
-            raise MasterSilent("the ROS master does not answer") from error
-        except _NO_ANSWER as error:
-            raise LabFailed("the ROS master is gone: %s" % error) from error
+    def _node_processes(self):
+        """Of each node of the lab: a function that tells whether its process lives."""
+        named = {}
+        for pid in self._pids():
+            with contextlib.suppress(OSError):
+                words = Path("/proc/%d/cmdline" % pid).read_bytes().split(b"\0")
+                named.update((pid, "/" + word[len(_NAME):].decode()) for word in words if word.startswith(_NAME))
+        # A process that a node has forked bears its name, too.
+        return {name: functools.partial(is_running, pid) for pid, name in named.items()
+                if not any(named[other] == name and other != pid and pid in children_of((other,)) for other in named)}
 
     def _all_there(self):
-        services = {name for name, _ in self._state()[2]}
+        services, nodes = self.graph.services(), self.graph.nodes()
         return (all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services
                     for side in ("left", "right"))
-                and "/robot_state_publisher" in self.nodes() and self.joint_names and self._has_time
+                and "/robot_state_publisher" in nodes and self.joint_names and self._has_time
                 # The spawner still waits for the answer of a service that the first reset withdraws.
-                and SPAWNER not in self.nodes())
+                and SPAWNER not in nodes)
 
     def _pace(self, connection, ended):
         """Read records, wait until the watched programs rest, let the world go on."""
@@ -374,6 +326,14 @@ class Lab:
             pass  # the simulator has gone: that is what is_alive says
         finally:
             ended.set()
+
+
+def _changes_the_world(kind, name):
+    """Whether a registration is a way to change the world that a program under check must not have."""
+    if kind == "service":
+        return (name.startswith("/gazebo/") and name not in SERVED
+                and not name.endswith(("logger_level", "loggers")))
+    return kind == "subscriber" and name in SILENCED
 
 
 def _accept(listener):

@@ -39,6 +39,16 @@ def children_of(parents):
     return found
 
 
+def is_running(pid):
+    """Whether a process is there and has not ended: one that only waits to be asked for its exit status has."""
+    try:
+        with open("/proc/%d/stat" % pid, "rb") as file:
+            text = file.read()
+    except OSError:
+        return False
+    return text[text.rfind(b")") + 2:][:1] not in (b"Z", b"X")
+
+
 def cpu_time_s(pids):
     """Processor time that the processes `pids` have used so far, all threads [s]."""
     total = 0.0

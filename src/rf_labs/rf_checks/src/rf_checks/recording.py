@@ -83,14 +83,30 @@ class Recording:
         return [tuple(request) for record in self.records for request in record["ik"]]
 
 
+@dataclass(frozen=True)
+class Changes:
+    """What became of a lab's own things. All names sorted.
+
+    missing_nodes: ended, or no longer registered. intruders: dict of the lab's topics to other nodes that publish them.
+    withdrawn: what the lab's nodes no longer publish, hear or serve. parameters: changed or deleted.
+    """
+
+    missing_nodes: list = field(default_factory=list)
+    intruders: dict = field(default_factory=dict)
+    withdrawn: list = field(default_factory=list)
+    parameters: list = field(default_factory=list)
+
+    def __bool__(self):
+        return bool(self.missing_nodes or self.intruders or self.withdrawn or self.parameters)
+
+
 @dataclass
 class Run:
     """One run of a program.
 
     ended: how the run came to its end: "exited", "satisfied" (the judge had seen enough), "sim time", "busy", "flood",
-    "output", "processes", "paused", "simulator gone", "meddled" (a node of the lab is gone, or another one publishes
-    its topics). stuck_at: line of the program where it was when the judge ended it. cpu_s: processor time that it used;
-    wall_s: how long it took.
+    "output", "processes", "paused", "simulator gone", "meddled". changes: what became of the lab. stuck_at: line of
+    the program where it was when the judge ended it. cpu_s: processor time that it used; wall_s: how long it took.
     """
 
     arguments: list
@@ -101,8 +117,7 @@ class Run:
     ended: str = "exited"
     stuck_at: int | None = None
     survivors: int = 0
-    missing_nodes: list = field(default_factory=list)
-    intruders: dict = field(default_factory=dict)
+    changes: Changes = Changes()
     program: str = ""
     cpu_s: float = 0.0
     wall_s: float = 0.0

@@ -3,7 +3,11 @@
 """The judge at work, on one lab of its own for all programs of a suite: exercises, wrong, adversaries; slow, busy."""
 import contextlib
 import json
+import os
+import shutil
+import subprocess
 import sys
+import tempfile
 import unittest
 from pathlib import Path
 
@@ -14,7 +18,7 @@ from rf_checks import isolation
 
 isolation.try_to_enter_network()  # before any library starts threads
 
-from rf_checks import report  # noqa: E402
+from rf_checks import handout, report  # noqa: E402
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose  # noqa: E402
 from rf_checks.judge import Judge  # noqa: E402
 from rf_checks.lab import Lab, robot_description  # noqa: E402
@@ -25,6 +29,7 @@ from cpu_quota import QuotaUnavailable, cpu_quota  # noqa: E402
 # Keys of a report that hold times.
 TIMES = ("wall_s", "cpu_s", "simulated_s", "real_time_factor")
 PACKAGE = Path(__file__).resolve().parents[2]
+WORKSPACE = PACKAGE.parents[2]
 # Program -> the key of its fault, and words of which its sentence must have one.
 WRONG = {
     "syntax_error": ("syntax", "line 7"),
@@ -52,6 +57,14 @@ ADVERSARIES = {
     "reads_the_judge": ("made_up", "experiment"),
     "fills_output": ("output", "megabytes"),
     "fork_bomb": ("processes", "processes"),
+    "creeps": ("not_enabled", "RobotEnable"),
+    "forges_ik_report": ("intruder", "IKReport"),
+    "fakes_joint_states": ("intruder", "/robot/joint_states"),
+    "shuts_nodes_down": ("killed_nodes", "/base_to_world"),
+    "shuts_master_down": ("killed_nodes", "the ROS master"),
+    "takes_a_name": ("killed_nodes", "/baxter_sim_kinematics_left"),
+    "unregisters_others": ("withdrawn", "/robot/limb/right/joint_command"),
+    "changes_parameters": ("parameters", "/robot_description"),
 }
 
 
@@ -178,6 +191,51 @@ class Wrong(Judged):
 class Adversaries(Judged):
     """Programs against the judge."""
 
+    def test_what_a_run_plants_is_gone_in_the_next(self):
+        result = self.check("test/wrong", "plants_files")
+        self.assertEqual([run.fault.key for run in result.runs], ["no_matrix", "no_matrix"], report.text(result))
+        self.assertEqual(result.points, 0.0)
+
+    def test_a_solution_cannot_be_run_and_the_attempt_is_noted(self):
+        result = self.check("test/wrong", "runs_the_solution")
+        self.assertTrue(any("runpy.run_path" in note for note in result.notes), result.notes)
+        if not self.judge.has_walls:
+            self.skipTest("no walls: %s" % isolation.problem())
+        # It would earn all.
+        self.assertEqual(result.points, 0.0, report.text(result))
+
+    def test_the_next_program_finds_the_lab_as_it_was(self):
+        for name in ("takes_a_name", "unregisters_others", "changes_parameters"):
+            self.check("test/wrong", name)
+            result = self.check("exercises/solutions", "joint_command")
+            self.assertAlmostEqual(result.points, 100.0, delta=0.01, msg="after %s" % name)
+
+    def test_a_copied_solution_is_noted(self):
+        note, *_ = self.check("exercises/solutions", "tf_listener").notes
+        self.assertIn("exercises/solutions/tf_listener.py", note)
+
+
+class Handout(unittest.TestCase):
+    """The check in a students' copy: its own files, with what the workspace has built."""
+
+    def test_a_student_is_graded_there(self):
+        with tempfile.TemporaryDirectory(prefix="lab-handout-") as folder:
+            copy, result = Path(folder) / "workspace", Path(folder) / "result.json"
+            handout.make(WORKSPACE, copy)
+            program = Path(shutil.copy(PACKAGE / "exercises/solutions/tf_listener.py", folder))
+            sources = [str(setup.parent / "src") for setup in sorted((copy / "src").rglob("setup.py"))]
+            environment = {**os.environ, "LAB_ROOT": str(copy),
+                           "PYTHONPATH": os.pathsep.join((*sources, os.environ["PYTHONPATH"])),
+                           "ROS_PACKAGE_PATH": "%s/src:%s" % (copy, os.environ["ROS_PACKAGE_PATH"])}
+            check = copy / "src/rf_labs/rf_checks/scripts/check"
+            done = subprocess.run([sys.executable, check, "lab2", program, "--trusted", "--json", result],
+                                  env=environment, cwd=folder, capture_output=True, text=True, timeout=900.0)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            found = json.loads(result.read_text(encoding="utf-8"))
+            self.assertEqual((found["points"], found["fault"]), (100.0, None), found)
+            # There is no solution to compare with.
+            self.assertEqual(found["notes"], [])
+
 
 def add(suite, name, test):
     setattr(suite, "test_" + name, test)
@@ -217,7 +275,7 @@ for suite, programs in ((Wrong, WRONG), (Adversaries, ADVERSARIES)):
         add(suite, program, fault(program, key, *words))
 
 SUITES = {"exercises": Exercises, "wrong": Wrong, "adversaries": Adversaries, "slow": Slow, "busy": Busy,
-          "repeated": Repeated}
+          "repeated": Repeated, "handout": Handout}
 
 if __name__ == "__main__":
     name = next(word for word in sys.argv[1:] if word in SUITES)

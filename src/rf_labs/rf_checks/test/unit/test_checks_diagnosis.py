@@ -12,7 +12,7 @@ import pytest
 from rf_checks import diagnosis, report
 from rf_checks.exercises import EXERCISES, UnknownExercise, choose
 from rf_checks.judge import Result, RunResult, how_it_ended
-from rf_checks.recording import Criterion, Fault, Recording, Run, arm_joints
+from rf_checks.recording import Changes, Criterion, Fault, Recording, Run, arm_joints
 from rf_checks.tasks_printed import IkFrame, matrices
 
 JOINTS = (*arm_joints("left"), *arm_joints("right"))
@@ -54,8 +54,10 @@ def run(recording, **fields):
 @pytest.mark.parametrize(("case", "key", "words"), [
     (run(records(), ended="simulator gone"), "killed_simulator", ["rosnode kill"]),
     (run(records(), ended="paused"), "paused", ["pause_physics"]),
-    (run(records(), missing_nodes=["/rosout"]), "killed_nodes", ["/rosout"]),
-    (run(records(), intruders={"/clock": ["/me"]}), "intruder", ["/me", "/clock"]),
+    (run(records(), changes=Changes(missing_nodes=["/rosout"])), "killed_nodes", ["/rosout"]),
+    (run(records(), changes=Changes(intruders={"/clock": ["/me"]})), "intruder", ["/me", "/clock"]),
+    (run(records(), changes=Changes(withdrawn=["/IKService"])), "withdrawn", ["/IKService"]),
+    (run(records(), changes=Changes(parameters=["/a", "/b", "/c", "/d"])), "parameters", ["/a, /b, /c and 1 more"]),
     (run(records(seconds=0.05, left=3.0)), "teleport", ["set_model_configuration"]),
     (run(records(left=0.4, placed=60)), "teleport", ["set_model_configuration"]),
     (run(pushed()), "moved_otherwise", ["0.40 rad", "joint command"]),
@@ -130,6 +132,12 @@ def test_what_python_cannot_read_is_told(text, words):
     fault = diagnosis.check_syntax(text, "me.py")
     assert fault.key == "syntax"
     assert all(word in fault.sentence for word in words), fault.sentence
+
+
+def test_the_sheets_return_at_the_margin_is_told():
+    fault = diagnosis.check_syntax("def generate_posemsg():\n    a = 1\nreturn a\n", "me.py")
+    assert fault.key == "syntax"
+    assert "line 3" in fault.sentence and "generate_posemsg" in fault.sentence
 
 
 def test_the_line_of_the_program_is_found():

@@ -5,10 +5,7 @@ import sys
 import time
 
 import pytest
-from rosmaster.master import Master
 
-from lab_environment import master_calls
-from lab_environment.ports import free_port
 from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
 from rf_checks.lab import Lab, LabFailed, TooSlow
@@ -54,31 +51,3 @@ def test_a_lab_ends_with_its_judge(tmp_path):
         wait_until(lambda: (tmp_path / "output.txt").read_text(), "the lab to have started")
         judge.kill()
     wait_until(lambda: not is_alive(pid), "the end of the lab")
-
-
-@pytest.fixture
-def master():
-    """A ROS master, in a thread of this process."""
-    master = Master(port=free_port())
-    master.start()
-    yield master
-    master.stop()
-
-
-def test_strangers_that_are_gone_are_taken_off_the_masters_lists(lab, master):
-    lab.uri, lab.own_nodes = master.uri, frozenset(("/gazebo",))
-    for node in ("/gazebo", "/student"):
-        entry = master_calls.master(node, master.uri, 10.0)
-        entry.registerPublisher("/shared", "std_msgs/Empty", "http://127.0.0.1:1/" + node)
-        entry.registerSubscriber("/heard", "std_msgs/Empty", "http://127.0.0.1:1/" + node)
-        entry.registerService(node + "/service", "rosrpc://127.0.0.1:1", "http://127.0.0.1:1/" + node)
-    assert lab.nodes() == {"/gazebo", "/student"}
-    lab.forget_strangers()
-    assert lab.nodes() == {"/gazebo"}
-    assert lab._state() == [[["/shared", ["/gazebo"]]], [["/heard", ["/gazebo"]]], [["/gazebo/service", ["/gazebo"]]]]
-
-
-def test_a_master_that_is_gone_is_named(lab):
-    lab.uri = "http://127.0.0.1:%d" % free_port()
-    with pytest.raises(LabFailed, match="the ROS master is gone"):
-        lab.nodes()

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the ROS master of the judge's lab knows, and what of it is no longer as the lab left it.
+
+The judge asks through rosgraph and is no node. Everybody who reaches a master may register, unregister and set
+parameters in anybody's name, so a node counts as gone when its process is, whoever bears its name by then.
+"""
+import contextlib
+import time
+import xmlrpc.client
+
+import rosgraph
+
+from lab_environment import master_calls
+from rf_checks.recording import Changes
+
+#: Topics that programs publish on, too.
+SHARED_TOPICS = frozenset(("/rosout", "/rosout_agg", "/tf", "/tf_static", "/diagnostics"))
+_CALLER = "/lab_judge"
+# How long a master may take to answer: one that was stopped never does.
+_ANSWER_S = 5.0
+# A node that is told to shut down ends within this time [s].
+_END_S = 5.0
+_NO_ANSWER = (OSError, xmlrpc.client.Error, rosgraph.MasterException)
+_KINDS = ("publisher", "subscriber", "service")
+
+
+class LabFailed(Exception):
+    """The judge's own lab does not come up or is gone; the text says why."""
+
+
+class MasterSilent(LabFailed):
+    """The ROS master takes connections, but does not answer in time."""
+
+
+def registrations(state):
+    """{(kind, name, node)} of a master's getSystemState; kind is "publisher", "subscriber" or "service"."""
+    return {(kind, name, node) for kind, part in zip(_KINDS, state, strict=True) for name, nodes in part
+            for node in nodes}
+
+
+def flat(parameters, prefix=""):
+    """A tree of parameters as {name: value}; an empty branch counts as a value."""
+    found = {}
+    for name, value in parameters.items():
+        found.update(flat(value, prefix + "/" + name) if isinstance(value, dict) and value else
+                     {prefix + "/" + name: value})
+    return found
+
+
+class Graph:
+    """The master at `uri`. What is there when `remember` is called belongs to the lab."""
+
+    def __init__(self, uri):
+        self._uri = uri
+        self._own = frozenset()
+        self._own_parameters = {}
+        self._processes = {}
+        self.own_nodes = frozenset()
+
+    def state(self):
+        """The master's registrations, as `registrations` gives them. Raises LabFailed, MasterSilent."""
+        return registrations(self._ask("getSystemState"))
+
+    def nodes(self):
+        """Names of all nodes: a set. Raises LabFailed, MasterSilent."""
+        return {node for _, _, node in self.state()}
+
+    def services(self):
+        """Names of all services: a set. Raises LabFailed, MasterSilent."""
+        return {name for kind, name, _ in self.state() if kind == "service"}
+
+    def remember(self, processes):
+        """Take what is there for the lab's own. processes: {node: function that tells whether its process lives}."""
+        self._own = frozenset(self.state())
+        self._own_parameters = self._parameters()
+        self.own_nodes = frozenset(node for _, _, node in self._own)
+        self._processes = {node: lives for node, lives in processes.items() if node in self.own_nodes}
+
+    def changes(self, with_parameters=False):
+        """The Changes since `remember`; of parameters only if asked, since that takes longer. Raises LabFailed."""
+        now = self.state()
+        topics = {name for kind, name, _ in self._own if kind == "publisher"} - SHARED_TOPICS
+        intruders = {}
+        for kind, name, node in sorted(now - self._own):
+            if kind == "publisher" and name in topics and node not in self.own_nodes:
+                intruders.setdefault(name, []).append(node)
+        missing = self._ended() | (self.own_nodes - {node for _, _, node in now})
+        missing |= self._ending({node for _, _, node in self._own - now} - missing)
+        withdrawn = {name for _, name, node in self._own - now if node not in missing}
+        changed = []
+        if with_parameters:
+            parameters = self._parameters()
+            changed = sorted(name for name, value in self._own_parameters.items()
+                             if name not in parameters or parameters[name] != value)
+        return Changes(sorted(missing), intruders, sorted(withdrawn), changed)
+
+    def _ended(self):
+        return {node for node, lives in self._processes.items() if not lives()}
+
+    def _ending(self, nodes):
+        """Of nodes that lack a registration, those that are shutting down: they take all back before they end."""
+        deadline = time.monotonic() + _END_S
+        while not nodes <= self._ended() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        return nodes & self._ended()
+
+    def is_as_it_was(self):
+        """Whether everything is there and as it was remembered, and nothing else. Raises LabFailed."""
+        return (self.nodes() == self.own_nodes and not self.changes(with_parameters=True)
+                and self._parameters().keys() == self._own_parameters.keys())
+
+    def forget_strangers(self):
+        """Take nodes that are gone, and were not the lab's, off the master's lists, and their parameters."""
+        with contextlib.suppress(LabFailed, *_NO_ANSWER):
+            for kind, name, node in self.state():
+                if node in self.own_nodes:
+                    continue
+                master = self._master(node)  # a node is taken off in its own name
+                with contextlib.suppress(rosgraph.MasterError):  # it is gone by now
+                    if kind == "service":
+                        master.unregisterService(name, master.lookupService(name))
+                    elif kind == "publisher":
+                        master.unregisterPublisher(name, master.lookupNode(node))
+                    else:
+                        master.unregisterSubscriber(name, master.lookupNode(node))
+            for name in self._parameters().keys() - self._own_parameters.keys():
+                self._master().deleteParam(name)
+
+    def _parameters(self):
+        return flat(self._ask("getParam", "/"))
+
+    def _ask(self, method, *words):
+        try:
+            return getattr(self._master(), method)(*words)
+        except TimeoutError as error:
+            raise MasterSilent("the ROS master does not answer") from error
+        except _NO_ANSWER as error:
+            raise LabFailed("the ROS master is gone: %s" % error) from error
+
+    def _master(self, caller=_CALLER):
+        return master_calls.master(caller, self._uri, _ANSWER_S)
