@@ -155,7 +155,10 @@ def crashed(run):
     last = [line for line in run.errors.strip().splitlines() if line and not line[0].isspace()]
     line = line_of(run.program, run.errors)
     where = " in line %d" % line if line else ""
-    return Fault("crashed", "the program ended with an error%s: %s" % (where, last[-1][:300] if last else "unknown"))
+    said = last[-1][:300] if last else "unknown"
+    if "'Quaternion' object is not subscriptable" in said:
+        said += "; " + slips.SHEET_QUERY
+    return Fault("crashed", "the program ended with an error%s: %s" % (where, said))
 
 
 def _at_line(run):

@@ -16,6 +16,8 @@ SAME_M = 0.005
 SHEET_TF_LISTENER = "the sheet's own tf_listener listing has this slip, in the line that begins `quat = (q.x`"
 SHEET_NAMES = ("Case Western's notes have this slip in the lines `right_cmd.names.push_back(...)`: right_e1 and "
                "right_w1 stand there twice, two joints are missing")
+SHEET_QUERY = ("the sheet's `query_transformation` returns the fields of a message, and its `rotate_pose` takes a "
+               "list: hand over [quat.x, quat.y, quat.z, quat.w]")
 SHEET_ROTATE = ("the sheet's listing of rotate_pose puts w first in the line that begins `quat_t3d =` and takes a "
                 "list; compare yours")
 

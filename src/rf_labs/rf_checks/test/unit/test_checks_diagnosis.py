@@ -134,6 +134,12 @@ def test_what_python_cannot_read_is_told(text, words):
     assert all(word in fault.sentence for word in words), fault.sentence
 
 
+def test_the_sheets_quaternion_that_is_a_message_is_told():
+    errors = TRACEBACK.replace('NameError: name "f"', "TypeError: 'Quaternion' object is not subscriptable")
+    fault = diagnosis.crashed(run(records(), exit_code=1, errors=errors))
+    assert "line 12" in fault.sentence and "[quat.x, quat.y, quat.z, quat.w]" in fault.sentence
+
+
 def test_the_sheets_return_at_the_margin_is_told():
     fault = diagnosis.check_syntax("def generate_posemsg():\n    a = 1\nreturn a\n", "me.py")
     assert fault.key == "syntax"
