@@ -68,6 +68,7 @@ def _serve(service, transport, is_persistent, caller, events):
         while True:
             for request in transport.receive_once():
                 service._handle_request(transport, request)
+                _forget_unsent(transport.write_buff)
             if not is_persistent:
                 return
     except TransportTerminated as error:
@@ -76,6 +77,13 @@ def _serve(service, transport, is_persistent, caller, events):
         # Otherwise the client has gone.
     except (TransportException, OSError) as error:
         _reject(service, transport, caller, error, events)
+
+
+def _forget_unsent(buffer):
+    """Drop the half of an answer that could not be written: it would go out in front of the next one."""
+    if buffer.tell():
+        buffer.seek(0)
+        buffer.truncate()
 
 
 def _reject(service, transport, caller, error, events):

@@ -9,6 +9,7 @@ from rospy_limits.node import limit_ports
 
 # More than a socket takes of a client that does not read.
 LARGE_BYTES = 20_000_000
+HALF = "\udcff"
 
 
 def main():
@@ -18,6 +19,8 @@ def main():
     latched.publish(String("x" * LARGE_BYTES))
     echo = rospy.Publisher("echo", String, queue_size=10)
     keep = [rospy.Service("serve", SetBool, lambda request: SetBoolResponse(request.data, "served")),
+            # Half a character cannot be sent.
+            rospy.Service("half", SetBool, lambda request: SetBoolResponse(True, HALF if request.data else "whole")),
             rospy.Subscriber("heard", String, echo.publish), rospy.Subscriber("large", String, echo.publish)]
     rospy.spin()
     del keep

@@ -140,6 +140,34 @@ class RospyLimits(unittest.TestCase):
             self.assertIn(b"a message of %d bytes is announced, at most %d" % (announced, LIMIT_BYTES), answer)
         self.check_alive()
 
+    def test_a_request_that_cannot_be_read_is_answered_with_an_error_and_the_connection_closed(self):
+        level = rosgraph.names.ns_join(NODE, "set_logger_level")
+        for service, requests in (("/serve", [b""]), (level, [b"", b"\x01", struct.pack("<I", 2**31), b"\xff" * 12])):
+            for request in requests:
+                for persistent in "01":
+                    client = self.shake_hands(service=service, persistent=persistent)
+                    client.sendall(struct.pack("<I", len(request)) + request)
+                    stream = client.makefile("rb")
+                    header_bytes, = struct.unpack("<I", stream.read(4))
+                    stream.read(header_bytes)
+                    # Up to the end of the connection.
+                    answer = stream.read()
+                    self.assertEqual(answer[:1], b"\0", (service, request, answer))
+                    length, = struct.unpack("<I", answer[1:5])
+                    self.assertEqual(len(answer), 5 + length)
+                    self.assertIn(b"request refused", answer)
+        self.check_alive()
+
+    def test_an_answer_that_cannot_be_sent_spoils_none_of_those_after_it(self):
+        for persistent in (False, True):
+            half = rospy.ServiceProxy("half", SetBool, persistent=persistent)
+            self.addCleanup(half.close)
+            for _ in range(3):
+                with self.assertRaisesRegex(rospy.ServiceException, "error processing request"):
+                    half(True)
+                answer = half(False)
+                self.assertEqual((answer.success, answer.message), (True, "whole"))
+
     def test_a_message_that_announces_too_much_ends_its_connection_with_one_line(self):
         publisher = rospy.Publisher("large", String, queue_size=None)
         wait_until(publisher.get_num_connections, "the node to connect", DEADLINE_S)
