@@ -204,6 +204,14 @@ step_overlay() {
     fi
 }
 
+# Relays in devel to scripts that are gone: catkin_make leaves them, and one in devel/bin hides the system's program.
+remove_dead_relays() {
+    local relay
+    { grep -rlsE "^python_script = '" devel/bin devel/lib || true; } | while IFS= read -r relay; do
+        [[ -e $(sed -n "s/^python_script = '\(.*\)'\$/\1/p" "$relay") ]] || rm -f "$relay"
+    done
+}
+
 step_build() {
     local key
     # Without the workspace's own CMakeLists.txt, which catkin_make puts there.
@@ -226,6 +234,7 @@ step_build() {
     # -j without -l, which catkin_make would add: on a busy machine make waits then until the others have come to rest.
     # With the virtual environment's Python, installed executables get a first line that finds its packages.
     run catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3" "-j$(nproc)"
+    remove_dead_relays
     stamp "$key"
     note="$(find src -name CATKIN_IGNORE -prune -o -name package.xml -print | wc -l) packages"
 }

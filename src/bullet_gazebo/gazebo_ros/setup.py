@@ -2,4 +2,4 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["gazebo_ros"], scripts=["scripts/roslaunch"], package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=["gazebo_ros"], package_dir={"": "src"}))

@@ -8,7 +8,8 @@ import os
 import sys
 
 # Module that is amended when somebody imports it -> ours, whose `amend(module)` is called then.
-AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_environment.last_messages"}
+AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_environment.last_messages",
+           "roslaunch.parent": "lab_environment.launch_guard"}
 
 
 class AmendingFinder:

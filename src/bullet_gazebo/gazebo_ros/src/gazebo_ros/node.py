@@ -30,11 +30,11 @@ from gazebo_ros.publications import Publications
 from gazebo_ros.resources import ResourceFinder, model_folders
 from gazebo_ros.ros_objects import RosObjects
 from gazebo_ros.simulation import Simulation
-from gazebo_ros.single_instance import refusal, running_instance
 from gazebo_ros.snapshot import SnapshotError
 from gazebo_ros.spawning import Spawner
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
 from gazebo_ros.world_lights import WorldLights
+from lab_environment.single_instance import refusal, running_instance
 from rospy_limits.node import limit_ports
 from sdf_model import ModelFolders
 

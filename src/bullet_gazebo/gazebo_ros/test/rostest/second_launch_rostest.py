@@ -3,6 +3,7 @@
 """A lab that is launched twice on one master: the second touches nothing, and what is dead is in nobody's way."""
 import contextlib
 import os
+import shutil
 import signal
 import subprocess
 import unittest
@@ -16,6 +17,8 @@ from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 
 DEADLINE_S = 60.0
+# ROS's own, called by its full path.
+ROSLAUNCH = shutil.which("roslaunch")
 LAB = str(Path(__file__).resolve().parent / "second_lab.launch")
 OTHER = """<launch>
   <node name="other" pkg="tf2_ros" type="static_transform_publisher" args="0 0 0 0 0 0 base tool"/>
@@ -30,13 +33,13 @@ class SecondLaunch(unittest.TestCase):
         self.master = rosgraph.Master("/second_launch_test", self.uri)
 
     def launch(self, *arguments):
-        launch = subprocess.Popen(["roslaunch", *arguments], env=self.environment, start_new_session=True,
+        launch = subprocess.Popen([ROSLAUNCH, *arguments], env=self.environment, start_new_session=True,
                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
         self.addCleanup(end, launch)
         return launch
 
     def check_refused(self):
-        second = subprocess.run(["roslaunch", LAB, "mark:=second"], env=self.environment, capture_output=True,
+        second = subprocess.run([ROSLAUNCH, LAB, "mark:=second"], env=self.environment, capture_output=True,
                                 text=True, timeout=DEADLINE_S, check=False)
         self.assertEqual(second.returncode, 1, second.stdout)
         self.assertEqual(len(second.stderr.splitlines()), 3, second.stderr)
@@ -65,7 +68,7 @@ class SecondLaunch(unittest.TestCase):
         self.assertIsNone(first.poll())
 
         # What brings no simulator is welcome.
-        other = subprocess.Popen(["roslaunch", "-"], env=self.environment, start_new_session=True,
+        other = subprocess.Popen([ROSLAUNCH, "-"], env=self.environment, start_new_session=True,
                                  stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
         self.addCleanup(end, other)
         other.stdin.write(OTHER)

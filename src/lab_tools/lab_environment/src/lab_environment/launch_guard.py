@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What our ``roslaunch`` adds to ROS's: a second simulator on a master is refused before anything is touched.
+"""What the environment adds to roslaunch: a second simulator on a master is refused before anything is touched.
 
 roslaunch sets parameters first and starts nodes in any order, and each node that bears the name of another shuts that
 one down. By the time the second simulator itself could refuse, the first lab has lost its nodes. So the launch file is
@@ -8,18 +8,17 @@ read, and if there is a simulator in it, and one on the master or about to be, r
 import contextlib
 import sys
 
-import roslaunch.parent
 import roslaunch.pmon
 from rosgraph.names import ns_join
 
-from gazebo_ros.single_instance import Claim, refusal, refusal_while_starting, running_instance
+from .single_instance import Claim, refusal, refusal_while_starting, running_instance
 
 _PACKAGE, _TYPES = "gazebo_ros", ("gzserver", "gazebo")
 
 
-def guard():
-    """Have every ``ROSLaunchParent`` of this process look before it starts anything."""
-    parent = roslaunch.parent.ROSLaunchParent
+def amend(module):
+    """Have every ``ROSLaunchParent`` of the module roslaunch.parent look before it starts anything."""
+    parent = module.ROSLaunchParent
     load_config, start_monitor = parent._load_config, parent._start_pm
 
     def load_and_look(launch):
@@ -32,8 +31,10 @@ def guard():
 
     def start_and_listen(launch):
         start_monitor(launch)
-        launch.pm.add_process_listener(launch.simulators)
+        if launch.simulators is not None:
+            launch.pm.add_process_listener(launch.simulators)
 
+    parent.simulators = None  # as it stays for rostest, which loads its files itself and starts masters of its own
     parent._load_config, parent._start_pm = load_and_look, start_and_listen
 
 

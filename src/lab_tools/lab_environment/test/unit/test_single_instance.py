@@ -11,8 +11,8 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
-from gazebo_ros import single_instance
-from gazebo_ros.single_instance import Claim, refusal, refusal_while_starting, running_instance
+from lab_environment import single_instance
+from lab_environment.single_instance import Claim, refusal, refusal_while_starting, running_instance
 from lab_testing.waiting import wait_until
 
 NODE = "/gazebo"
@@ -83,7 +83,7 @@ def test_no_master_is_an_error():
 
 TAKE_AND_STAY = """
 import sys, time
-from gazebo_ros.single_instance import Claim
+from lab_environment.single_instance import Claim
 claim = Claim(sys.argv[1], sys.argv[2])
 print(claim.take(), flush=True)
 time.sleep(600)
