@@ -189,6 +189,18 @@ def test_a_failure_names_step_cause_command_and_log(workspace, step):
     assert_whole(root)
 
 
+def test_relays_to_scripts_that_are_gone_are_removed(workspace):
+    root, _ = workspace
+    (root / "devel/bin").mkdir(parents=True)
+    (root / "script").write_text("")
+    for name, script in (("gone", "nowhere"), ("living", "script")):
+        (root / "devel/bin" / name).write_text(f"#!/usr/bin/env python3\npython_script = '{root}/{script}'\n")
+    (root / "devel/bin/other").write_text("no relay\n")
+    status, said = finish(start(root))
+    assert status == 0, said
+    assert sorted(path.name for path in (root / "devel/bin").iterdir()) == ["living", "other"]
+
+
 def test_a_step_that_refuses_to_start_is_not_cut_off(workspace):
     root, _ = workspace
     (root / "theirs.rosinstall").rename(root / "elsewhere")
