@@ -15,6 +15,7 @@ from baxter_sim_hardware import JOINT_SUFFIXES, Poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
 from gazebo_ros.mailbox import Queue
+from gazebo_ros.model_plugin import PluginContext
 from gazebo_ros.resources import ResourceFinder
 from urdf_model import parse_urdf
 
@@ -22,6 +23,7 @@ PACKAGE = Path(__file__).resolve().parents[2]
 SIDES = ("left", "right")
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINT_SUFFIXES)
 TICK_S = 0.002
+NAMESPACE = "/robot"
 
 
 class _Outbox:
@@ -33,6 +35,9 @@ class _Outbox:
 
     def publish(self, message):
         self.messages.append((self._lab.world.time_s, message))
+
+    def close(self):
+        del self._lab.outboxes[self.topic]
 
 
 class _Drawn:
@@ -54,59 +59,69 @@ class _Log:
     info = warn = error = _take
 
 
+class _Service:
+    def __init__(self, services, name):
+        self._services, self._name = services, name
+
+    def close(self):
+        self._services.pop(self._name, None)
+
+
+class _Ros:
+    """What the plugin's context opens, kept in the Lab under the plugin's own names, instead of on a ROS master."""
+
+    def __init__(self, lab):
+        self._lab = lab
+        self.faults = self
+
+    def publisher(self, topic, msg_class, latch):
+        outbox = self._lab.outboxes[_own(topic)] = _Outbox(self._lab, _own(topic))
+        return outbox
+
+    def queue(self, topic, msg_class, depth, notice):
+        queue = self._lab.inboxes[_own(topic)] = Queue(depth, notice, lambda error: self.note(_own(topic), error))
+        return queue
+
+    def service(self, name, srv_class, handler):
+        self._lab.services[_own(name)] = handler
+        return _Service(self._lab.services, _own(name))
+
+    def note(self, place, error):
+        self._lab.faults.append((place, error))
+
+
+def _own(name):
+    return name.removeprefix(NAMESPACE + "/")
+
+
 class Lab:
-    """A world with Baxter in it. Arrays over the 14 arm joints are in the order of NAMES."""
+    """A world with Baxter in it, whose plugin has the simulator's own PluginContext.
+
+    Arrays over the 14 arm joints are in the order of NAMES.
+    ``inboxes``, ``outboxes``, ``services``: {name as the plugin says it: queue, _Outbox, handler}.
+    """
 
     def __init__(self, robot, pose="neutral", parameters=None, angles=None, meshes=False):
         """meshes: whether the body collides as it looks; without, it is passed through, which loads faster."""
         self.world = World(time_step_s=TICK_S, **({"find_mesh": ResourceFinder()} if meshes else {}))
-        self.robot, self.urdf_xml, self.namespace = robot, "", "/robot"
-        self.element = ElementTree.fromstring("<plugin/>")
+        element = ElementTree.fromstring("<plugin/>")
         self.model = self.world.spawn(robot, "baxter", Pose((0.0, 0.0, 0.93), (0.0, 0.0, 0.0, 1.0)),
-                                      **BaxterPlugin.spawn_options(robot, self.element))
+                                      **BaxterPlugin.spawn_options(robot, element))
         self.arm = self.model.index(NAMES)
         if angles is None:
             poses = Poses(yaml.safe_load((PACKAGE / "config" / "poses.yaml").read_text()))
             angles = [poses.angles(pose, name.split("_")[0])[name] for name in NAMES]
         angles = np.clip(angles, self.model.lower[self.arm], self.model.upper[self.arm])
         self.model.set_joint_positions(self.arm, angles)
-        self.parameters = {"/baxter_sim_hardware/" + key: value for key, value in (parameters or {}).items()}
         self.log = _Log()
         self.inboxes, self.outboxes, self.services = {}, {}, {}
-        self.mailed, self.faults = [], []
-        self.plugin = BaxterPlugin(self)
+        self.faults = []  # (place, error)
+        self.context = PluginContext(self.world, self.model, robot, element, NAMESPACE, "", self.log, _Ros(self),
+                                     {"baxter_sim_hardware": parameters or {}}, self._screen)
+        self.plugin = BaxterPlugin(self.context)
         self.effort_limit = self.model.max_effort[self.arm]
 
-    # -- what a plugin's context offers
-
-    def param(self, name, default=None):
-        return self.parameters.get(name, default)
-
-    def publisher(self, topic, msg_class, latch=False):
-        return self.outboxes.setdefault(topic, _Outbox(self, topic))
-
-    def queue(self, topic, msg_class, depth):
-        if topic not in self.inboxes:
-            self.inboxes[topic] = Queue(depth, lambda: self.mailed.append(topic),
-                                        lambda error: self.survived(topic, error))
-        return self.inboxes[topic]
-
-    def mail(self):
-        mailed, self.mailed = dict.fromkeys(self.mailed), []
-        return [self.inboxes[topic] for topic in mailed]
-
-    def survived(self, place, error):
-        self.faults.append((place, error))
-
-    def begin_anew(self):
-        pass
-
-    end_anew = begin_anew
-
-    def service(self, name, srv_class, handler):
-        self.services[name] = handler
-
-    def screen(self, link, place, size_m, pixels):
+    def _screen(self, link, place, size_m, pixels):
         self.drawn = _Drawn(link, place, size_m, pixels)
         return self.drawn
 

@@ -30,7 +30,7 @@ class Loop:
         world = SimpleNamespace(time_step_s=TICK_S, step=lab.world.step, reset_models=lab.world.reset_models,
                                 reset_time=lab.world.reset_time)
         self.simulation = Simulation(world, RequestBoard(), lab.log, Faults(lab.log), paused=True)
-        self.hosted = HostedPlugin(lab.plugin, lab, "baxter", "libbaxter.so")
+        self.hosted = HostedPlugin(lab.plugin, lab.context, "baxter", "libbaxter.so")
         self.simulation.host(self.hosted)
         self.simulation.tick = lab.world.tick
         self.path = []
