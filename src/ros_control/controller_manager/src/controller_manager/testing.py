@@ -1,12 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers without ROS and without physics: topics as lists, a robot whose joints go where they are told."""
+import collections
+import copy
+import io
+
 from .controller import ControllerContext
 from .hardware import RobotHardware
 from .interfaces import EFFORT, POSITION, VELOCITY
 
 
 class FakeRos:
-    """Keeps what a controller opens, by absolute name."""
+    """Keeps what a controller opens, by absolute name.
+
+    Answers as ``gazebo_ros.model_plugin.PluginContext`` does, which ``test_fake_context.py`` of gazebo_ros_control asks
+    the same. ``publishers``, ``inboxes``: {topic: the first one}; ``services``: {name: handler}.
+    """
 
     def __init__(self):
         self.publishers, self.inboxes, self.services = {}, {}, {}
@@ -16,52 +24,70 @@ class FakeRos:
         return self.publishers.setdefault(topic, FakePublisher())
 
     def mailbox(self, topic, msg_class):
-        return self.inboxes.setdefault(topic, FakeInbox(newest_only=True))
+        return self._subscribe(topic, FakeMailbox())
 
     def queue(self, topic, msg_class, depth):
-        return self.inboxes.setdefault(topic, FakeInbox())
+        return self._subscribe(topic, FakeQueue(depth))
 
     def service(self, name, srv_class, handler):
         self.services[name] = handler
-        return handler
+        return _FakeService(self.services, name)
 
     def close(self):
         self.closed = True
+        for publisher in self.publishers.values():
+            publisher.close()
+        for inbox in self.inboxes.values():
+            inbox.close()
+        self.services.clear()
+
+    def _subscribe(self, topic, inbox):
+        """What comes in on a topic comes to all who subscribe to it."""
+        if topic in self.inboxes:
+            self.inboxes[topic].others.append(inbox)
+        else:
+            self.inboxes[topic] = inbox
+        return inbox
+
+
+class _FakeService:
+    def __init__(self, services, name):
+        self._services, self._name = services, name
+
+    def close(self):
+        self._services.pop(self._name, None)
 
 
 class FakePublisher:
-    """``messages``: all that was published."""
-
-    has_listeners = True
+    """``messages``: all that was published while somebody listened, as it was then; one that cannot be sent raises."""
 
     def __init__(self):
         self.messages = []
+        self.has_listeners = True
 
     def publish(self, message):
-        self.messages.append(message)
+        if self.has_listeners:
+            message.serialize(io.BytesIO())
+            self.messages.append(copy.deepcopy(message))
+
+    def close(self):
+        self.has_listeners = False
 
 
-class FakeInbox:
-    """A mailbox and a queue; ``put`` a message into it. ``faults``: what was raised by who took one with ``handle``."""
+class _FakeInbox:
+    """``put`` a message into it. ``faults``: what was raised by who took one with ``handle``."""
 
-    def __init__(self, newest_only=False):
-        self._messages, self._newest_only = [], newest_only
-        self.faults = []
+    def __init__(self, depth):
+        self.faults, self.others = [], []
+        self._messages = collections.deque(maxlen=depth)
 
     def put(self, message):
         self._messages.append(message)
-
-    def take(self):
-        messages = self.drain()
-        return messages[-1] if messages else None
-
-    def drain(self):
-        messages, self._messages = self._messages, []
-        return messages
+        for other in self.others:
+            other.put(message)
 
     def handle(self, take):
-        messages = self.drain()
-        for message in messages[-1:] if self._newest_only else messages:
+        for message in self._drain():
             self.guarded(take, message)
 
     def guarded(self, take, *arguments):
@@ -69,6 +95,34 @@ class FakeInbox:
             take(*arguments)
         except (Exception, SystemExit) as error:
             self.faults.append(error)
+
+    def close(self):
+        self._messages.clear()
+        for other in self.others:
+            other.close()
+
+    def _drain(self):
+        messages = list(self._messages)
+        self._messages.clear()
+        return messages
+
+
+class FakeMailbox(_FakeInbox):
+    """Of what was put into it only the newest counts."""
+
+    def __init__(self):
+        super().__init__(1)
+
+    def take(self):
+        messages = self._drain()
+        return messages[0] if messages else None
+
+
+class FakeQueue(_FakeInbox):
+    """Loses nothing up to ``depth`` unread messages, and then the oldest."""
+
+    def drain(self):
+        return self._drain()
 
 
 class FakeLog:
@@ -85,6 +139,9 @@ class FakeLog:
 
     def error(self, text):
         self.lines.append(("error", text))
+
+    def info_throttle(self, period_s, text):
+        self.info(text)
 
     def warn_throttle(self, period_s, text):
         self.warn(text)

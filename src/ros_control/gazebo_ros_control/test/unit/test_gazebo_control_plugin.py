@@ -8,7 +8,7 @@ from std_msgs.msg import Bool
 
 from bullet_sim import Pose, World
 from controller_manager import POSITION, Controller
-from controller_manager.testing import FakeInbox, FakeLog, fake_context
+from controller_manager.testing import FakeLog, FakeMailbox, fake_context
 from gazebo_ros.faults import Faults
 from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.simulation import HostedPlugin, Simulation
@@ -62,7 +62,7 @@ class Simulator:
         return self.element.findtext(tag, default)
 
     def mailbox(self, topic, msg_class):
-        return self.inboxes.setdefault(topic, FakeInbox())
+        return self.inboxes.setdefault(topic, FakeMailbox())
 
     def service_in_thread(self, name, srv_class, handler):
         self.services[name] = handler
