@@ -9,9 +9,26 @@ import unittest
 
 import rospy
 import rostest
-from baxter_core_msgs.msg import AssemblyState, CameraControl, CameraSettings, JointCommand, RobustControllerStatus
+from baxter_core_msgs.msg import (
+    AnalogIOState,
+    AnalogOutputCommand,
+    AssemblyState,
+    CameraControl,
+    CameraSettings,
+    DigitalIOState,
+    DigitalOutputCommand,
+    EndEffectorCommand,
+    EndEffectorProperties,
+    EndEffectorState,
+    HeadPanCommand,
+    HeadState,
+    JointCommand,
+    NavigatorState,
+    RobustControllerStatus,
+)
 from baxter_core_msgs.srv import CloseCamera, ListCameras, OpenCamera, SolvePositionIK
 from baxter_maintenance_msgs.msg import TareEnable, UpdateStatus
+from bullet_sim_msgs.srv import Press
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Empty, String
@@ -153,7 +170,121 @@ def updater(prefix):
                             lambda message: message.status == UpdateStatus.STS_INVALID).status
 
 
-QUESTIONS = (cameras, inverse_kinematics, switch, arms, procedures, updater)
+def enabled(prefix):
+    """Enable the robot, for what needs power."""
+    enable = publisher(prefix, "/robot/set_super_enable", Bool)
+    wait_until(lambda: enable.publish(True) or wait_for_message(prefix + "/robot/state", AssemblyState).enabled,
+               "the robot is enabled", DEADLINE_S)
+
+
+class Newest:
+    """The newest message on a topic, and how many have come."""
+
+    def __init__(self, topic, kind):
+        self.message, self.count = None, 0
+        self._subscriber = rospy.Subscriber(topic, kind, self._take)
+        wait_until(lambda: self.count, topic, DEADLINE_S)
+
+    def _take(self, message):
+        self.message, self.count = message, self.count + 1
+
+    def wait_for(self, messages):
+        """Let so many more come: the only way to tell that a request changes nothing."""
+        until = self.count + messages
+        wait_until(lambda: self.count >= until, "%d more messages" % messages, DEADLINE_S)
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+def gripper(prefix):
+    """The electric gripper: what it says it is, and its state after each command, right and wrong."""
+    enabled(prefix)
+    name = prefix + "/robot/end_effector/left_gripper/"
+    properties = wait_for_message(name + "properties", EndEffectorProperties)
+    found = [{field: getattr(properties, field) for field in properties.__slots__}]
+    command = publisher(prefix, "/robot/end_effector/left_gripper/command", EndEffectorCommand)
+    state = Newest(name + "state", EndEffectorState)
+    flags = ("enabled", "calibrated", "ready", "moving", "gripping", "missed", "error", "reverse")
+    for number, (what, args) in enumerate((
+            ("configure", '{"velocity": 100}'), ("go", '{"position": 40}'), ("go", '{"position": 150}'), ("go", "{}"),
+            ("go", "nonsense"), ("go", "[" * 50), ("fly", ""), ("configure", '{"colour": 1}'), ("grip", ""),
+            ("prepare_to_grip", ""), ("clear_calibration", ""), ("go", '{"position": 20}'), ("calibrate", ""),
+            ("go", '{"position": 20}'), ("release", ""), ("stop", ""), ("reset", ""), ("no_op", ""), ("reboot", ""),
+            ("calibrate", "")), 1):
+        command.publish(id=properties.id, command=what, args=args, sender="/fakes", sequence=number)
+        state.wait_for(30)
+        wait_until(lambda: state.message.ready == 1 and state.message.moving == 0, "the fingers rest", DEADLINE_S)
+        state.wait_for(5)
+        now = state.message
+        found.append((what, args, now.command, now.command_sender, now.command_sequence, round(now.position, -1),
+                      {flag: getattr(now, flag) for flag in flags}))
+    state.close()
+    return found
+
+
+def channels(prefix):
+    """A light, a cuff, the fan and a navigator after commands and fingers, right and wrong."""
+    digital = publisher(prefix, "/robot/digital_io/command", DigitalOutputCommand)
+    analog = publisher(prefix, "/robot/analog_io/command", AnalogOutputCommand)
+    press = service(prefix, "/robot/sim/press", Press)
+    heard = {name: Newest(prefix + "/robot/%s/state" % name, kind) for name, kind in (
+        ("digital_io/torso_left_inner_light", DigitalIOState), ("digital_io/left_lower_cuff", DigitalIOState),
+        ("digital_io/torso_left_button_ok", DigitalIOState), ("analog_io/torso_fan", AnalogIOState),
+        ("navigators/torso_left_navigator", NavigatorState))}
+    found = []
+
+    def note(what):
+        for newest in heard.values():
+            newest.wait_for(5)
+        found.append((what, [{field: getattr(newest.message, field) for field in newest.message.__slots__
+                              if field != "timestamp"} for newest in heard.values()]))
+
+    for topic, name, value in (
+            (digital, "torso_left_inner_light", True), (digital, "left_lower_cuff", True), (digital, "nose", True),
+            (digital, "torso_left_inner_light", False), (analog, "torso_fan", 70), (analog, "left_hand_range", 5),
+            (analog, "nose", 1), (analog, "torso_fan", 0)):
+        topic.publish(name, value)
+        note((name, value))
+    for component, action, steps in (
+            ("left_lower_cuff", "press", 0), ("torso_left_button_ok", "press", 0), ("torso_left_wheel", "turn", 300),
+            ("torso_left_wheel", "turn", -300), ("torso_left_inner_light", "press", 0), ("nose", "press", 0),
+            ("torso_left_wheel", "press", 0), ("left_lower_cuff", "pinch", 0), ("left_lower_cuff", "release", 0),
+            ("torso_left_button_ok", "release", 0)):
+        answer = press(component=component, action=action, steps=steps)
+        note((component, action, steps, answer.success, answer.status_message))
+    for newest in heard.values():
+        newest.close()
+    return found
+
+
+def head(prefix):
+    """Where the head turns, and that it nods."""
+    enabled(prefix)
+    pan = publisher(prefix, "/robot/head/command_head_pan", HeadPanCommand)
+    nod = publisher(prefix, "/robot/head/command_head_nod", Bool)
+    state = Newest(prefix + "/robot/head/head_state", HeadState)
+    found = []
+    void, off, on = (HeadPanCommand.REQUEST_PAN_VOID, HeadPanCommand.REQUEST_PAN_DISABLE,
+                     HeadPanCommand.REQUEST_PAN_ENABLE)
+    for target, ratio, request in ((0.5, 1.0, void), (9.0, 1.0, void), (float("nan"), 1.0, void), (0.2, -1.0, void),
+                                   (-0.3, 0.0, 0), (0.4, 1.0, off), (0.1, 0.5, on), (0.0, 1.0, void)):
+        pan.publish(target, ratio, request)
+        state.wait_for(20)
+        wait_until(lambda: not state.message.isTurning, "the head stands", DEADLINE_S)
+        state.wait_for(5)
+        found.append((repr(target), ratio, request, round(state.message.pan, 2), state.message.isPanEnabled))
+    nod.publish(False)
+    state.wait_for(20)
+    found.append(("no nod", state.message.isNodding))
+    nod.publish(True)
+    wait_until(lambda: state.message.isNodding, "the head nods", DEADLINE_S)
+    wait_until(lambda: not state.message.isNodding, "the nod ends", DEADLINE_S)
+    state.close()
+    return found
+
+
+QUESTIONS = (cameras, inverse_kinematics, switch, arms, procedures, updater, gripper, channels, head)
 
 
 class FakesTest(unittest.TestCase):

@@ -1,20 +1,31 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The left gripper in a few lines, of any kind, for the SDK's tests; knobs as those of the fake robot."""
-import json
+"""The left gripper, of any kind, for the SDK's tests: the simulator's own, on fingers and a cup without physics.
+
+Knobs are private parameters, read at the start and again at each call of ~reload.
+"""
+import copy
 import threading
 import time
+from types import SimpleNamespace
 
 import rospy
 from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndEffectorState
 from std_srvs.srv import Trigger, TriggerResponse
 
+from baxter_sim_hardware.errors import CommandRefused
+from baxter_sim_hardware.gripper import OPEN, ElectricGripper
+from baxter_sim_hardware.gripper_topics import GripperTopics
+from baxter_sim_hardware.hands import NoHand
+from baxter_sim_hardware.suction import SuctionGripper
+
+SIDE = "left"
 RATE_HZ = 100.0
-SPEED = 200.0  # [%/s]
-IDS = {0: 131073, 1: 65537, 2: 65538, 3: 131073}  # by ui_type
+TRAVEL_M = 0.02  # of a finger
+CUSTOM_ID = 131073
 KNOBS = {
-    "ui_type": 2,
-    "firmware_date": "2014/7/24 18:30:00",
+    "ui_type": EndEffectorProperties.ELECTRIC_GRIPPER,
+    "firmware_date": "",  # of the electric one, in place of its own
     "calibrated": True,   # at a reload
     "error": False,       # at a reload
     "acknowledges": True,
@@ -24,93 +35,100 @@ KNOBS = {
 }
 
 
+class Fingers:
+    """Two fingers that are where they shall be at once, unless something lies between them."""
+
+    def __init__(self, knobs):
+        self.gripper = ElectricGripper(TRAVEL_M, OPEN, 1.0 / RATE_HZ)
+        self.gripper.calibrated, self.gripper.error = knobs["calibrated"], knobs["error"]
+        self._block = knobs["block_at"] / 100.0
+        self._position, self._squeeze = OPEN, 0.0
+
+    def readings(self, _positions):
+        return 100.0 * self._position, self._squeeze
+
+    def update(self, _joints):
+        drive = self.gripper.update(self._position, lambda: self._squeeze)
+        if drive is not None:
+            setpoint, force = drive
+            self._position = max(setpoint, self._block)
+            self._squeeze = force if setpoint < self._block else 0.0
+
+
+class Cup:
+    """A cup on something, or on air."""
+
+    def __init__(self, knobs):
+        self.gripper = SuctionGripper(1.0 / RATE_HZ)
+        self._seal = knobs["seal"]
+
+    def readings(self, _positions):
+        return 0.0, 0.0
+
+    def update(self, _joints):
+        self.gripper.update(self._seal)
+
+
+HANDS = {EndEffectorProperties.ELECTRIC_GRIPPER: Fingers, EndEffectorProperties.SUCTION_CUP_GRIPPER: Cup}
+
+
 class FakeGripper:
     def __init__(self):
         self._lock = threading.RLock()
         self.reload(None)
-        self._publishers = [rospy.Publisher("/robot/end_effector/left_gripper/" + name, kind, queue_size=1)
-                            for name, kind in (("properties", EndEffectorProperties), ("state", EndEffectorState))]
+        prefix = "/robot/end_effector/%s_gripper/" % SIDE
+        self._properties = rospy.Publisher(prefix + "properties", EndEffectorProperties, queue_size=1)
+        self._state = rospy.Publisher(prefix + "state", EndEffectorState, queue_size=1)
         self._subscribers = [
-            rospy.Subscriber("/robot/end_effector/left_gripper/command", EndEffectorCommand, self._on_command),
-            rospy.Subscriber("/robot/end_effector/left_gripper/rsdk/set_properties", EndEffectorProperties,
-                             self._on_set_properties),
-            rospy.Subscriber("/robot/end_effector/left_gripper/rsdk/set_state", EndEffectorState, self._on_set_state)]
+            rospy.Subscriber(prefix + "command", EndEffectorCommand, self._on_command),
+            rospy.Subscriber(prefix + "rsdk/set_properties", EndEffectorProperties,
+                             lambda message: self._take("gripper_set_properties", message)),
+            rospy.Subscriber(prefix + "rsdk/set_state", EndEffectorState,
+                             lambda message: self._take("gripper_set_state", message))]
         self._service = rospy.Service("~reload", Trigger, self.reload)
 
     def reload(self, _request):
         with self._lock:
-            knobs = {name: rospy.get_param("~" + name, default) for name, default in KNOBS.items()}
-            kind = knobs["ui_type"]
-            electric = kind == 2
-            self._properties = EndEffectorProperties(
-                id=IDS[kind], ui_type=kind, product="SDK End Effector", firmware_rev="3.0.0 5.5",
-                firmware_date=knobs["firmware_date"], controls_force=electric, controls_position=electric)
-            self._state = EndEffectorState(id=IDS[kind], enabled=1, ready=1, calibrated=int(knobs["calibrated"]),
-                                           error=int(knobs["error"]), position=100.0)
-            self._goal = 100.0
-            self._suction = {"vacuum sensor": 0, "vacuum": False, "blowing": False, "sucking": False}
-            self._blow_until_s = 0.0
-            self._knobs = knobs
+            self._knobs = {name: rospy.get_param("~" + name, default) for name, default in KNOBS.items()}
+            kind = self._knobs["ui_type"]
+            self._hand = HANDS[kind](self._knobs) if kind in HANDS else NoHand()
+            # The robot is enabled here.
+            self._topics = GripperTopics({SIDE: self._hand}, SimpleNamespace(enabled=True))
+            if kind == EndEffectorProperties.PASSIVE_GRIPPER:
+                self._take("gripper_set_properties", EndEffectorProperties(id=CUSTOM_ID, ui_type=kind))
         return TriggerResponse(success=True)
 
     def run(self):
         while not rospy.is_shutdown():
             with self._lock:
-                if self._properties.ui_type != EndEffectorProperties.PASSIVE_GRIPPER:
-                    self._step(1.0 / RATE_HZ)
-                for publisher, message in zip(self._publishers, (self._properties, self._state), strict=True):
-                    publisher.publish(message)
+                self._topics.update(None)
+                self._publish()
             time.sleep(1.0 / RATE_HZ)
 
-    def _step(self, dt):
-        state, block = self._state, self._knobs["block_at"]
-        step = max(-SPEED * dt, min(SPEED * dt, self._goal - state.position))
-        held = block >= 0.0 and step < 0.0 and state.position + step <= block
-        if held:
-            step = 0.0
-        state.position += step
-        state.moving = int(step != 0.0)
-        state.gripping = int(held)
-        self._suction["blowing"] = time.monotonic() < self._blow_until_s
-        if self._properties.ui_type == 1:
-            state.state = json.dumps(self._suction)
+    def _publish(self):
+        arguments = time.monotonic(), SIDE, SimpleNamespace(position=())
+        properties = copy.copy(self._topics.makers["gripper_properties"](*arguments))
+        properties.firmware_date = self._knobs["firmware_date"] or properties.firmware_date
+        state = self._topics.makers["gripper_state"](*arguments)
+        if not self._knobs["acknowledges"]:
+            state.command, state.command_sender, state.command_sequence = "", "", 0
+        self._properties.publish(properties)
+        self._state.publish(state)
 
     def _on_command(self, message):
+        if self._knobs["works"]:
+            self._take("gripper_command", message)
+            return
         with self._lock:
-            repeated = (message.sender, message.sequence) == (self._state.command_sender,
-                                                              self._state.command_sequence)
-            if self._knobs["acknowledges"]:
-                self._state.command = message.command
-                self._state.command_sender, self._state.command_sequence = message.sender, message.sequence
-            if self._knobs["works"] and message.id == self._state.id and not repeated:
-                self._do(message.command, json.loads(message.args or "{}"))
+            gripper = self._hand.gripper
+            gripper.command, gripper.sender, gripper.sequence = message.command, message.sender, message.sequence
 
-    def _do(self, command, args):
-        state = self._state
-        if command == "go" and "position" in args:
-            self._goal = args["position"]
-        elif command == "go":
-            seal = self._knobs["seal"]
-            self._suction.update({"sucking": True, "vacuum": seal, "vacuum sensor": 204 if seal else 0})
-        elif command == "stop":
-            self._goal = state.position
-        elif command == "release":
-            self._suction.update({"sucking": False, "vacuum": False, "vacuum sensor": 0})
-            self._blow_until_s = time.monotonic() + 0.2
-        elif command in ("calibrate", "clear_calibration"):
-            state.calibrated = int(command == "calibrate")
-        elif command == "reset":
-            state.error = 0
-        elif command == "reboot":
-            state.calibrated = 0
-
-    def _on_set_properties(self, message):
+    def _take(self, key, message):
         with self._lock:
-            self._properties = message
-
-    def _on_set_state(self, message):
-        with self._lock:
-            self._state = message
+            try:
+                self._topics.takers[key](SIDE, message, time.monotonic())
+            except CommandRefused as refusal:
+                rospy.logwarn("%s", refusal)
 
 
 def main():

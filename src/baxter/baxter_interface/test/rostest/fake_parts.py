@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Channels, a navigator and a head of a few lines for the SDK's tests, with knobs for their faults.
+"""Channels, a navigator and a head for the SDK's tests: the simulator's own, without a robot, with knobs for faults.
 
-Knobs are private parameters, read at the start and again at each call of ~reload. The topics ~touch (a channel, inputs
-too) and ~turn (a wheel's counter) stand in for fingers.
+Knobs are private parameters, read at the start and at each call of ~reload. Its service /robot/sim/press stands in
+for fingers, as the simulator's does.
 """
 import threading
 import time
+from types import SimpleNamespace
 
+import numpy as np
 import rospy
 from baxter_core_msgs.msg import (
     AnalogIOState,
@@ -18,52 +20,81 @@ from baxter_core_msgs.msg import (
     HeadState,
     NavigatorState,
 )
-from std_msgs.msg import Bool, UInt8
+from std_msgs.msg import Bool
 from std_srvs.srv import Trigger, TriggerResponse
+
+from baxter_sim_hardware.errors import CommandRefused
+from baxter_sim_hardware.head_topics import HeadTopics
+from baxter_sim_hardware.panel_topics import PanelTopics
 
 RATE_HZ = 100.0
 KNOBS = {
-    "io_echo": True,         # channels follow their commands
-    "head_full_speed": 8.4,  # [rad/s]
-    "nods": True,            # the head nods when it is told to
-    "nod_ends": True,        # and stops again
+    "io_echo": True,     # channels follow their commands
+    "head_turns": True,  # the head follows its commands
+    "nods": True,        # the head nods when it is told to
+    "nod_ends": True,    # and stops again
 }
-NOD_S = 0.3
-OUTPUTS = ("torso_left_inner_light", "torso_left_outer_light")
-INPUTS = ("left_lower_cuff",)
-BUTTONS = ("torso_left_button_ok", "torso_left_button_back", "torso_left_button_show")
-FAN, RANGE = "torso_fan", "left_hand_range"
+DIGITAL = ("torso_left_inner_light", "torso_left_outer_light", "left_lower_cuff", "torso_left_button_ok",
+           "torso_left_button_back", "torso_left_button_show")
+RANGE = "left_hand_range"
+ANALOG = (RANGE, "torso_fan")
+NAVIGATOR = "torso_left"
+RANGE_MM = 123
+
+
+class PanJoint:
+    """A model of one joint, which is at once where it is driven to; limits as in the robot's description [rad]."""
+
+    lower, upper, max_effort = np.array([-np.pi / 2.0]), np.array([np.pi / 2.0]), np.array([50.0])
+
+    def __init__(self):
+        self.position, self.velocity = np.zeros(1), np.zeros(1)
+
+    def index(self, _names):
+        return np.array([0])
+
+    def read_joints(self):
+        return self.position, self.velocity, np.zeros(1)
+
+    def drive_position(self, _index, position, _max_effort, velocity):
+        self.position, self.velocity = position.copy(), velocity.copy()
 
 
 class FakeParts:
     def __init__(self):
         self._lock = threading.RLock()
-        self._knobs = {}
         self.reload(None)
-        self._digital = dict.fromkeys((*OUTPUTS, *INPUTS, *BUTTONS), False)
-        self._analog = {FAN: 0, RANGE: 123.5}
-        self._wheel = 0
-        self._head = HeadState()
-        self._pan_command = HeadPanCommand(speed_ratio=1.0)
-        self._nod_began_s = None
-        self._digital_publishers = {
-            name: rospy.Publisher("/robot/digital_io/%s/state" % name, DigitalIOState, queue_size=1)
-            for name in self._digital}
-        self._analog_publishers = {
-            name: rospy.Publisher("/robot/analog_io/%s/state" % name, AnalogIOState, queue_size=1)
-            for name in self._analog}
-        self._navigator_publisher = rospy.Publisher(
-            "/robot/navigators/torso_left_navigator/state", NavigatorState, queue_size=1)
-        self._head_publisher = rospy.Publisher("/robot/head/head_state", HeadState, queue_size=1)
+        self._services = []
+        panel = PanelTopics(SimpleNamespace(service=self._serve), lambda pressed: None)
+        panel.attach(RANGE, lambda: RANGE_MM)
+        self._joint = PanJoint()
+        # The robot is enabled here.
+        self._head = HeadTopics(self._joint, SimpleNamespace(enabled=True), 1.0 / RATE_HZ)
+        self._makers, self._takers = {**panel.makers, **self._head.makers}, {**panel.takers, **self._head.takers}
+        self._nods_on = False
+        self._published = [
+            *(("digital_io", name, self._publisher("digital_io/%s/state" % name, DigitalIOState)) for name in DIGITAL),
+            *(("analog_io", name, self._publisher("analog_io/%s/state" % name, AnalogIOState)) for name in ANALOG),
+            ("navigator", NAVIGATOR, self._publisher("navigators/%s_navigator/state" % NAVIGATOR, NavigatorState)),
+            ("head_state", None, self._publisher("head/head_state", HeadState))]
         self._subscribers = [
-            rospy.Subscriber("/robot/digital_io/command", DigitalOutputCommand, self._on_digital),
-            rospy.Subscriber("/robot/analog_io/command", AnalogOutputCommand, self._on_analog),
-            rospy.Subscriber("/robot/head/command_head_pan", HeadPanCommand, self._on_pan),
-            rospy.Subscriber("/robot/head/command_head_nod", Bool, self._on_nod),
-            rospy.Subscriber("~touch", DigitalOutputCommand, self._on_touch),
-            rospy.Subscriber("~turn", UInt8, self._on_turn),
-        ]
-        self._service = rospy.Service("~reload", Trigger, self.reload)
+            rospy.Subscriber("/robot/" + topic, kind, self._take, (key, knob)) for topic, kind, key, knob in (
+                ("digital_io/command", DigitalOutputCommand, "digital_io_command", "io_echo"),
+                ("analog_io/command", AnalogOutputCommand, "analog_io_command", "io_echo"),
+                ("head/command_head_pan", HeadPanCommand, "command_head_pan", "head_turns"),
+                ("head/command_head_nod", Bool, "command_head_nod", "nods"))]
+        self._services.append(rospy.Service("~reload", Trigger, self.reload))
+
+    @staticmethod
+    def _publisher(topic, kind):
+        return rospy.Publisher("/robot/" + topic, kind, queue_size=1)
+
+    def _serve(self, name, kind, handler):
+        def locked(request):
+            with self._lock:
+                return handler(request)
+
+        self._services.append(rospy.Service("/robot/" + name, kind, locked))
 
     def reload(self, _request):
         with self._lock:
@@ -73,55 +104,25 @@ class FakeParts:
     def run(self):
         while not rospy.is_shutdown():
             with self._lock:
-                self._step_head(1.0 / RATE_HZ)
-                self._publish()
+                self._head.update()
+                now = time.monotonic()
+                for key, part, publisher in self._published:
+                    message = self._makers[key](now, part, self._joint)
+                    if key == "head_state":
+                        self._nods_on = not self._knobs["nod_ends"] and (self._nods_on or message.isNodding)
+                        message.isNodding |= self._nods_on
+                    publisher.publish(message)
             time.sleep(1.0 / RATE_HZ)
 
-    def _step_head(self, dt):
-        distance = self._pan_command.target - self._head.pan
-        reach = self._pan_command.speed_ratio * self._knobs["head_full_speed"] * dt
-        self._head.pan += max(-reach, min(reach, distance))
-        self._head.isTurning = abs(distance) > reach > 0.0
-        if self._nod_began_s is not None and self._knobs["nod_ends"] and time.monotonic() - self._nod_began_s > NOD_S:
-            self._nod_began_s = None
-        self._head.isNodding = self._nod_began_s is not None
-
-    def _publish(self):
-        for name, publisher in self._digital_publishers.items():
-            publisher.publish(DigitalIOState(state=self._digital[name], isInputOnly=name not in OUTPUTS))
-        for name, publisher in self._analog_publishers.items():
-            publisher.publish(AnalogIOState(value=self._analog[name], isInputOnly=name != FAN))
-        self._navigator_publisher.publish(NavigatorState(
-            button_names=["ok", "back", "show"], buttons=[self._digital[name] for name in BUTTONS],
-            wheel=self._wheel, light_names=["inner", "outer"], lights=[self._digital[name] for name in OUTPUTS]))
-        self._head_publisher.publish(self._head)
-
-    def _on_digital(self, message):
+    def _take(self, message, key_and_knob):
+        key, knob = key_and_knob
         with self._lock:
-            if self._knobs["io_echo"] and message.name in OUTPUTS:
-                self._digital[message.name] = message.value
-
-    def _on_analog(self, message):
-        with self._lock:
-            if self._knobs["io_echo"] and message.name == FAN:
-                self._analog[FAN] = message.value
-
-    def _on_pan(self, message):
-        with self._lock:
-            self._pan_command = message
-
-    def _on_nod(self, message):
-        with self._lock:
-            if message.data and self._knobs["nods"] and self._nod_began_s is None:
-                self._nod_began_s = time.monotonic()
-
-    def _on_touch(self, message):
-        with self._lock:
-            self._digital[message.name] = message.value
-
-    def _on_turn(self, message):
-        with self._lock:
-            self._wheel = message.data
+            if not self._knobs[knob]:
+                return
+            try:
+                self._takers[key](None, message, time.monotonic())
+            except CommandRefused as refusal:
+                rospy.logwarn("%s", refusal)
 
 
 def main():

@@ -6,8 +6,7 @@ import time
 import unittest
 
 import rospy
-from baxter_core_msgs.msg import DigitalOutputCommand
-from std_msgs.msg import UInt8
+from bullet_sim_msgs.srv import Press, PressRequest
 from std_srvs.srv import Trigger
 
 from baxter_dataflow import wait_for
@@ -27,18 +26,22 @@ def set_knobs(**knobs):
 
 
 class Fingers:
-    """Presses, releases and turns; each call waits until the fake has a connection to hear it."""
+    """Presses, releases and turns."""
 
     def __init__(self):
-        self._touch = rospy.Publisher("/fake_parts/touch", DigitalOutputCommand, queue_size=10)
-        self._turn = rospy.Publisher("/fake_parts/turn", UInt8, queue_size=10)
-        wait_for(lambda: self._touch.get_num_connections() and self._turn.get_num_connections(), DEADLINE_S)
+        rospy.wait_for_service("/robot/sim/press", DEADLINE_S)
+        self._do = rospy.ServiceProxy("/robot/sim/press", Press)
 
     def touch(self, name, pressed):
-        self._touch.publish(name, pressed)
+        self._insist(name, PressRequest.PRESS if pressed else PressRequest.RELEASE, 0)
 
-    def turn(self, count):
-        self._turn.publish(count)
+    def turn(self, wheel, steps):
+        self._insist(wheel, PressRequest.TURN, steps)
+
+    def _insist(self, component, action, steps):
+        answer = self._do(component=component, action=action, steps=steps)
+        if not answer.success:
+            raise AssertionError(answer.status_message)
 
 
 class PartsTest(unittest.TestCase):
@@ -95,7 +98,7 @@ class DigitalIOTest(PartsTest):
 class AnalogIOTest(PartsTest):
     def test_input_reads_and_refuses(self):
         hand_range = AnalogIO("left_hand_range")
-        self.assertEqual(hand_range.state(), 123.5)
+        self.assertEqual(hand_range.state(), 123.0)
         self.assertFalse(hand_range.is_output())
         with self.assertRaises(OSError) as caught:
             hand_range.set_output(1)
@@ -146,12 +149,12 @@ class NavigatorTest(PartsTest):
 
     def test_wheel_signals_steps_across_its_wrap(self):
         navigator, fingers, seen = Navigator("torso_left"), Fingers(), []
-        fingers.turn(250)
+        fingers.turn("torso_left_wheel", 250 - navigator.wheel)
         wait_for(lambda: navigator.wheel == 250, DEADLINE_S)
         note = seen.append
         navigator.wheel_changed.connect(note)
-        for count in (3, 251):
-            fingers.turn(count)
+        for steps, count in ((9, 3), (-8, 251)):
+            fingers.turn("torso_left_wheel", steps)
             wait_for(lambda count=count: navigator.wheel == count, DEADLINE_S)
         wait_for(lambda: len(seen) >= 2, DEADLINE_S)
         self.assertEqual(seen, [9, -8])
@@ -183,7 +186,7 @@ class HeadTest(PartsTest):
         wait_for(self.head.panning, DEADLINE_S)
 
     def test_pan_that_does_not_arrive_times_out(self):
-        set_knobs(head_full_speed=0.0)
+        set_knobs(head_turns=False)
         self.assert_times_out(lambda: self.head.set_pan(-1.0, timeout=0.3), "did not turn to -1.000 rad within 0.3 s")
         self.assertRaises(ValueError, self.head.set_pan, float("nan"))
 

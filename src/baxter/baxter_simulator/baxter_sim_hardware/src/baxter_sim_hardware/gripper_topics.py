@@ -7,10 +7,9 @@ from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.gripper import ElectricGripper
 from baxter_sim_hardware.gripper_commands import CustomGripper
-from baxter_sim_hardware.hands import NoHand, hand_of
+from baxter_sim_hardware.hands import NoHand
 from baxter_sim_hardware.panel import BLOWERS, PUMPS, VACUUM_SENSORS
 from baxter_sim_hardware.robot import ENABLE_HINT
-from baxter_sim_hardware.sides import SIDES
 from baxter_sim_hardware.suction import SuctionGripper
 from sim_time.stamps import stamp
 
@@ -33,14 +32,11 @@ _LONGEST = 10000
 
 
 class GripperTopics:
-    """makers and takers: as in PanelTopics. world, model: of bullet_sim; state: the robot's RobotState.
+    """makers and takers: as in PanelTopics. hands: {side: one of `hands`}; state: the robot's RobotState."""
 
-    What each arm carries is what its description says.
-    """
-
-    def __init__(self, world, model, state, dt):
+    def __init__(self, hands, state):
         self._state = state
-        self._hands = {side: hand_of(world, model, side, dt) for side in SIDES}
+        self._hands = hands
         self._properties = {side: _PROPERTIES[type(hand.gripper)] for side, hand in self._hands.items()}
         self._told = {}  # {side: EndEffectorState of a tool that only a client knows}
         self.makers = {"gripper_state": self._gripper_state,

@@ -12,6 +12,7 @@ from baxter_sim_hardware.arms import BRAKES_EFFORT_FACTOR
 from baxter_sim_hardware.collision_topics import CollisionTopics
 from baxter_sim_hardware.errors import CommandRefused, HardwareError
 from baxter_sim_hardware.gripper_topics import GripperTopics
+from baxter_sim_hardware.hands import hand_of
 from baxter_sim_hardware.head_topics import HeadTopics
 from baxter_sim_hardware.joint_command import JointLimits
 from baxter_sim_hardware.limbs import BASE_FRAME, finger_openings, limbs_of, tip_of
@@ -73,7 +74,8 @@ class BaxterPlugin(ModelPlugin):
             limbs, limits, model.read_joints()[0][arm], dt=self._dt,
             profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"), state=before)
         self._head = HeadTopics(model, self._baxter.state, self._dt)
-        self._grippers = GripperTopics(context.world, model, self._baxter.state, self._dt)
+        hands = {side: hand_of(context.world, model, side, self._dt) for side in SIDES}
+        self._grippers = GripperTopics(hands, self._baxter.state)
         self._panel = PanelTopics(context, self._press_estop)
         senses = SensorTopics(context.world, model, robot, self._limb_index, self._dt)
         for part in (self._grippers, senses):
