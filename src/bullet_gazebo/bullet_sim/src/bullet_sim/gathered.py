@@ -48,7 +48,9 @@ def gathered(parts, keep):
     for hollow, lines in ((True, _triangles), (False, _bodies)):
         chosen = [part for part in many if part.hollow == hollow]
         if chosen:
-            key = repr([(part.geometry, part.file, part.origin.tolist()) for part in chosen] + [hollow])
+            # In the loop, too, where the file is there already: a thousand matrices in words would take it 20 ms.
+            key = repr([(part.geometry, part.file) for part in chosen] + [hollow]).encode()
+            key += b"".join(part.origin.tobytes() for part in chosen)
             file = keep(key, lambda lines=lines, chosen=chosen: lines(chosen))
             few.append(Part(Mesh(file), file, np.eye(4), hollow))
     return few

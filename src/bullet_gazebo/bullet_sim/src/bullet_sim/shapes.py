@@ -63,8 +63,8 @@ class MeshCache:
         return str(hull if not hollow and hull.exists() else self._known[key])
 
     def keep(self, key, lines):
-        """Return the path of a file with what ``lines()`` returns; one that was made for the same ``key`` is kept."""
-        name = hashlib.sha256(key.encode() + _VERSION).hexdigest()[:32] + ".obj"
+        """Return the path of a file with what ``lines()`` returns; one made for the same ``key`` (bytes) is kept."""
+        name = hashlib.sha256(key + _VERSION).hexdigest()[:32] + ".obj"
         target = self.folder / name
         if not target.exists():
             self._make_folder()
