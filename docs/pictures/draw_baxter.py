@@ -12,6 +12,7 @@ import rospkg
 import trimesh
 
 import xacro
+from baxter_model import joint_names, poses
 from urdf_model import Box, Cylinder, Mesh, Sphere, parse_urdf
 from urdf_model.transforms import axis_rotation, rigid
 
@@ -20,16 +21,12 @@ GRID = 0.017  # [m] vertices within one cell become one
 LEAST_PIXELS = 2  # a polygon of which less shows is left out
 EYE, TARGET, UP = np.array([3.2, 1.5, 0.9]), np.array([0.12, 0.05, 0.0]), np.array([0.0, 0.0, 1.0])
 LIGHT = np.array([0.75, 0.3, 0.6]) / np.linalg.norm([0.75, 0.3, 0.6])
-POSE = {  # the left arm at the lab's pose, the right one untucked
-    "left": (-1.0051, -1.0358, -0.3310, 1.7034, 0.3051, 0.8611, -1.4742),
-    "right": (0.08, -1.0, 1.19, 1.94, -0.67, 1.03, 0.50),
-}
+LAB_POSE = (-1.0051, -1.0358, -0.3310, 1.7034, 0.3051, 0.8611, -1.4742)  # of the left arm
 
 
 def link_frames(robot):
     """4x4 pose of every link in base."""
-    names = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
-    angles = {f"{side}_{name}": angle for side, arm in POSE.items() for name, angle in zip(names, arm, strict=True)}
+    angles = {**dict(zip(joint_names("left"), LAB_POSE, strict=True)), **poses().angles("untucked", "right")}
     frames, links = {robot.root: np.eye(4)}, [robot.root]
     while links:
         parent = links.pop()

@@ -7,7 +7,7 @@ import PyKDL
 import rospkg
 
 import xacro
-from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
+from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics import Chain
 from baxter_sim_kinematics.bullet_checker import BulletChecker
 from gazebo_ros.resources import ResourceFinder

@@ -8,17 +8,15 @@ import time
 
 import numpy as np
 import rospkg
-import yaml
 
 import xacro
-from baxter_sim_hardware import JOINT_SUFFIXES, Poses
+from baxter_model import SIDES, joint_names, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
 from gazebo_ros.resources import ResourceFinder
 from urdf_model import parse_urdf
 
-SIDES = ("left", "right")
-NAMES = [f"{side}_{joint}" for side in SIDES for joint in JOINT_SUFFIXES]
+NAMES = [name for side in SIDES for name in joint_names(side)]
 PRESSING = {  # where the arms start, and where they are told to go, through each other or the body
     "arm on arm": (dict.fromkeys(NAMES, 0.0), {"left_s0": -1.5, "right_s0": 1.5}),
     "hand on body": ("neutral", {"left_s0": -1.7, "left_s1": -0.3, "left_e1": 2.6}),
@@ -80,16 +78,14 @@ def step_times(labs, steps):
 
 def measure(report, quick, number):
     steps = 200 if quick else 2000
-    packages = rospkg.RosPack()
-    file = packages.get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
+    file = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
     robot = parse_urdf(xacro.process_file(file).toxml(), source=file)
-    poses = Poses(yaml.safe_load(open(packages.get_path("baxter_sim_hardware") + "/config/poses.yaml")))
 
     def angles(pose):
-        return {name: poses.angles(pose, name.split("_")[0])[name] for name in NAMES}
+        return {name: poses().angles(pose, name.split("_")[0])[name] for name in NAMES}
 
     bare, whole = Lab(robot, False), Lab(robot, True)
-    for pose in poses.names:
+    for pose in poses().names:
         for lab in (bare, whole):
             lab.place(angles(pose))
             lab.step()

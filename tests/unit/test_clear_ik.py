@@ -5,7 +5,7 @@ import pytest
 import rospkg
 
 import xacro
-from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
+from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics import Chain, NoSolution, Reason, solve
 from baxter_sim_kinematics.bullet_checker import BulletChecker
 from bullet_sim import World

@@ -14,8 +14,7 @@ def read(path):
 
 
 DEFAULTS, AS_IN_NOTES = (read(_PACKAGE / "config" / name) for name in ("streamer.yaml", "as_in_notes.yaml"))
-ROBOT_POSES = read(_PACKAGE.parents[1] / "baxter/baxter_simulator/baxter_sim_hardware/config/poses.yaml")
 
 
 def make_settings(**overrides):
-    return Settings(DEFAULTS, overrides, robot_poses=ROBOT_POSES)
+    return Settings(DEFAULTS, overrides)

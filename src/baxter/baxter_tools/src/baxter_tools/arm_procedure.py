@@ -6,8 +6,8 @@ import rospy
 
 from baxter_interface import CHECK_VERSION, Gripper, RobotEnable, RobustController
 from baxter_interface.gripper_link import NoGripper
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.programs import ProgramFailed, run
+from baxter_model import SIDES
 
 
 def run_arm_procedure(node_name, procedure, kind, data, timeout_s, description):

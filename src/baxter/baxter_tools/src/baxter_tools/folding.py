@@ -5,21 +5,18 @@ import itertools
 import threading
 
 import numpy as np
-import rospkg
 import rospy
-import yaml
 from baxter_core_msgs.msg import CollisionAvoidanceState
 from std_msgs.msg import Empty
 
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker
 from baxter_interface import Limb
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.joint_motion import Move
 from baxter_interface.limb import COMMAND_RATE_HZ
 from baxter_interface.programs import ProgramFailed
 from baxter_interface.resets import PUT_ELSEWHERE
-from baxter_sim_hardware import Poses
+from baxter_model import SIDES, poses
 
 from .path_planner import NoPath, PathPlanner
 from .self_clearance import SelfClearance
@@ -98,9 +95,6 @@ class Folding:
             raise ProgramFailed("the parameter %s is not set: only the robot's shape tells a safe way for its arms"
                                 % rospy.resolve_name("robot_description"))
         self._clearance = SelfClearance(text, names, rospy.logwarn)
-        folder = rospkg.RosPack().get_path("baxter_sim_hardware")
-        with open(folder + "/config/poses.yaml") as stream:
-            self._poses = Poses(yaml.safe_load(stream))
 
     def way(self, angles, pose):
         """Return the way from `angles` (dict of name to rad) to the named pose as a list of such dicts.
@@ -118,7 +112,7 @@ class Folding:
         return [dict(zip(self._names, posture.tolist(), strict=True)) for posture in way]
 
     def _posture(self, pose):
-        angles = {name: angle for side in SIDES for name, angle in self._poses.angles(pose, side).items()}
+        angles = {name: angle for side in SIDES for name, angle in poses().angles(pose, side).items()}
         return np.array([angles[name] for name in self._names])
 
 

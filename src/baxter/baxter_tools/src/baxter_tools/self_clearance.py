@@ -5,7 +5,8 @@ The shapes and the pairs of parts that can meet are those that the simulator col
 """
 import numpy as np
 
-from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
+from baxter_model.description import finger_openings
+from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from bullet_sim import World
 from gazebo_ros.resources import ResourceFinder
 from urdf_model import parse_urdf
@@ -31,9 +32,8 @@ class SelfClearance:
                                         self_collision_pairs=self_collision_pairs(robot.links))
         self._index = self._model.index(names)
         self.lower, self.upper = self._model.lower[self._index], self._model.upper[self._index]
-        fingers = self._model.index([name for name in self._model.joint_names if name.endswith("finger_joint")])
-        lower, upper = self._model.lower[fingers], self._model.upper[fingers]
-        self._model.set_joint_positions(fingers, np.where(np.abs(lower) > np.abs(upper), lower, upper))
+        openings = finger_openings(robot)
+        self._model.set_joint_positions(self._model.index(openings), np.array(list(openings.values())))
 
     def __call__(self, posture):
         self._model.set_joint_positions(self._index, np.asarray(posture))

@@ -14,8 +14,9 @@ from baxter_dataflow import wait_for
 from baxter_dataflow.ros_clock import RosClock
 from baxter_interface import CameraController, DigitalIO, Gripper, Head, Limb, RobotEnable, startup
 from baxter_interface.camera import list_cameras
-from baxter_interface.joint_checks import SIDES
+from baxter_interface.navigator import LOCATIONS
 from baxter_interface.programs import ProgramFailed, expect
+from baxter_model import ELECTRIC, SIDES, poses
 
 ZERO_G_S = 10.0
 MESSAGE_TIMEOUT_S = 5.0
@@ -26,14 +27,12 @@ PICTURE_S = 5.0
 CAMERA_S = 10.0
 BLINKS, BLINK_S = 9, 0.1
 SCREEN = (600, 1024)
-# Postures from shoulder to wrist [rad], the same numbers on both arms; neutral at both ends.
-POSTURES = ((0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), (0.5, -0.8, 2.8, 0.15, 0.0, 1.9, 2.8),
-            (-0.1, -0.8, -1.0, 2.5, 0.0, -1.4, -2.8), (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0))
+# Postures from shoulder to wrist [rad], the same numbers on both arms; neutral comes before and after them.
+POSTURES = ((0.5, -0.8, 2.8, 0.15, 0.0, 1.9, 2.8), (-0.1, -0.8, -1.0, 2.5, 0.0, -1.4, -2.8))
 # A pose that the left arm can reach: position [m], quaternion x y z w, in base.
 REACHABLE = ((0.657579481614, 0.851981417433, 0.0388352386502),
              (-0.366894936773, 0.885980397775, 0.108155782462, 0.262162481772))
-LIGHTS = tuple("%s_%s_light" % pair for pair in itertools.product(
-    ("left", "right", "torso_left", "torso_right"), ("inner", "outer")))
+LIGHTS = tuple("%s_%s_light" % pair for pair in itertools.product(LOCATIONS, ("inner", "outer")))
 CAMERA_RESOLUTION = (960, 600)
 # What the cameras are left with.
 USUAL_RESOLUTION, USUAL_FPS = (640, 400), 25.0
@@ -90,11 +89,12 @@ def test_move_arms(say):
     RobotEnable().enable()
     limbs = [Limb(side) for side in SIDES]
     with concurrent.futures.ThreadPoolExecutor(len(limbs)) as workers:
-        for number, posture in enumerate(POSTURES, 1):
-            say("moving both arms to posture %d of %d" % (number, len(POSTURES)))
-            moves = [workers.submit(limb.move_to_joint_positions,
-                                    dict(zip(limb.joint_names(), posture, strict=True)), MOVE_TIMEOUT_S)
-                     for limb in limbs]
+        neutral = {limb.name: poses().angles("neutral", limb.name) for limb in limbs}
+        stops = [neutral, *({limb.name: dict(zip(limb.joint_names(), posture, strict=True)) for limb in limbs}
+                            for posture in POSTURES), neutral]
+        for number, stop in enumerate(stops, 1):
+            say("moving both arms to posture %d of %d" % (number, len(stops)))
+            moves = [workers.submit(limb.move_to_joint_positions, stop[limb.name], MOVE_TIMEOUT_S) for limb in limbs]
             for limb, move in zip(limbs, moves, strict=True):
                 expect(move.result(), "the %s arm did not get to posture %d" % (limb.name, number))
 
@@ -103,7 +103,7 @@ def test_grippers(say):
     """Both electric grippers calibrate, open, close and take positions and speeds."""
     RobotEnable().enable()
     for gripper in [Gripper(side) for side in SIDES]:
-        if gripper.type() != "electric":
+        if gripper.type() != ELECTRIC.name:
             raise ProgramFailed("%s is of type %s; this test is for two electric grippers"
                                 % (gripper.name, gripper.type()))
         say("%s: reboot, calibrate" % gripper.name)

@@ -9,7 +9,8 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from baxter_interface import Limb, RobotEnable
-from baxter_interface.joint_checks import JOINTS, SIDES, limb_joint_names
+from baxter_interface.joint_checks import limb_joint_names
+from baxter_model import JOINTS, SIDES
 from baxter_tools.self_clearance import SelfClearance
 
 DEADLINE_S = 120.0

@@ -5,16 +5,15 @@ import itertools
 import numpy as np
 import pytest
 import rospkg
-import yaml
 
+import baxter_model
 import xacro
-from baxter_interface.joint_checks import SIDES, limb_joint_names
-from baxter_sim_hardware import Poses
+from baxter_model import SIDES
 from baxter_tools.path_planner import PathPlanner
 from baxter_tools.self_clearance import SelfClearance
 
 MARGIN_M = 0.01
-NAMES = [name for side in SIDES for name in limb_joint_names(side)]
+NAMES = [name for side in SIDES for name in baxter_model.joint_names(side)]
 
 
 @pytest.fixture(scope="module")
@@ -31,12 +30,9 @@ def clearance(packages):
 
 
 @pytest.fixture(scope="module")
-def poses(packages):
-    with open(packages.get_path("baxter_sim_hardware") + "/config/poses.yaml") as stream:
-        table = Poses(yaml.safe_load(stream))
-
+def poses():
     def posture(name):
-        angles = {joint: angle for side in SIDES for joint, angle in table.angles(name, side).items()}
+        angles = {joint: angle for side in SIDES for joint, angle in baxter_model.poses().angles(name, side).items()}
         return np.array([angles[joint] for joint in NAMES])
 
     return posture

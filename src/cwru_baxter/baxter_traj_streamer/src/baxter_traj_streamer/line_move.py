@@ -4,15 +4,13 @@ import numpy as np
 import rospy
 
 import urdf_model
+from baxter_model import BASE_FRAME, tip_of
 from baxter_sim_kinematics import Chain
 
 from .ros_settings import read_limits
 from .settings import SIDES, SettingsError, arm_joint_names
 from .straight_line import straight_line
 from .traj_client import joint_trajectory
-
-# Frame of the displacements.
-BASE = "base"
 
 
 class LineMove:
@@ -26,7 +24,7 @@ class LineMove:
         if not rospy.has_param("robot_description"):
             raise SettingsError("the parameter robot_description is not set; the arms' kinematics are read from it")
         robot = urdf_model.parse_urdf(rospy.get_param("robot_description"), source="robot_description")
-        self._chains = {side: Chain.from_robot(robot, BASE, "%s_gripper" % side) for side in SIDES}
+        self._chains = {side: Chain.from_robot(robot, BASE_FRAME, tip_of(side)) for side in SIDES}
         self._limits = read_limits()
 
     def trajectory(self, side, displacement, speed=0.0):

@@ -19,11 +19,11 @@ def read_settings(changes=None):
     """Settings from config/streamer.yaml; ``changes``, another file there, and the parameters below NAMESPACE override
     it. Raises SettingsError."""
     overrides = {**(_read(changes) if changes else {}), **rospy.get_param(NAMESPACE, {})}
-    return Settings(_read("streamer.yaml"), overrides, robot_poses=_read("poses.yaml", "baxter_sim_hardware"))
+    return Settings(_read("streamer.yaml"), overrides)
 
 
-def _read(name, package="baxter_traj_streamer"):
-    path = pathlib.Path(rospkg.RosPack().get_path(package)) / "config" / name
+def _read(name):
+    path = pathlib.Path(rospkg.RosPack().get_path("baxter_traj_streamer")) / "config" / name
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
 

@@ -2,12 +2,11 @@
 """Joint names and settings, from config/streamer.yaml, which explains each. Free of ROS."""
 import math
 
-from baxter_sim_hardware.errors import PoseError
-from baxter_sim_hardware.poses import Poses
+import baxter_model
+from baxter_model import JOINTS, PoseError
 
-SIDES = ("right", "left")
-# From torso to tool flange, the order of all 7-vectors here.
-JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+# The right arm comes first here, as in Case Western's notes.
+SIDES = tuple(reversed(baxter_model.SIDES))
 # What these settings may be; the first is the default.
 _CHOICES = {"interpolation": ("fields", "linear", "cubic", "quintic", "time_optimal"),
             "start": ("refuse", "blend", "jump"), "joints": ("any", "right_arm")}
@@ -24,17 +23,16 @@ def arm_joint_names(side):
     """The seven joint names of one arm, from torso to tool flange. Raises SettingsError for an unknown side."""
     if side not in SIDES:
         raise SettingsError("there is no arm %r: the arms are %s" % (side, " and ".join(SIDES)))
-    return ["%s_%s" % (side, joint) for joint in JOINTS]
+    return list(baxter_model.joint_names(side))
 
 
 class Settings:
     """The checked content of streamer.yaml as attributes of the same names.
 
-    defaults: that content; overrides: dict with some of the same keys; robot_poses: the content of
-    baxter_sim_hardware/config/poses.yaml. Raises SettingsError.
+    defaults: that content; overrides: dict with some of the same keys. Raises SettingsError.
     """
 
-    def __init__(self, defaults, overrides=None, *, robot_poses):
+    def __init__(self, defaults, overrides=None):
         overrides = overrides or {}
         if unknown := sorted(set(overrides) - set(defaults)):
             raise SettingsError("unknown setting %s; there are %s" % (", ".join(unknown), ", ".join(sorted(defaults))))
@@ -58,7 +56,7 @@ class Settings:
                 _require_positive("%s of %s" % (table, joint), value)
 
         try:
-            self._named_poses = Poses({**robot_poses, "poses": {**robot_poses["poses"], **self.poses}})
+            self._named_poses = baxter_model.poses().extended(self.poses)
         except PoseError as error:
             raise SettingsError(str(error)) from error
 

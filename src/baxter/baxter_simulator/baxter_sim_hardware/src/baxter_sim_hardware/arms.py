@@ -20,7 +20,6 @@ others go on with what they were told; a command in another mode makes them stop
 No set-point runs away from its joint: one that is pushed or blocked keeps its set-point within reach, so the arm comes
 back at the speed its mode allows, never with a snap.
 """
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -61,14 +60,6 @@ _POSITION, _VELOCITY, _TORQUE, _RAW_POSITION = (
     int(mode) for mode in (Mode.POSITION, Mode.VELOCITY, Mode.TORQUE, Mode.RAW_POSITION))
 
 
-@dataclass(frozen=True)
-class LimbModel:
-    """One arm as the URDF has it: its side and the names of its seven joints, torso to wrist."""
-
-    side: str
-    joint_names: tuple
-
-
 class Drives(NamedTuple):
     """What the joint drives shall do in this tick; indices count the joints of the limits.
 
@@ -102,8 +93,9 @@ class _Limb:
 class Arms:
     """The joint commands of all limbs, from message fields to drive set-points.
 
-    limbs: sequence of LimbModel; limits: JointLimits of all their joints, which fixes the order of every array here;
-    position: (n,) [rad] where the arms are now; speed_ratio: 0..1 at start; dt: length of a tick [s].
+    limbs: sequence of baxter_model.description.LimbModel; limits: JointLimits of all their joints, which fixes the
+    order of every array here; position: (n,) [rad] where the arms are now; speed_ratio: 0..1 at start;
+    dt: length of a tick [s].
     """
 
     def __init__(self, limbs, limits, position, speed_ratio=1.0, dt=0.002):

@@ -6,8 +6,9 @@ drives push with a fraction of what they have, in the modes in which the physica
 and velocity). Detection is about everything: an arm is in a collision when its joints feel more than its own weight and
 motion explain, or its hand more than it may carry.
 """
-from .joint_command import JOINT_SUFFIXES
-from .self_collision import BODY
+from baxter_model import JOINTS, is_part_of_arm
+from baxter_model.self_collision import BODY
+
 from .topic_row import STATE_RATE_HZ, Topic
 
 SUPPRESSION_S = 0.6  # [simulated s] the physical robot's: how long one suppress message counts
@@ -24,7 +25,7 @@ SUPPRESSIONS = {
 }
 # Torque [Nm] by joint from which an arm counts as squeezed, and what a hand may feel [N, Nm]: the physical robot's
 # parameters. It gives no figure for w2; the wrist's others stand in.
-SQUISH_NM = dict(zip(JOINT_SUFFIXES, (16.0, 24.0, 16.0, 16.0, 7.0, 7.0, 7.0), strict=True))
+SQUISH_NM = dict(zip(JOINTS, (16.0, 24.0, 16.0, 16.0, 7.0, 7.0, 7.0), strict=True))
 HAND_FORCE_N, HAND_TORQUE_NM = 100.0, 30.0
 
 COLLISION_TOPICS = (
@@ -60,21 +61,16 @@ class Suppressions:
 def touched(contacts, side):
     """(links that one arm touches, whether the other arm is among them), from contacts within the robot.
 
-    contacts: iterable of (link, other link), each one that overlaps or presses. Links belong to an arm by their names'
-    beginnings, of which fingers have the first letter.
+    contacts: iterable of (link, other link), each one that overlaps or presses.
     """
     links = set()
     for pair in contacts:
-        own = [_belongs(link, side) for link in pair]
+        own = [is_part_of_arm(link, side) for link in pair]
         if own == [True, True]:
             links.update(pair)
         elif any(own):
             links.add(pair[own.index(False)])
-    return sorted(links), any(link != BODY and not _belongs(link, side) for link in links)
-
-
-def _belongs(link, side):
-    return link.startswith((side + "_", side[0] + "_gripper"))
+    return sorted(links), any(link != BODY and not is_part_of_arm(link, side) for link in links)
 
 
 def is_squeezed(torques):

@@ -3,10 +3,9 @@
 from baxter_core_msgs.msg import CollisionAvoidanceState, CollisionDetectionState
 from std_msgs.msg import Header
 
+from baxter_model import BASE_FRAME, SIDES
+from baxter_model.self_collision import BODY
 from baxter_sim_hardware import collision
-from baxter_sim_hardware.limbs import BASE_FRAME
-from baxter_sim_hardware.self_collision import BODY
-from baxter_sim_hardware.sides import SIDES
 from sim_time.pace import Schedule
 from sim_time.stamps import stamp
 

@@ -3,8 +3,9 @@
 from collections import Counter, defaultdict
 from fnmatch import fnmatchcase
 
+from baxter_model import SIDES
+
 from .interface import TOPICS
-from .sides import SIDES
 
 
 def served(namespace="/robot"):

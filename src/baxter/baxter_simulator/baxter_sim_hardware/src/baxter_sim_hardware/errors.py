@@ -8,11 +8,3 @@ class HardwareError(Exception):
 
 class CommandRefused(HardwareError):
     """A command that cannot be obeyed as a whole; nothing of it was applied."""
-
-
-class PoseError(HardwareError):
-    """A named pose that does not exist or does not cover the joints asked for."""
-
-
-class ModelMismatch(HardwareError):
-    """The URDF lacks a joint or a frame without which it is no Baxter."""

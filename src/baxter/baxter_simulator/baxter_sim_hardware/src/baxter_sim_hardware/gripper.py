@@ -3,6 +3,8 @@
 import json
 from enum import Enum
 
+from baxter_model import ELECTRIC
+
 from .errors import CommandRefused
 from .gripper_commands import Gripper, is_number
 
@@ -35,8 +37,7 @@ class ElectricGripper(Gripper):
     Attributes: calibrated, error, missed: flags of the state message.
     """
 
-    PARAMETERS = {"velocity": (50.0, 100.0), "moving_force": (40.0, 100.0), "holding_force": (30.0, 100.0),
-                  "dead_zone": (5.0, 100.0)}  # [%]
+    PARAMETERS = {name: (start, 100.0) for name, start in ELECTRIC.parameters.items()}  # [%]
     COMMANDS = {
         "no_op": ("no_op", False),
         "set": ("configure", False),

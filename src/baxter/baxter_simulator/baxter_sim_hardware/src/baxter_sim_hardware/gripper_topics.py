@@ -4,6 +4,7 @@ import copy
 
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 
+from baxter_model import ELECTRIC, NO_GRIPPER, SIDES, SUCTION
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.gripper import ElectricGripper
 from baxter_sim_hardware.gripper_commands import CustomGripper
@@ -16,13 +17,13 @@ from sim_time.stamps import stamp
 _MAKER = {"manufacturer": "Rethink Research Robot", "product": "SDK End Effector"}
 _PROPERTIES = {
     ElectricGripper: EndEffectorProperties(
-        id=65538, ui_type=EndEffectorProperties.ELECTRIC_GRIPPER, serial_number="3712199347", hardware_rev="2",
+        id=ELECTRIC.id, ui_type=ELECTRIC.ui_type, serial_number="3712199347", hardware_rev="2",
         firmware_rev="3.0.0 5.5", firmware_date="2014/7/24 18:30:00", has_calibration=True, controls_grip=True,
         senses_grip=True, controls_force=True, senses_force=True, controls_position=True, senses_position=True,
         **_MAKER),
     SuctionGripper: EndEffectorProperties(
-        id=65537, ui_type=EndEffectorProperties.SUCTION_CUP_GRIPPER, controls_grip=True, senses_grip=True, **_MAKER),
-    CustomGripper: EndEffectorProperties(ui_type=EndEffectorProperties.NO_GRIPPER),
+        id=SUCTION.id, ui_type=SUCTION.ui_type, controls_grip=True, senses_grip=True, **_MAKER),
+    CustomGripper: EndEffectorProperties(ui_type=NO_GRIPPER.ui_type),
 }
 _FLAGS = ("enabled", "calibrated", "ready", "moving", "gripping", "missed", "error", "reverse")
 _UNKNOWN = dict.fromkeys(_FLAGS, EndEffectorState.STATE_UNKNOWN)
@@ -79,7 +80,7 @@ class GripperTopics:
 
     def _command(self, side, msg, time_s):
         gripper = self._hands[side].gripper
-        if self._properties[side].ui_type == EndEffectorProperties.NO_GRIPPER:
+        if self._properties[side].ui_type == NO_GRIPPER.ui_type:
             raise CommandRefused("the %s arm carries no gripper" % side)
         gripper.take(msg.command, msg.args, msg.sender, msg.sequence, self._state.enabled)
 

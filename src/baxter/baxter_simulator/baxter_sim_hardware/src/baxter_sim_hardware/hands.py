@@ -2,9 +2,11 @@
 """Grippers in the physics world: each brings a gripper's core together with the bodies that it moves and touches."""
 import numpy as np
 
+from baxter_model import tip_of
+from baxter_model.description import cup_of, openings_of
+
 from .gripper import ElectricGripper
 from .gripper_commands import CustomGripper
-from .limbs import cup_of, openings_of, tip_of
 from .suction import SuctionGripper
 
 RIM_RAYS = 8  # that look for a surface around the rim of the cup, and one in its middle

@@ -7,7 +7,6 @@ import numpy as np
 from .errors import CommandRefused
 from .setpoint import approach
 
-HEAD_JOINT = "head_pan"
 FULL_SPEED = 8.4  # [rad/s] at speed ratio 1: the physical robot's
 ACCELERATION = 30.0  # [rad/s^2] of the set-point; the joint follows that without overshooting
 NOD_S = 1.0  # the screen's way down and up again

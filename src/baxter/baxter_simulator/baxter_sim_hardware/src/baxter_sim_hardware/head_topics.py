@@ -2,8 +2,9 @@
 """The head's ROS side: messages from and to `head.Head`, and the drive of its joint."""
 from baxter_core_msgs.msg import HeadPanCommand, HeadState
 
+from baxter_model import HEAD_JOINT
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.head import HEAD_JOINT, TURNING_SPEED, Head
+from baxter_sim_hardware.head import TURNING_SPEED, Head
 from baxter_sim_hardware.robot import ENABLE_HINT
 
 _REQUESTS = {HeadPanCommand.REQUEST_PAN_ENABLE: True, HeadPanCommand.REQUEST_PAN_DISABLE: False}

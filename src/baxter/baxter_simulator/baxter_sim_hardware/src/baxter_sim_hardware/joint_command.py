@@ -14,8 +14,6 @@ import numpy as np
 
 from .errors import CommandRefused
 
-JOINT_SUFFIXES = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")  # torso to wrist
-
 
 class Mode(IntEnum):
     """JointCommand.mode on the wire."""

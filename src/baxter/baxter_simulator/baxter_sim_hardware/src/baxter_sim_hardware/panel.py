@@ -4,8 +4,9 @@
 The names are the physical robot's. Documents leave open which of the torso's channels can be written; here what its
 name calls a sensor, an input or a switch is an input. Sensors belong to what they measure, which attaches them.
 """
+from baxter_model import SIDES
+
 from .errors import CommandRefused
-from .sides import SIDES
 
 NAVIGATORS = (*SIDES, *("torso_%s" % side for side in SIDES))
 BUTTONS = ("ok", "back", "show")  # of a navigator, in the order of its state message

@@ -7,6 +7,9 @@ import numpy as np
 import roslib.message
 from std_msgs.msg import Empty, UInt32
 
+from baxter_model import BASE_FRAME, SIDES, ModelError, tip_of
+from baxter_model.description import finger_openings, limbs_of
+from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_hardware import convert, endpoint, interface
 from baxter_sim_hardware.arms import BRAKES_EFFORT_FACTOR
 from baxter_sim_hardware.collision_topics import CollisionTopics
@@ -15,15 +18,12 @@ from baxter_sim_hardware.gripper_topics import GripperTopics
 from baxter_sim_hardware.hands import hand_of
 from baxter_sim_hardware.head_topics import HeadTopics
 from baxter_sim_hardware.joint_command import JointLimits
-from baxter_sim_hardware.limbs import BASE_FRAME, finger_openings, limbs_of, tip_of
 from baxter_sim_hardware.panel_topics import PanelTopics
 from baxter_sim_hardware.procedure_topics import ProcedureTopics
 from baxter_sim_hardware.robot import Baxter
 from baxter_sim_hardware.robot_state import Event, State
 from baxter_sim_hardware.screen_topics import ScreenTopics
-from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_hardware.sensor_topics import SensorTopics
-from baxter_sim_hardware.sides import SIDES
 from baxter_sim_hardware.status_topics import StatusTopics
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
@@ -53,7 +53,7 @@ class BaxterPlugin(ModelPlugin):
         self._model = context.model
         try:
             self._build(context, before)
-        except HardwareError as error:
+        except (HardwareError, ModelError) as error:
             raise PluginError("cannot be Baxter's brain for model '%s': %s" % (context.model.name, error)) from error
         self._open_topics(context)
 

@@ -4,9 +4,9 @@ from baxter_core_msgs.msg import RobustControllerStatus
 from baxter_maintenance_msgs.msg import UpdateSources, UpdateStatus
 from std_msgs.msg import Bool, Int32
 
+from baxter_model import SIDES
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.procedures import PROCEDURES, STATUS_RATE_HZ, Procedure, Updater
-from baxter_sim_hardware.sides import SIDES
 from sim_time.pace import Schedule
 
 

@@ -5,10 +5,10 @@ from baxter_core_msgs.msg import URDFConfiguration
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
+from baxter_model import BASE_FRAME, tip_of
 from baxter_sim_hardware import convert, endpoint, status
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.joint_command import Mode
-from baxter_sim_hardware.limbs import BASE_FRAME, tip_of
 from baxter_sim_hardware.robot import ENABLE_HINT
 from sim_time.stamps import stamp
 

@@ -3,6 +3,8 @@
 import json
 import math
 
+from baxter_model import SUCTION
+
 from .errors import CommandRefused
 from .gripper_commands import Gripper, is_number
 
@@ -13,6 +15,7 @@ EVACUATE_S, FILL_S = 0.1, 0.02  # time constants of the pressure in a cup that i
 EMPTY = 1e-3  # share of the full vacuum that is none
 SENSOR_MAX = 255
 ATTEMPT_S = 5.0  # of a command that names no time
+LARGEST = {"vacuum_sensor_threshold": 100.0, "blow_off_seconds": 60.0}  # of each parameter [%], [s]
 
 
 class SuctionGripper(Gripper):
@@ -21,7 +24,7 @@ class SuctionGripper(Gripper):
     Attributes: sucking: whether the pump does; missed: an attempt ended without a vacuum. dt: length of a tick [s].
     """
 
-    PARAMETERS = {"vacuum_sensor_threshold": (18.0, 100.0), "blow_off_seconds": (0.4, 60.0)}  # [%], [s]
+    PARAMETERS = {name: (start, LARGEST[name]) for name, start in SUCTION.parameters.items()}
     COMMANDS = {
         "no_op": ("no_op", False),
         "set": ("configure", False),

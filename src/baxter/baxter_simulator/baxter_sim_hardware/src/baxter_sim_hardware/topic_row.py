@@ -2,8 +2,9 @@
 """What a row of the interface table says."""
 from dataclasses import dataclass
 
+from baxter_model import SIDES
+
 from .panel import ANALOG, DIGITAL, NAVIGATORS
-from .sides import SIDES
 
 STATE_RATE_HZ = 100.0  # the physical robot's state topics
 LATCHED = "latched"  # in place of a rate: once, and again for who comes later

@@ -6,12 +6,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import rospkg
-import yaml
 from baxter_core_msgs.msg import JointCommand
 from std_msgs.msg import Bool, Empty, Float64
 
 import xacro
-from baxter_sim_hardware import JOINT_SUFFIXES, Poses
+from baxter_model import JOINTS, SIDES, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
 from gazebo_ros.mailbox import Queue
@@ -20,8 +19,7 @@ from gazebo_ros.resources import ResourceFinder
 from urdf_model import parse_urdf
 
 PACKAGE = Path(__file__).resolve().parents[2]
-SIDES = ("left", "right")
-NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINT_SUFFIXES)
+NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 TICK_S = 0.002
 NAMESPACE = "/robot"
 
@@ -109,8 +107,7 @@ class Lab:
                                       **BaxterPlugin.spawn_options(robot, element))
         self.arm = self.model.index(NAMES)
         if angles is None:
-            poses = Poses(yaml.safe_load((PACKAGE / "config" / "poses.yaml").read_text()))
-            angles = [poses.angles(pose, name.split("_")[0])[name] for name in NAMES]
+            angles = [poses().angles(pose, name.split("_")[0])[name] for name in NAMES]
         angles = np.clip(angles, self.model.lower[self.arm], self.model.upper[self.arm])
         self.model.set_joint_positions(self.arm, angles)
         self.log = _Log()

@@ -7,11 +7,12 @@ from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Bool, Empty, Header
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from baxter_sim_hardware import JOINT_SUFFIXES, collision
+from baxter_model import JOINTS
+from baxter_sim_hardware import collision
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
 SIDES = ("left", "right")
-NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINT_SUFFIXES)
+NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 
 
 def avoidance(lab, side):

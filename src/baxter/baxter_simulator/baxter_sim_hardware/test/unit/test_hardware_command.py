@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baxter_sim_hardware import JOINT_SUFFIXES, CommandRefused, JointLimits, Mode
+from baxter_model import JOINTS
+from baxter_sim_hardware import CommandRefused, JointLimits, Mode
 from baxter_sim_hardware.joint_command import CommandParser
 
 SIDES = ("left", "right")
-NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINT_SUFFIXES)
+NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 LIMITS = JointLimits(
     NAMES,
     lower=np.tile([-1.70167993878, -2.147, -3.05417993878, -0.05, -3.059, -1.57079632679, -3.059], 2),

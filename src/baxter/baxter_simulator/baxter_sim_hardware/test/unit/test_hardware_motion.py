@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from std_msgs.msg import Empty, Float64
 
-from baxter_sim_hardware import JOINT_SUFFIXES
+from baxter_model import JOINTS
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
 SIDES = ("left", "right")
-NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINT_SUFFIXES)
+NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 SMALL_MOVE = np.tile([0.2, 0.2, -0.2, 0.2, 0.3, -0.3, 0.3], 2)
 
 

@@ -8,15 +8,16 @@ import pytest
 from baxter_core_msgs.msg import JointCommand
 from std_msgs.msg import Bool, Empty, Float64, UInt16
 
-from baxter_sim_hardware import JOINT_SUFFIXES, ModelMismatch, interface
-from baxter_sim_hardware.limbs import limbs_of
+from baxter_model import JOINTS, ModelMismatch
+from baxter_model.description import limbs_of
+from baxter_sim_hardware import interface
 from baxter_sim_hardware.robot_state import State
 from gazebo_ros.model_plugin import PluginError
 from urdf_model import parse_urdf
 from urdf_model.transforms import matrix_from_quaternion
 
 SIDES = ("left", "right")
-NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINT_SUFFIXES)
+NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 FINGERS = tuple("%s_gripper_%s_finger_joint" % (hand, finger) for hand in "lr" for finger in "lr")
 
 
@@ -104,7 +105,7 @@ def test_first_joint_state_is_the_start_pose(make_lab):
     lab.run(0.002)
     message = lab.outboxes["joint_states"].messages[0][1]
     for side in SIDES:
-        for joint, angle in zip(JOINT_SUFFIXES, expected[side], strict=True):
+        for joint, angle in zip(JOINTS, expected[side], strict=True):
             name = "%s_%s" % (side, joint)
             assert message.position[message.name.index(name)] == pytest.approx(angle, abs=1e-4)
 

@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The arms collide with each other and with the body, and with nothing where they are just folded."""
-import itertools
-
 import numpy as np
 import pytest
 
-from baxter_sim_hardware import JOINT_SUFFIXES
-from baxter_sim_hardware.self_collision import self_collision_pairs
+from baxter_model import JOINTS
 
 POSITION = 1
 SIDES = ("left", "right")
-NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINT_SUFFIXES)
+NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 
 
 def touching(lab):
@@ -47,23 +44,3 @@ def test_a_hand_does_not_enter_the_body(make_lab):
     lab.run(3.0)
     assert any("base" in pair for pair in touching(lab))
     assert min(contact.distance for contact in lab.world.contacts(lab.model)) > -0.005
-
-
-def test_every_pair_is_of_links_that_the_robot_has(robot):
-    for pair in self_collision_pairs(robot.links):
-        assert all(link in robot.links for link in pair)
-    bare = [link for link in robot.links if "finger" not in link]
-    assert 0 < len(self_collision_pairs(bare)) < len(self_collision_pairs(robot.links))
-
-
-def test_pairs_are_the_same_on_both_sides(robot):
-    def mirrored(link):
-        for a, b in itertools.permutations(SIDES):
-            if link.startswith(a + "_"):
-                return b + link[len(a):]
-            if link.startswith(a[0] + "_gripper"):
-                return b[0] + link[1:]
-        return link
-
-    pairs = {frozenset(pair) for pair in self_collision_pairs(robot.links)}
-    assert {frozenset(map(mirrored, pair)) for pair in pairs} == pairs

@@ -7,8 +7,9 @@ import pytest
 from baxter_core_msgs.msg import DigitalOutputCommand, EndEffectorCommand
 
 import xacro
-from baxter_sim_hardware import CommandRefused, ModelMismatch
-from baxter_sim_hardware.limbs import cup_of
+from baxter_model import ModelMismatch
+from baxter_model.description import cup_of
+from baxter_sim_hardware import CommandRefused
 from baxter_sim_hardware.suction import SuctionGripper
 from bullet_sim import Pose
 from urdf_model import parse_urdf

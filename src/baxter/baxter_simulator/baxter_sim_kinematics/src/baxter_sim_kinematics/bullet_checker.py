@@ -7,6 +7,7 @@ from collections import Counter
 
 import numpy as np
 
+from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics.collision import Touch
 from bullet_sim import World
 
@@ -88,6 +89,16 @@ class BulletChecker:
         if found.model_a == self._model.name:
             return (found.link_a,), "%s/%s" % (found.model_b, found.link_b)
         return (found.link_b,), "%s/%s" % (found.model_a, found.link_a)
+
+
+def self_checker(robot, find_mesh):
+    """Return a BulletChecker of a robot alone: with Baxter's own pairs and convex pieces, or of another robot with all
+    pairs that make sense. ``robot``: urdf_model.Robot; ``find_mesh``: as for ``bullet_sim.World``.
+    """
+    pairs = self_collision_pairs(robot.links)
+    if not pairs:
+        return BulletChecker.of_robot(robot, find_mesh=find_mesh)
+    return BulletChecker.of_robot(robot, pairs, find_mesh=find_mesh, mesh_cuts=MESH_CUTS)
 
 
 def plausible_pairs(world, model, samples=50):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from baxter_model import BASE_FRAME, SIDES, poses, tip_of
 from baxter_sim_kinematics.chain import Chain
 from baxter_sim_kinematics.errors import KinematicsError, NoSolution
 from baxter_sim_kinematics.ik import solve_all
@@ -37,7 +38,7 @@ def _robot(path):
 
 def _parser(description):
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--side", choices=("left", "right"), default="left", help="arm of Baxter (default: left)")
+    parser.add_argument("--side", choices=SIDES, default="left", help="arm of Baxter (default: left)")
     parser.add_argument("--urdf", type=Path, help="another robot's URDF or xacro file; give --tip with it")
     parser.add_argument("--base", default=None, help="link that poses are given in (default: base, or the root)")
     parser.add_argument("--tip", help="link that is put there (default: <side>_gripper)")
@@ -53,10 +54,10 @@ def _numbers(parser):
 
 def _chain(options):
     robot = _robot(options.urdf)
-    base = options.base or ("base" if options.urdf is None else robot.root)
+    base = options.base or (BASE_FRAME if options.urdf is None else robot.root)
     if options.tip is None and options.urdf is not None:
         raise UrdfError("with --urdf say --tip too; the links are %s" % ", ".join(robot.links))
-    return robot, Chain.from_robot(robot, base, options.tip or options.side + "_gripper")
+    return robot, Chain.from_robot(robot, base, options.tip or tip_of(options.side))
 
 
 def _told(main):
@@ -71,8 +72,8 @@ def _told(main):
         return 130
 
 
-def _row(values, digits=6):
-    return " ".join("%.*f" % (digits, value) for value in values)
+def _row(values, number="%.6f"):
+    return " ".join(number % value for value in values)
 
 
 # -- fk --------------------------------------------------------------------------------------------------------------
@@ -80,8 +81,9 @@ def _row(values, digits=6):
 
 def fk():
     """Entry point of ``rosrun baxter_sim_kinematics fk``."""
+    neutral = poses().angles("neutral", SIDES[0]).values()
     parser = _numbers(_parser("Where the tip of an arm is for given joint values.\n\n"
-                              "  rosrun baxter_sim_kinematics fk 0 -0.55 0 0.75 0 1.26 0"))
+                              "  rosrun baxter_sim_kinematics fk %s" % _row(neutral, "%g")))
     parser.add_argument("q", type=float, nargs="+", metavar="Q", help="joint values, base to tip [rad, m]")
     parser.add_argument("--degrees", action="store_true", help="the joint values are in degrees")
     parser.add_argument("--jacobian", action="store_true", help="print the Jacobian as well")
@@ -171,16 +173,9 @@ def _ik(parser, options):
 
 
 def _self_checker(robot):
-    from baxter_sim_kinematics.bullet_checker import BulletChecker
+    from baxter_sim_kinematics.bullet_checker import self_checker
     from gazebo_ros.resources import ResourceFinder
-    try:
-        from baxter_sim_hardware.self_collision import MESH_CUTS, self_collision_pairs
-        pairs = self_collision_pairs(robot.links)
-    except (ImportError, KeyError):
-        pairs = []
-    if not pairs:
-        return BulletChecker.of_robot(robot, find_mesh=ResourceFinder())
-    return BulletChecker.of_robot(robot, pairs, find_mesh=ResourceFinder(), mesh_cuts=MESH_CUTS)
+    return self_checker(robot, ResourceFinder())
 
 
 # -- reach -----------------------------------------------------------------------------------------------------------

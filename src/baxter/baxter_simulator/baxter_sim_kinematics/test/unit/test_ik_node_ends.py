@@ -11,7 +11,6 @@ from socketserver import ThreadingMixIn
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
-import yaml
 
 from lab_testing.waiting import wait_until
 
@@ -55,8 +54,6 @@ def master(baxter_xml):
     master = _Master({
         "/robot_description": baxter_xml,
         NODE + "/limb": "left",
-        **{"%s/%s" % (NODE, name): value
-           for name, value in yaml.safe_load((PACKAGE / "config" / "null_space_postures.yaml").read_text()).items()},
     })
     yield master
     master.close()

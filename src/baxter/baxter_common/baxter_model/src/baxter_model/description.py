@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the URDF says about Baxter: which joints make an arm, where its tip is, what it carries there."""
+from dataclasses import dataclass
+
 from urdf_model import Cylinder
 
-from .arms import LimbModel
 from .errors import ModelMismatch
-from .joint_command import JOINT_SUFFIXES
-from .sides import SIDES
-
-BASE_FRAME = "base"
+from .names import BASE_FRAME, SIDES, finger_prefix, joint_names, tip_of
 
 
-def tip_of(side):
-    """Name of the frame that end-point topics and the IK service mean."""
-    return "%s_gripper" % side
+@dataclass(frozen=True)
+class LimbModel:
+    """One arm as the URDF has it: its side and the names of its seven joints, torso to wrist."""
+
+    side: str
+    joint_names: tuple
 
 
 def limbs_of(robot):
@@ -20,7 +21,7 @@ def limbs_of(robot):
     movable = {joint.name for joint in robot.movable_joints()}
     limbs = []
     for side in SIDES:
-        names = tuple("%s_%s" % (side, suffix) for suffix in JOINT_SUFFIXES)
+        names = joint_names(side)
         missing = [name for name in names if name not in movable]
         missing += [link for link in (BASE_FRAME, tip_of(side)) if link not in robot.links]
         if missing:
@@ -43,7 +44,7 @@ def finger_openings(robot):
 def openings_of(robot, side):
     """`finger_openings` of one arm; empty where it carries no electric gripper."""
     return {name: opening for name, opening in finger_openings(robot).items()
-            if name.startswith("%s_gripper_" % side[0])}
+            if name.startswith(finger_prefix(side))}
 
 
 def cup_of(robot, side):

@@ -5,9 +5,10 @@ Left out are pairs that a joint's limits keep apart and pairs whose shapes, thic
 them, overlap although the robot's covers do not: neighbours and their neighbours along an arm, the upper arm and the
 torso, the two fingers of a hand (their boxes overlap by 5 mm when it is closed).
 """
-from .sides import SIDES
+from .names import BASE_FRAME, SIDES, finger_prefix
 
-BODY = "base"
+# The torso: the link of this name is merged with all that does not move.
+BODY = BASE_FRAME
 # An arm from torso to wrist; the links of the description, of which several are one body.
 SHOULDER, UPPER_ARM = "upper_shoulder", "lower_shoulder"
 BEYOND_UPPER_ARM = ("upper_elbow", "lower_elbow", "upper_forearm", "lower_forearm", "wrist")
@@ -46,7 +47,7 @@ class _Arm:
             return tuple("%s_%s" % (side, suffix) for suffix in suffixes)
 
         fingers = tuple(sorted(link for link in links
-                               if link.startswith("%s_gripper_" % side[0]) and link.endswith("_finger")))
+                               if link.startswith(finger_prefix(side)) and link.endswith("_finger")))
         self.shoulder, self.upper_arm = named(SHOULDER), named(UPPER_ARM)
         self.beyond_upper_arm = named(*BEYOND_UPPER_ARM) + fingers
         self.hand = named(*HAND) + fingers

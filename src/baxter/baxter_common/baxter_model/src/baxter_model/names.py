@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Names of sides, joints, frames and links, and how one arm mirrors the other.
+
+The description (baxter_description) spells the same names. It is not read here: expanding it takes longer than starting
+most programs. The tests of this package compare the two.
+"""
+
+SIDES = ("left", "right")
+
+# Sign of a joint's angle on one arm where the other arm is its mirror image, from shoulder to wrist.
+MIRROR_SIGNS = {"s0": -1, "s1": 1, "e0": -1, "e1": 1, "w0": -1, "w1": 1, "w2": -1}
+# From shoulder to wrist: the order of every array of seven in this workspace.
+JOINTS = tuple(MIRROR_SIGNS)
+
+HEAD_JOINT = "head_pan"
+
+# The frame that poses are given in, which is also the link of the torso that does not move.
+BASE_FRAME = "base"
+
+
+def joint_names(side):
+    """Return the seven joint names of one arm, from shoulder to wrist."""
+    return tuple("%s_%s" % (side, joint) for joint in JOINTS)
+
+
+def tip_of(side):
+    """Return the name of the frame that end-point topics and the IK service mean."""
+    return "%s_gripper" % side
+
+
+def other_side(side):
+    """Return "right" for "left", and "left" for "right"."""
+    return SIDES[1 - SIDES.index(side)]
+
+
+def mirrored(angles):
+    """Return {joint without its side: angle [rad]} of the other arm where the two mirror each other."""
+    return {joint: MIRROR_SIGNS[joint] * angle for joint, angle in angles.items()}
+
+
+def named(side, angles):
+    """Return {joint name: angle [rad]} of one arm for {joint without its side: angle [rad]}."""
+    # Adding zero makes 0.0 of -0.0, and a float of what a file gave as an integer.
+    return {"%s_%s" % (side, joint): angle + 0.0 for joint, angle in angles.items()}
+
+
+def arm_angles(side, left):
+    """Return {joint name: angle [rad]} of one arm, for a posture that is given for the left arm.
+
+    left: {joint without its side, such as "s0": angle [rad]}. The right arm takes the mirror image.
+    """
+    return named(side, left if side == SIDES[0] else mirrored(left))
+
+
+def finger_prefix(side):
+    """Return what the names of one electric gripper's links and joints begin with."""
+    return "%s_gripper_" % side[0]
+
+
+def is_part_of_arm(link, side):
+    """Whether a link belongs to one arm, by its name; fingers have only the first letter of their side."""
+    return link.startswith((side + "_", finger_prefix(side)))

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the IK service takes its null-space postures from: Baxter's own, or a parameter for another robot."""
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+
+import pytest
+
+import baxter_model
+
+NODE = Path(__file__).resolve().parents[2] / "nodes" / "position_kinematics"
+TABLE = {"side": "left", "mirrored": ["turn"], "joints": ["turn", "lift"], "postures": {"neutral": [0.5, -0.25]}}
+
+
+@pytest.fixture
+def node(monkeypatch):
+    """The node as a module, on a parameter server whose content is `parameters`."""
+    loader = SourceFileLoader("position_kinematics", str(NODE))
+    module = module_from_spec(spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    module.parameters = {}
+    monkeypatch.setattr(module.rospy, "get_param", lambda name, default=None: module.parameters.get(name, default))
+    return module
+
+
+@pytest.mark.parametrize("limb", baxter_model.SIDES)
+def test_without_a_parameter_they_are_baxters(node, limb):
+    assert node._null_space_postures(limb) == baxter_model.null_space_postures(limb)
+
+
+@pytest.mark.parametrize(("limb", "turn"), [("left", 0.5), ("right", -0.5)])
+def test_a_parameter_comes_first(node, limb, turn):
+    node.parameters["~null_space_postures"] = TABLE
+    assert node._null_space_postures(limb) == {"neutral": {limb + "_turn": turn, limb + "_lift": -0.25}}
