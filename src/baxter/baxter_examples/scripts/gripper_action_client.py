@@ -7,8 +7,8 @@ from control_msgs.msg import GripperCommandAction, GripperCommandGoal
 
 from baxter_examples.action_client import ActionClient
 from baxter_examples.arguments import new_parser, parse
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.programs import EnabledRobot, run
+from baxter_model import SIDES
 
 # Position [%] and force [%].
 GOALS = ((0.0, 50.0), (100.0, 50.0), (25.0, 40.0), (75.0, 20.0), (0.0, 30.0), (100.0, 40.0))

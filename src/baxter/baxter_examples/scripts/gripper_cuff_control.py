@@ -5,8 +5,8 @@ import sys
 
 from baxter_examples.arguments import new_parser, parse
 from baxter_examples.cuff_control import CuffControl
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.programs import EnabledRobot, run
+from baxter_model import SIDES
 
 RATE_HZ = 10.0
 

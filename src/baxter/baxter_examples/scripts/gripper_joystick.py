@@ -8,8 +8,8 @@ from baxter_examples.gripper_steps import GripperSteps
 from baxter_examples.joystick_loop import JoystickTable, joystick_loop
 from baxter_examples.mounted_grippers import mounted_grippers
 from baxter_external_devices.joystick import JOYSTICKS
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.programs import EnabledRobot, run
+from baxter_model import SIDES
 
 DEAD_BAND_PERCENT = 2.5
 # By side: buttons with what they do, and the stick that moves the fingers.

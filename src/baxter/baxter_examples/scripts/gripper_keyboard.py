@@ -8,8 +8,8 @@ from baxter_examples.gripper_steps import GripperSteps
 from baxter_examples.key_table import KeyTable
 from baxter_examples.keyboard_loop import keyboard_loop
 from baxter_examples.mounted_grippers import mounted_grippers
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.programs import EnabledRobot, run
+from baxter_model import SIDES
 
 # For the left gripper; for the right one the same with Shift. (A key, what it does, the method, its arguments.)
 KEYS = (

@@ -9,8 +9,8 @@ from baxter_examples import recording
 from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_examples.mounted_grippers import mounted_grippers
 from baxter_interface import Limb
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.programs import EnabledRobot, expect, run
+from baxter_model import SIDES
 
 RATE_HZ = 1000.0
 # A gripper is sent what changed by more than this [%].

@@ -8,8 +8,8 @@ from baxter_examples.jogging import STEP_RAD, Jogging
 from baxter_examples.joystick_loop import JoystickTable, joystick_loop
 from baxter_examples.mounted_grippers import mounted_grippers
 from baxter_external_devices.joystick import JOYSTICKS
-from baxter_interface.joint_checks import JOINTS, SIDES
 from baxter_interface.programs import EnabledRobot, run
+from baxter_model import JOINTS, SIDES
 
 GRIPPER_BUTTONS = {"left": ("leftTrigger", "dPadLeft", "btnLeft"), "right": ("rightTrigger", "dPadRight", "btnRight")}
 

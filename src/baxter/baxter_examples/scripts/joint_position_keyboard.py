@@ -8,8 +8,8 @@ from baxter_examples.jogging import STEP_RAD, Jogging
 from baxter_examples.key_table import KeyTable
 from baxter_examples.keyboard_loop import keyboard_loop
 from baxter_examples.mounted_grippers import mounted_grippers
-from baxter_interface.joint_checks import JOINTS, SIDES
 from baxter_interface.programs import EnabledRobot, run
+from baxter_model import JOINTS, SIDES
 
 # For the joints from shoulder to wrist: the key that adds, the key that takes away.
 JOINT_KEYS = {"left": ("96", "87", "oy", "iu", "lh", "kj", ".n"), "right": ("41", "32", "rq", "ew", "fa", "ds", "vz")}

@@ -6,8 +6,8 @@ import sys
 from baxter_examples import JointRecorder
 from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_examples.cuff_control import CuffControl
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.programs import EnabledRobot, run
+from baxter_model import SIDES
 
 
 def record(path, rate_hz):

@@ -11,8 +11,8 @@ from baxter_examples.arguments import add_limb, new_parser, parse
 from baxter_examples.springs import spring_torques
 from baxter_interface import Limb
 from baxter_interface.dynamic_parameters import ParameterServer
-from baxter_interface.joint_checks import JOINTS
 from baxter_interface.programs import EnabledRobot, expect, run
+from baxter_model import JOINTS
 
 RATE_HZ = 1000.0
 # The robot leaves torque mode when so many commands are missed.

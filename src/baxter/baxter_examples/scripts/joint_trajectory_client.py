@@ -6,12 +6,11 @@ import sys
 from baxter_examples.arguments import add_limb, new_parser, parse
 from baxter_examples.trajectories import TrajectoryClient
 from baxter_interface import Limb
-from baxter_interface.joint_checks import JOINTS
 from baxter_interface.programs import EnabledRobot, run
+from baxter_model import JOINTS, arm_angles
 
-# From shoulder to wrist [rad], on the left arm; on the right one MIRRORED joints turn the other way.
+# From shoulder to wrist [rad], on the left arm; the right one mirrors it.
 POSTURE = (-0.11, -0.62, -1.15, 1.32, 0.80, 1.27, 2.39)
-MIRRORED = ("s0", "e0", "w0", "w2")
 # Time [s] and what POSTURE is multiplied with.
 POINTS = ((7.0, 1.0), (9.0, 0.75), (12.0, 1.25))
 PATIENCE_S = 15.0
@@ -21,8 +20,7 @@ def move(side):
     client = TrajectoryClient(side)
     with EnabledRobot():
         limb = Limb(side)
-        posture = [-angle if side == "right" and joint in MIRRORED else angle
-                   for joint, angle in zip(JOINTS, POSTURE, strict=True)]
+        posture = list(arm_angles(side, dict(zip(JOINTS, POSTURE, strict=True))).values())
         here = limb.joint_angles()
         client.add(0.0, [here[name] for name in limb.joint_names()])
         for time_s, factor in POINTS:

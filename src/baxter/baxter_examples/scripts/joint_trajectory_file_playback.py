@@ -12,8 +12,8 @@ from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_examples.mounted_grippers import mounted_grippers
 from baxter_examples.trajectories import TrajectoryClient
 from baxter_interface import Limb
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.programs import EnabledRobot, run
+from baxter_model import SIDES
 
 GRIPPER_RATE_HZ = 20.0
 # Parameters of the action server: speed of the way to the recording's start [rad/s], and extra time at the end [s].

@@ -6,12 +6,10 @@ import sys
 
 from baxter_examples.arguments import add_limb, new_parser, parse
 from baxter_interface import Limb
-from baxter_interface.joint_checks import JOINTS, SIDES
 from baxter_interface.programs import EnabledRobot, expect, run
+from baxter_model import JOINTS, mirrored, named, other_side
 
 RATE_HZ = 100.0
-# Joints that turn the other way on the other arm.
-MIRRORED = ("s0", "e0", "w0", "w2")
 AMPLIFICATION_RANGE = (0.1, 3.0)
 
 
@@ -24,17 +22,15 @@ def amplification(text):
 
 def mirror(side, factor):
     with EnabledRobot() as robot:
-        hand, puppet = Limb(side), Limb(next(other for other in SIDES if other != side))
+        hand, puppet = Limb(side), Limb(other_side(side))
         for limb in (hand, puppet):
             expect(limb.move_to_neutral(), "the %s arm did not get to neutral" % limb.name)
         print("squeeze the %s cuff and move that arm; Ctrl-C: quit" % side, flush=True)
         try:
             for _ in robot.beats(RATE_HZ):
                 speeds = hand.joint_velocities()
-                puppet.set_joint_velocities({
-                    "%s_%s" % (puppet.name, joint):
-                        factor * (-1.0 if joint in MIRRORED else 1.0) * speeds["%s_%s" % (side, joint)]
-                    for joint in JOINTS})
+                mirrored_speeds = mirrored({joint: factor * speeds["%s_%s" % (side, joint)] for joint in JOINTS})
+                puppet.set_joint_velocities(named(puppet.name, mirrored_speeds))
         finally:
             puppet.exit_control_mode()
 

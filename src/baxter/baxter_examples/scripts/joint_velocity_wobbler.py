@@ -12,8 +12,8 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch
 from baxter_examples.arguments import new_parser, parse
 from baxter_interface import Limb
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.programs import EnabledRobot, expect, run
+from baxter_model import SIDES
 
 RATE_HZ = 500
 USUAL_STATE_RATE_HZ = 100

@@ -10,8 +10,8 @@ from baxter_interface.cfg import GripperActionServerConfig
 
 from baxter_interface import programs
 from baxter_interface.dynamic_parameters import ParameterServer
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.serving import serve
+from baxter_model import SIDES
 from gripper_action.gripper_action import GripperActionServer
 
 

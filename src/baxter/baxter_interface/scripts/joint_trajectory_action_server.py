@@ -14,8 +14,8 @@ from baxter_interface.cfg import (
 
 from baxter_interface import programs
 from baxter_interface.dynamic_parameters import ParameterServer
-from baxter_interface.joint_checks import SIDES
 from baxter_interface.serving import serve
+from baxter_model import SIDES
 from joint_trajectory_action.joint_trajectory_action import JointTrajectoryActionServer
 
 CONFIGS = {

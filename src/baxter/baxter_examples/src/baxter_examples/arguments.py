@@ -5,7 +5,7 @@ import argparse
 import rospy
 
 from baxter_external_devices.controls import CONTROLLERS
-from baxter_interface.joint_checks import SIDES
+from baxter_model import SIDES
 
 
 def new_parser(description):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Move single joints by small steps."""
 from baxter_interface import Limb
-from baxter_interface.joint_checks import SIDES
+from baxter_model import SIDES
 
 STEP_RAD = 0.1
 

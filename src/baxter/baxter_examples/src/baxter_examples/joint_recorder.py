@@ -5,7 +5,8 @@ import rospy
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker
 from baxter_interface import Limb
-from baxter_interface.joint_checks import SIDES, require_number
+from baxter_interface.joint_checks import require_number
+from baxter_model import SIDES
 
 from .mounted_grippers import mounted_grippers
 from .recording import COLUMNS, write_row

@@ -4,6 +4,7 @@ import rospy
 
 from baxter_interface import CHECK_VERSION, Gripper
 from baxter_interface.gripper_link import NoGripper
+from baxter_model import CUSTOM, ELECTRIC
 
 
 def mounted_grippers(sides, calibrate=False):
@@ -18,10 +19,10 @@ def mounted_grippers(sides, calibrate=False):
         except NoGripper as lacking:
             rospy.loginfo("%s", lacking.strerror)
             continue
-        if gripper.type() == "custom":
+        if gripper.type() == CUSTOM.name:
             rospy.loginfo("%s is a custom one: it is left alone", gripper.name)
             continue
-        if calibrate and gripper.type() == "electric" and not gripper.calibrated():
+        if calibrate and gripper.type() == ELECTRIC.name and not gripper.calibrated():
             gripper.calibrate()
         grippers[side] = gripper
     return grippers

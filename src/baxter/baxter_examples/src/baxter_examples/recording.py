@@ -7,7 +7,8 @@ import bisect
 import csv
 import math
 
-from baxter_interface.joint_checks import SIDES, limb_joint_names
+from baxter_interface.joint_checks import limb_joint_names
+from baxter_model import SIDES
 
 COLUMNS = ["time", *(name for side in SIDES for name in (*limb_joint_names(side), side + "_gripper"))]
 

@@ -12,7 +12,7 @@ from bullet_sim_msgs.srv import Press, PressRequest
 
 from baxter_examples import recording
 from baxter_interface import Limb, RobotEnable
-from baxter_interface.joint_checks import SIDES
+from baxter_model import SIDES
 from lab_testing.fake_joystick import FakeJoystick
 from lab_testing.waiting import wait_for_message
 

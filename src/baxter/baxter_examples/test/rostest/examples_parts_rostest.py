@@ -14,7 +14,7 @@ from bullet_sim_msgs.srv import Press, PressRequest
 from sensor_msgs.msg import Image
 
 from baxter_interface import Gripper, RobotEnable
-from baxter_interface.joint_checks import SIDES
+from baxter_model import SIDES
 from lab_testing.fake_joystick import FakeJoystick
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))

@@ -3,14 +3,13 @@
 import rospy
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 
+from baxter_model import CUSTOM, ELECTRIC
+
 from . import settings
 from .gripper_link import GripperLink
 from .gripper_types import clip_percent, judge_firmware
 from .joint_checks import require_number, require_side
 from .version_check import VersionMismatch
-
-# What a custom tool is told to the robot as.
-CUSTOM_ID = 131073
 
 
 class Gripper:
@@ -36,14 +35,14 @@ class Gripper:
         self.on_type_changed = self._link.on_type_changed
         self.on_gripping_changed = self._link.on_gripping_changed
         self.on_moving_changed = self._link.on_moving_changed
-        if versioned and self.type() == "electric" and not self.version_check():
+        if versioned and self.type() == ELECTRIC.name and not self.version_check():
             self._link.unregister()
             raise VersionMismatch("%s: %s" % (self.name, self._firmware()[1]))
         self.set_parameters(defaults=True)
 
     def version_check(self):
         """Tell whether the firmware of an electric gripper fits this SDK; log what there is to say."""
-        if self.type() != "electric":
+        if self.type() != ELECTRIC.name:
             self._link.warn("only an electric gripper has firmware with a version to check")
             return True
         fits, text = self._firmware()
@@ -83,7 +82,7 @@ class Gripper:
         """Tell the robot the default properties of a custom gripper; return whether it took them in `timeout` [s]."""
         if not self._is_custom("reset_custom_properties"):
             return None
-        wanted = EndEffectorProperties(id=CUSTOM_ID, ui_type=EndEffectorProperties.PASSIVE_GRIPPER)
+        wanted = EndEffectorProperties(id=CUSTOM.id, ui_type=CUSTOM.ui_type)
         return self._link.override("set_properties", wanted, lambda: self._link.properties == wanted, timeout)
 
     def reset_custom_state(self, timeout=2.0):
@@ -91,7 +90,7 @@ class Gripper:
         if not self._is_custom("reset_custom_state"):
             return None
         flags = ("enabled", "calibrated", "ready", "moving", "gripping", "missed", "error", "reverse")
-        wanted = EndEffectorState(id=CUSTOM_ID, **dict.fromkeys(flags, EndEffectorState.STATE_UNKNOWN))
+        wanted = EndEffectorState(id=CUSTOM.id, **dict.fromkeys(flags, EndEffectorState.STATE_UNKNOWN))
         return self._link.override(
             "set_state", wanted,
             lambda: all(getattr(self._link.state, name) == getattr(wanted, name) for name in ("id", *flags)), timeout)
@@ -247,7 +246,7 @@ class Gripper:
         return action(*args)
 
     def _is_custom(self, method):
-        if self.type() == "custom":
+        if self.type() == CUSTOM.name:
             return True
         self._link.warn("%s is for custom grippers, this one is of type %s" % (method, self.type()))
         return False

@@ -8,6 +8,8 @@ Flags of the state are 0, 1, or 2 for unknown: only 1 counts as true.
 """
 from datetime import datetime
 
+from baxter_model import CUSTOM, ELECTRIC, SUCTION
+
 CLOSED, OPEN = 0.0, 100.0
 DATE_FORMAT = "%Y/%m/%d %H:%M:%S"
 # After a reboot the hand answers before it takes commands [s].
@@ -22,8 +24,7 @@ def clip_percent(value):
 class CustomGripper:
     """A tool that the robot knows nothing about: it has neither motor nor parameters."""
 
-    name = "custom"
-    defaults = {}
+    name, defaults = CUSTOM.name, CUSTOM.parameters
 
     def __init__(self, link):
         self._link = link
@@ -32,9 +33,7 @@ class CustomGripper:
 class ElectricGripper:
     """Two fingers on a motor; position and force in percent, 0 is closed."""
 
-    name = "electric"
-    # All in percent.
-    defaults = {"velocity": 50.0, "moving_force": 40.0, "holding_force": 30.0, "dead_zone": 5.0}
+    name, defaults = ELECTRIC.name, ELECTRIC.parameters
 
     def __init__(self, link):
         self._link = link
@@ -91,9 +90,7 @@ class ElectricGripper:
 class SuctionGripper:
     """A cup on a vacuum pump: it sucks, holds, and blows off."""
 
-    name = "suction"
-    # In percent, and in seconds.
-    defaults = {"vacuum_sensor_threshold": 18.0, "blow_off_seconds": 0.4}
+    name, defaults = SUCTION.name, SUCTION.parameters
 
     def __init__(self, link):
         self._link = link
@@ -128,8 +125,8 @@ class SuctionGripper:
         return bool(self._link.details.get("sucking", False))
 
 
-# By EndEffectorProperties.ui_type; 0 is an arm without a gripper.
-TYPES = {1: SuctionGripper, 2: ElectricGripper, 3: CustomGripper}
+# By EndEffectorProperties.ui_type.
+TYPES = {SUCTION.ui_type: SuctionGripper, ELECTRIC.ui_type: ElectricGripper, CUSTOM.ui_type: CustomGripper}
 
 
 def judge_firmware(date, dates):

@@ -3,9 +3,7 @@
 import math
 from collections.abc import Mapping
 
-SIDES = ("left", "right")
-# From the shoulder to the wrist, the order of joint_names().
-JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+from baxter_model import SIDES, joint_names
 
 
 class UnknownNameError(ValueError, KeyError):
@@ -27,7 +25,7 @@ def require_side(side):
 
 def limb_joint_names(side):
     """List the seven joint names of a limb from shoulder to wrist. Raises UnknownNameError."""
-    return ["%s_%s" % (require_side(side), joint) for joint in JOINTS]
+    return list(joint_names(require_side(side)))
 
 
 def require_joint(name, known):

@@ -13,15 +13,14 @@ from std_msgs.msg import Float64
 
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
+from baxter_model import BASE_FRAME, poses
 
 from . import settings, startup
-from .joint_checks import JOINTS, limb_joint_names, require_joint, require_joint_values, require_number, require_side
+from .joint_checks import limb_joint_names, require_joint, require_joint_values, require_number, require_side
 from .joint_motion import Move
 from .resets import PUT_ELSEWHERE, Resets
 from .services import call_service
 
-# Joint angles of the neutral pose, the same on both arms [rad].
-NEUTRAL_POSE = dict(zip(JOINTS, (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True))
 # Commands per second during a move; the robot's own time-out asks for more than 5.
 COMMAND_RATE_HZ = 100.0
 IK_TIMEOUT_S = 5.0
@@ -166,8 +165,7 @@ class Limb:
 
     def move_to_neutral(self, timeout=15.0):
         """Move to the neutral pose and wait; `timeout` [s] and result as of move_to_joint_positions."""
-        target = {"%s_%s" % (self.name, joint): angle for joint, angle in NEUTRAL_POSE.items()}
-        return self.move_to_joint_positions(target, timeout)
+        return self.move_to_joint_positions(poses().angles("neutral", self.name), timeout)
 
     def move_to_joint_positions(self, positions, timeout=15.0, threshold=settings.JOINT_ANGLE_TOLERANCE, test=None):
         """Move smoothly to joint angles, in position mode, and wait until they are reached.
@@ -302,7 +300,7 @@ def _pose_stamped(pose):
         except (KeyError, TypeError, ValueError) as error:
             raise type(error)("a pose is what endpoint_pose() returns, a Pose or PoseStamped, or a position x y z [m] "
                               "with an orientation x y z w, got %r" % (pose,)) from error
-    stamped.header.frame_id = stamped.header.frame_id or "base"
+    stamped.header.frame_id = stamped.header.frame_id or BASE_FRAME
     for part in (stamped.pose.position, stamped.pose.orientation):
         for axis in part.__slots__:
             require_number(getattr(part, axis), "the pose's %s" % axis)

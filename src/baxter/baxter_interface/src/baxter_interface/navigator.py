@@ -4,12 +4,13 @@ import rospy
 from baxter_core_msgs.msg import NavigatorState
 
 from baxter_dataflow import Signal
+from baxter_model import SIDES
 
 from . import startup
 from .digital_io import DigitalIO
 from .wheel import wheel_steps
 
-LOCATIONS = ("left", "right", "torso_left", "torso_right")
+LOCATIONS = (*SIDES, *("torso_%s" % side for side in SIDES))
 # By their place in NavigatorState: pressing the wheel, the button above it, the button below it.
 BUTTON_COUNT = 3
 INNER, OUTER = 0, 1

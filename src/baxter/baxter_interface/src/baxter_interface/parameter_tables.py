@@ -5,8 +5,7 @@ Free of ROS and of the rest of the package: it is loaded while the workspace is 
 """
 from typing import NamedTuple
 
-SIDES = ("left", "right")
-JOINTS = tuple("%s_%s" % (side, joint) for side in SIDES for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2"))
+from baxter_model import ELECTRIC, SIDES, SUCTION, joint_names
 
 
 class Parameter(NamedTuple):
@@ -28,7 +27,7 @@ def trajectory_parameters(goal_time, stopped_velocity, path, goal, highest, gain
     yield Parameter("goal_time", "how much later than planned a goal may be reached [s]", goal_time, 0.0, 120.0)
     yield Parameter("stopped_velocity_tolerance", "velocity below which a joint has stopped at a goal [rad/s]; "
                     "0 or less: any", stopped_velocity, -1.0, 1.0)
-    for joint in JOINTS:
+    for joint in (name for side in SIDES for name in joint_names(side)):
         yield Parameter(joint + "_goal", "position error of %s allowed at a goal [rad]; 0 or less: any" % joint,
                         goal, -1.0, highest)
         yield Parameter(joint + "_trajectory", "position error of %s allowed on the way [rad]; 0 or less: any" % joint,
@@ -48,11 +47,13 @@ GRIPPER = tuple(
     for side in SIDES
     for name, meaning, default, lowest, highest in (
         ("timeout", "longest time for a goal [s]; below 0: any", 5.0, -1.0, 20.0),
-        ("goal", "position error at which a goal is reached [%]", 5.0, 0.0, 100.0),
-        ("velocity", "speed of the fingers [%]", 50.0, 0.0, 100.0),
-        ("moving_force", "force at which moving fingers grip, unless the goal says max_effort [%]", 40.0, 0.0, 100.0),
-        ("holding_force", "force of holding [%]", 30.0, 0.0, 100.0),
-        ("vacuum_threshold", "vacuum at which a cup holds, unless the goal says max_effort [%]", 18.0, 0.0, 100.0),
+        ("goal", "position error at which a goal is reached [%]", ELECTRIC.parameters["dead_zone"], 0.0, 100.0),
+        ("velocity", "speed of the fingers [%]", ELECTRIC.parameters["velocity"], 0.0, 100.0),
+        ("moving_force", "force at which moving fingers grip, unless the goal says max_effort [%]",
+         ELECTRIC.parameters["moving_force"], 0.0, 100.0),
+        ("holding_force", "force of holding [%]", ELECTRIC.parameters["holding_force"], 0.0, 100.0),
+        ("vacuum_threshold", "vacuum at which a cup holds, unless the goal says max_effort [%]",
+         SUCTION.parameters["vacuum_sensor_threshold"], 0.0, 100.0),
         ("blow_off", "how long a release blows [s]", 0.0, 0.0, 100.0)))
 HEAD = (
     Parameter("timeout", "longest time for a goal [s]; below 0: any", 5.0, -1.0, 20.0),

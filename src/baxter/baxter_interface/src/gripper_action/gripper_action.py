@@ -8,6 +8,7 @@ from control_msgs.msg import GripperCommandAction, GripperCommandFeedback, Gripp
 from baxter_interface import CHECK_VERSION, Gripper, RobotEnable
 from baxter_interface.goal_loop import GoalLoop, Work
 from baxter_interface.gripper_types import OPEN, clip_percent
+from baxter_model import ELECTRIC, SUCTION
 
 # How many steps fingers that hold something are given to let go of it, before they count as stalled.
 STEPS_TO_BEGIN = 4
@@ -32,7 +33,7 @@ class GripperActionServer:
         self._gripper = Gripper(gripper, CHECK_VERSION)
         self._config = reconfig_server
         name, kind = self._gripper.name, self._gripper.type()
-        self._actions = {"electric": _Electric, "suction": _Suction}.get(kind)
+        self._actions = {ELECTRIC.name: _Electric, SUCTION.name: _Suction}.get(kind)
         if self._actions is None:
             raise OSError(errno.ENODEV, "%s is of type %s; this server moves electric and suction grippers"
                           % (name, kind))
@@ -49,7 +50,7 @@ class GripperActionServer:
             self._gripper.reset(block=True)
         if self._gripper.error():
             raise OSError(errno.EIO, "%s has an error that a reset does not clear" % self._gripper.name)
-        if self._gripper.type() == "electric" and not self._gripper.calibrated():
+        if self._gripper.type() == ELECTRIC.name and not self._gripper.calibrated():
             self._gripper.calibrate(block=True)
             if not self._gripper.calibrated():
                 raise OSError(errno.EIO, "%s could not be calibrated: is the robot enabled "

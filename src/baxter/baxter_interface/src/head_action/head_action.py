@@ -8,6 +8,7 @@ from control_msgs.msg import SingleJointPositionAction, SingleJointPositionFeedb
 from baxter_interface import Head, RobotEnable
 from baxter_interface.goal_loop import GoalLoop, Work
 from baxter_interface.joint_limits import read_joint_limits
+from baxter_model import HEAD_JOINT
 
 ACTION_NAME = "robot/head/head_action"
 
@@ -24,7 +25,7 @@ class HeadActionServer:
     def __init__(self, reconfig_server):
         self._config = reconfig_server
         self._head = Head()
-        self._limit = read_joint_limits(["head_pan"])["head_pan"]
+        self._limit = read_joint_limits([HEAD_JOINT])[HEAD_JOINT]
         self._loop = GoalLoop(ACTION_NAME, SingleJointPositionAction, RobotEnable(), "head", self._begin)
 
     def clean_shutdown(self):

@@ -25,7 +25,7 @@ from control_msgs.msg import (
 from trajectory_client import DEADLINE_S, TrajectoryClient
 
 from baxter_interface import HEAD_PAN_ANGLE_TOLERANCE, Head, Limb, RobotEnable, startup
-from baxter_interface.joint_checks import SIDES
+from baxter_model import SIDES
 from lab_testing.waiting import wait_until
 
 NEUTRAL = [0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0]

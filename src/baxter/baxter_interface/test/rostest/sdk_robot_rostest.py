@@ -13,10 +13,11 @@ from baxter_core_msgs.msg import JointCommand
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import Trigger
 
+import baxter_model
 from baxter_dataflow import wait_for
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable, VersionMismatch
 from baxter_interface.joint_motion import PEAK_SPEED_RAD_S
-from baxter_interface.limb import COMMAND_RATE_HZ, NEUTRAL_POSE
+from baxter_interface.limb import COMMAND_RATE_HZ
 from baxter_interface.robot_enable import ENABLE_TIMEOUT_S
 
 DEADLINE_S = 5.0
@@ -266,7 +267,7 @@ class LimbTest(unittest.TestCase):
             thread.join(20.0)
         self.assertEqual(results, {"left": True, "right": True})
         for side, recorder in recorders.items():
-            target = {"%s_%s" % (side, joint): angle for joint, angle in NEUTRAL_POSE.items()}
+            target = baxter_model.poses().angles("neutral", side)
             wait_for(lambda recorder=recorder, target=target:
                      dict(zip(recorder.messages[-1].names, recorder.messages[-1].command, strict=True)) == target,
                      DEADLINE_S, timeout_msg="the exact target is not the last command")

@@ -8,11 +8,12 @@ frame between the finger tips, in `base`; orientations are quaternions x, y, z, 
 import math
 from dataclasses import dataclass
 
+from baxter_model import arm_angles
+
 # Where the left arm begins [rad]; the vendor's demo begins there too. The right arm's is the mirror image.
 START_ANGLES = {"s0": -0.08000397926829805, "s1": -0.9999781166910306, "e0": -1.189968899785275,
                 "e1": 1.9400238130755056, "w0": 0.6699952259595108, "w1": 1.030009435085784,
                 "w2": -0.4999997247485215}
-MIRRORED = ("s0", "e0", "w0", "w2")
 
 HOVER_M = 0.15  # above a spot: free to move sideways
 NEAR_M = 0.05  # above a spot: from here on straight down and slowly, from here up straight
@@ -35,8 +36,7 @@ class Spot:
 
 def start_angles(limb):
     """Angles by joint name [rad] in which an arm, "left" or "right", begins."""
-    sign = {name: -1.0 if limb == "right" and name in MIRRORED else 1.0 for name in START_ANGLES}
-    return {"%s_%s" % (limb, name): sign[name] * angle for name, angle in START_ANGLES.items()}
+    return arm_angles(limb, START_ANGLES)
 
 
 def tool_down(yaw):
