@@ -12,10 +12,10 @@ from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Header
 
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable
+from baxter_model import BASE_FRAME, SIDES
 from rf_lab2.poses import pose_difference, unit_quaternion
 from rf_lab2.programs import ProgramFailed, run
 
-SIDES = ("left", "right")
 # The lab's pose of the left gripper in `base`.
 LAB_POINT = (0.644, 0.0, 0.066)
 LAB_QUATERNION = (-0.381, 0.923, -0.015, 0.052)
@@ -60,7 +60,7 @@ def solve_ik(arm, point, quaternion):
     """
     name = "/ExternalTools/%s/PositionKinematicsNode/IKService" % arm
     rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
-    pose = PoseStamped(header=Header(stamp=rospy.Time.now(), frame_id="base"),
+    pose = PoseStamped(header=Header(stamp=rospy.Time.now(), frame_id=BASE_FRAME),
                        pose=Pose(position=Point(*point), orientation=Quaternion(*quaternion)))
     response = rospy.ServiceProxy(name, SolvePositionIK)(SolvePositionIKRequest(pose_stamp=[pose]))
     if not response.isValid or not response.isValid[0]:

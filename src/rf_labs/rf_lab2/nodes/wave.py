@@ -8,10 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 import rospy
 
 from baxter_interface import CHECK_VERSION, Limb, RobotEnable
+from baxter_model import SIDES
 from rf_lab2.programs import ProgramFailed, run
 from rf_lab2.waving import Swing, hands_up, shifts
 
-SIDES = ("left", "right")
 POINTS = 24
 RATE_HZ = 50
 

@@ -2,6 +2,8 @@
 """Joints over time. ROS-free."""
 import numpy as np
 
+from baxter_model import SIDES
+
 from .picture import Picture, new_figure
 
 # Colours that stay apart on white paper, also for most of those who see colours differently.
@@ -44,7 +46,7 @@ def figure_of(samples, unit="rad", title=""):
 def _side(label):
     """left, right, or ~ for what belongs to no arm, which sorts last."""
     side = label.partition("_")[0]
-    return side if side in ("left", "right") else "~"
+    return side if side in SIDES else "~"
 
 
 def draw(samples, unit="rad", title=""):

@@ -5,9 +5,10 @@ import re
 
 import numpy as np
 
+from baxter_model import SIDES
 from rf_checks import slips
 from rf_checks.measures import JUMP_RAD, largest_jump, moving_rows, path_length
-from rf_checks.recording import RECORD_S, SIDES, Fault
+from rf_checks.recording import RECORD_S, Fault
 
 #: More joint commands than this in FLOOD_WINDOW_S [sim s] are a flood; the robot's own limit is some 800 a second.
 FLOOD_COMMANDS = 1000

@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 
+from baxter_model import SIDES
 from rf_checks import tasks, tasks_printed
 
 #: Points of 100 from which an exercise counts as done.
@@ -32,7 +33,7 @@ EXERCISES = (
     Exercise("lab2", "rotate_gripper", "turn the left gripper about its own x, y or z axis",
              "rotate_gripper.py AXIS DEGREES", tasks.RotateGripper(), ("rotate", "gripper", "rotation"), ("left",)),
     Exercise("lab2", "wave", "wave with both arms along a sine path", "wave.py", tasks.Wave(),
-             ("wave", "waving", "sine"), ("left", "right")),
+             ("wave", "waving", "sine"), SIDES),
     Exercise("lab2", "unreachable", "say why a pose has no solution", "unreachable.py X Y Z QX QY QZ QW",
              tasks_printed.Unreachable(), ("unreachable", "reach", "report")),
     Exercise("lab2", "ik_frame", "find the frames of the IK service", "ik_frame.py", tasks_printed.IkFrame(),

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import rospkg
 
+from baxter_model import SIDES
 from lab_environment.ports import free_port
 from rf_checks import isolation
 from rf_checks.graph import Graph, LabFailed
@@ -288,7 +289,7 @@ class Lab:
     def _all_there(self):
         services, nodes = self.graph.services(), self.graph.nodes()
         return (all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services
-                    for side in ("left", "right"))
+                    for side in SIDES)
                 and "/robot_state_publisher" in nodes and self.joint_names and self._has_time
                 # The spawner still waits for the answer of a service that the first reset withdraws.
                 and SPAWNER not in nodes)

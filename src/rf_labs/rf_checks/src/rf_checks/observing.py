@@ -4,8 +4,9 @@ import threading
 
 import numpy as np
 
+from baxter_model import SIDES
 from rf_checks import diagnosis
-from rf_checks.recording import RECORD_S, SIDES
+from rf_checks.recording import RECORD_S
 
 #: A program that hardly ever rests for so much of its own processor time computes without end [s]; this share of the
 #: records is hardly ever.

@@ -19,11 +19,11 @@ import rospy
 from gazebo_msgs.srv import SetModelConfigurationRequest
 from std_srvs.srv import EmptyRequest
 
+from baxter_model import SIDES
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from rf_checks.recorder_names import RECORDS, REQUESTS, SERVED, SILENCED, SOCKETS_VARIABLE
 
 RECORD_TICKS = 5  # 10 ms of simulation
-SIDES = ("left", "right")
 #: Commands written out in one record; who sends more floods, and the rest is only counted.
 COMMANDS_TOLD = 3
 _DATAGRAM_BYTES = 1 << 18

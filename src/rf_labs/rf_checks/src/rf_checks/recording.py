@@ -5,14 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
+from baxter_model import SIDES, joint_names
+
 RECORD_S = 0.01
-SIDES = ("left", "right")
-JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
-
-
-def arm_joints(side):
-    """The seven joint names of one arm, from shoulder to wrist."""
-    return tuple("%s_%s" % (side, joint) for joint in JOINTS)
 
 
 class Recording:
@@ -34,7 +29,7 @@ class Recording:
 
     def arm(self, side):
         """(n, 7) [rad]: one arm's joints from shoulder to wrist."""
-        return self.positions[:, [self.joint_names.index(name) for name in arm_joints(side)]]
+        return self.positions[:, [self.joint_names.index(name) for name in joint_names(side)]]
 
     def joints_at(self, row):
         """Joint values of one record: dict of name to rad or m. Negative rows count from the end."""

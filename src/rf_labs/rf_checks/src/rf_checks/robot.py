@@ -2,12 +2,12 @@
 """Where the robot's frames are for given joint values. Free of ROS."""
 import numpy as np
 
+from baxter_model import BASE_FRAME, joint_names, poses, tip_of
 from baxter_sim_kinematics import Chain, ChainError, NoSolution, pose_from_quaternion, solve
-from rf_checks.recording import arm_joints
 from urdf_model import parse_urdf
 
 # Where an inverse kinematics search starts: the middle of what the arm can do well.
-_SEED = np.array((0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0))
+_START = "neutral"
 
 
 class Robot:
@@ -24,11 +24,11 @@ class Robot:
 
     def frame(self, name, joints):
         """(4, 4) pose of a frame in `base` [m]. `joints`: dict of name to rad."""
-        if name in ("base", "world"):
+        if name in (BASE_FRAME, "world"):
             return np.eye(4)
         if name not in self._chains:
             try:
-                self._chains[name] = Chain.from_robot(self._robot, base="base", tip=name)
+                self._chains[name] = Chain.from_robot(self._robot, base=BASE_FRAME, tip=name)
             except ChainError:
                 self._chains[name] = None
         chain = self._chains[name]
@@ -37,7 +37,7 @@ class Robot:
         return chain.fk(np.array([joints[joint] for joint in chain.joint_names]))
 
     def _hangs_on_base(self, link):
-        while link != "base":
+        while link != BASE_FRAME:
             joint = self._robot.parent_joint(link)
             if joint is None:
                 return False
@@ -47,7 +47,7 @@ class Robot:
     def _fixed(self, name):
         """Pose of a frame that no joint moves."""
         matrix = np.eye(4)
-        for joint in self._robot.chain("base", name):
+        for joint in self._robot.chain(BASE_FRAME, name):
             matrix = matrix @ joint.origin @ joint.child_offset
         return matrix
 
@@ -67,10 +67,13 @@ class Robot:
     def solve(self, side, xyz, xyzw):
         """What becomes of an IK request: joint values (7,) or the NoSolution, returned."""
         try:
-            return solve(self._chain(side), pose_from_quaternion(xyz, xyzw), seed=_SEED).q
+            return solve(self._chain(side), pose_from_quaternion(xyz, xyzw), seed=self._start(side)).q
         except NoSolution as failure:
             return failure
 
+    def _start(self, side):
+        return np.array(list(poses().angles(_START, side).values()))
+
     def _chain(self, side):
-        self.frame("%s_gripper" % side, dict.fromkeys(arm_joints(side), 0.0))
-        return self._chains["%s_gripper" % side]
+        self.frame(tip_of(side), dict.fromkeys(joint_names(side), 0.0))
+        return self._chains[tip_of(side)]

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from baxter_model import joint_names
 from rf_checks.measures import pose_error
-from rf_checks.recording import arm_joints
 from urdf_model.transforms import matrix_from_quaternion, rotation_angle
 
 # Near enough to say that a wrong answer is that wrong answer [m], [rad].
@@ -158,7 +158,7 @@ def command_slip(commands):
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
             side = repeated[0].split("_")[0]
-            missing = [name for name in arm_joints(side) if name not in names]
+            missing = [name for name in joint_names(side) if name not in names]
             return "repeated_names", ("the joint command names %s more than once and misses %s; %s"
                                       % (" and ".join(repeated), " and ".join(missing) or "none", SHEET_NAMES))
         if len(names) != len(values):

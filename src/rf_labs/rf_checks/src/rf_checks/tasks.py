@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from baxter_model import SIDES, joint_names, poses
 from rf_checks import measures, slips
 from rf_checks.measures import ramp
-from rf_checks.recording import SIDES, Criterion, Fault, arm_joints
+from rf_checks.recording import Criterion, Fault
 
-NEUTRAL = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0)
 # The lab's pose of the left gripper in `base`.
 LAB_POINT = (0.644, 0.0, 0.066)
 LAB_QUATERNION = (-0.381, 0.923, -0.015, 0.052)
@@ -36,7 +36,7 @@ class Call:
 def postures(rng, spread=0.12):
     """Both arms about neutral, each joint up to `spread` [rad] beside it."""
     return {name: round(float(angle + rng.uniform(-spread, spread)), 4)
-            for side in SIDES for name, angle in zip(arm_joints(side), NEUTRAL, strict=True)}
+            for side in SIDES for name, angle in poses().angles("neutral", side).items()}
 
 
 def pose_matrix(point, quaternion_xyzw):
@@ -181,7 +181,7 @@ class JointCommand:
         if recording.records and measures.path_length(recording.arm("right")) > 0.1:
             off = np.abs(recording.arm("right")[-1] - np.array(call.expected))
             share = float(np.mean([ramp(value, 0.02, 0.25) for value in off]))
-            found = "farthest off is %s, by %.3f rad" % (arm_joints("right")[int(off.argmax())], off.max())
+            found = "farthest off is %s, by %.3f rad" % (joint_names("right")[int(off.argmax())], off.max())
             share = share if off.max() < 0.25 else 0.6 * share
         return [Criterion("joint angles", share, 55.0, found),
                 *motion_criteria(run, ("right",), share, call, (15.0, 15.0, 15.0), 1)]
@@ -193,7 +193,7 @@ class JointCommand:
             if off.max() > 0.02 and run.exit_code == 0:
                 return Fault("far_off", "%s ended %.2f rad from its goal: go on sending the goal until "
                              "/robot/joint_states says that the arm is there"
-                             % (arm_joints("right")[int(off.argmax())], off.max()))
+                             % (joint_names("right")[int(off.argmax())], off.max()))
         return None
 
 

@@ -7,9 +7,10 @@ import re
 
 import numpy as np
 
+from baxter_model import SIDES
 from rf_checks import measures, slips
 from rf_checks.measures import ramp
-from rf_checks.recording import SIDES, Criterion, Fault
+from rf_checks.recording import Criterion, Fault
 from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, Call, pose_matrix, postures
 
 SHEET_PAIRS = (("base", "left_hand"), ("left_hand", "right_hand"), ("head_camera", "left_gripper_base"))

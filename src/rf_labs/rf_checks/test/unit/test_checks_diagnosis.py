@@ -9,13 +9,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from baxter_model import joint_names
 from rf_checks import diagnosis, report
 from rf_checks.exercises import EXERCISES, UnknownExercise, choose
 from rf_checks.judge import Result, RunResult, how_it_ended
-from rf_checks.recording import Changes, Criterion, Fault, Recording, Run, arm_joints
+from rf_checks.recording import Changes, Criterion, Fault, Recording, Run
 from rf_checks.tasks_printed import IkFrame, matrices
 
-JOINTS = (*arm_joints("left"), *arm_joints("right"))
+JOINTS = (*joint_names("left"), *joint_names("right"))
 TRACEBACK = ('Traceback (most recent call last):\n  File "/x/me.py", line 12, in <module>\n    f()\n'
              'NameError: name "f"')
 ROTATE = next(exercise for exercise in EXERCISES if exercise.name == "rotate_gripper")

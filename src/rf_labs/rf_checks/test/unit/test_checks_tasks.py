@@ -6,14 +6,17 @@ import math
 import numpy as np
 import pytest
 
+from baxter_model import SIDES, joint_names, poses
 from rf_checks import slips, tasks, tasks_printed
 from rf_checks.lab import robot_description
-from rf_checks.recording import SIDES, Recording, Run, arm_joints
+from rf_checks.recording import Recording, Run
 from rf_checks.robot import Robot
 
 # All joints that the simulated robot has.
 OTHERS = ("head_pan", *("%s_gripper_%s_finger_joint" % pair for pair in itertools.product("lr", "lr")))
-JOINTS = (*OTHERS, *arm_joints("left"), *arm_joints("right"))
+JOINTS = (*OTHERS, *joint_names("left"), *joint_names("right"))
+# The same numbers on both arms.
+NEUTRAL = tuple(poses().angles("neutral", "left").values())
 POINT, QUATERNION = tasks.LAB_POINT, tasks.LAB_QUATERNION
 
 
@@ -22,7 +25,7 @@ def robot():
     return Robot(robot_description())
 
 
-def trace(left=((tasks.NEUTRAL,)), right=((tasks.NEUTRAL,)), seconds=2.0, ik=(), contacts=()):
+def trace(left=((NEUTRAL,)), right=((NEUTRAL,)), seconds=2.0, ik=(), contacts=()):
     """A Recording in which each arm goes smoothly from posture to posture; requests and contacts come at the end."""
     count = round(seconds / 0.01)
     columns = [np.zeros((count, len(OTHERS)))]
@@ -46,7 +49,7 @@ def graded(task, call, run, robot):
 
 def rotated(robot, rotation):
     """Postures that lead from neutral to the lab's point in an orientation (3, 3)."""
-    return tasks.NEUTRAL, robot.solve("left", POINT, slips.quaternion_of(rotation))
+    return NEUTRAL, robot.solve("left", POINT, slips.quaternion_of(rotation))
 
 
 def calls(task, seed=3):
@@ -95,7 +98,7 @@ def test_a_pose_in_another_frame_is_told(robot):
 def test_collisions_cost_their_points_and_no_others(robot):
     task = tasks.JointCommand()
     call = calls(task)[0]
-    run = Run([], trace(right=(tasks.NEUTRAL, call.expected), contacts=[["right_hand", "torso"]]), exit_code=0)
+    run = Run([], trace(right=(NEUTRAL, call.expected), contacts=[["right_hand", "torso"]]), exit_code=0)
     assert graded(task, call, run, robot)[0] == pytest.approx(85.0)
 
 
@@ -116,7 +119,7 @@ def waving(robot, side, periods=3, amplitude=0.08):
 ])
 def test_waves_are_graded(robot, sides, periods, amplitude, key):
     task = tasks.Wave()
-    arms = {side: waving(robot, side, periods, amplitude) if side in sides else [tasks.NEUTRAL] for side in SIDES}
+    arms = {side: waving(robot, side, periods, amplitude) if side in sides else [NEUTRAL] for side in SIDES}
     points, found = graded(task, calls(task)[0], Run([], trace(**arms, seconds=4.0 * periods), exit_code=0), robot)
     assert found == key
     assert points == pytest.approx(100.0, abs=1.0) if key is None else points < 95.0
@@ -200,6 +203,6 @@ def test_verdicts_are_graded(robot, output, asked, points, key):
 def test_answers_about_frames_need_their_experiment(robot, output, moves, points, key):
     task = tasks_printed.IkFrame()
     there = robot.solve("left", POINT, QUATERNION)
-    left = (tasks.NEUTRAL, there) if moves else (tasks.NEUTRAL,)
+    left = (NEUTRAL, there) if moves else (NEUTRAL,)
     run = Run([], trace(left=left, ik=[["left", "base", list(POINT), list(QUATERNION), 0]]), output=output)
     assert graded(task, calls(task)[0], run, robot) == (pytest.approx(points, abs=1.0), key)

@@ -2,18 +2,17 @@
 """Waving: a pose held up, and a sine on top of it. Free of ROS."""
 import numpy as np
 
+from baxter_model import arm_angles
+
 # The left arm with its hand up [rad].
 HANDS_UP = {"s0": -0.3, "s1": -1.2, "e0": 0.0, "e1": 1.2, "w0": 0.0, "w1": -1.4, "w2": 0.0}
-# Joints whose sign a mirror changes: those that turn about an upright axis or along the arm.
-MIRRORED = ("s0", "e0", "w0", "w2")
 # The swing grows and fades within this [s].
 RAMP_S = 1.0
 
 
 def hands_up(side):
     """Joint angles {name: rad} of the arm `side`, "left" or "right", with its hand up."""
-    sign = -1.0 if side == "right" else 1.0
-    return {"%s_%s" % (side, joint): sign * angle if joint in MIRRORED else angle for joint, angle in HANDS_UP.items()}
+    return arm_angles(side, HANDS_UP)
 
 
 def shifts(side, amplitude_m, count):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rf_lab2.waving import MIRRORED, Swing, hands_up, shifts
+from baxter_model import MIRROR_SIGNS
+from rf_lab2.waving import Swing, hands_up, shifts
 
 ROWS = np.sin(np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False))[:, None] * [[0.3, -0.2]] + [[1.0, 2.0]]
 
@@ -12,7 +13,7 @@ def test_right_arm_is_the_left_one_in_a_mirror():
     left, right = hands_up("left"), hands_up("right")
     for joint, angle in left.items():
         name = joint.partition("_")[2]
-        assert right["right_" + name] == (-angle if name in MIRRORED else angle)
+        assert right["right_" + name] == MIRROR_SIGNS[name] * angle
     np.testing.assert_allclose(shifts("left", 0.1, 8) * (1, -1, 1), shifts("right", 0.1, 8))
     assert np.abs(shifts("left", 0.1, 8)).max() == pytest.approx(0.1)
 

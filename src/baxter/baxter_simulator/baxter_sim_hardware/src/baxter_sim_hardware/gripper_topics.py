@@ -4,7 +4,7 @@ import copy
 
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 
-from baxter_model import ELECTRIC, NO_GRIPPER, SIDES, SUCTION
+from baxter_model import ELECTRIC, NO_GRIPPER, SUCTION
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.gripper import ElectricGripper
 from baxter_sim_hardware.gripper_commands import CustomGripper
