@@ -24,12 +24,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, UInt16
 from std_srvs.srv import Empty
 
+from baxter_model import JOINTS, SIDES, joint_names, poses
 from lab_testing.hostile_descriptions import chain, write_ball, write_entity_bomb
 from lab_testing.waiting import wait_until
 
-SIDES = ("left", "right")
-JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
-NEUTRAL = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0)
+# The same numbers on both arms.
+NEUTRAL = tuple(poses().angles("neutral", "left").values())
 # Both hands drawn against the body, where they stop.
 PRESSING = {"s0": -1.7, "s1": -0.3, "e1": 2.6}
 BOX = """<sdf version="1.6"><model name="box"><link name="link"><inertial><mass>0.5</mass><inertia><ixx>0.001</ixx>
@@ -59,7 +59,7 @@ def command_arms(target):
     while not rospy.is_shutdown():
         for side, publisher in publishers.items():
             publisher.publish(JointCommand(JointCommand.POSITION_MODE, target(side, time.monotonic()),
-                                           ["%s_%s" % (side, joint) for joint in JOINTS]))
+                                           list(joint_names(side))))
         time.sleep(0.01)
 
 
@@ -117,7 +117,7 @@ def empty():
 
 def posture():
     """The joint states of a robot that stands in its neutral posture, at the robot's own rate."""
-    names = ["%s_%s" % (side, joint) for side in SIDES for joint in JOINTS]
+    names = [name for side in SIDES for name in joint_names(side)]
     publisher = rospy.Publisher("/robot/joint_states", JointState, queue_size=1)
     wait_until(publisher.get_num_connections, "somebody to listen", 60.0)
     up()
@@ -196,7 +196,7 @@ def lockstep(ticks):
         swing = 0.3 * math.sin(2.0 * number * COMMAND_TICKS * TICK_S)
         for side, publisher in commands.items():
             publisher.publish(JointCommand(JointCommand.POSITION_MODE, [angle + swing for angle in NEUTRAL],
-                                           ["%s_%s" % (side, joint) for joint in JOINTS]))
+                                           list(joint_names(side))))
         end = step(COMMAND_TICKS, topics.values()).sim_time.to_nsec()
     wait_until(lambda: end in states, "joint states of %d ns" % end, 60.0)
     counted = sorted(stamp for stamp in states if begin < stamp <= end)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pybullet
 
+from baxter_model import SIDES, joint_names
 from bullet_sim import Pose, World
 from urdf_model import parse_urdf
 from urdf_model.transforms import axis_rotation, rigid
@@ -138,7 +139,7 @@ def compare(steps, seed):
     """Return {way of loading: (load [s], step [us], whole tick [us], greatest error of a gravity torque [Nm])}."""
     path = vendor_urdf()
     robot = parse_urdf(path.read_text(), path.name)
-    names = [f"{side}_{joint}" for side in ("left", "right") for joint in ("s0", "s1", "e0", "e1", "w0", "w1", "w2")]
+    names = [name for side in SIDES for name in joint_names(side)]
     limits = [robot.joints[name].limit for name in names]
     random = np.random.default_rng(seed)
     poses = [np.array([random.uniform(limit.lower, limit.upper) for limit in limits]) for _ in range(5)]

@@ -10,6 +10,7 @@ import numpy as np
 from arms import expanded
 from baxter_core_msgs.msg import JointCommand
 
+from baxter_model import SIDES, joint_names, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
 from gazebo_ros.faults import Faults
@@ -22,8 +23,9 @@ from gazebo_ros.simulation import HostedPlugin, Simulation
 from gazebo_ros.snapshot import SnapshotWriter
 from urdf_model import Box, Inertial, Link, Robot, Shape, parse_urdf
 
-NEUTRAL = dict(zip(("s0", "s1", "e0", "e1", "w0", "w1", "w2"), (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0), strict=True))
-NAMES = {side: ["%s_%s" % (side, joint) for joint in NEUTRAL] for side in ("left", "right")}
+# The same numbers on both arms.
+NEUTRAL = tuple(poses().angles("neutral", "left").values())
+NAMES = {side: list(joint_names(side)) for side in SIDES}
 TICKS = 50  # of a turn; a command for each arm comes before it, as at ten times real time and 100 Hz
 TURNS = 100
 ASLEEP_TICKS = 2500
@@ -66,7 +68,7 @@ class BareWorld:
         self.model = self.world.spawn(self.robot, "baxter", Pose((0, 0, 0.93)),
                                       **BaxterPlugin.spawn_options(self.robot, None))
         for names in NAMES.values():
-            self.model.set_joint_positions(self.model.index(names), np.array(list(NEUTRAL.values())))
+            self.model.set_joint_positions(self.model.index(names), np.array(NEUTRAL))
 
 
 class Loop(BareWorld):
@@ -92,7 +94,7 @@ class Loop(BareWorld):
         swing = 0.3 * np.sin(0.0004 * self._simulation.tick)
         for side, names in NAMES.items():
             self._queues["/robot/limb/%s/joint_command" % side].put(
-                JointCommand(JointCommand.POSITION_MODE, [angle + swing for angle in NEUTRAL.values()], names))
+                JointCommand(JointCommand.POSITION_MODE, [angle + swing for angle in NEUTRAL], names))
         self._stepping_s, end = 0.0, self._simulation.tick + TICKS
         begin = time.thread_time()
         self._simulation.run(lambda: self._simulation.tick >= end)

@@ -17,13 +17,14 @@ import rospy
 from baxter_core_msgs.msg import JointCommand
 from sensor_msgs.msg import JointState
 
+from baxter_model import poses
 from baxter_traj_streamer.moves import PoseMove
 from baxter_traj_streamer.settings import SIDES, arm_joint_names
 from baxter_traj_streamer.traj_client import TrajClient
 from lab_testing.waiting import wait_until
 
 # Where the move begins [rad]: neutral, the same signs for both arms.
-NEUTRAL = [0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0]
+NEUTRAL = list(poses().angles("neutral", "left").values())
 # How long after the last command the arm counts as at rest, and how long it is then watched [s, simulated].
 SETTLED_S, REST_S = 0.5, 1.0
 PICTURE_SIZE = (1000, 900)

@@ -23,7 +23,7 @@ def bare_factor(steps, arms_only=False):
     with BareWorld() if arms_only else Loop() as loop:
         model, client = loop.model, loop.world._client
         index = model.index([name for names in NAMES.values() for name in names])
-        middle = np.array(list(NEUTRAL.values()) * len(NAMES))
+        middle = np.array(NEUTRAL * len(NAMES))
         spent = 0.0
         for tick in range(steps):
             model.drive_position(index, middle + 0.3 * np.sin(0.004 * tick), model.max_effort[index])

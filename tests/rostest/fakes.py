@@ -33,11 +33,11 @@ from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Empty, String
 
+from baxter_model import JOINTS, joint_names
 from lab_testing.waiting import wait_for_message, wait_until
 
 ROBOT, FAKE = "", "/fake"
 DEADLINE_S = 60.0
-SUFFIXES = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
 
 
 def service(prefix, name, kind):
@@ -108,7 +108,7 @@ def arms(prefix):
     """Names and order of the arms' joints, and which commands move them: enabled, disabled, halted."""
     enable = publisher(prefix, "/robot/set_super_enable", Bool)
     command = publisher(prefix, "/robot/limb/left/joint_command", JointCommand)
-    names = ["left_" + suffix for suffix in SUFFIXES]
+    names = list(joint_names("left"))
 
     def angles():
         message = wait_for_message(prefix + "/robot/joint_states", JointState)
@@ -130,7 +130,7 @@ def arms(prefix):
         except AssertionError:
             return False
 
-    listed = [name for name in angles() if name[-2:] in SUFFIXES]
+    listed = [name for name in angles() if name[-2:] in JOINTS]
     state(False)
     start = [angles()[name] for name in names]
     goal = [angle - 0.2 for angle in start]

@@ -14,10 +14,9 @@ from std_msgs.msg import Bool
 from std_msgs.msg import Empty as EmptyMessage
 from std_srvs.srv import Empty
 
+from baxter_model import SIDES, joint_names
 from lab_testing.waiting import wait_until
 
-SIDES = ("left", "right")
-SUFFIXES = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
 DEADLINE_S = 60.0  # [s, wall] for what takes a second on a machine with nothing else to do
 BEAT_TICKS, TICK_S = 5, 0.002
 # How long the world waits for a command after each beat [s, wall]: programs beside it shall keep up, and a program that
@@ -26,7 +25,7 @@ PATIENCE_S = 0.03
 
 
 def joints(side):
-    return ["%s_%s" % (side, suffix) for suffix in SUFFIXES]
+    return list(joint_names(side))
 
 
 class Program:

@@ -9,17 +9,18 @@ from actionlib_msgs.msg import GoalStatus
 from baxter_core_msgs.msg import EndEffectorCommand, HeadPanCommand, JointCommand
 from baxter_traj_streamer.msg import trajAction, trajGoal
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
-from interruption_bench import DEADLINE_S, SIDES, SUFFIXES, TICK_S, Program, joints
+from interruption_bench import DEADLINE_S, TICK_S, Program, joints
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from baxter_model import ELECTRIC, JOINTS, SIDES
 from lab_testing.waiting import wait_until
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
 # Where a motion leads from the arms' start [rad], and how long it takes [s]: to be caught on the way.
-WAY = dict(zip(SUFFIXES, (0.5, -0.6, 0.4, 0.6, -0.6, 0.6, 0.8), strict=True))
+WAY = dict(zip(JOINTS, (0.5, -0.6, 0.4, 0.6, -0.6, 0.6, 0.8), strict=True))
 DURATION_S = 2.0
 # A command of another program, which interrupts [rad from where the arm is].
-ELSEWHERE = dict.fromkeys(SUFFIXES, 0.05)
+ELSEWHERE = dict.fromkeys(JOINTS, 0.05)
 
 
 class Motion:
@@ -236,7 +237,7 @@ class GripperMotion(Motion):
     def _say(self, command, arguments):
         self._number += 1
         self._publisher.publish(EndEffectorCommand(
-            id=65538, command=command, args=arguments, sender="/interruptions", sequence=self._number))
+            id=ELECTRIC.id, command=command, args=arguments, sender="/interruptions", sequence=self._number))
         self.bench.run(TICK_S)
 
     def close(self):

@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 import baxter_interface
+from baxter_model import poses
 from lab_testing.waiting import wait_until
 
 WAIT_S = 60.0
@@ -22,7 +23,6 @@ GOALS = {
     "left_anno": [0.4, -0.3, 0.3, 0.2, -0.4, 0.5],
     "right_anno": [-0.5, -0.2, 0.4, -0.3, 0.3, -0.6],
 }
-NEUTRAL = {"s0": 0.0, "s1": -0.55, "e0": 0.0, "e1": 0.75, "w0": 0.0, "w1": 1.26, "w2": 0.0}
 
 
 def running(name):
@@ -65,7 +65,7 @@ class ThreeRobots(unittest.TestCase):
                     state.position[state.name.index(joint)], wanted, delta=0.005, msg=f"{name} {joint}"
                 )
         state = rospy.wait_for_message("/robot/joint_states", JointState, timeout=10)
-        self.assert_at(state, {"left_" + joint: angle for joint, angle in NEUTRAL.items()})
+        self.assert_at(state, poses().angles("neutral", "left"))
 
     def assert_at(self, state, wanted):
         for joint, angle in wanted.items():

@@ -3,7 +3,8 @@
 import math
 import re
 
-JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
+from baxter_model import SIDES, joint_names
+
 MODES = (1, 2, 3, 4)
 _LIMB = re.compile(r"/robot/limb/(left|right)/(\w+)$")
 # Whatever they say, it is not for the arms; a world that is changed, started anew or paused is another matter.
@@ -13,7 +14,7 @@ _WORLD = re.compile(r"^/gazebo/|/goal$|^/robot/sim/|^/robot/set_super_|/set_(par
 def is_refused(side, value):
     """Whether a baxter_core_msgs/JointCommand must be refused as a whole, or says nothing."""
     names, command = value["names"], value["command"]
-    known = {"%s_%s" % (side, joint) for joint in JOINTS}
+    known = set(joint_names(side))
     return (value["mode"] not in MODES or len(names) != len(command) or len(set(names)) != len(names)
             or not set(names) <= known or not all(map(math.isfinite, command)) or not names)
 
@@ -44,7 +45,7 @@ def may_move(name, value, style):
 
 # Values that make sense, by the name of their field.
 WORDS = {
-    "names": tuple("%s_%s" % (side, joint) for side in ("left", "right") for joint in JOINTS),
+    "names": tuple(name for side in SIDES for name in joint_names(side)),
     "mode": MODES,
     "frame_id": ("base", "", "left_gripper", "world"),
     "model_name": ("torture_box", "ground_plane", "nobody"),

@@ -11,7 +11,6 @@ import rospy
 from baxter_core_msgs.msg import CameraSettings, EndEffectorCommand, JointCommand
 from baxter_core_msgs.srv import CloseCamera, ListCameras, OpenCamera, SolvePositionIK, SolvePositionIKRequest
 from bullet_sim_msgs.srv import Press, PressRequest
-from commands import JOINTS
 from controller_manager_msgs.srv import (
     ListControllers,
     LoadController,
@@ -27,10 +26,12 @@ from hypothesis import stateful
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition
 from invariants import EmergencyStop
-from robot import SIDES, Robot
+from robot import Robot
 from std_msgs.msg import Bool, Empty
 from std_srvs.srv import Empty as EmptyService
 from watch import STATES
+
+from baxter_model import JOINTS, SIDES
 
 # A state is published every 5 ticks, and a tick goes by before it is on its way.
 STOP = EmergencyStop(ticks=10, rest_ticks=100, rest_speed=0.05)

@@ -6,7 +6,6 @@ import rospy
 import tcpros
 from baxter_core_msgs.msg import JointCommand
 from bullet_sim_msgs.srv import Press, PressRequest
-from commands import JOINTS
 from gazebo_msgs.srv import DeleteModel, GetWorldProperties
 from invariants import Patience
 from lab import CALLER, cpu_s
@@ -14,9 +13,9 @@ from std_msgs.msg import Bool, Empty, Float64, UInt16
 from std_srvs.srv import Empty as EmptyService
 from watch import STATE, STATES
 
+from baxter_model import JOINTS, SIDES
 from lab_testing.waiting import wait_until
 
-SIDES = ("left", "right")
 # A service's answer: within so much of its node's computing, or of time gone by where it computes less [s].
 PATIENCE_CPU_S, PATIENCE_WALL_S = 60.0, 180.0
 PATIENCE = Patience(PATIENCE_CPU_S, PATIENCE_WALL_S)

@@ -15,13 +15,15 @@ import tcpros
 from invariants import JointLimits, Stamps, Still, not_finite
 from lab import class_of, subscribe
 
+from baxter_model import SIDES
+
 STATES, STATE = "/robot/joint_states", "/robot/state"
 CORE = {"/clock", STATES, STATE, "/robot/limb/left/endpoint_state", "/robot/limb/right/endpoint_state",
         "/robot/end_effector/left_gripper/state", "/robot/end_effector/right_gripper/state"}
 # Repeat what they are told, and what they are told is ours: states as transforms, requests with why they were refused.
 ECHOES = {("/tf", "/robot_state_publisher")} | {
     ("/ExternalTools/%s/PositionKinematicsNode/IKReport" % side, "/baxter_sim_kinematics_" + side)
-    for side in ("left", "right")}
+    for side in SIDES}
 # Pictures and clouds are bytes to a reader; their cost is drawing them.
 BULKY = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2")
 SAMPLE = 15

@@ -5,7 +5,8 @@ import re
 import subprocess
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from workspace_tree import ROOT, is_in_tests, own_files, packages
+
 TOPS = "src|docs|tests|tools|docker|rosinstall"
 PATTERN = r"(?<![\w./~$}{*+-])((?:%s)/[\w./-]*[\w/])"
 PATH = re.compile(PATTERN % TOPS)
@@ -16,18 +17,6 @@ READERS_OWN = "src/my_lab"
 # Names that stand for any file or folder of their kind.
 GENERAL = {"rosinstall/FILE", "test/unit", "test/rostest"}
 NOT_READ = (".rst", ".ipynb", ".png", ".jpg", ".svg", ".stl", ".dae", ".rosinstall")
-
-
-def own_files():
-    """The workspace's files, relative to it: what git tracks or would track. Links are left out."""
-    command = ["git", "-C", str(ROOT), "ls-files", "--cached", "--others", "--exclude-standard"]
-    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n")
-    return sorted(name for name in listed if (ROOT / name).is_file() and not (ROOT / name).is_symlink())
-
-
-def is_in_tests(name):
-    """Whether a file belongs to tests: those make up files of their own."""
-    return name.startswith("tests/") or "/test/" in name
 
 
 def stale_paths(name, text):
@@ -81,12 +70,6 @@ def house():
             groups.append((indentation, groups[-1][1] / folder))
         found |= {name: groups[-1][1] / name for name in re.findall(r"\w+", names.rpartition(":")[2])}
     return found
-
-
-def packages():
-    """Package name to folder, of all packages below src."""
-    return {Path(name).parent.name: Path(name).parent for name in own_files()
-            if name.startswith("src/") and name.endswith("/package.xml")}
 
 
 def test_each_package_lies_where_the_architecture_page_says():

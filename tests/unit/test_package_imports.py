@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Who imports whom: only what package.xml names, and never upwards, so that no two packages need each other."""
+
+import ast
+import re
+from xml.etree import ElementTree
+
+import pytest
+from workspace_tree import ROOT, is_in_tests, is_python, own_files, packages
+
+PACKAGES = packages()
+#: Students' programs, which run in the environment of a whole lab.
+NO_PARTS = ("src/rf_labs/rf_checks/exercises/", "src/rf_labs/rf_checks/test/wrong/")
+
+
+def imported(text):
+    """Names of the modules that a program imports, at the top or later, each by its first part."""
+    names = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names.add(node.module)
+    return {name.partition(".")[0] for name in names}
+
+
+def owners():
+    """Python package to the package of the workspace that brings it."""
+    found = {name: name for name in PACKAGES}
+    for name, folder in PACKAGES.items():
+        found |= {module.parent.name: name for module in (ROOT / folder / "src").glob("*/__init__.py")}
+    return found
+
+
+def named(package):
+    """(packages that the package needs, those that only its tests need besides), by its package.xml."""
+    root = ElementTree.parse(ROOT / PACKAGES[package] / "package.xml").getroot()
+    needed = {tag.text.strip() for tag in root if re.fullmatch(r"(build_|exec_|run_|build_export_)?depend", tag.tag)}
+    return needed, {tag.text.strip() for tag in root if tag.tag == "test_depend"}
+
+
+def uses():
+    """(package, file, package that the file imports) for each pair of packages of the workspace."""
+    owner = owners()
+    folders = sorted(((str(folder) + "/", name) for name, folder in PACKAGES.items()), reverse=True)
+    for file in own_files():
+        package = next((name for folder, name in folders if file.startswith(folder)), None)
+        if package is None or file.startswith(NO_PARTS) or not is_python(file):
+            continue
+        for module in sorted(imported((ROOT / file).read_text(encoding="utf-8"))):
+            if owner.get(module, package) != package:
+                yield package, file, owner[module]
+
+
+USES = tuple(uses())
+
+
+def test_package_xml_names_what_is_imported():
+    unnamed = []
+    for package, file, needed in USES:
+        always, in_tests = named(package)
+        if needed not in (always | in_tests if is_in_tests(file) else always):
+            unnamed.append((file, needed))
+    assert unnamed == []
+
+
+def circle(edges):
+    """One circle in a graph, {node: set of nodes}, as a list of nodes; empty where there is none."""
+    done = set()
+
+    def walk(node, path):
+        if node in path:
+            return path[path.index(node):]
+        if node in done:
+            return []
+        for other in sorted(edges.get(node, ())):
+            if found := walk(other, [*path, node]):
+                return found
+        done.add(node)
+        return []
+
+    return next((found for node in sorted(edges) if (found := walk(node, []))), [])
+
+
+def test_no_two_packages_need_each_other():
+    edges = {}
+    for package, file, needed in USES:
+        if not is_in_tests(file):
+            edges.setdefault(package, set()).add(needed)
+    assert circle(edges) == []
+
+
+def test_a_package_below_imports_none_above():
+    """What stands at the bottom of the house, and what must not be needed for a physical robot."""
+    product = {(package, needed) for package, file, needed in USES if not is_in_tests(file)}
+    assert {needed for package, needed in product if package == "baxter_model"} <= {"urdf_model"}
+    simulator = {"baxter_sim_hardware", "gazebo_ros_control", "baxter_gazebo"}
+    robot_side = {"baxter_model", "baxter_interface", "baxter_tools", "baxter_examples", "baxter_sim_kinematics"}
+    assert {pair for pair in product if pair[0] in robot_side and pair[1] in simulator} == set()
+
+
+@pytest.mark.parametrize(("text", "names"), [
+    ("import a.b, c\nfrom d.e import f", {"a", "c", "d"}),
+    ("def later():\n    from g import h\n    import i as j", {"g", "i"}),
+    ("from . import k\nfrom .l import m", set()),
+])
+def test_every_kind_of_import_is_seen(text, names):
+    assert imported(text) == names
+
+
+def test_a_circle_is_seen():
+    assert circle({"a": {"b"}, "b": {"c", "d"}, "d": {"b"}}) == ["b", "d"]
+    assert circle({"a": {"b", "c"}, "b": {"c"}}) == []
