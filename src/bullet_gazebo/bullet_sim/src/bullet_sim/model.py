@@ -91,7 +91,6 @@ class Model(Body):
         self._bounds = None
         self._gears = {}  # of (joint, other), by index
         self._couplings = {}  # the same -> ratio
-        self._direct = None
         self._never_sleeps = static
         self._set_damping(joints)
         if count:
@@ -109,19 +108,6 @@ class Model(Body):
                 "model '%s' has no joint %s; its joints are %s" % (self.name, error, ", ".join(self.joint_names))
             ) from None
 
-    def call_directly(self):
-        """Read and drive joints through Bullet's C interface from now on, where that is to be had; returns whether.
-
-        It gives the same bits in little more than half the time. For who does so at every tick: it takes importing
-        numba.
-        """
-        try:
-            from .direct import DirectJoints
-        except ImportError:  # numba is not there
-            return False
-        self._direct = DirectJoints.of(self._client, self.body, len(self._all)) if self._all else None
-        return self._direct is not None
-
     def read_joints(self):
         """Return positions, velocities and efforts, three (n,) read-only arrays, as they are after the last step.
 
@@ -135,12 +121,6 @@ class Model(Body):
     def _read(self):
         if not self._all:
             return np.empty(0), np.empty(0), np.empty(0)
-        if self._direct is not None:
-            values = self._direct.read()
-            if self._any_effort_driven:
-                values[2, self._effort_driven] = self._commanded_effort[self._effort_driven]
-            values.setflags(write=False)
-            return tuple(values)
         states = pybullet.getJointStates(self.body, self._all, physicsClientId=self._client)
         position, velocity, _, effort = zip(*states, strict=True)
         effort = self._array(effort)
@@ -165,10 +145,6 @@ class Model(Body):
             # The motor adds the velocity to what closes the gap, so the gap is the one at the beginning of the step.
             position = position - velocity * self._world.time_step_s
         self._refuse_nan(index, position, "position")
-        if self._direct is not None:
-            at_rest = np.zeros(gains) if velocity is None else velocity
-            self._direct.drive_position(index, position, at_rest, max_effort, POSITION_GAIN)
-            return
         pybullet.setJointMotorControlArray(
             self.body,
             index.tolist(),
@@ -348,7 +324,6 @@ class Model(Body):
 
     def let_go(self):
         """For World: the physics that holds the body is about to end."""
-        self._direct = None  # Bullet itself does not notice that they are gone
 
     def set_base_pose(self, pose):
         super().set_base_pose(pose)
@@ -452,7 +427,6 @@ class Model(Body):
     def take_body(self, body, motion):
         """Go on with PyBullet's multibody ``body``, like the one before and just made in its place."""
         base, joints, twist, velocity = motion
-        was_direct, self._direct = self._direct is not None, None
         client = {"physicsClientId": self._client}
         self.body, self._reading, self._gears = body, None, {}
         self._effort_driven[:] = self._any_effort_driven = False
@@ -475,8 +449,6 @@ class Model(Body):
         for pair, ratio in self._couplings.items():
             self.couple(*pair, ratio)
         self._restore_collisions()
-        if was_direct:
-            self.call_directly()
         self._good = (base, joints)
 
     # -- inside -------------------------------------------------------------------------------------------------

@@ -94,11 +94,8 @@ def test_everything_still_collides_afterwards(world, boxes):
     assert height(new) == pytest.approx(0.05, abs=2e-3)
 
 
-@pytest.mark.parametrize("direct", [True, False])
-def test_an_arm_goes_on_from_where_it_was(world, told, direct):
+def test_an_arm_goes_on_from_where_it_was(world, told):
     arm = world.spawn(parse_urdf(ARM), "arm", Pose((0, 0, 0.3)), static=True)
-    if direct and not arm.call_directly():
-        pytest.skip("this PyBullet does not let itself be called directly")
     arm.set_limits(1, -1.0, 1.0)
     target = np.array([0.4, -0.3])
     for _ in range(500):
@@ -191,17 +188,14 @@ def test_a_drive_gives_no_more_than_there_is(world, told):
     assert told == []
 
 
-@pytest.mark.parametrize("direct", [False, True])
 @pytest.mark.parametrize("push", [
     lambda arm, effort: arm.add_effort(BOTH[:1], np.array([effort])),
     lambda arm, effort: arm.add_effort(BOTH[1:], np.array([effort])),
     lambda arm, effort: arm.apply_wrench("lower", (effort, 0.0, 0.0), (0.0, effort, 0.0))],
     ids=["shoulder", "elbow", "wrench"])
 @pytest.mark.parametrize("effort", [1e3, 1e5, 1e7, -1e7])
-def test_no_force_pushes_a_joint_through_its_limit(world, told, push, effort, direct):
+def test_no_force_pushes_a_joint_through_its_limit(world, told, push, effort):
     arm = world.spawn(parse_urdf(ARM), "arm", Pose((0.0, 0.0, 2.0)), static=True)
-    if direct:
-        arm.call_directly()
     turned = 0.0
     for tick in range(200):
         if tick < 20:

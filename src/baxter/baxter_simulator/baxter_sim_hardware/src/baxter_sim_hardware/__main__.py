@@ -3,12 +3,6 @@
 import numpy as np
 
 from baxter_sim_hardware.setpoint import SetPoints, any_beyond, approach, follow
-from bullet_sim import World
-from urdf_model import parse_urdf
-
-LINK = """<link name="%s"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>"""
-ROBOT = """<robot name="robot">%s%s<joint name="turn" type="revolute"><parent link="a"/><child link="b"/>
-  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>""" % (LINK % "a", LINK % "b")
 
 
 def main():
@@ -17,11 +11,6 @@ def main():
     points = SetPoints(1)
     follow(points.numbers, points.flags, np.zeros((1, 1)), 0, here, 1.0, 1.0)
     any_beyond(1.0, here, at_rest, here, 1.0)
-    world = World()
-    model = world.spawn(parse_urdf(ROBOT), "robot", static=True)
-    model.call_directly()
-    model.drive_position(model.index(["turn"]), here, bound, at_rest)
-    world.close()
 
 
 if __name__ == "__main__":

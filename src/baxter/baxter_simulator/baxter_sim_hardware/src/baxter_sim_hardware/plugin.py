@@ -59,7 +59,6 @@ class BaxterPlugin(ModelPlugin):
 
     def _build(self, context, before):
         model, robot = context.model, context.robot
-        model.call_directly()
         limbs = limbs_of(robot)
         names = tuple(name for limb in limbs for name in limb.joint_names)
         self._arm_index = model.index(names)
