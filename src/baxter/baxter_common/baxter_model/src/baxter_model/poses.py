@@ -3,8 +3,6 @@
 import functools
 import pathlib
 
-import yaml
-
 from .errors import PoseError
 from .names import JOINTS, mirrored, named
 
@@ -49,6 +47,8 @@ class Poses:
 
 @functools.cache
 def _file():
+    # Here: it takes longer to load than all of this package, and most programs ask for names alone.
+    import yaml
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     with open(pathlib.Path(__file__).with_name("poses.yaml")) as stream:
         return yaml.load(stream, loader)
