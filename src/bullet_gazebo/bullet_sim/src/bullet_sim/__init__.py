@@ -4,7 +4,6 @@
 One thread owns a World and all its Models; nothing here locks.
 """
 
-from . import quiet_pybullet  # noqa: F401  (first: it has an effect on the imports below)
 from .errors import BulletSimError
 from .model import Contact, Model
 from .pose import Pose

@@ -4,13 +4,13 @@
 import math
 
 import numpy as np
-import pybullet
 
 from urdf_model import Inertial, bounds
 from urdf_model.transforms import inverse
 
 from .errors import BulletSimError, within
 from .pose import Pose
+from .quiet_pybullet import pybullet
 
 BASE = -1  # PyBullet's index of the root link
 

@@ -6,12 +6,12 @@ copies, the inertia exactly as merged, and 10 ms where loading the same robot fr
 """
 
 import numpy as np
-import pybullet
 
 from urdf_model import Surface, bounds
 from urdf_model.transforms import quaternion_from_matrix, rigid
 
 from .pose import Pose
+from .quiet_pybullet import pybullet
 from .shapes import NO_SHAPE, principal_axes
 
 _JOINT_TYPES = {

@@ -6,13 +6,13 @@ import struct
 from typing import NamedTuple
 
 import numpy as np
-import pybullet
 
 from urdf_model import bounds
 
 from .body import BASE, Body
 from .errors import BulletSimError, within
 from .pose import Pose
+from .quiet_pybullet import pybullet
 
 # Bullet's joint motor reaches its target as velocity = gain * error / time step. With 20 solver iterations a gain of
 # 0.5 holds Baxter's arms within 5e-5 rad for 0.11 ms a step; the default of 0.1 sags by 2.4e-4 rad.

@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Import PyBullet without the line that it prints on every import, which every launch and every tool would show."""
+"""PyBullet, imported without the line that it prints each time, which every launch and every tool would show."""
 
+import importlib
 import os
 import sys
 
 
-def _import():
+def _imported():
     if "pybullet" in sys.modules:
-        return
+        return sys.modules["pybullet"]
     sys.stderr.flush()
     # The line is written by C to the descriptor, out of reach of sys.stderr.
     kept = os.dup(2)
     try:
         with open(os.devnull, "w") as nowhere:
             os.dup2(nowhere.fileno(), 2)
-            import pybullet  # noqa: F401
+            return importlib.import_module("pybullet")
     finally:
         os.dup2(kept, 2)
         os.close(kept)
 
 
-_import()
+#: The module: ``from bullet_sim.quiet_pybullet import pybullet``.
+pybullet = _imported()

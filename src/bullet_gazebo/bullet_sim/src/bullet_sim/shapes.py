@@ -10,7 +10,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import pybullet
 
 from urdf_model import Box, Cylinder, Mesh, Plane, Sphere, read_file
 from urdf_model.files import kind_of
@@ -20,6 +19,7 @@ from .errors import BulletSimError
 from .gathered import Part, gathered
 from .limited import MESHES, LimitError
 from .mesh_loading import MOST_BYTES, to_wavefront
+from .quiet_pybullet import pybullet
 
 NO_SHAPE = -1
 # Part of what cached files are named by: raise it when the same mesh would come out differently.

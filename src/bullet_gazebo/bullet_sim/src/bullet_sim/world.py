@@ -4,7 +4,6 @@
 import os
 
 import numpy as np
-import pybullet
 
 from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
@@ -12,6 +11,7 @@ from .builder import build
 from .errors import BulletSimError, within
 from .model import Contact, Model
 from .pose import Pose
+from .quiet_pybullet import pybullet
 from .shapes import MeshCache, MeshFiles, ShapeStore
 from .stand_ins import with_stand_ins
 from .state_watch import StateWatch

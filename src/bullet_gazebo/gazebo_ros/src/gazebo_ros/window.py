@@ -5,10 +5,7 @@ import sys
 
 import numpy as np
 
-from bullet_sim import quiet_pybullet  # noqa: F401  (before pybullet, which prints a line when it is imported)
-
-import pybullet  # isort: skip
-
+from bullet_sim.quiet_pybullet import pybullet
 from gazebo_ros.drawing import DrawingError
 from gazebo_ros.snapshot import SnapshotError
 from gazebo_ros.window_screen import WindowScreen

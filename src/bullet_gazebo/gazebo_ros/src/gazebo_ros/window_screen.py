@@ -5,8 +5,8 @@ import struct
 import tempfile
 
 import numpy as np
-import pybullet
 
+from bullet_sim.quiet_pybullet import pybullet
 from gazebo_ros.shared_picture import PictureReader
 
 # PyBullet takes a texture number by number: more columns than this would cost more time than a picture of the window.
