@@ -16,7 +16,7 @@ from bullet_sim import Pose, World
 from gazebo_ros.faults import Faults
 from gazebo_ros.loop_publisher import LoopPublisher, PublisherHub
 from gazebo_ros.mailbox import Queue, RequestBoard
-from gazebo_ros.model_plugin import PluginContext
+from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
 from gazebo_ros.publications import Publications
 from gazebo_ros.resources import ResourceFinder
 from gazebo_ros.simulation import HostedPlugin, Simulation
@@ -79,8 +79,9 @@ class Loop(BareWorld):
         writer = SnapshotWriter()
         stack.callback(writer.close)
         ros, log = _Ros(), SimpleNamespace(info=lambda text: None, warn=print, error=print)
-        context = PluginContext(self.world, self.model, self.robot, None, "/robot", "", log, ros,
-                                {"baxter_sim_hardware": {"enable": True}}, add_screen=lambda *_: None)
+        source, host = PluginSource(self.robot, namespace="/robot"), PluginHost(add_screen=lambda *_: None)
+        parameters = {"baxter_sim_hardware": {"enable": True}}
+        context = PluginContext(self.world, self.model, source, log, ros, parameters, host)
         self._queues = ros.queues
         self._simulation = Simulation(self.world, RequestBoard(), log, Faults(log), real_time_factor=0.0)
         publications = Publications(self._simulation, ros, writer, log, clock_rate=500.0)

@@ -9,7 +9,7 @@ from geometry_msgs.msg import Twist, Vector3
 from bullet_sim import Pose, World
 from controller_manager.testing import FakeLog, FakeRos
 from gazebo_plugins.drives import DiffDrive, PlanarMove, SkidSteer
-from gazebo_ros.model_plugin import PluginContext, PluginError
+from gazebo_ros.model_plugin import PluginContext, PluginError, PluginSource
 from gazebo_ros.urdf_extras import plugins
 from urdf_model import parse_urdf
 
@@ -45,7 +45,8 @@ class Vehicle:
         robot = parse_urdf(text)
         self.model = self.world.spawn(robot, "r", Pose((0, 0, 0.1 if wheels else 0.5)))
         self.ros, self.log = FakeRos(), FakeLog()
-        context = PluginContext(self.world, self.model, robot, plugins(robot)[0], "/ns", text, self.log, self.ros, {})
+        source = PluginSource(robot, plugins(robot)[0], "/ns", text)
+        context = PluginContext(self.world, self.model, source, self.log, self.ros, {})
         self.plugin = plugin_class(context)
 
     def command(self, x=0.0, turn=0.0, y=0.0):

@@ -6,6 +6,8 @@ things other threads touch are the mailboxes and queues that the context hands o
 and services are registered with the ROS master by a thread of their own, messages are sent without waiting.
 """
 import contextlib
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -95,6 +97,26 @@ class ModelPlugin:
         return False
 
 
+class PluginSource(NamedTuple):
+    """Where in which description a plugin stands; the fields are attributes of :class:`PluginContext`, which says what
+    they are."""
+
+    robot: object = None
+    element: object = None
+    namespace: str = ""
+    urdf_xml: str = ""
+
+
+class PluginHost(NamedTuple):
+    """What :meth:`PluginContext.screen` and :meth:`PluginContext.plugins` call."""
+
+    add_screen: Callable = None
+    plugins: Callable = tuple
+
+
+_NO_HOST = PluginHost()
+
+
 class PluginContext:
     """What one plugin of one model is given.
 
@@ -114,22 +136,18 @@ class PluginContext:
         ``info``, ``warn``, ``error`` and ``*_throttle(period_s, text)``; never blocks the loop.
     """
 
-    def __init__(self, world, model, robot, element, namespace, urdf_xml, log, ros, parameters,
-                 add_screen=None, plugins=tuple):
-        """``ros`` makes the communication objects (see :mod:`gazebo_ros.ros_objects`); ``parameters`` is the tree of
-        the parameter server at spawn time; ``add_screen``, ``plugins``: what :meth:`screen` and :meth:`plugins` call.
+    def __init__(self, world, model, source, log, ros, parameters, host=_NO_HOST):
+        """``ros`` makes the communication objects, see :mod:`gazebo_ros.ros_objects`; ``parameters`` is the tree of the
+        parameter server at spawn time. ``source``: :class:`PluginSource`; ``host``: :class:`PluginHost`.
         """
         self.world = world
         self.model = model
-        self.robot = robot
-        self.element = element
-        self.namespace = namespace
-        self.urdf_xml = urdf_xml
+        self.robot, self.element, self.namespace, self.urdf_xml = source
         self.log = log
+        self._source = source
         self._ros = ros
         self._parameters = parameters
-        self._add_screen = add_screen
-        self._plugins = plugins
+        self._host = host
         self._opened = []  # of (what it is: kind, name, type ..., the object)
         self._kept = []  # the same, of the plugin before; see `begin_anew`
         self._queues, self._noted = [], set()  # of the queues, the numbers of those that something came into
@@ -200,12 +218,11 @@ class PluginContext:
 
     def branch(self):
         """A context for a part of the plugin that opens topics and services, and closes them, on its own."""
-        return PluginContext(self.world, self.model, self.robot, self.element, self.namespace, self.urdf_xml, self.log,
-                             self._ros, self._parameters, self._add_screen, self._plugins)
+        return PluginContext(self.world, self.model, self._source, self.log, self._ros, self._parameters, self._host)
 
     def plugins(self):
         """Loop thread: the :class:`ModelPlugin` objects that the model has now, in the order of its description."""
-        return tuple(self._plugins())
+        return tuple(self._host.plugins())
 
     def served(self):
         """Absolute names of the services that the simulator serves now, this model's and all others: a list."""
@@ -227,7 +244,7 @@ class PluginContext:
         :class:`gazebo_ros.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """
         return self._opening(("screen", link, tuple(size_m), tuple(pixels)),
-                             lambda: self._add_screen(link, np.asarray(place, dtype=float), size_m, pixels))
+                             lambda: self._host.add_screen(link, np.asarray(place, dtype=float), size_m, pixels))
 
     def param(self, name, default=None):
         """Value of a ROS parameter as it was when the model was spawned; relative names as in :meth:`resolve`."""

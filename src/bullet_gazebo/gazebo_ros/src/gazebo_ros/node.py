@@ -31,7 +31,7 @@ from gazebo_ros.resources import ResourceFinder, model_folders
 from gazebo_ros.ros_objects import RosObjects
 from gazebo_ros.simulation import Simulation
 from gazebo_ros.snapshot import SnapshotError
-from gazebo_ros.spawning import Spawner
+from gazebo_ros.spawning import Library, Spawner
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
 from gazebo_ros.world_lights import WorldLights
 from lab_environment.single_instance import refusal, running_instance
@@ -138,7 +138,8 @@ def _build(log, cleanup, line):
             log.error_throttle(60.0, str(error))
         publications.write_snapshot()
 
-    spawner = Spawner(simulation, table, ros, finder, folders, log, on_change=tell_viewers, folder=writer.folder)
+    library = Library(table, finder, folders)
+    spawner = Spawner(simulation, library, ros, log, on_change=tell_viewers, folder=writer.folder)
     services = GazeboServices(simulation, spawner, lights, ros, log)
     spawner.spawn_world(description.models)
     tell_viewers()

@@ -52,8 +52,7 @@ class _Advance:
 class Simulation:
     """Runs a ``bullet_sim.World`` and its model plugins, tick by tick."""
 
-    def __init__(self, world, board, log, faults, real_time_factor=1.0, paused=False, deliveries=dict,
-                 clock=time.monotonic):
+    def __init__(self, world, board, log, faults, real_time_factor=1.0, paused=False, deliveries=dict):
         """Ready to :meth:`run`.
 
         ``board``: :class:`gazebo_ros.mailbox.RequestBoard`; ``faults``: :class:`gazebo_ros.faults.Faults`.
@@ -71,7 +70,6 @@ class Simulation:
         self._log = log
         self._faults = faults
         self._deliveries = deliveries
-        self._clock = clock
         self._step_s = world.time_step_s
         self._step_ns = round(world.time_step_s * 1e9)
         self._pacer = Pacer(self._step_s, real_time_factor)
@@ -163,7 +161,7 @@ class Simulation:
         if unheard:
             raise AdvanceRefused("nothing in this world listens to %s; it listens to %s"
                                  % (", ".join(unheard), ", ".join(sorted(heard)) or "no topic"))
-        self._advance = _Advance(ticks, list(topics), timeout_s, self._clock() + timeout_s)
+        self._advance = _Advance(ticks, list(topics), timeout_s, time.monotonic() + timeout_s)
         return self._advance.future
 
     def reset(self, time_too):
@@ -214,7 +212,7 @@ class Simulation:
             counts = self._deliveries()
             advance.awaited = [topic for topic in advance.awaited
                                if counts.get(topic, 0) <= self._delivered_before.get(topic, 0)]
-            if advance.awaited and self._clock() > advance.give_up_at:
+            if advance.awaited and time.monotonic() > advance.give_up_at:
                 self._end_advance(AdvanceRefused("no message within %g s on %s"
                                                  % (advance.timeout_s, ", ".join(advance.awaited))))
             elif advance.awaited:

@@ -6,7 +6,9 @@ the bodies.
 """
 import gc
 import itertools
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from lxml import etree
@@ -17,11 +19,13 @@ from bullet_sim.world import is_fixed
 from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
 from gazebo_ros.faults import SURVIVED, described
-from gazebo_ros.model_plugin import PluginContext, PluginError
+from gazebo_ros.model_plugin import PluginContext, PluginError, PluginHost, PluginSource
+from gazebo_ros.plugin_table import PluginTable
+from gazebo_ros.resources import ResourceFinder
 from gazebo_ros.shared_picture import NoPicture, PictureWriter
 from gazebo_ros.simulation import HostedPlugin
 from gazebo_ros.snapshot import SnapshotError
-from sdf_model import SdfError, parse_sdf_model
+from sdf_model import ModelFolders, SdfError, parse_sdf_model
 from urdf_model import Mesh, OutOfBounds, Plane, UrdfError, bounds, drawing_urdf, merge_fixed, parse_urdf
 
 
@@ -29,43 +33,53 @@ class SpawnRefused(Exception):
     """The model cannot be made; the text says what was found and what would be right."""
 
 
+@dataclass(eq=False)
 class Prepared:
-    """A description that the loop can turn into a model. ``drawing``: URDF text for viewers, or None for a floor."""
+    """A description that the loop can turn into a model."""
 
-    #: Where the model stands in the frame it is spawned in (4x4), which an SDF may say itself. None: there.
-    origin = None
+    name: str
+    #: The description as it came; :mod:`urdf_model`'s reading of it; the same with its fixed links merged.
+    xml: str
+    robot: object
+    merged: object
+    #: URDF text for viewers, or None for a floor.
+    drawing: str | None
+    #: Joint name to where it starts [rad, m].
+    start: dict
+    #: (class, element, namespace) of each plugin; what viewers are told of the sensors that need pictures.
+    plugins: list
+    sensors: list
+    #: The tree of the parameter server, {} where no plugin needs it.
+    parameters: dict
+    #: What else ``World.spawn`` is told.
+    options: dict
     #: What stands in for meshes that cannot be had, in one line; "" where nothing does.
-    mended = ""
+    mended: str
+    #: Where the model stands in the frame it is spawned in (4x4), which an SDF may say itself. None: there.
+    origin: object = None
 
-    def __init__(self, name, xml, drawing, merged, robot, namespace, start, plugins, sensors, parameters, options):
-        self.name = name
-        self.merged = merged
-        self.xml = xml
-        self.drawing = drawing
-        self.robot = robot
-        self.namespace = namespace
-        self.start = start
-        self.plugins = plugins
-        self.sensors = sensors
-        self.parameters = parameters
-        self.options = options
+
+class Library(NamedTuple):
+    """Where a :class:`Spawner` looks things up: plugin classes, files, models of SDF."""
+
+    plugins: PluginTable
+    files: ResourceFinder
+    models: ModelFolders
 
 
 class Spawner:
     """Makes models and their plugins, and keeps the list that viewers are told."""
 
-    def __init__(self, simulation, table, ros, finder, model_folders, log, on_change, folder=None):
-        """``table``: :class:`PluginTable`; ``finder``: :class:`ResourceFinder`; ``on_change()``: models changed.
+    def __init__(self, simulation, library, ros, log, on_change, folder=None):
+        """``library``: :class:`Library`; ``on_change()``: models changed.
 
-        ``model_folders``: ``sdf_model.ModelFolders``. ``folder``: where viewers find the pictures of screens.
+        ``folder``: where viewers find the pictures of screens.
         """
         self._simulation = simulation
-        self._table = table
+        self._library = library
         self._ros = ros
-        self._finder = finder
         self._log = log
         self._on_change = on_change
-        self.model_folders = model_folders
         self._mesh_files = simulation.world.mesh_files
         #: What viewers draw of the models that were spawned here: {model name: URDF text, or None for a floor}.
         self.drawings = {}
@@ -99,7 +113,7 @@ class Spawner:
         """Any thread but the loop's: read an SDF with one model. Raises :class:`SpawnRefused`."""
         self._check_name(name)
         try:
-            found = parse_sdf_model(xml, "the description of '%s'" % name, self.model_folders)
+            found = parse_sdf_model(xml, "the description of '%s'" % name, self._library.models)
         except SdfError as error:
             raise SpawnRefused(str(error)) from error
         if found.warning:
@@ -122,7 +136,7 @@ class Spawner:
         for warning in robot.warnings:
             self._log.warn(warning)
         # Reads every mesh, so that the loop finds it in the form that loads quickly.
-        self._finder.forget_missing()
+        self._library.files.forget_missing()
         robot, mended = with_stand_ins(robot, self._mesh_files)
         if mended:
             self._log.warn("model '%s': %s (are the files there, and the packages in ROS_PACKAGE_PATH?)"
@@ -135,10 +149,8 @@ class Spawner:
         for link in _that_take_time(merged):
             self._mesh_files.parts(merged.links[link].collisions, stands_fast and link == merged.root,
                                    options.get("mesh_cuts"))
-        prepared = Prepared(name, xml, drawing, merged, robot, namespace, start, plugins, sensors,
-                            parameters() if plugins else {}, options)
-        prepared.mended = mended
-        return prepared
+        return Prepared(name=name, xml=xml, robot=robot, merged=merged, drawing=drawing, start=start, plugins=plugins,
+                        sensors=sensors, parameters=parameters() if plugins else {}, options=options, mended=mended)
 
     def make_shapes(self, prepared):
         """Any thread but the loop's, once that runs: have the loop make what takes long of a model, one at a turn.
@@ -217,10 +229,10 @@ class Spawner:
         label = element.get("filename")
         # By name: an earlier plugin may have replaced the model by a fixed one.
         model = simulation.world.models[model_name]
-        context = PluginContext(simulation.world, model, prepared.robot, element, namespace, prepared.xml, self._log,
-                                self._ros, prepared.parameters,
-                                lambda *screen: self._add_screen(prepared, *screen),
-                                lambda: [h.plugin for h in simulation.plugins if h.model_name == model_name])
+        host = PluginHost(lambda *screen: self._add_screen(prepared, *screen),
+                          lambda: [h.plugin for h in simulation.plugins if h.model_name == model_name])
+        context = PluginContext(simulation.world, model, PluginSource(prepared.robot, element, namespace, prepared.xml),
+                                self._log, self._ros, prepared.parameters, host)
         try:
             plugin = plugin_class(context)
         except PluginError as error:
@@ -254,10 +266,10 @@ class Spawner:
         found, sensors, options = [], [], {}
         for element in (*urdf_extras.plugins(robot), *urdf_extras.sensor_plugins(robot, self._log.warn)):
             filename = element.get("filename") or ""
-            plugin_class = self._table.find(filename)
+            plugin_class = self._library.plugins.find(filename)
             if plugin_class is None:
                 self._log.warn("model plugin '%s' is not known here and is left out; known plugins: %s"
-                               % (filename, ", ".join(self._table.known)))
+                               % (filename, ", ".join(self._library.plugins.known)))
                 continue
             namespace = urdf_extras.namespace_of(element, spawn_namespace)
             if issubclass(plugin_class, DrawnSensor):

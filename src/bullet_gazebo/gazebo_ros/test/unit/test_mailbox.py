@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue, RequestBoard
-from gazebo_ros.model_plugin import PluginContext
+from gazebo_ros.model_plugin import PluginContext, PluginSource
 from lab_testing.waiting import wait_until
 
 
@@ -38,7 +38,7 @@ def test_a_plugin_is_told_once_which_of_its_queues_have_mail():
         return queues.setdefault(topic, Queue(depth, notice))
 
     ros = SimpleNamespace(queue=make)
-    context = PluginContext(None, None, None, None, "/robot", "", None, ros, {})
+    context = PluginContext(None, None, PluginSource(namespace="/robot"), None, ros, {})
     first, second = context.queue("first", None, 10), context.queue("second", None, 10)
     assert not context.mail()
     second.put("a")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError
+from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError, PluginSource
 from gazebo_ros.plugin_table import PluginTable
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "model_plugins.yaml"
@@ -61,7 +61,7 @@ def test_our_own_table_is_well_formed():
 
 def test_names_in_a_context_are_relative_to_its_namespace():
     parameters = {"robot": {"rate": 50.0}, "settings": {"enable": True}}
-    context = PluginContext(None, None, None, None, "/robot", "", None, None, parameters)
+    context = PluginContext(None, None, PluginSource(namespace="/robot"), None, None, parameters)
     assert context.resolve("joint_states") == "/robot/joint_states"
     assert context.resolve("/tf") == "/tf"
     assert context.param("rate") == 50.0

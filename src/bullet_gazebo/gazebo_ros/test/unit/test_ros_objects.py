@@ -18,7 +18,7 @@ from gazebo_ros.faults import Faults
 from gazebo_ros.loop_publisher import PublisherHub
 from gazebo_ros.loop_subscriber import InletHub
 from gazebo_ros.mailbox import RequestBoard
-from gazebo_ros.model_plugin import ModelPlugin, PluginContext
+from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginHost, PluginSource
 from gazebo_ros.ros_objects import RosObjects, _read_in_loop
 from lab_testing.waiting import wait_until
 
@@ -291,7 +291,8 @@ def test_a_message_that_a_handler_cannot_digest_is_counted_under_its_topic(scene
 
 def test_a_plugin_that_begins_anew_keeps_its_topics_and_services(scene_of_faults, registrations, services):
     ros = scene_of_faults.ros
-    context = PluginContext(None, None, None, None, "/robot", "", None, ros, {}, add_screen=lambda *_: object())
+    context = PluginContext(None, None, PluginSource(namespace="/robot"), None, ros, {},
+                            PluginHost(add_screen=lambda *_: object()))
 
     def open_all(answer):
         return (context.publisher("out", String), context.publisher("other", String, latch=True),

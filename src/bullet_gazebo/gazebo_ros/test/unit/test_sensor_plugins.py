@@ -10,7 +10,7 @@ from lxml import etree
 from bullet_sim import Pose, World
 from gazebo_ros import sensor_plugins
 from gazebo_ros.drawn_sensor import DrawnSensor
-from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError
+from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError, PluginSource
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.ray_pattern import RAYS_PER_TICK, RayPattern, RayPatternError
 from gazebo_ros.urdf_extras import plugins
@@ -58,7 +58,7 @@ class Lab:
         self.model = self.world.spawn(robot, "it", pose, static=static)
         element = (plugins(robot) + found_in(robot, warn=pytest.fail))[0]
         self.ros = Ros()
-        context = PluginContext(self.world, self.model, robot, element, "/ns", urdf, None, self.ros, {})
+        context = PluginContext(self.world, self.model, PluginSource(robot, element, "/ns", urdf), None, self.ros, {})
         try:
             self.plugin = plugin_class(context)
         except PluginError:

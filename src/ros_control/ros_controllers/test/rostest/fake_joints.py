@@ -24,7 +24,7 @@ from gazebo_ros.loop_log import LoopLog
 from gazebo_ros.loop_publisher import PublisherHub
 from gazebo_ros.loop_subscriber import InletHub
 from gazebo_ros.mailbox import RequestBoard
-from gazebo_ros.model_plugin import PluginContext
+from gazebo_ros.model_plugin import PluginContext, PluginSource
 from gazebo_ros.pacing import Pacer
 from gazebo_ros.ros_objects import RosObjects
 from urdf_model import parse_urdf
@@ -59,7 +59,7 @@ def main():
     log = LoopLog({"info": rospy.loginfo, "warn": rospy.logwarn, "error": rospy.logerr})
     hub, inlets, board = PublisherHub(), InletHub(), RequestBoard()
     ros = RosObjects(hub, inlets, board, log, Faults(log))
-    context = PluginContext(None, None, robot, None, "/robot", text, log, ros, {})
+    context = PluginContext(None, None, PluginSource(robot, None, "/robot", text), log, ros, {})
     pushed = rospy.get_param("/robot/effort_joints", [])
     hardware = FakeHardware({joint.name: (EFFORT if joint.name in pushed else POSITION,)
                              for joint in robot.movable_joints()})
