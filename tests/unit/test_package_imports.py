@@ -1,14 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who imports whom: only what package.xml names, and never upwards, so that no two packages need each other."""
+"""Who imports whom: only what package.xml names, and never upwards, so that no two packages need each other.
+
+Of packages outside of the workspace those of ROS and of Debian count; pip's are in requirements.txt.
+"""
 
 import ast
 import re
+from functools import cache
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 from workspace_tree import ROOT, is_in_tests, is_python, own_files, packages
 
-PACKAGES = packages()
+PACKAGES = {**packages(), "lab_testing": Path("tests/lab_testing"), "workspace_tests": Path("tests")}
+#: Modules that Debian's packages bring under another name: what a manifest calls them.
+RENAMED = {"PyKDL": "python3-pykdl", "PyQt5": "python3-pyqt5", "cv2": "python3-opencv", "lxml": "python3-lxml",
+           "numpy": "python3-numpy", "yaml": "python3-yaml", "hypothesis": "python3-hypothesis",
+           "rospkg": "python3-rospkg"}
+SHARES = (Path("/usr/share"), Path("/opt/ros/noetic/share"))
 #: Students' programs, which run in the environment of a whole lab.
 NO_PARTS = ("src/rf_labs/rf_checks/exercises/", "src/rf_labs/rf_checks/test/wrong/")
 
@@ -26,7 +36,7 @@ def imported(text):
 
 def owners():
     """Python package to the package of the workspace that brings it."""
-    found = {name: name for name in PACKAGES}
+    found = {**RENAMED, **{name: name for name in PACKAGES}}
     for name, folder in PACKAGES.items():
         found |= {module.parent.name: name for module in (ROOT / folder / "src").glob("*/__init__.py")}
     return found
@@ -39,8 +49,14 @@ def named(package):
     return needed, {tag.text.strip() for tag in root if tag.tag == "test_depend"}
 
 
+@cache
+def of_ros(module):
+    """The installed ROS package that brings a module, or None."""
+    return module if any((share / module / "package.xml").is_file() for share in SHARES) else None
+
+
 def uses():
-    """(package, file, package that the file imports) for each pair of packages of the workspace."""
+    """(package, file, package that the file imports) for each pair of packages, the second one anybody's."""
     owner = owners()
     folders = sorted(((str(folder) + "/", name) for name, folder in PACKAGES.items()), reverse=True)
     for file in own_files():
@@ -48,8 +64,9 @@ def uses():
         if package is None or file.startswith(NO_PARTS) or not is_python(file):
             continue
         for module in sorted(imported((ROOT / file).read_text(encoding="utf-8"))):
-            if owner.get(module, package) != package:
-                yield package, file, owner[module]
+            needed = owner.get(module) or of_ros(module)
+            if needed not in (None, package):
+                yield package, file, needed
 
 
 USES = tuple(uses())
@@ -85,7 +102,7 @@ def circle(edges):
 def test_no_two_packages_need_each_other():
     edges = {}
     for package, file, needed in USES:
-        if not is_in_tests(file):
+        if not is_in_tests(file) and needed in PACKAGES:
             edges.setdefault(package, set()).add(needed)
     assert circle(edges) == []
 
@@ -93,7 +110,7 @@ def test_no_two_packages_need_each_other():
 def test_a_package_below_imports_none_above():
     """What stands at the bottom of the house, and what must not be needed for a physical robot."""
     product = {(package, needed) for package, file, needed in USES if not is_in_tests(file)}
-    assert {needed for package, needed in product if package == "baxter_model"} <= {"urdf_model"}
+    assert {needed for package, needed in product if package == "baxter_model"} & set(PACKAGES) <= {"urdf_model"}
     simulator = {"baxter_sim_hardware", "gazebo_ros_control", "baxter_gazebo"}
     robot_side = {"baxter_model", "baxter_interface", "baxter_tools", "baxter_examples", "baxter_sim_kinematics"}
     assert {pair for pair in product if pair[0] in robot_side and pair[1] in simulator} == set()

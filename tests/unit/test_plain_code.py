@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""No module is imported for a side effect, and no function takes a crowd of parameters."""
+
+import ast
+from pathlib import Path
+
+from workspace_tree import ROOT, is_in_tests, is_python, own_files
+
+MOST_PARAMETERS = 7
+# Functions with more parameters than that. A list to be shortened: what is mended leaves it, nothing new comes in.
+CROWDED = {
+    "arm_motion.py begin", "batch.py solve_batch", "body.py __init__", "builder.py build", "descent.py _fill_drift",
+    "descent.py nearest", "descent.py walk", "direct.py _drive_position", "errors.py __init__", "ik.py _search",
+    "ik.py solve", "ik.py solve_all", "model.py __init__", "motion.py place_joints", "search.py __init__",
+    "searching.py gather", "searching.py search", "searching.py search_many", "world.py __init__",
+}
+
+
+def product_code():
+    """(file, text) of every Python file that is no test."""
+    return [(name, (ROOT / name).read_text(encoding="utf-8")) for name in own_files()
+            if is_python(name) and not is_in_tests(name)]
+
+
+def test_no_module_is_imported_for_its_side_effects():
+    """ruff finds imports that nobody uses; nobody may silence it."""
+    assert [name for name, text in product_code() if "noqa: F401" in text] == []
+
+
+def crowded(name, text):
+    """"file function" of functions with more than MOST_PARAMETERS parameters, self not counted."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            names = [argument.arg for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
+            if len(names) - (names[:1] in (["self"], ["cls"])) > MOST_PARAMETERS:
+                yield f"{Path(name).name} {node.name}"
+
+
+def test_functions_take_few_parameters_or_named_groups_of_them():
+    found = {one for name, text in product_code() for one in crowded(name, text)}
+    assert found - CROWDED == set(), "group these parameters"
+    assert CROWDED - found == set(), "these are mended: take them off the list"
+
+
+def test_a_crowd_is_noticed():
+    text = "def many(a, b, c, d, e, f, g, *, h): pass\nclass A:\n    def few(self, a, b, c, d, e, f, g): 0"
+    assert list(crowded("src/a.py", text)) == ["a.py many"]
