@@ -4,8 +4,6 @@ import socket
 import threading
 
 import pytest
-
-pytest.importorskip("rospy")
 from rospy.impl.tcpros_base import TCPROSTransport, TCPROSTransportProtocol
 from rospy.impl.tcpros_pubsub import QueuedConnection
 
