@@ -18,7 +18,7 @@ from gazebo_ros.loop_log import LoopLog
 from gazebo_ros.loop_publisher import PublisherHub
 from gazebo_ros.loop_subscriber import InletHub
 from gazebo_ros.mailbox import RequestBoard
-from gazebo_ros.model_plugin import PluginContext
+from gazebo_ros.model_plugin import PluginContext, PluginSource
 
 TOPIC, SERVICE = "/topic", "/service"
 
@@ -82,7 +82,7 @@ class Real:
         self.log = LoopLog(dict.fromkeys(("info", "warn", "error"), self._lines.append))
         self._board, self._hub = RequestBoard(), PublisherHub()
         objects = ros_objects.RosObjects(self._hub, InletHub(), self._board, self.log, Faults(self.log))
-        self.context = PluginContext(None, None, None, None, "", "", self.log, objects, {})
+        self.context = PluginContext(None, None, PluginSource(), self.log, objects, {})
         self._objects = objects
 
     def _publisher(self, topic, msg_class, latch=False, queue_size=None):

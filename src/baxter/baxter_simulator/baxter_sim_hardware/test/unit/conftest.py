@@ -14,7 +14,7 @@ from baxter_model import JOINTS, SIDES, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
 from gazebo_ros.mailbox import Queue
-from gazebo_ros.model_plugin import PluginContext
+from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
 from gazebo_ros.resources import ResourceFinder
 from urdf_model import parse_urdf
 
@@ -113,8 +113,9 @@ class Lab:
         self.log = _Log()
         self.inboxes, self.outboxes, self.services = {}, {}, {}
         self.faults = []  # (place, error)
-        self.context = PluginContext(self.world, self.model, robot, element, NAMESPACE, "", self.log, _Ros(self),
-                                     {"baxter_sim_hardware": parameters or {}}, self._screen)
+        source = PluginSource(robot, element, NAMESPACE)
+        self.context = PluginContext(self.world, self.model, source, self.log, _Ros(self),
+                                     {"baxter_sim_hardware": parameters or {}}, PluginHost(self._screen))
         self.plugin = BaxterPlugin(self.context)
         self.effort_limit = self.model.max_effort[self.arm]
 
