@@ -92,11 +92,12 @@ class Still:
         self._reference = None
 
     def check(self, names, positions):
-        if self._reference is None:
+        reference = self._reference  # another thread may disarm at any time
+        if reference is None:
             return []
         found = []
         for name, position in zip(names, positions, strict=True):
-            moved = abs(position - self._reference.get(name, position))
+            moved = abs(position - reference.get(name, position))
             self.farthest = max(self.farthest, moved)
             if not moved <= self._tolerance:
                 found.append("%s moved by %.5f rad, though nothing that was sent may move it" % (name, moved))

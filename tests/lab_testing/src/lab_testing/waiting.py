@@ -9,6 +9,11 @@ POLL_S = 0.01
 STRETCH = float(os.environ.get("LAB_TEST_STRETCH", "1"))
 
 
+def stretched(seconds):
+    """``seconds`` for what waits by itself (rospy, subprocess): STRETCH times as long."""
+    return seconds * STRETCH
+
+
 def wait_until(condition, what="the condition", timeout_s=20.0, interval_s=POLL_S):
     """Ask ``condition()`` every ``interval_s`` [s] of wall time and return its first true answer.
 

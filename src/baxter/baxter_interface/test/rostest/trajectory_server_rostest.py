@@ -22,8 +22,9 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 
 from baxter_dataflow import wait_for
 from baxter_interface import Limb, RobotEnable
+from lab_testing.waiting import stretched
 
-DEADLINE_S = 30.0
+DEADLINE_S = stretched(30.0)
 HOME = [0.2, 0.5, 0.0, 0.5, -0.2, -0.1, 0.0]
 AWAY = [0.4, 0.3, 0.2, 0.7, 0.0, 0.1, 0.2]
 # As many messages of the robot's state, at 100 Hz, show that a server at 100 Hz commands nothing.

@@ -14,9 +14,9 @@ import rospy
 from control_msgs.msg import FollowJointTrajectoryAction
 from sensor_msgs.msg import JointState
 
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import stretched, wait_until
 
-TIMEOUT_S = 60.0
+TIMEOUT_S = stretched(60.0)
 
 
 def has_planning_server():

@@ -17,11 +17,11 @@ from controller_manager_msgs.srv import ListControllers
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import stretched, wait_until
 
 JOINTS = ["joint_%d" % number for number in range(1, 7)]
 ACTION = "/probot_anno/arm_joint_controller/follow_joint_trajectory"
-TIMEOUT_S = 60.0
+TIMEOUT_S = stretched(60.0)
 # All in one line, upwards: far from "home" in two joints, and the tip is known by hand.
 START = (0.0, 0.0, 1.5708, 0.0, 1.5708, 0.0)
 START_TIP_M = (0.0, 0.0, 0.487 + 0.22885535 + 0.055)

@@ -23,12 +23,12 @@ from controller_manager_msgs.srv import LoadController, SwitchController
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import stretched, wait_until
 
 JOINTS = ["shoulder", "elbow"]
 ACTION = "/robot/arm/follow_joint_trajectory"
-START_S = 60.0  # for the joints and their controller manager to come
-WAIT_S = 20.0
+START_S = stretched(60.0)  # for the joints and their controller manager to come
+WAIT_S = stretched(20.0)
 R = FollowJointTrajectoryResult
 
 
