@@ -18,7 +18,7 @@ from controller_manager_msgs.srv import (
     SwitchControllerRequest,
     UnloadController,
 )
-from expected import ENABLED, PRESSED, ExpectedControllers, ExpectedRobot
+from expected import DISABLED, ENABLED, PRESSED, ExpectedControllers, ExpectedRobot
 from gazebo_msgs.srv import DeleteModel, SpawnModel
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from hypothesis import errors as hypothesis_errors
@@ -34,7 +34,8 @@ from watch import STATES
 from baxter_model import JOINTS, SIDES
 
 # A state is published every 5 ticks, and a tick goes by before it is on its way.
-STOP = EmergencyStop(ticks=10, rest_ticks=100, rest_speed=0.05)
+REST_SPEED = 0.05  # slower counts as at rest [rad/s]
+STOP = EmergencyStop(ticks=10, rest_ticks=100, rest_speed=REST_SPEED)
 SETTLED_TICKS, WATCHED_TICKS, MOVE_TICKS = 250, 100, 1000
 ARRIVED = 0.02  # [rad]
 CLAIMS = {"joint_state_controller": (), "both": ("hip", "knee"), "hip": ("hip",), "trajectory": ("hip", "knee")}
@@ -91,10 +92,10 @@ class Machine(RuleBasedStateMachine):
 
     # -- start --------------------------------------------------------------------------------------------------------
 
-    @initialize()
-    def start(self):
+    @initialize(disabled=st.booleans())
+    def start(self, disabled):
         """Whatever the example before left behind is undone through the interface."""
-        self.step("start")
+        self.step("start", "disabled" if disabled else "enabled")
         robot = Robot(self.watch)
         self.lockstep.pause()
         robot.call("/robot/sim/press", Press, "estop", PressRequest.RELEASE, 0)
@@ -111,6 +112,9 @@ class Machine(RuleBasedStateMachine):
         self.reset("simulation")
         self.lockstep.send("/robot/set_super_reset", Empty(), 10)
         self.robot.reset()
+        if not disabled:
+            self.enable()
+            self.command_position("left", 0.3)
 
     # -- enable, stop -------------------------------------------------------------------------------------------------
 
@@ -125,6 +129,9 @@ class Machine(RuleBasedStateMachine):
         self.step("disable")
         self.lockstep.send("/robot/set_super_enable", Bool(False), 10)
         self.robot.disable()
+        if self.robot.state == DISABLED:
+            self.lockstep.advance(90)
+            self.is_at_rest("disabled")
         self.stays()
 
     @rule()
@@ -184,12 +191,17 @@ class Machine(RuleBasedStateMachine):
         self.command(side, mode, ["%s_s0" % side, "%s_s1" % side], [bad, 0.5], 20)
         self.stays(before)
 
-    @rule(side=SIDE)
-    def interrupt_motion(self, side):
-        """A velocity that is commanded, and a stop in the middle."""
-        self.step("a velocity, and a stop in it", side)
-        self.command(side, JointCommand.VELOCITY_MODE, ["%s_w0" % side], [1.0], 40)
-        self.stop()
+    @rule(side=SIDE, by_position=st.booleans(), how=st.sampled_from(("stop", "press", "disable")))
+    def interrupt_motion(self, side, by_position, how):
+        """A motion that is commanded, and its end in the middle."""
+        self.step("a motion, and an end of it", side, by_position, how)
+        name = "%s_w0" % side
+        if by_position:  # a position counts until it is reached, a velocity for 0.2 s
+            away = -1.5 if self.positions().get(name, 0.0) > 0.0 else 1.5
+            self.command(side, JointCommand.POSITION_MODE, [name], [away], 40)
+        else:
+            self.command(side, JointCommand.VELOCITY_MODE, [name], [1.0], 40)
+        getattr(self, how)()
 
     @rule(side=SIDE, command=st.sampled_from(("go", "grip", "release", "calibrate", "stop", "reboot", "xyzzy")),
           args=st.sampled_from(("", "{}", '{"position": 30.0}', '{"position": NaN}', "[" * 2000, '{"position": 1e9}')))
@@ -349,6 +361,10 @@ class Machine(RuleBasedStateMachine):
         found = STOP.check(100, self.lockstep.state().stopped, self.speeds())
         assert not found, found
         self.stays()
+
+    def is_at_rest(self, after):
+        fastest = max(map(abs, self.speeds()))
+        assert fastest < REST_SPEED, "a joint moves at %.4f rad/s 100 ticks after it was %s" % (fastest, after)
 
     def switch_service(self, names):
         start, stop = ([name] if name else [] for name in names)

@@ -13,7 +13,7 @@ from watch import Watch
 
 STILL_RAD = 0.001
 # Of a round. The first example of hypothesis is always the plainest there is: one and the same step, again and again.
-EXAMPLES, STEPS = 6, 15
+EXAMPLES, STEPS = 20, 25
 
 
 def run(options, journal):
@@ -24,8 +24,8 @@ def run(options, journal):
             return {"also": machine(lab, watch, options, journal), "simulated_s": watch.simulated_s}
 
 
-def machine(lab, watch, options, journal):
-    """The same with a lab that stands, and a Watch."""
+def machine(lab, watch, options, journal, examples=EXAMPLES, steps=STEPS):
+    """The same with a lab that stands, and a Watch. A round is of so many examples of at most so many steps."""
     lockstep = LockStep(watch)
     Machine.watch, Machine.lockstep = watch, lockstep
     Machine.journal_step = staticmethod(lambda text: journal.note(journal.sent, "step", "", text))
@@ -33,7 +33,8 @@ def machine(lab, watch, options, journal):
     while journal.sent - begin < options.messages and (options.until is None or time.monotonic() < options.until):
         first, Machine.first_error = journal.sent, None
         try:
-            run_state_machine_as_test(hypothesis.seed(seed)(Machine), settings=settings(min(STEPS, options.messages)))
+            run_state_machine_as_test(hypothesis.seed(seed)(Machine),
+                                      settings=settings(examples, min(steps, options.messages)))
         except Exception as error:  # whatever it is, it is what the round found
             error = Machine.first_error or error
             count = journal.sent - first
@@ -49,9 +50,9 @@ def machine(lab, watch, options, journal):
             "messages_read_and_checked": sum(watch.counts.values())}
 
 
-def settings(steps):
-    """Examples of at most that many steps. Shrinking would repeat steps on a lab that is broken by now; the journal
-    has what they were."""
+def settings(examples, steps):
+    """So many examples of at most that many steps. Shrinking would repeat steps on a lab that is broken by now; the
+    journal has what they were."""
     return hypothesis.settings(
-        max_examples=EXAMPLES, stateful_step_count=steps, deadline=None, database=None,
+        max_examples=examples, stateful_step_count=steps, deadline=None, database=None,
         phases=[hypothesis.Phase.generate], suppress_health_check=list(hypothesis.HealthCheck))

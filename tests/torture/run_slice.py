@@ -4,8 +4,10 @@ from lab import Lab
 from limits import arm_limits
 from robot import init_node
 from run_fuzz import STILL_RAD, fuzz
-from run_machine import STEPS, machine
+from run_machine import machine
 from watch import Watch
+
+EXAMPLES, STEPS = 6, 15
 
 
 def run(options, journal):
@@ -15,4 +17,5 @@ def run(options, journal):
         with Watch(lab, arm_limits(), STILL_RAD, options.seed) as watch:
             fuzzed = fuzz(lab, watch, options, journal)
             options.messages, watch.checks_limits = STEPS, True
-            return {"also": {**fuzzed, **machine(lab, watch, options, journal)}, "simulated_s": watch.simulated_s}
+            stepped = machine(lab, watch, options, journal, EXAMPLES, STEPS)
+            return {"also": {**fuzzed, **stepped}, "simulated_s": watch.simulated_s}
