@@ -8,6 +8,7 @@ Each prints "up" when it is at work.
 import hashlib
 import json
 import math
+import random
 import statistics
 import struct
 import sys
@@ -211,7 +212,7 @@ def hostile():
     spawn.wait_for_service(60)
     with tempfile.TemporaryDirectory() as folder:
         large, lie, bomb = (str(Path(folder) / name) for name in ("large.stl", "lie.stl", "bomb.dae"))
-        write_ball(large, 548)
+        write_ball(large, 548, radius=random.uniform(0.5, 1.5))  # no cache knows it
         write_ball(lie, 5, announced=2**32 - 1)
         write_entity_bomb(bomb)
         descriptions = {"600,000 triangles": OF_MESH % (large, large), "a header that lies": OF_MESH % (lie, lie),

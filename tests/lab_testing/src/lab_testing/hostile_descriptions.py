@@ -8,7 +8,7 @@ _COLLADA = """<?xml version="1.0"?><!DOCTYPE c [%s]>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><extra>&e8;</extra></COLLADA>"""
 
 
-def write_ball(path, across, announced=None):
+def write_ball(path, across, announced=None, radius=1.0):
     """Write a ball of 2 * ``across`` ** 2 triangles as a binary STL, whose header says ``announced`` where given."""
     u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, across + 1), np.linspace(0.01, 3.13, across + 1))
     points = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1).reshape(-1, 3)
@@ -16,7 +16,7 @@ def write_ball(path, across, announced=None):
     faces = np.concatenate([np.stack([i, i + 1, i + across + 1], 1),
                             np.stack([i + 1, i + across + 2, i + across + 1], 1)])
     records = np.zeros(len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
-    records["corners"] = points[faces]
+    records["corners"] = radius * points[faces]
     with open(path, "wb") as file:
         file.write(b"\0" * 80 + struct.pack("<I", len(faces) if announced is None else announced) + records.tobytes())
 
