@@ -23,7 +23,7 @@ def run(options, journal):
     with Lab(options.out, prefix=prefix("")) as lab:
         init_node()
         with Watch(lab, arm_limits(), STILL_RAD, options.seed) as watch:
-            fill(Path("/proc/%d/root/dev/shm" % lab.pid("/gazebo")))
+            fill(Path("/proc", str(lab.pid("/gazebo")), "root", "dev", "shm"))
             bear(lab, watch, options, journal, MINUTES if options.minutes is None else options.minutes)
             simulated_s = watch.simulated_s
     said = start_on_a_full_one(options)
