@@ -317,13 +317,9 @@ class Model(Body):
 
     def remove(self):
         """For World: take the body out of the physics."""
-        self.let_go()
         for gear in self._gears.values():
             pybullet.removeConstraint(gear, physicsClientId=self._client)
         pybullet.removeBody(self.body, physicsClientId=self._client)
-
-    def let_go(self):
-        """For World: the physics that holds the body is about to end."""
 
     def set_base_pose(self, pose):
         super().set_base_pose(pose)

@@ -302,8 +302,6 @@ class World:
     def close(self):
         """Give the physics client back. The world is of no use afterwards."""
         if self._client is not None:
-            for model in self.models.values():
-                model.let_go()
             pybullet.disconnect(physicsClientId=self._client)
             self._client = None
             self.models = {}
