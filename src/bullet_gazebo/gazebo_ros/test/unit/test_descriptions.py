@@ -4,12 +4,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from gazebo_ros import drawing, urdf_extras, world_file
 from gazebo_ros.spawning import is_floor
 from gazebo_ros.urdf_extras import ExtrasError
+from lab_testing.meshes import sphere
 from sdf_model import ModelFolders
 from urdf_model import parse_urdf
 
@@ -111,18 +111,6 @@ def test_wrong_values_are_named_with_their_line(tmp_path, content, text):
 def test_a_missing_world_says_where_it_was_looked_for(tmp_path):
     with pytest.raises(world_file.WorldFileError, match="nowhere.world.*%s" % tmp_path):
         world_file.find_world("nowhere.world", [tmp_path])
-
-
-def sphere(rings):
-    """Vertices (n, 3) and outward triangles of a unit sphere."""
-    angles = np.linspace(0.0, np.pi, rings + 1)
-    turns = np.linspace(0.0, 2.0 * np.pi, 2 * rings + 1)
-    grid = np.array([[np.sin(a) * np.cos(t), np.sin(a) * np.sin(t), np.cos(a)] for a in angles for t in turns])
-    width = len(turns)
-    faces = [f for i in range(rings) for j in range(width - 1)
-             for f in ((i * width + j, (i + 1) * width + j, (i + 1) * width + j + 1),
-                       (i * width + j, (i + 1) * width + j + 1, i * width + j + 1))]
-    return grid, np.array(faces)
 
 
 @pytest.mark.parametrize(("size_m", "least", "most"), [
