@@ -5,7 +5,7 @@
 by those who need them, so that `import baxter_model` stays cheap.
 """
 from .errors import ModelError, ModelMismatch, PoseError
-from .grippers import CUSTOM, ELECTRIC, NO_GRIPPER, SUCTION, GripperKind
+from .grippers import CUSTOM, ELECTRIC, SUCTION, GripperKind
 from .names import (
     BASE_FRAME,
     HEAD_JOINT,
@@ -24,7 +24,7 @@ from .names import (
 from .poses import Poses, clamp_to_limits, null_space_postures, poses
 
 __all__ = [
-    "BASE_FRAME", "CUSTOM", "ELECTRIC", "HEAD_JOINT", "JOINTS", "MIRROR_SIGNS", "NO_GRIPPER", "SIDES", "SUCTION",
+    "BASE_FRAME", "CUSTOM", "ELECTRIC", "HEAD_JOINT", "JOINTS", "MIRROR_SIGNS", "SIDES", "SUCTION",
     "GripperKind", "ModelError", "ModelMismatch", "PoseError", "Poses", "arm_angles", "clamp_to_limits",
     "finger_prefix", "is_part_of_arm", "joint_names", "mirrored", "named", "null_space_postures",
     "other_side", "poses", "tip_of",

@@ -16,11 +16,10 @@ class GripperKind(NamedTuple):
     parameters: dict
 
 
-NO_GRIPPER = GripperKind("none", 0, 0, {})
 # [%], [s]
 SUCTION = GripperKind("suction", 1, 65537, {"vacuum_sensor_threshold": 18.0, "blow_off_seconds": 0.4})
 # [%]
 ELECTRIC = GripperKind("electric", 2, 65538,
                        {"velocity": 50.0, "moving_force": 40.0, "holding_force": 30.0, "dead_zone": 5.0})
-# A tool that only its program knows.
+# A tool that only its program knows, or a bare arm: the robot does not tell them apart.
 CUSTOM = GripperKind("custom", 3, 131073, {})

@@ -100,12 +100,12 @@ def test_another_robot_is_no_baxter():
 
 
 def test_grippers_are_those_of_the_messages():
-    kinds = (baxter_model.NO_GRIPPER, baxter_model.SUCTION, baxter_model.ELECTRIC, baxter_model.CUSTOM)
+    kinds = (baxter_model.SUCTION, baxter_model.ELECTRIC, baxter_model.CUSTOM)
     assert [kind.ui_type for kind in kinds] == [
-        EndEffectorProperties.NO_GRIPPER, EndEffectorProperties.SUCTION_CUP_GRIPPER,
-        EndEffectorProperties.ELECTRIC_GRIPPER, EndEffectorProperties.PASSIVE_GRIPPER]
+        EndEffectorProperties.SUCTION_CUP_GRIPPER, EndEffectorProperties.ELECTRIC_GRIPPER,
+        EndEffectorProperties.PASSIVE_GRIPPER]
     # The ids of the robot's interface: what commands to a suction, electric, custom gripper carry.
-    assert [kind.id for kind in kinds] == [0, 65537, 65538, 131073]
+    assert [kind.id for kind in kinds] == [65537, 65538, 131073]
 
 
 def test_loads_without_ros():
