@@ -4,7 +4,7 @@ import copy
 
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 
-from baxter_model import ELECTRIC, NO_GRIPPER, SUCTION
+from baxter_model import CUSTOM, ELECTRIC, SUCTION
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.gripper import ElectricGripper
 from baxter_sim_hardware.gripper_commands import CustomGripper
@@ -23,7 +23,8 @@ _PROPERTIES = {
         **_MAKER),
     SuctionGripper: EndEffectorProperties(
         id=SUCTION.id, ui_type=SUCTION.ui_type, controls_grip=True, senses_grip=True, **_MAKER),
-    CustomGripper: EndEffectorProperties(ui_type=NO_GRIPPER.ui_type),
+    # A bare arm: the robot takes whatever may hang there for a tool that is passive.
+    CustomGripper: EndEffectorProperties(id=CUSTOM.id, ui_type=CUSTOM.ui_type, **_MAKER),
 }
 _FLAGS = ("enabled", "calibrated", "ready", "moving", "gripping", "missed", "error", "reverse")
 _UNKNOWN = dict.fromkeys(_FLAGS, EndEffectorState.STATE_UNKNOWN)
@@ -80,8 +81,8 @@ class GripperTopics:
 
     def _command(self, side, msg, time_s):
         gripper = self._hands[side].gripper
-        if self._properties[side].ui_type == NO_GRIPPER.ui_type:
-            raise CommandRefused("the %s arm carries no gripper" % side)
+        if self._properties[side] is _PROPERTIES[CustomGripper] and msg.command not in gripper.COMMANDS:
+            raise CommandRefused("gripper command '%s': the %s arm carries no gripper" % (msg.command[:40], side))
         gripper.take(msg.command, msg.args, msg.sender, msg.sequence, self._state.enabled)
 
     def _set_properties(self, side, msg, time_s):

@@ -44,7 +44,7 @@ TOPICS = (
           "position and force [%], moving, gripping, missed; sender and sequence of the last command; `state` of a "
           "suction gripper is a JSON object: `vacuum sensor` (0 to 255), `vacuum`, `blowing`, `sucking`"),
     Topic("gripper_properties", "end_effector/{limb}_gripper/properties", "baxter_core_msgs/EndEffectorProperties",
-          STATE_RATE_HZ, "`ui_type` 1 suction, 2 electric, 0 where the arm carries no gripper; else what "
+          STATE_RATE_HZ, "`ui_type` 1 suction, 2 electric, 3 where the arm carries no gripper; else what "
           "`set_properties` said"),
     Topic("started", "sim/started", "std_msgs/Empty", LATCHED,
           "the robot stands, publishes and listens"),

@@ -100,6 +100,8 @@ class StatusTopics:
     # -- in
 
     def _feed_forward(self, side, msg, time_s):
+        if not msg.velocities and len(msg.positions) == len(self._baxter.arms.joints_of(side)):
+            return  # a set-point alone: nothing to feed forward
         self._baxter.arms.feed_forward(side, np.array(msg.velocities), time_s)
 
     def _twist(self, side, msg, time_s):

@@ -267,6 +267,16 @@ def test_feed_forward_of_the_time_before_a_reset_moves_nothing(lab):
     assert np.abs(lab.position - start).max() < 1e-3
 
 
+def test_positions_alone_feed_nothing_forward(lab):
+    lab.enable()
+    lab.run(0.1)
+    start, lines = lab.position, len(lab.log.lines)
+    lab.send("limb/left/inverse_dynamics_command", JointTrajectoryPoint(positions=[1.0] * 7))
+    lab.run(0.1)
+    assert np.abs(lab.position - start).max() < 1e-4
+    assert lab.log.lines[lines:] == []
+
+
 @pytest.mark.parametrize("velocities", [[0.1] * 6, [float("nan")] * 7, []])
 def test_senseless_feed_forward_is_refused(lab, velocities):
     lab.send("limb/left/inverse_dynamics_command", JointTrajectoryPoint(velocities=velocities))

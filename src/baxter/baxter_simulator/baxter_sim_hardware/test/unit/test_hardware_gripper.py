@@ -283,12 +283,15 @@ def move_left_arm(lab, change, seconds):
     lab.run(0.5)
 
 
-def test_an_arm_without_a_gripper_says_so(make_lab, bare_robot):
+def test_a_bare_arm_is_passive(make_lab, bare_robot):
     lab = make_lab(model=bare_robot)
     lab.run(0.1)
     for side in SIDES:
-        assert lab.last("end_effector/%s_gripper/properties" % side).ui_type == 0
-        assert state(lab, side).gripping == 2
+        properties = lab.last("end_effector/%s_gripper/properties" % side)
+        assert (properties.id, properties.ui_type) == (131073, 3)
+        assert (state(lab, side).id, state(lab, side).gripping) == (131073, 2)
+    configured = tell(lab, "configure", "{}", "me_configure", 3)
+    assert (configured.command_sender, configured.command_sequence) == ("me_configure", 3)
     tell(lab, "go", '{"position": 0}')
     assert "the left arm carries no gripper" in lab.log.lines[-1]
 
@@ -299,7 +302,7 @@ def test_a_tool_that_only_the_client_knows(make_lab, bare_robot):
     lab.send("end_effector/left_gripper/rsdk/set_properties", pen)
     lab.run(0.02)
     assert lab.last("end_effector/left_gripper/properties").product == "pen"
-    assert lab.last("end_effector/right_gripper/properties").ui_type == 0
+    assert lab.last("end_effector/right_gripper/properties").product == "SDK End Effector"
     assert (state(lab).id, state(lab).ready) == (131073, 2)
     lab.send("end_effector/left_gripper/rsdk/set_state", EndEffectorState(id=131073, ready=1, position=30.0))
     told = tell(lab, "configure", "{}", "me_configure", 5)
