@@ -14,10 +14,10 @@ from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndE
 from std_srvs.srv import Trigger, TriggerResponse
 
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.gripper import OPEN, ElectricGripper
-from baxter_sim_hardware.gripper_topics import GripperTopics
-from baxter_sim_hardware.hands import NoHand
-from baxter_sim_hardware.suction import SuctionGripper
+from baxter_sim_hardware.grippers.electric import OPEN, ElectricGripper
+from baxter_sim_hardware.grippers.hands import NoHand
+from baxter_sim_hardware.grippers.suction import SuctionGripper
+from baxter_sim_hardware.topics.grippers import GripperTopics
 
 SIDE = "left"
 RATE_HZ = 100.0

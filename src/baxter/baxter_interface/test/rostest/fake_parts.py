@@ -24,8 +24,8 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger, TriggerResponse
 
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.head_topics import HeadTopics
-from baxter_sim_hardware.panel_topics import PanelTopics
+from baxter_sim_hardware.topics.head import HeadTopics
+from baxter_sim_hardware.topics.panel import PanelTopics
 
 RATE_HZ = 100.0
 KNOBS = {

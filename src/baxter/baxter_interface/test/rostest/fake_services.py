@@ -23,7 +23,7 @@ from std_msgs.msg import Empty, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 
-from baxter_sim_hardware.cameras import CameraRefused, Rack, Settings
+from baxter_sim_hardware.sensing.cameras import CameraRefused, Rack, Settings
 
 RATE_HZ = 20.0
 SIDES = ("left", "right")

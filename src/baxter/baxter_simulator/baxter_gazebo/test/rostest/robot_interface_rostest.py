@@ -13,7 +13,8 @@ from bullet_sim_msgs.srv import Press
 from robot_client import POSITION, RAW, SIDES, TORQUE, VELOCITY, Robot, joints
 from sensor_msgs.msg import Image
 
-from baxter_sim_hardware import collision, interface
+from baxter_sim_hardware.arms import collision
+from baxter_sim_hardware.topics import interface
 from lab_testing.waiting import wait_until
 
 NEUTRAL = {name: angle for side in SIDES

@@ -3,9 +3,9 @@
 
 `plugin.BaxterPlugin` brings it into a world; it is not imported here, because it needs ROS.
 """
-from .arms import Arms, Drives
+from .arms.control import Arms, Drives
+from .arms.joint_command import JointLimits, Mode
 from .errors import CommandRefused, HardwareError
-from .joint_command import JointLimits, Mode
 from .robot import Baxter
 from .robot_state import Event, RobotState, State
 

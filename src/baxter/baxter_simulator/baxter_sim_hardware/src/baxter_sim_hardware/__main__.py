@@ -2,7 +2,7 @@
 """``python3 -m baxter_sim_hardware``: compile everything into the cache, so that no start has to wait for it."""
 import numpy as np
 
-from baxter_sim_hardware.setpoint import SetPoints, any_beyond, approach, follow
+from baxter_sim_hardware.arms.setpoint import SetPoints, any_beyond, approach, follow
 
 
 def main():

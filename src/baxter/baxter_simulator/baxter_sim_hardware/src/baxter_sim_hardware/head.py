@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from .arms.setpoint import approach
 from .errors import CommandRefused
-from .setpoint import approach
 
 FULL_SPEED = 8.4  # [rad/s] at speed ratio 1: the physical robot's
 ACCELERATION = 30.0  # [rad/s^2] of the set-point; the joint follows that without overshooting

@@ -10,21 +10,22 @@ from std_msgs.msg import Empty, UInt32
 from baxter_model import BASE_FRAME, SIDES, ModelError, tip_of
 from baxter_model.description import finger_openings, limbs_of
 from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
-from baxter_sim_hardware import convert, endpoint, interface
-from baxter_sim_hardware.arms import BRAKES_EFFORT_FACTOR
-from baxter_sim_hardware.collision_topics import CollisionTopics
+from baxter_sim_hardware.arms import endpoint
+from baxter_sim_hardware.arms.control import BRAKES_EFFORT_FACTOR
+from baxter_sim_hardware.arms.joint_command import JointLimits
 from baxter_sim_hardware.errors import CommandRefused, HardwareError
-from baxter_sim_hardware.gripper_topics import GripperTopics
-from baxter_sim_hardware.hands import hand_of
-from baxter_sim_hardware.head_topics import HeadTopics
-from baxter_sim_hardware.joint_command import JointLimits
-from baxter_sim_hardware.panel_topics import PanelTopics
-from baxter_sim_hardware.procedure_topics import ProcedureTopics
+from baxter_sim_hardware.grippers.hands import hand_of
 from baxter_sim_hardware.robot import Baxter
 from baxter_sim_hardware.robot_state import Event, State
-from baxter_sim_hardware.screen_topics import ScreenTopics
-from baxter_sim_hardware.sensor_topics import SensorTopics
-from baxter_sim_hardware.status_topics import StatusTopics
+from baxter_sim_hardware.topics import convert, interface
+from baxter_sim_hardware.topics.collision import CollisionTopics
+from baxter_sim_hardware.topics.grippers import GripperTopics
+from baxter_sim_hardware.topics.head import HeadTopics
+from baxter_sim_hardware.topics.panel import PanelTopics
+from baxter_sim_hardware.topics.procedures import ProcedureTopics
+from baxter_sim_hardware.topics.screen import ScreenTopics
+from baxter_sim_hardware.topics.sensors import SensorTopics
+from baxter_sim_hardware.topics.status import StatusTopics
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from sim_time.pace import Schedule

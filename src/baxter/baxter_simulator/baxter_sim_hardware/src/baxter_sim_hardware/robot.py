@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter's brain: who may move the arms, and what they do when nobody may."""
-from .arms import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
+from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
 from .errors import CommandRefused, HardwareError
 from .robot_state import RobotState
 

@@ -5,7 +5,7 @@ import numpy as np
 from urdf_model import Box
 
 from .errors import CommandRefused
-from .topic_row import Topic
+from .topics.row import Topic
 
 WIDTH, HEIGHT = 1024, 600
 SCREEN_RATE_HZ = 10.0

@@ -4,7 +4,7 @@ from xml.etree import ElementTree
 
 from .errors import CommandRefused
 from .robot_state import State
-from .topic_row import JOINT_STATE_RATE, LATCHED, STATE_RATE_HZ, Topic
+from .topics.row import JOINT_STATE_RATE, LATCHED, STATE_RATE_HZ, Topic
 
 DIAGNOSTICS_RATE_HZ = 1.0
 OK, WARN, ERROR = 0, 1, 2  # levels of a DiagnosticStatus

@@ -5,7 +5,7 @@ import errno
 import numpy as np
 import pytest
 
-from baxter_sim_hardware.cameras import (
+from baxter_sim_hardware.sensing.cameras import (
     CONTROLS,
     EXPOSURE,
     FLIP,

@@ -8,7 +8,7 @@ from std_msgs.msg import Bool, Empty, Header
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from baxter_model import JOINTS
-from baxter_sim_hardware import collision
+from baxter_sim_hardware.arms import collision
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
 SIDES = ("left", "right")

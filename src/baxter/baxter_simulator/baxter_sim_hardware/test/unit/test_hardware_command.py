@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from baxter_model import JOINTS
 from baxter_sim_hardware import CommandRefused, JointLimits, Mode
-from baxter_sim_hardware.joint_command import CommandParser
+from baxter_sim_hardware.arms.joint_command import CommandParser
 
 SIDES = ("left", "right")
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from std_msgs.msg import Empty
 
-from baxter_sim_hardware import coverage, interface
+from baxter_sim_hardware.topics import coverage, interface
 
 PACKAGE = Path(__file__).resolve().parents[2]
 

@@ -10,8 +10,8 @@ from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndE
 from bullet_sim_msgs.srv import PressRequest
 from std_msgs.msg import Bool, Empty, Float64
 
-from baxter_sim_hardware import interface
 from baxter_sim_hardware.robot_state import State
+from baxter_sim_hardware.topics import interface
 from gazebo_ros.faults import Faults
 from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.simulation import HostedPlugin, Simulation

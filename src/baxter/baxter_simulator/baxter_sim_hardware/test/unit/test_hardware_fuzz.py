@@ -10,7 +10,7 @@ import pytest
 import roslib.message
 from std_msgs.msg import Bool, Empty, Float64
 
-from baxter_sim_hardware import interface
+from baxter_sim_hardware.topics import interface
 
 SIDES = ("left", "right")
 INPUTS = [(name, roslib.message.get_message_class(row.type))

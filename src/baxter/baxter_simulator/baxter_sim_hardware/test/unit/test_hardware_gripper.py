@@ -8,8 +8,8 @@ from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndE
 
 import xacro
 from baxter_sim_hardware import CommandRefused
-from baxter_sim_hardware.gripper import ElectricGripper
-from baxter_sim_hardware.gripper_commands import CustomGripper
+from baxter_sim_hardware.grippers.commands import CustomGripper
+from baxter_sim_hardware.grippers.electric import ElectricGripper
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 

@@ -7,7 +7,7 @@ import pytest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from baxter_sim_hardware.convert import JointStates
+from baxter_sim_hardware.topics.convert import JointStates
 from sim_time.stamps import stamp
 
 

@@ -6,7 +6,7 @@ from bullet_sim_msgs.srv import PressRequest
 from std_msgs.msg import Empty
 
 from baxter_sim_hardware import CommandRefused
-from baxter_sim_hardware.panel import DIGITAL, NAVIGATORS, Panel
+from baxter_sim_hardware.sensing.panel import DIGITAL, NAVIGATORS, Panel
 
 
 def test_outputs_follow_and_inputs_refuse():

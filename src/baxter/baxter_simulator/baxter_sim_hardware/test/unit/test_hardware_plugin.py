@@ -10,8 +10,8 @@ from std_msgs.msg import Bool, Empty, Float64, UInt16
 
 from baxter_model import JOINTS, ModelMismatch
 from baxter_model.description import limbs_of
-from baxter_sim_hardware import interface
 from baxter_sim_hardware.robot_state import State
+from baxter_sim_hardware.topics import interface
 from gazebo_ros.model_plugin import PluginError
 from urdf_model import parse_urdf
 from urdf_model.transforms import matrix_from_quaternion

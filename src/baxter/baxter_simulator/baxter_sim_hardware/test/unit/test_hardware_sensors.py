@@ -8,7 +8,7 @@ from genpy import Time
 from sensor_msgs.msg import Image
 from std_msgs.msg import Empty, Float32, String, UInt16
 
-from baxter_sim_hardware import sensors
+from baxter_sim_hardware.sensing import sensors
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from baxter_sim_hardware.setpoint import MovingAverage, SetPoints, approach, follow, stopping_point
+from baxter_sim_hardware.arms.setpoint import MovingAverage, SetPoints, approach, follow, stopping_point
 
 DT = 0.002
 

@@ -10,7 +10,7 @@ import xacro
 from baxter_model import ModelMismatch
 from baxter_model.description import cup_of
 from baxter_sim_hardware import CommandRefused
-from baxter_sim_hardware.suction import SuctionGripper
+from baxter_sim_hardware.grippers.suction import SuctionGripper
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 

@@ -8,8 +8,8 @@ from sensor_msgs.msg import ChannelFloat32, Imu, LaserScan, PointCloud, Range
 from std_msgs.msg import Float32, Header, UInt16
 
 from baxter_model import BASE_FRAME, SIDES
-from baxter_sim_hardware import sensors
-from baxter_sim_hardware.panel import RANGE_SENSORS
+from baxter_sim_hardware.sensing import sensors
+from baxter_sim_hardware.sensing.panel import RANGE_SENSORS
 from baxter_sim_kinematics import Chain
 from sim_time.stamps import stamp
 

@@ -12,7 +12,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from .errors import CommandRefused
+from baxter_sim_hardware.errors import CommandRefused
 
 
 class Mode(IntEnum):

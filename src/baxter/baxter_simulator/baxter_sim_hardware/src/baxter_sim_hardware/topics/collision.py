@@ -5,7 +5,7 @@ from std_msgs.msg import Header
 
 from baxter_model import BASE_FRAME, SIDES
 from baxter_model.self_collision import BODY
-from baxter_sim_hardware import collision
+from baxter_sim_hardware.arms import collision
 from sim_time.pace import Schedule
 from sim_time.stamps import stamp
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's ROS interface as one table: what the plugin opens, what the documentation lists, what tests expect."""
-from .collision import COLLISION_TOPICS
-from .procedures import MAINTENANCE_TOPICS
-from .screen import SCREEN_TOPICS
-from .sensors import SENSOR_TOPICS
-from .status import STATUS_TOPICS
-from .topic_row import JOINT_STATE_RATE, LATCHED, PARTS, STATE_RATE_HZ, Topic
+from baxter_sim_hardware.arms.collision import COLLISION_TOPICS
+from baxter_sim_hardware.arms.procedures import MAINTENANCE_TOPICS
+from baxter_sim_hardware.screen import SCREEN_TOPICS
+from baxter_sim_hardware.sensing.sensors import SENSOR_TOPICS
+from baxter_sim_hardware.status import STATUS_TOPICS
+
+from .row import JOINT_STATE_RATE, LATCHED, PARTS, STATE_RATE_HZ, Topic
 
 JOINT_STATE_RATE_HZ = 50.0  # what the vendor's simulator publishes and the lab sheets print
 

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from .errors import CommandRefused
-from .topic_row import STATE_RATE_HZ, Topic
+from baxter_sim_hardware.errors import CommandRefused
+from baxter_sim_hardware.topics.row import STATE_RATE_HZ, Topic
 
 # Infrared range of a hand: one ray along x of its frame [m, rad]; the physical robot's figures.
 RANGE_MIN_M, RANGE_MAX_M, RANGE_FIELD_RAD = 0.004, 0.4, 0.0872664600611

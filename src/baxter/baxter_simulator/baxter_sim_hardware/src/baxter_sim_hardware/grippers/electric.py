@@ -4,9 +4,9 @@ import json
 from enum import Enum
 
 from baxter_model import ELECTRIC
+from baxter_sim_hardware.errors import CommandRefused
 
-from .errors import CommandRefused
-from .gripper_commands import Gripper, is_number
+from .commands import Gripper, is_number
 
 FULL_SPEED = 0.1  # [m/s] of a finger at velocity 100 %
 REACH = 0.1  # share of the travel by which the set-point may lead fingers that something stops

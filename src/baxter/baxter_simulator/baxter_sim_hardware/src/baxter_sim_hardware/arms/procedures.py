@@ -6,8 +6,9 @@ rest: it succeeds when what they exert is, on average, what their model says, an
 """
 import numpy as np
 
+from baxter_sim_hardware.topics.row import Topic
+
 from .collision import SQUISH_NM
-from .topic_row import Topic
 
 STATUS_RATE_HZ = 10.0
 UPDATER_RATE_HZ = 1.0

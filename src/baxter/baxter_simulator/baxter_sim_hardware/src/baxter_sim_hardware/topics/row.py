@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 from baxter_model import SIDES
-
-from .panel import ANALOG, DIGITAL, NAVIGATORS
+from baxter_sim_hardware.sensing.panel import ANALOG, DIGITAL, NAVIGATORS
 
 STATE_RATE_HZ = 100.0  # the physical robot's state topics
 LATCHED = "latched"  # in place of a rate: once, and again for who comes later

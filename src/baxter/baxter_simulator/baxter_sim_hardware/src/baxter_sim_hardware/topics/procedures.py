@@ -5,8 +5,8 @@ from baxter_maintenance_msgs.msg import UpdateSources, UpdateStatus
 from std_msgs.msg import Bool, Int32
 
 from baxter_model import SIDES
+from baxter_sim_hardware.arms.procedures import PROCEDURES, STATUS_RATE_HZ, Procedure, Updater
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.procedures import PROCEDURES, STATUS_RATE_HZ, Procedure, Updater
 from sim_time.pace import Schedule
 
 

@@ -6,12 +6,12 @@ from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 
 from baxter_model import CUSTOM, ELECTRIC, SUCTION
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.gripper import ElectricGripper
-from baxter_sim_hardware.gripper_commands import CustomGripper
-from baxter_sim_hardware.hands import NoHand
-from baxter_sim_hardware.panel import BLOWERS, PUMPS, VACUUM_SENSORS
+from baxter_sim_hardware.grippers.commands import CustomGripper
+from baxter_sim_hardware.grippers.electric import ElectricGripper
+from baxter_sim_hardware.grippers.hands import NoHand
+from baxter_sim_hardware.grippers.suction import SuctionGripper
 from baxter_sim_hardware.robot import ENABLE_HINT
-from baxter_sim_hardware.suction import SuctionGripper
+from baxter_sim_hardware.sensing.panel import BLOWERS, PUMPS, VACUUM_SENSORS
 from sim_time.stamps import stamp
 
 _MAKER = {"manufacturer": "Rethink Research Robot", "product": "SDK End Effector"}

@@ -5,8 +5,8 @@ import numpy as np
 from baxter_model import tip_of
 from baxter_model.description import cup_of, openings_of
 
-from .gripper import ElectricGripper
-from .gripper_commands import CustomGripper
+from .commands import CustomGripper
+from .electric import ElectricGripper
 from .suction import SuctionGripper
 
 RIM_RAYS = 8  # that look for a surface around the rim of the cup, and one in its middle

@@ -4,9 +4,9 @@ import json
 import math
 
 from baxter_model import SUCTION
+from baxter_sim_hardware.errors import CommandRefused
 
-from .errors import CommandRefused
-from .gripper_commands import Gripper, is_number
+from .commands import Gripper, is_number
 
 FULL_VACUUM_PA = 60e3  # below the air around, at a sensor reading of 100 %; what a venturi pump of this size reaches
 BLOW_PA = 1e3  # above the air around

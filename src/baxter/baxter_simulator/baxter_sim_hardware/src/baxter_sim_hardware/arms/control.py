@@ -24,7 +24,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .errors import CommandRefused
+from baxter_sim_hardware.errors import CommandRefused
+
 from .joint_command import CommandParser, Mode
 from .setpoint import MovingAverage, SetPoints, any_beyond, follow, stopping_point
 

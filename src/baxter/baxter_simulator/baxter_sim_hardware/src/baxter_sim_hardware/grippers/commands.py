@@ -2,10 +2,9 @@
 """What every kind of gripper does with a command message: check it, echo it, hand it on."""
 import math
 
+from baxter_sim_hardware.errors import CommandRefused
+from baxter_sim_hardware.robot import ENABLE_HINT
 from rospy_limits.json_object import JsonRefused, read_object
-
-from .errors import CommandRefused
-from .robot import ENABLE_HINT
 
 #: A sender's name, which goes out with every state of the gripper, is no longer than this [characters].
 LONGEST_SENDER = 1000

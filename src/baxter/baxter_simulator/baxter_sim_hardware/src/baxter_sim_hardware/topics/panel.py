@@ -12,7 +12,7 @@ from bullet_sim_msgs.srv import Press, PressRequest, PressResponse
 from std_msgs.msg import UInt32
 
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.panel import ANALOG, BUTTONS, DIGITAL, ESTOP, LIGHTS, NAVIGATORS, Panel, navigator_name
+from baxter_sim_hardware.sensing.panel import ANALOG, BUTTONS, DIGITAL, ESTOP, LIGHTS, NAVIGATORS, Panel, navigator_name
 from sim_time.stamps import stamp
 
 PRESS_SERVICE = "sim/press"

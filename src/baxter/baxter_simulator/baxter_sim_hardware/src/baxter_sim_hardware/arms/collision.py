@@ -8,8 +8,7 @@ motion explain, or its hand more than it may carry.
 """
 from baxter_model import JOINTS, is_part_of_arm
 from baxter_model.self_collision import BODY
-
-from .topic_row import STATE_RATE_HZ, Topic
+from baxter_sim_hardware.topics.row import STATE_RATE_HZ, Topic
 
 SUPPRESSION_S = 0.6  # [simulated s] the physical robot's: how long one suppress message counts
 AVOIDANCE, BODY_AVOIDANCE = "suppress_collision_avoidance", "suppress_body_avoidance"

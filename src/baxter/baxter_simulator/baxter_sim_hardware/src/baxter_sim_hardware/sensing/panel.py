@@ -5,8 +5,7 @@ The names are the physical robot's. Documents leave open which of the torso's ch
 name calls a sensor, an input or a switch is an input. Sensors belong to what they measure, which attaches them.
 """
 from baxter_model import SIDES
-
-from .errors import CommandRefused
+from baxter_sim_hardware.errors import CommandRefused
 
 NAVIGATORS = (*SIDES, *("torso_%s" % side for side in SIDES))
 BUTTONS = ("ok", "back", "show")  # of a navigator, in the order of its state message

@@ -6,10 +6,12 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from baxter_model import BASE_FRAME, tip_of
-from baxter_sim_hardware import convert, endpoint, status
+from baxter_sim_hardware import status
+from baxter_sim_hardware.arms import endpoint
+from baxter_sim_hardware.arms.joint_command import Mode
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.joint_command import Mode
 from baxter_sim_hardware.robot import ENABLE_HINT
+from baxter_sim_hardware.topics import convert
 from sim_time.stamps import stamp
 
 AGGREGATE = "/Baxter"

@@ -13,7 +13,7 @@ from baxter_core_msgs.srv import (
 )
 from std_srvs.srv import Empty, EmptyResponse
 
-from baxter_sim_hardware.cameras import FLIP, MIRROR, CameraRefused, Rack, Settings
+from baxter_sim_hardware.sensing.cameras import FLIP, MIRROR, CameraRefused, Rack, Settings
 from sensor_renderer import convert
 from sensor_renderer.drivers import ColourTopics, Driver
 from sim_time.pace import Pace
