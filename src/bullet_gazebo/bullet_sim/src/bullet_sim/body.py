@@ -38,6 +38,7 @@ class Body:
         self._link_names = {index: link for link, index in self._link_index.items()}
         self._late_twist = None
         self._late_pushes = []
+        self._pushes, self._pushed_at = [], -1  # of the step after `_pushed_at` steps
         #: Whether the body was made so that some of its links can collide with each other.
         self.self_collision = self_collision
         self._pairs = ()
@@ -105,11 +106,19 @@ class Body:
         """
         within(bounds.FORCE, force, "the force on link '%s::%s'" % (self.name, link))
         within(bounds.TORQUE, torque, "the torque on link '%s::%s'" % (self.name, link))
-        push = (self._link_index[self._frame(link).link], force, torque, position)
+        body = self._frame(link).link
+        if self._pushed_at != self._world.steps:
+            self._pushes, self._pushed_at = [], self._world.steps
+        self._pushes.append((body, force, torque, position))
+        push = (self._link_index[body], force, torque, position)
         if not self.static:
             self._late_pushes.append(push)
         self.wake()
         self._push(*push)
+
+    def pushes(self):
+        """Return what :meth:`apply_wrench` did in the last step: a list of (body, force, torque, position or None)."""
+        return self._pushes if self._pushed_at == self._world.steps - 1 else []
 
     def wake(self):
         """Have the model simulated again if it has come to rest and fallen asleep."""

@@ -55,6 +55,7 @@ class Contact(NamedTuple):
     normal: tuple  # unit, on b, towards a
     distance: float  # negative when the shapes overlap
     force: float  # along the normal, in the last step
+    friction: tuple  # force (3,) on a, across the normal, in the last step [N]
 
 
 class Fault(NamedTuple):

@@ -269,7 +269,9 @@ class World:
             a, b = names[point[1]], names[point[2]]
             found.append(
                 Contact(
-                    a.name, a.link_name(point[3]), b.name, b.link_name(point[4]), point[5], point[7], point[8], point[9]
+                    a.name, a.link_name(point[3]), b.name, b.link_name(point[4]),
+                    point[5], point[7], point[8], point[9],
+                    tuple(point[10] * u + point[12] * v for u, v in zip(point[11], point[13], strict=True)),
                 )
             )
         return found

@@ -225,6 +225,13 @@ def test_free_box_falls_rests_and_is_reset(world):
     contact = world.contacts(box)[0]
     assert {contact.model_a, contact.model_b} == {"box", "ground_plane"}
     assert sum(c.force for c in world.contacts(box)) == pytest.approx(9.81, rel=0.05)
+    assert box.pushes() == []
+    for _ in range(100):
+        box.apply_wrench("box", (2.0, 1.0, 0.0))
+        world.step()
+    assert box.pushes() == [("box", (2.0, 1.0, 0.0), (0.0, 0.0, 0.0), None)]
+    on_box = [np.array(c.friction) * (1 if c.model_a == "box" else -1) for c in world.contacts(box)]
+    np.testing.assert_allclose(sum(on_box), (-2.0, -1.0, 0.0), atol=0.02)
     box.set_base_pose(Pose((0, 0, 0.5)))
     world.detect_contacts()
     assert world.contacts(box) == []

@@ -3,9 +3,10 @@
 
 import numpy as np
 from gazebo_msgs.msg import ContactsState, ContactState
-from geometry_msgs.msg import Vector3, Wrench
+from geometry_msgs.msg import Quaternion, Vector3, Wrench
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState, LaserScan, Range
+from std_srvs.srv import Empty, EmptyResponse
 
 from bullet_sim import Pose
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
@@ -14,7 +15,7 @@ from gazebo_ros.ray_pattern import RayPattern, RayPatternError, Sweep
 from gazebo_ros.urdf_extras import sensor_of, unscoped
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
-from urdf_model.transforms import pose_matrix
+from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 
 class PacedSensor(ModelPlugin):
@@ -167,16 +168,27 @@ class RangeFinder(_RaySensor):
 
 class ImuSensor(PacedSensor):
     """``libgazebo_ros_imu.so`` and ``libgazebo_ros_imu_sensor.so``: orientation in the world, rates and accelerations
-    in the link's axes. The acceleration is what a device feels: at rest, gravity upwards."""
+    in the link's axes. The acceleration is what a device feels: at rest, gravity upwards. ``rpyOffset`` turns the
+    orientation; ``initialOrientationAsReference`` (false) has it begin at none; ``serviceName`` is there and does
+    nothing."""
 
     message_class = Imu
     default_topic = "imu"
 
     def __init__(self, context):
         super().__init__(context)
+        rate = self.number("updateRateHZ", 0.0)
+        if rate > 0.0:
+            self._pace.rate = rate
         self._body = self.link if self.link is not None else self.link_named("bodyName")
         self._frame = context.element_text("frameName", self._body)
         self._noise = self.number("gaussianNoise", 0.0)
+        self._turn = pose_matrix((0.0, 0.0, 0.0), self.numbers(context.element, "rpyOffset", (0.0,) * 3))[:3, :3]
+        if context.element_text("initialOrientationAsReference", "false").lower() in ("true", "1"):
+            self._turn = self._turn @ context.model.link_pose(self._body).matrix()[:3, :3].T
+        service = context.element_text("serviceName")
+        if service is not None:
+            context.service(service, Empty, lambda request: EmptyResponse())
         self._last = None
 
     def publish(self, time_s):
@@ -196,7 +208,7 @@ class ImuSensor(PacedSensor):
             random = self.context.world.random
             felt, turning = felt + random.normal(0.0, self._noise, 3), turning + random.normal(0.0, self._noise, 3)
         message = Imu(angular_velocity=Vector3(*turning), linear_acceleration=Vector3(*felt))
-        message.orientation = msg_from_pose(pose).orientation
+        message.orientation = Quaternion(*quaternion_from_matrix(self._turn @ axes))
         for covariance in (message.orientation_covariance, message.angular_velocity_covariance,
                            message.linear_acceleration_covariance):
             covariance[0] = covariance[4] = covariance[8] = self._noise ** 2
@@ -284,7 +296,7 @@ def _contact_state(mine, other, points):
     total = np.zeros(3)
     for contact, sign in points:
         normal = sign * np.asarray(contact.normal)
-        force = contact.force * normal
+        force = contact.force * normal + sign * np.asarray(contact.friction)
         total += force
         state.wrenches.append(Wrench(force=Vector3(*force)))
         state.contact_positions.append(Vector3(*contact.position))

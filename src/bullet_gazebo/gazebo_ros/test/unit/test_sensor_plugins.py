@@ -150,6 +150,18 @@ def test_an_imu_at_rest_feels_gravity_and_in_free_fall_nothing(lab):
     assert abs(felt.z) < 0.05
 
 
+@pytest.mark.parametrize(("elements", "pitch"), [
+    ("", 0.4), ("<rpyOffset>0 0.3 0</rpyOffset>", 0.7),
+    ("<initialOrientationAsReference>true</initialOrientationAsReference>", 0.0)])
+def test_what_an_imu_counts_its_orientation_from(lab, elements, pitch):
+    plugin = """<gazebo reference="link"><sensor type="imu" name="i"><plugin filename="libgazebo_ros_imu_sensor.so">
+<topicName>imu</topicName><updateRateHZ>50</updateRateHZ>%s</plugin></sensor></gazebo>""" % elements
+    it = lab(BOX % plugin, sensor_plugins.ImuSensor, Pose((0, 0, 1), (0, math.sin(0.2), 0, math.cos(0.2))))
+    sent = it.run(1.0)
+    assert 2.0 * math.asin(sent[-1].orientation.y) == pytest.approx(pitch, abs=1e-6)
+    assert len(sent) == pytest.approx(50, abs=1)
+
+
 def test_p3d_says_where_a_link_is(lab):
     plugin = """<gazebo><plugin filename="libgazebo_ros_p3d.so"><topicName>truth</topicName><bodyName>link</bodyName>
 <xyzOffset>1 0 0</xyzOffset><updateRate>50</updateRate></plugin></gazebo>"""
@@ -170,6 +182,12 @@ def test_a_bumper_feels_the_weight(lab):
     assert state.collision1_name == "it::link" and state.collision2_name.startswith("ground_plane::")
     assert state.total_wrench.force.z == pytest.approx(2 * 9.81, rel=0.05)
     assert all(normal.z > 0.99 for normal in state.contact_normals)
+    for _ in range(100):
+        it.model.apply_wrench("link", (3.0, 0.0, 0.0))
+        it.run(0.002)
+    (state,) = it.publisher.sent[-1].states
+    # Friction holds against the push.
+    assert state.total_wrench.force.x == pytest.approx(-3.0, abs=0.1)
 
 
 def test_joint_states(lab):

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is wrong with a measurement: an offset, a drift, noise, a scale. ROS-free."""
+import numpy as np
+
+_ONE_HOUR_HZ = 1.0 / 3600.0
+
+
+class ErrorModel:
+    """Errors of ``size`` numbers that are measured together; each argument is one number for all, or ``size`` of them.
+
+    :param size: how many numbers
+    :param random: numpy.random.Generator
+    :param offset: constant error [as the measurement]
+    :param drift: standard deviation of a slow wandering (Gauss and Markov's process) [as the measurement]
+    :param frequency: how quickly that forgets [1/s]
+    :param noise: standard deviation of what is new each time [as the measurement]
+    :param scale: factor on the measurement
+    """
+
+    def __init__(self, size, random, offset=0.0, drift=0.0, frequency=_ONE_HOUR_HZ, noise=0.0, scale=1.0):
+        self._random = random
+        self._offset, self.drift, self._frequency, self.noise, self._scale = (
+            np.broadcast_to(np.asarray(values, dtype=float), (size,))
+            for values in (offset, drift, frequency, noise, scale))
+        self.reset()
+
+    def reset(self):
+        """Drift begins anew, somewhere."""
+        self._drifted = self._random.normal(0.0, 1.0, self.drift.shape) * self.drift
+
+    @property
+    def bias(self):
+        """What is wrong for longer than one measurement (size,): offset and drift."""
+        return self._offset + self._drifted
+
+    def add_drift(self, change):
+        """Have the drift be ``change`` (size,) more."""
+        self._drifted = self._drifted + change
+
+    def measure(self, value, dt):
+        """What is measured (size,) where ``value`` (size,) is true, ``dt`` [s] after the time before."""
+        if self.drift.any():
+            # The process keeps its deviation whatever dt is: what is forgotten is made up for by what is new.
+            kept = np.exp(-dt * self._frequency)
+            new = self._random.normal(0.0, 1.0, self.drift.shape) * self.drift * np.sqrt(1.0 - kept * kept)
+            self._drifted = kept * self._drifted + new
+        measured = np.asarray(value) * self._scale + self.bias
+        if self.noise.any():
+            measured = measured + self._random.normal(0.0, 1.0, self.noise.shape) * self.noise
+        return measured

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A world's metres as degrees on the globe, and the magnetic field there. ROS-free."""
+import math
+
+import numpy as np
+
+# WGS 84: equatorial radius [m] and flattening.
+_RADIUS_M = 6378137.0
+_FLATTENING = 1.0 / 298.257223563
+_ECCENTRICITY_SQUARED = _FLATTENING * (2.0 - _FLATTENING)
+
+
+class Reference:
+    """Where on the globe the world's origin is: latitude and longitude [deg], altitude [m], and which way x looks
+    [rad], clockwise from north."""
+
+    def __init__(self, latitude, longitude, altitude=0.0, heading=0.0):
+        self._latitude, self._longitude, self._altitude = latitude, longitude, altitude
+        self._cosine, self._sine = math.cos(heading), math.sin(heading)
+        bulge = 1.0 / (1.0 - _ECCENTRICITY_SQUARED * math.sin(math.radians(latitude)) ** 2)
+        across = _RADIUS_M * math.sqrt(bulge)
+        self._north_m = across * (1.0 - _ECCENTRICITY_SQUARED) * bulge  # radius of the meridian
+        self._east_m = across * math.cos(math.radians(latitude))  # of the circle of latitude
+
+    def north_west_up(self, vector):
+        """A vector (3,) of the world in these axes (3,)."""
+        x, y, z = vector
+        return np.array([self._cosine * x + self._sine * y, self._cosine * y - self._sine * x, z])
+
+    def place(self, position):
+        """Latitude and longitude [deg] and altitude [m] of a ``position`` (3,) [m] of the world, as on a plane that
+        touches the globe."""
+        north, west, up = self.north_west_up(position)
+        return (self._latitude + math.degrees(north / self._north_m),
+                self._longitude - math.degrees(west / self._east_m), self._altitude + up)
+
+
+def magnetic_field(magnitude, inclination, declination, heading):
+    """The field (3,) [as ``magnitude``] in world axes: it dips by ``inclination`` below the horizon and points
+    ``declination`` east of north; x of the world looks ``heading`` clockwise from north. All in [rad]."""
+    level = magnitude * math.cos(inclination)
+    return np.array([level * math.cos(heading - declination), level * math.sin(heading - declination),
+                     -magnitude * math.sin(inclination)])

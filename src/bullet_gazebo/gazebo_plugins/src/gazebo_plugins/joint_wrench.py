@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The force and torque that a joint transmits, fixed joints included, by the balance of momentum. ROS-free."""
+import numpy as np
+
+from bullet_sim import BulletSimError
+from urdf_model import Box, Cylinder, Mesh, Sphere
+from urdf_model.merge import combine
+from urdf_model.transforms import inverse
+
+
+class JointWrench:
+    """What the links behind a joint exert on those before it, in the last step of the world.
+
+    Newton and Euler: the change of the momentum of all links behind the joint is due to their weight, to contacts, to
+    what ``Model.apply_wrench`` did, and to the joint. Fixed joints have no counterpart in the physics, since the links
+    that they hold are one body there, and need none this way. Of a body that the joint divides, a contact belongs to
+    the link whose shape is nearest; a mesh counts as its link's origin.
+
+    :param world: bullet_sim.World
+    :param model: bullet_sim.Model, which has a joint of this name in its description
+    :param joint: name of a joint of the description, movable or not
+    """
+
+    def __init__(self, world, model, joint):
+        robot = model.robot
+        if joint not in robot.joints:
+            raise BulletSimError("model '%s' has no joint '%s'; its joints are %s"
+                                 % (model.name, joint, ", ".join(robot.joints) or "none"))
+        self._world, self._model = world, model
+        found = robot.joints[joint]
+        #: The link behind the joint.
+        self.child = found.child
+        #: Where the joint is in that link's frame (4, 4).
+        self.offset = inverse(found.child_offset)
+        behind = _links_behind(robot, found.child)
+        #: {body: Inertial of what of it is behind the joint, in the frame of the link it is named after}.
+        self._parts = {}
+        #: {body that the joint divides: all its links}.
+        self._divided = {}
+        self._behind = behind
+        for body, merged in model.merged.links.items():
+            members = [link for link in merged.members if link in behind]
+            if not members:
+                continue
+            self._parts[body] = _inertial(model, members)
+            if len(members) < len(merged.members):
+                self._divided[body] = merged.members
+        self._before = None
+
+    def note(self):
+        """Before the step that shall be measured."""
+        self._before = self._momentum()
+
+    def measure(self):
+        """After that step: (force (3,) [N], torque (3,) [Nm] about the joint's origin), in the axes of the child link.
+
+        Of a weight that hangs on the joint the force points down.
+        """
+        frame = self._model.link_pose(self.child).matrix() @ self.offset
+        origin = frame[:3, 3]
+        before, after = self._before, self._momentum()
+        dt = self._world.time_step_s
+        change = [(now - then) / dt for now, then in zip(after, before, strict=True)]
+        force, torque = self._outside(origin)
+        # The joint gives what the others do not; what is told is the reaction to it.
+        force = force - change[0]
+        torque = torque - (change[1] - np.cross(origin, change[0]))
+        axes = self._model.link_pose(self.child).matrix()[:3, :3]
+        return axes.T @ force, axes.T @ torque
+
+    def _momentum(self):
+        """Momentum (3,) and angular momentum (3,) about the world's origin of what is behind the joint."""
+        total, turning = np.zeros(3), np.zeros(3)
+        for centre, inertial, axes, (linear, angular) in self._moving():
+            momentum = inertial.mass * linear
+            total += momentum
+            turning += np.cross(centre, momentum) + axes @ inertial.inertia @ axes.T @ angular
+        return total, turning
+
+    def _moving(self):
+        """For each part: centre of mass (3,) in the world, Inertial, axes (3, 3), twist of the centre."""
+        for body, inertial in self._parts.items():
+            pose = self._model.link_pose(body).matrix()
+            linear, angular = (np.asarray(values) for values in self._model.link_twist(body))
+            arm = pose[:3, :3] @ inertial.centre
+            yield pose[:3, 3] + arm, inertial, pose[:3, :3], (linear + np.cross(angular, arm), angular)
+
+    def _outside(self, origin):
+        """Force and torque about ``origin`` (3,) of weight, contacts and pushes on what is behind the joint."""
+        force, torque = np.zeros(3), np.zeros(3)
+
+        def add(push, where, turn=(0.0, 0.0, 0.0)):
+            nonlocal force, torque
+            push = np.asarray(push, dtype=float)
+            force = force + push
+            torque = torque + np.cross(np.asarray(where) - origin, push) + turn
+
+        gravity = np.asarray(self._world.gravity)
+        for (centre, inertial, _, _), body in zip(self._moving(), self._parts, strict=True):
+            if self._model.has_weight(body):
+                add(inertial.mass * gravity, centre)
+        for body, push, where in contact_forces(self._world, self._model, self._parts):
+            if self._is_behind(body, where):
+                add(push, where)
+        for body, push, turn, where in self._model.pushes():
+            if body in self._parts:
+                if where is None:
+                    # At the centre of the whole body, as PyBullet has it.
+                    where = (self._model.link_pose(body).matrix() @ (*self._model.inertial(body).centre, 1.0))[:3]
+                if self._is_behind(body, where):
+                    add(push, where, turn)
+        return force, torque
+
+    def _is_behind(self, body, where):
+        """Whether what happens to ``body`` at ``where`` (3,) happens to a link behind the joint."""
+        if body not in self._divided:
+            return True
+        away = {link: _distance(self._model, link, where) for link in self._divided[body]}
+        return min(away, key=away.get) in self._behind
+
+
+def contact_forces(world, model, bodies):
+    """List of (body, force (3,) on it [N], where (3,) [m]) of the last step's contacts on ``bodies`` of ``model``.
+
+    In world axes, friction included. What two of the bodies do to each other is left out.
+    """
+    found = []
+    for contact in world.contacts(model):
+        push = contact.force * np.asarray(contact.normal) + np.asarray(contact.friction)
+        sides = ((contact.model_a, contact.link_a, push), (contact.model_b, contact.link_b, -push))
+        mine = [(link, force, contact.position) for name, link, force in sides if name == model.name and link in bodies]
+        if len(mine) == 1:
+            found += mine
+    return found
+
+
+def _links_behind(robot, first):
+    """The names (set) of ``first`` and of all links that hang on it."""
+    children = {}
+    for joint in robot.joints.values():
+        children.setdefault(joint.parent, []).append(joint.child)
+    behind, waiting = set(), [first]
+    while waiting:
+        link = waiting.pop()
+        behind.add(link)
+        waiting += children.get(link, ())
+    return behind
+
+
+def _inertial(model, members):
+    """The Inertial of ``members`` of a body together, in the frame of the link that the body is named after."""
+    body = model.merged.frames[members[0]].link
+    to_frame = inverse(model.merged.frames[body].offset)
+    parts = []
+    for name in members:
+        inertial = model.robot.links[name].inertial
+        if inertial is not None:
+            place = to_frame @ model.merged.frames[name].offset
+            turn = place[:3, :3]
+            parts.append((inertial.mass, turn @ inertial.centre + place[:3, 3], turn @ inertial.inertia @ turn.T))
+    return combine(parts)
+
+
+def _distance(model, link, where):
+    """How far a point (3,) of the world is from the nearest collision shape of a link [m]."""
+    in_link = np.linalg.inv(model.link_pose(link).matrix()) @ (*where, 1.0)
+    shapes = model.robot.links[link].collisions
+    return min((_from_shape(shape, (inverse(shape.origin) @ in_link)[:3]) for shape in shapes), default=np.inf)
+
+
+def _from_shape(shape, point):
+    geometry = shape.geometry
+    if isinstance(geometry, Box):
+        return float(np.linalg.norm(np.maximum(np.abs(point) - np.asarray(geometry.size) / 2.0, 0.0)))
+    if isinstance(geometry, Sphere):
+        return max(float(np.linalg.norm(point)) - geometry.radius, 0.0)
+    if isinstance(geometry, Cylinder):
+        outside = np.array([np.hypot(point[0], point[1]) - geometry.radius, abs(point[2]) - geometry.length / 2.0])
+        return float(np.linalg.norm(np.maximum(outside, 0.0)))
+    if isinstance(geometry, Mesh):
+        return float(np.linalg.norm(point))
+    return np.inf

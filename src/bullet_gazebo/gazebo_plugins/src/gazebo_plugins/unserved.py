@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Plugins that are known and of which nothing is left to do here."""
+from std_msgs.msg import Int32, String
+
+from gazebo_ros.model_plugin import ModelPlugin
+
+
+class Nothing(ModelPlugin):
+    """A plugin that does nothing in Gazebo, or what the simulator does by itself here: ``libgazebo_ros_template.so``,
+    ``libgazebo_ros_api_plugin.so``, ``libgazebo_ros_paths_plugin.so``."""
+
+    required = False
+
+
+class Projector(ModelPlugin):
+    """``libgazebo_ros_projector.so``: its topics are there (``projectorTopicName``, std_msgs/Int32, and
+    ``textureTopicName``, std_msgs/String), but no light is thrown: cameras see the world without its pattern."""
+
+    required = False
+
+    def __init__(self, context):
+        super().__init__(context)
+        context.log.warn("plugin %s of model '%s': projected patterns are not drawn; its topics are there and have no "
+                         "effect" % (context.element.get("filename"), context.model.name))
+        self._inboxes = [context.mailbox(topic, kind) for topic, kind in (
+            (context.element_text("projectorTopicName"), Int32), (context.element_text("textureTopicName"), String))
+            if topic is not None]
+
+    def update(self, time_s, dt):
+        for inbox in self._inboxes:
+            inbox.take()
