@@ -59,6 +59,13 @@ def test_a_turning_arm_pulls_outwards(make):
     assert said(lab)[0][0] == pytest.approx((1 * 0.6 + 0.5 * 1.0) * 9.0, rel=0.02)
 
 
+def test_what_turns_the_arm_is_the_torque_about_its_joint(make):
+    lab = make(ARM, ForceTorqueSensor, {"jointName": "turn", "topicName": "wrench"}, Pose((2, 3, 1)))
+    index = lab.model.index(["turn"])
+    lab.run(0.2, lambda: lab.model.drive_effort(index, np.array([5.0])))
+    assert said(lab)[1][2] == pytest.approx(-5.0, abs=0.02)
+
+
 def test_a_push_on_the_tool_goes_through_the_mount_and_one_before_it_does_not(make):
     lab = sensor(make, "mount")
     index = lab.model.index(["turn", "twist"])

@@ -15,10 +15,11 @@ from gazebo_plugins.hector import HectorGps, HectorImu, HectorMagnetic, HectorSo
 from gazebo_ros.model_plugin import PluginError
 
 BOX = """<robot name="box"><link name="link"><inertial><mass value="2"/>
-<inertia ixx="0.02" iyy="0.02" izz="0.02"
-ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>%s</robot>"""
+<inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>%s</robot>"""
 RAYS = """<gazebo reference="link"><sensor type="ray" name="s"><pose>0 0 -0.11 0 1.5708 0</pose>
-<update_rate>20</update_rate><ray><scan><horizontal><samples>3</samples><min_angle>-0.1</min_angle><max_angle>0.1</max_angle></horizontal></scan>
+<update_rate>20</update_rate><ray><scan><horizontal><samples>3</samples>
+<min_angle>-0.1</min_angle><max_angle>0.1</max_angle></horizontal></scan>
 <range><min>0.02</min><max>3</max></range></ray>%s</sensor></gazebo>"""
 
 

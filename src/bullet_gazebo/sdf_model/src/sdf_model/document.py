@@ -8,6 +8,8 @@ import numpy as np
 from urdf_model import XmlRefused, bounds, parse_xml
 from urdf_model.transforms import pose_matrix
 
+from .lenient import attributes_to_elements
+
 ROOT_TAGS = ("sdf", "gazebo")
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
 
@@ -20,19 +22,28 @@ class Notes:
     """What was not understood, from one file or several."""
 
     def __init__(self):
-        self._lines = {}  # what -> file -> lines
+        self._left_out, self._mended = {}, {}  # what -> file -> lines
 
     def add(self, what, source, line):
         """Note that ``what`` stands in ``line`` of ``source`` and is left out."""
-        self._lines.setdefault(what, {}).setdefault(source, []).append(line)
+        self._left_out.setdefault(what, {}).setdefault(source, []).append(line)
+
+    def mend(self, what, source, line):
+        """Note that ``what`` stands in ``line`` of ``source`` and is not as SDF wants it, but is understood."""
+        self._mended.setdefault(what, {}).setdefault(source, []).append(line)
 
     def warning(self):
         """Return one line that names everything noted, or "" where nothing was."""
-        parts = []
-        for what, files in self._lines.items():
-            places = ("%s line %s" % (source, ", ".join(map(str, lines))) for source, lines in files.items())
-            parts.append("%s (%s)" % (what, "; ".join(places)))
-        return "not understood and left out: %s" % ", ".join(parts) if parts else ""
+        said = (("not understood and left out", self._left_out), ("not as SDF has it, but read", self._mended))
+        return "; ".join("%s: %s" % (text, _listed(noted)) for text, noted in said if noted)
+
+
+def _listed(noted):
+    parts = []
+    for what, files in noted.items():
+        places = ("%s line %s" % (source, ", ".join(map(str, lines))) for source, lines in files.items())
+        parts.append("%s (%s)" % (what, "; ".join(places)))
+    return ", ".join(parts)
 
 
 class Document:
@@ -50,13 +61,18 @@ class Document:
         self.folder = folder
         self.notes = notes
         try:
-            self.root = parse_xml(xml, most_bytes)
+            self.root = parse_xml(xml, most_bytes, self._repaired)
         except XmlRefused as error:
             raise SdfError("%s %s" % (self.source, error)) from None
         if self.root is None or self.root.tag not in ROOT_TAGS:
             found = "nothing" if self.root is None else "<%s>" % self.root.tag
             raise SdfError("%s is not an SDF: its root element is %s, expected <sdf>" % (self.source, found))
+        for what, line in attributes_to_elements(self.root):
+            self.notes.mend(what, self.source, line)
         self.version = self._version()
+
+    def _repaired(self, error):
+        self.notes.mend("missing end tag (%s)" % error, self.source, "of the error")
 
     def _version(self):
         text = self.root.get("version", "1.6")
@@ -72,6 +88,10 @@ class Document:
     def note(self, element, what=None):
         """Note that an element is not understood."""
         self.notes.add(what or element.tag, self.source, element.sourceline)
+
+    def mend(self, element, what):
+        """Note that an element is not as SDF wants it, but is understood: ``what`` says how."""
+        self.notes.mend(what, self.source, element.sourceline)
 
     def children(self, element):
         """Return the child elements, without processing instructions."""
@@ -140,6 +160,13 @@ class Document:
             )
         return values
 
+    @staticmethod
+    def relative_to(element):
+        """Return the name of the frame that the child <pose> is given in, "" where it does not say."""
+        child = element.find("pose")
+        # Up to SDF 1.6 the attribute was called frame.
+        return "" if child is None else child.get("relative_to") or child.get("frame") or ""
+
     def pose(self, element):
         """Return the 4x4 matrix of the child <pose> (x y z [m], roll pitch yaw), identity where there is none."""
         child = element.find("pose")
@@ -148,6 +175,10 @@ class Document:
         rotation_format = child.get("rotation_format", "euler_rpy")
         if rotation_format != "euler_rpy":
             raise self.error(child, "rotation_format='%s' is not supported; use euler_rpy" % rotation_format)
+        words = child.text.split()
+        if len(words) == 3:
+            self.mend(child, "<pose> of three numbers")
+            child.text = "%s 0 0 0" % child.text
         values = np.array(self.numbers(child, 6))
         if (child.get("degrees") or "").lower() in _TRUE:
             values[3:] = np.radians(values[3:])

@@ -18,10 +18,8 @@ class Frames:
     def add(self, name, element, default="", pose=None):
         """Add a frame: the <pose> of ``element``, or ``pose``, in the frame its relative_to names or in ``default``."""
         if pose is None:
-            child = element.find("pose")
             pose = self._document.pose(element)
-            if child is not None and child.get("relative_to"):
-                default = child.get("relative_to")
+            default = self._document.relative_to(element) or default
         self._given[name] = (default, pose, element)
 
     def __contains__(self, name):

@@ -20,7 +20,7 @@ _INERTIA += (("izz", 2, 2, 1.0),)
 def read_link(document, element, name):
     """Return the urdf_model.Link of a <link>, named ``name``, in its own frame."""
     document.note_unknown(element, ("pose", "inertial", "collision", "visual", "sensor", "gravity", "self_collide",
-                                    *_QUIET))
+                                    "kinematic", *_QUIET))
     if document.flag(element, "self_collide"):
         document.note(element.find("self_collide"))
     link = Link(name, _inertial(document, element), line=element.sourceline)
@@ -70,10 +70,11 @@ def _shape(document, element, link):
     """Return the Shape of a <visual> or <collision>, or None for a kind that is not understood (which is noted)."""
     geometry = element.find("geometry")
     shapes = [] if geometry is None else document.children(geometry)
-    if len(shapes) != 1:
-        raise document.error(
-            element, "<geometry> in a <%s> of link '%s' holds %d shapes, expected 1" % (element.tag, link, len(shapes))
-        )
+    if not shapes:
+        document.note(element, "<%s> of link '%s' without a shape" % (element.tag, link))
+        return None
+    if len(shapes) > 1:
+        document.note(shapes[1], "<%s> beside <%s> in a <geometry>" % (shapes[1].tag, shapes[0].tag))
     kind, origin = shapes[0], document.pose(element)
     if kind.tag == "box":
         found = Box(document.positive(kind, "size", 3))

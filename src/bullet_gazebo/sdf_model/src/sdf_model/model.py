@@ -163,9 +163,21 @@ class ModelReader:
                 raise document.error(joint, "joint '%s' stands twice" % read.name)
             names.add(read.name)
             parts.joints.append(read)
+        self._hold_kinematic(document, element, parts)
         parts.gazebo += _plugins(document, element)
         parts.gazebo += [copy.deepcopy(child) for child in element.iterchildren("gazebo")]
         return _moved(parts, prefix, origin)
+
+    def _hold_kinematic(self, document, element, parts):
+        """A model of kinematic links stands fast: nothing in the world moves it, but who puts it elsewhere does."""
+        links = list(element.iterchildren("link"))
+        kinematic = [link for link in links if document.flag(link, "kinematic")]
+        if kinematic and len(kinematic) == len(links):
+            parts.static = True
+            return
+        for link in kinematic:
+            document.note(link.find("kinematic"), "kinematic of link '%s', beside links that are not"
+                          % document.name(link))
 
     def _nested(self, document, element, parts, frames, depth):
         """Add the parts of models inside this one to ``parts`` and their frames to ``frames``."""
@@ -243,7 +255,8 @@ def _joint(document, element, frames):
     if kind in _MOVABLE:
         given = element.find("axis")
         if given is None:
-            raise document.error(element, "%s joint '%s' has no <axis>" % (kind, name))
+            document.mend(element, "%s joint '%s' without <axis>, which is 0 0 1" % (kind, name))
+            given = etree.Element("axis")
         document.note_unknown(given, ("xyz", "limit", "dynamics", "use_parent_model_frame"))
         axis = _axis(document, given, name, frame, frames)
         kind, limit = _limit(document, given, name, kind)

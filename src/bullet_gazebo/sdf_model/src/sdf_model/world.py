@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from lxml import etree
 
-from urdf_model import OutOfBounds, bounds, read_file
+from urdf_model import Box, Link, OutOfBounds, Robot, Shape, bounds, read_file
+from urdf_model.transforms import pose_matrix
 
 from .document import Document, Notes, SdfError
 from .folders import ModelFolders
@@ -16,6 +18,10 @@ from .model import ModelReader, SdfModel
 
 # What a world says about windows, sound and weather, and about solvers that are not here.
 _QUIET = ("gui", "audio", "wind", "atmosphere", "magnetic_field", "spherical_coordinates")
+# What is left out by name.
+_NAMED = ("actor", "plugin")
+_ROAD_HEIGHT_M = 0.002
+_ASPHALT = (0.25, 0.25, 0.25, 1.0)
 
 
 @dataclass
@@ -63,8 +69,10 @@ class _WorldReader:
     def world(self, element):
         document = self._document
         self._world = SdfWorld(element.get("name", "default"))
-        known = ("gravity", "physics", "include", "model", "light", "frame", "state", "scene", *_QUIET)
+        known = ("gravity", "physics", "include", "model", "light", "frame", "state", "scene", "road", *_NAMED, *_QUIET)
         document.note_unknown(element, known)
+        for child in element.iterchildren(*_NAMED):
+            document.note(child, "%s '%s'" % (child.tag, child.get("filename") or child.get("name", "")))
         if element.find("gravity") is not None:
             self._world.gravity = self._gravity(element)
         for child in element.iterchildren("physics"):
@@ -74,7 +82,7 @@ class _WorldReader:
         for child in element.iterchildren("frame"):
             self._frames.add(document.name(child), child, child.get("attached_to", ""))
         for child in document.children(element):
-            if child.tag in ("include", "model", "light"):
+            if child.tag in ("include", "model", "light", "road"):
                 try:
                     self._entity(child)
                 except SdfError as error:
@@ -111,7 +119,9 @@ class _WorldReader:
         if element.tag == "light":
             world.lights.append(read_light(document, element, np.eye(4)))
             return
-        if element.tag == "model":
+        if element.tag == "road":
+            model = _road(document, element)
+        elif element.tag == "model":
             model = self._models.model(document, element)
         else:
             model = self._models.included(document, element, 0)
@@ -120,9 +130,7 @@ class _WorldReader:
             return
         if any(other.name == model.name for other in world.models):
             raise document.error(element, "model '%s' stands twice; give this one a <name> of its own" % model.name)
-        pose = element.find("pose")
-        relative_to = "" if pose is None else pose.get("relative_to", "")
-        model.pose = self._frames.where(relative_to, element) @ model.pose
+        model.pose = self._frames.where(document.relative_to(element), element) @ model.pose
         self._frames.add(model.name, element, pose=model.pose)
         world.models.append(model)
 
@@ -133,3 +141,27 @@ class _WorldReader:
             child = poses.get(model.name)
             if child is not None and child.find("pose") is not None:
                 model.pose = self._document.pose(child)
+
+
+def _road(document, element):
+    """Return the SdfModel of a <road>: something to be seen, which nothing collides with."""
+    width = document.number(element, "width", 1.0)
+    points = [np.array(document.numbers(point, 3)) for point in element.iterchildren("point")]
+    if len(points) < 2 or not width > 0.0:
+        raise document.error(element, "<road> has %d points and a width of %g m; expected two points and more, and a "
+                             "width above 0" % (len(points), width))
+    link = Link("link", line=element.sourceline)
+    for number, (start, end) in enumerate(zip(points, points[1:], strict=False)):
+        along = end - start
+        length = float(np.linalg.norm(along))
+        if length < 1e-6:
+            continue
+        pitch, yaw = -np.arctan2(along[2], np.hypot(along[0], along[1])), np.arctan2(along[1], along[0])
+        place = pose_matrix((start + end) / 2.0, (0.0, float(pitch), float(yaw)))
+        link.visuals.append(Shape(Box((length, width, _ROAD_HEIGHT_M)), place, "part%d" % number, _ASPHALT, "link"))
+    name = element.get("name") or "road"
+    robot = Robot(name, {"link": link}, {}, "link")
+    said = etree.Element("gazebo")
+    etree.SubElement(said, "static").text = "true"
+    robot.gazebo.append(said)
+    return SdfModel(name, robot, np.eye(4), True)

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What people write and Gazebo's reader took: attributes where elements belong, as before SDF 1.3."""
+
+from lxml import etree
+
+# Element -> the attributes that are elements in it today.
+_INSIDE = {
+    "box": ("size",),
+    "cylinder": ("radius", "length"),
+    "sphere": ("radius",),
+    "plane": ("normal", "size"),
+    "mesh": ("uri", "filename", "scale"),
+    "inertial": ("mass",),
+    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "axis": ("xyz",),
+    "limit": ("lower", "upper", "effort", "velocity"),
+    "dynamics": ("damping", "friction"),
+    "ode": ("mu", "mu2", "kp", "kd"),
+    "bounce": ("restitution_coefficient",),
+    "model": ("static",),
+    "link": ("gravity", "kinematic", "self_collide"),
+}
+_RENAMED = {"filename": "uri"}
+
+
+def attributes_to_elements(root):
+    """Add to the elements of ``root``, in place, what stands as an attribute; return a list of (what, line)."""
+    mended = []
+    for element in list(root.iter(*_INSIDE, "origin", "gravity")):
+        if any(True for _ in element.iterancestors("plugin", "sensor")):
+            continue
+        if element.tag == "gravity":
+            if element.get("xyz") and not (element.text or "").strip():
+                element.text = element.get("xyz")
+                mended.append(("attribute xyz of <gravity>", element.sourceline))
+        elif element.tag == "origin":
+            parent = element.getparent()
+            if element.get("pose") and parent is not None and parent.find("pose") is None:
+                _add(parent, "pose", element.get("pose"), element)
+                mended.append(("<origin pose>", element.sourceline))
+                parent.remove(element)
+        else:
+            found = [name for name in _INSIDE[element.tag] if element.get(name)
+                     and element.find(_RENAMED.get(name, name)) is None]
+            for name in found:
+                _add(element, _RENAMED.get(name, name), element.get(name), element)
+            if found:
+                mended.append(("attribute %s of <%s>" % (", ".join(found), element.tag), element.sourceline))
+    return mended
+
+
+def _add(parent, tag, text, where):
+    child = etree.SubElement(parent, tag)
+    child.text = text
+    child.sourceline = where.sourceline
