@@ -5,12 +5,12 @@ Built and judged with ik_oracle, which shares no code with the solver under test
 """
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from ik_oracle import MISSED, Oracle
 
-from baxter_sim_kinematics import NoSolution, Reason, solve
+from baxter_sim_kinematics import Budget, NoSolution, Reason, Target, solve
 from baxter_sim_kinematics.target import METRES_PER_RADIAN
 from bullet_sim import Pose
 from urdf_model import parse_urdf
@@ -36,7 +36,8 @@ class Case:
     kind: str
     target: np.ndarray
     right: Callable
-    options: dict = field(default_factory=dict)
+    budget: Budget = Budget()
+    position_only: bool = False
     post: tuple | None = None  # where a box of 10 cm stands [m, base frame]
 
 
@@ -69,12 +70,12 @@ class Builder:
 
     def ask(self, case):
         """Return the NoSolution about a case; None where the pose is solved although it was to be bad."""
-        options = dict(case.options)
+        options = {"budget": case.budget}
         if case.kind.startswith("touches"):
             options["checker"] = self.checker
         self._stand(case.post)
         try:
-            solve(self._chain, case.target, self._chain.mid_range, **options)
+            solve(self._chain, Target(case.target, case.position_only), self._chain.mid_range, **options)
         except NoSolution as failure:
             return failure
         finally:
@@ -107,16 +108,16 @@ class Builder:
         axis = self._rng.normal(size=3)
         return axis_rotation(axis / np.linalg.norm(axis), self._rng.uniform(0.0, np.pi))
 
-    def _out_of_reach(self, kind, target, over, **options):
+    def _out_of_reach(self, kind, target, over, position_only=False):
         """``over``: the least distance [m] by which it is missed, as far as lengths alone tell."""
-        least = self._oracle.nearest(target, self._rng, "position_only" in options)
+        least = self._oracle.nearest(target, self._rng, position_only)
 
         def right(failure):
-            short = np.hypot(failure.residual_m, METRES_PER_RADIAN * failure.residual_rad * (not options))
+            short = np.hypot(failure.residual_m, METRES_PER_RADIAN * failure.residual_rad * (not position_only))
             return (failure.reason is Reason.OUT_OF_REACH and failure.residual_m >= over
                     and short <= (1.0 + _LONGER) * least + _LONGER_M)
 
-        return Case(kind, target, right, options)
+        return Case(kind, target, right, position_only=position_only)
 
     def _too_far(self, kind):
         """No joint angles bridge more than the lengths of the links put end to end."""
@@ -248,21 +249,21 @@ class Builder:
 
     # -- not converged -------------------------------------------------------------------------------------------
 
-    def _not_converged(self, kind, **options):
+    def _not_converged(self, kind, budget):
         """The pose was made from a posture; it is left out where the search finds one although it was to fail."""
         target = self._oracle.fk(self._posture())
         try:
-            solve(self._chain, target, self._chain.mid_range, **options)
+            solve(self._chain, target, self._chain.mid_range, budget=budget)
         except NoSolution:
-            return Case(kind, target, lambda failure: failure.reason is Reason.NOT_CONVERGED, options)
+            return Case(kind, target, lambda failure: failure.reason is Reason.NOT_CONVERGED, budget)
         return None
 
     def _cut_short(self, kind):
-        return self._not_converged(kind, max_starts=1, max_iterations=int(self._rng.integers(1, 4)))
+        return self._not_converged(kind, Budget(max_starts=1, max_iterations=int(self._rng.integers(1, 4))))
 
     def _too_fine(self, kind):
         """Finer than a double can tell at this distance."""
-        return self._not_converged(kind, tolerance_m=1e-18, tolerance_rad=1e-18)
+        return self._not_converged(kind, Budget(tolerance_m=1e-18, tolerance_rad=1e-18))
 
 
 KINDS = {

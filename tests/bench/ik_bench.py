@@ -16,8 +16,8 @@ import PyKDL
 from arms import arms, checker_of, fill, kdl_chain
 from ik_oracle import Oracle
 
-from baxter_sim_kinematics import NoSolution, solve, solve_batch, warm_up
-from baxter_sim_kinematics.search import SERVICE_CANDIDATES
+from baxter_sim_kinematics import Budget, NoSolution, solve, solve_batch, warm_up
+from baxter_sim_kinematics.budget import SERVICE_BUDGET as SERVICE
 from baxter_sim_kinematics.target import METRES_PER_RADIAN
 from urdf_model.transforms import rotation_angle
 
@@ -56,9 +56,11 @@ def timed(chain, targets, seeds, answer):
 
 
 def ours(chain, candidates, checker=None):
+    budget = Budget(candidates, tolerance_m=TOLERANCE, tolerance_rad=TOLERANCE)
+
     def answer(target, seed):
         try:
-            return solve(chain, target, seed, TOLERANCE, TOLERANCE, candidates=candidates, checker=checker).q
+            return solve(chain, target, seed, budget=budget, checker=checker).q
         except NoSolution:
             return None
 
@@ -122,7 +124,7 @@ def compare(report, arm, count, rng):
     middle = [chain.mid_range] * count
     share, times = timed(chain, targets, middle, ours(chain, 1))
     two_share, two_times = timed(chain, targets, middle, ours(chain, 2))
-    service_share, service_times = timed(chain, targets, middle, ours(chain, SERVICE_CANDIDATES))
+    service_share, service_times = timed(chain, targets, middle, ours(chain, SERVICE.candidates))
     peers = {TRAC: (trac_ik(arm), count), "KDL LMA": (kdl(arm, False), min(count, KDL_POSES)),
              "KDL, restarts": (kdl(arm, True), min(count, KDL_POSES))}
     every = {"samples": count, "pooled": True, "least": 99.99}
@@ -130,8 +132,9 @@ def compare(report, arm, count, rng):
     report.add("%s: p99" % arm.name, np.percentile(times, 99), "ms", samples=count, most=1.0)
     report.add("%s: nearer of two, solved" % arm.name, two_share, "%", **every)
     report.add("%s: nearer of two, p99" % arm.name, np.percentile(two_times, 99), "ms", samples=count, most=1.0)
-    report.add("%s: the service's nearest of %d, solved" % (arm.name, SERVICE_CANDIDATES), service_share, "%", **every)
-    report.add("%s: the service's nearest of %d, p99" % (arm.name, SERVICE_CANDIDATES),
+    report.add("%s: the service's nearest of %d, solved" % (arm.name, SERVICE.candidates), service_share, "%",
+               **every)
+    report.add("%s: the service's nearest of %d, p99" % (arm.name, SERVICE.candidates),
                np.percentile(service_times, 99), "ms", samples=count)
     distributions = {"ours": times}
     for name, (answer, poses) in peers.items():
@@ -149,8 +152,8 @@ def compare(report, arm, count, rng):
                        (name, np.percentile(other_times, 99)), samples=count)
             report.add("%s: nearer of two, mean" % arm.name, two_times.mean(), "ms", (name, other_times.mean()),
                        samples=count)
-            report.add("%s: the service's nearest of %d, mean" % (arm.name, SERVICE_CANDIDATES), service_times.mean(),
-                       "ms", (name, other_times.mean()), samples=count)
+            report.add("%s: the service's nearest of %d, mean" % (arm.name, SERVICE.candidates),
+                       service_times.mean(), "ms", (name, other_times.mean()), samples=count)
     report.sample("time for a pose, %s" % arm.name, "ms", **distributions)
     servo(report, arm, postures, rng)
 
@@ -176,10 +179,11 @@ def servo(report, arm, postures, rng):
 def batch(report, arm, count, rng):
     chain = arm.chain
     targets = np.array([chain.fk(q) for q in rng.uniform(chain.lower, chain.upper, (count, len(chain)))])
+    budget = Budget(candidates=1, tolerance_m=TOLERANCE, tolerance_rad=TOLERANCE)
     rates = {}
     for threads in (1, None):
         start = time.perf_counter()
-        found = solve_batch(chain, targets, chain.mid_range, TOLERANCE, TOLERANCE, candidates=1, threads=threads)
+        found = solve_batch(chain, targets, chain.mid_range, budget=budget, threads=threads)
         rates[threads] = count / (time.perf_counter() - start)
         assert found.solved.mean() > 0.999
     report.add("batch on all cores", rates[None], "poses/s", ("one core", rates[1]), samples=count, least=10000)

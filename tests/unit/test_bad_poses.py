@@ -9,6 +9,7 @@ import PyKDL
 import pytest
 
 from baxter_sim_kinematics import NoSolution, Reason
+from baxter_sim_kinematics.errors import Attempt
 from baxter_sim_kinematics.target import METRES_PER_RADIAN
 
 BENCH = Path(__file__).resolve().parents[1] / "bench"
@@ -63,9 +64,10 @@ def test_wrong_verdict_is_not_taken_for_right(judged):
 
 
 def changed(failure, **changes):
-    values = {name: getattr(failure, name) for name in ("target", "reason", "detail", "residual_m", "residual_rad",
-                                                        "best", "joints", "excess", "pair", "nearest")}
-    return NoSolution(**{**values, **changes})
+    attempt = Attempt(failure.best, failure.nearest, changes.pop("residual_m", failure.residual_m),
+                      failure.residual_rad)
+    values = {name: getattr(failure, name) for name in ("target", "reason", "detail", "joints", "excess", "pair")}
+    return NoSolution(attempt=attempt, **{**values, **changes})
 
 
 @pytest.mark.parametrize("name", ["left arm", "right arm", "PROBOT"])

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baxter_sim_kinematics import NoSolution, Reason, solve
+from baxter_sim_kinematics import Budget, NoSolution, Reason, solve
 
 from .optimal import time_optimal
 
@@ -13,8 +13,8 @@ from .optimal import time_optimal
 _STEP_M, _SHORTEST_STEP_M = 0.005, 0.0005
 # Nearer than this to a solution the next one must be, else it is on another branch [rad].
 _SAME_BRANCH = 0.15
-# Residuals of a solution [m, rad]: the path is differentiated twice.
-_RESIDUAL = 1e-8
+# The solution next to the one before or none, and exact: the path is differentiated twice.
+_BUDGET = Budget(candidates=1, max_starts=1, tolerance_m=1e-8, tolerance_rad=1e-8)
 # A joint this near to a limit [rad] cannot go on.
 _STUCK = 1e-3
 # What the curvature of the path in joint space may take of the accelerations; the rest is for speeding up.
@@ -100,7 +100,7 @@ def _next(chain, pose, before):
     """(the solution for ``pose`` or None, why it is none on the branch of the one ``before`` or "", whether there is
     none on any)."""
     try:
-        found = solve(chain, pose, before, _RESIDUAL, _RESIDUAL, candidates=1, max_starts=1).q
+        found = solve(chain, pose, before, budget=_BUDGET).q
     except NoSolution as error:
         if error.reason is not Reason.NOT_CONVERGED:
             return None, str(error), True

@@ -2,16 +2,18 @@
 """Kinematics of a serial arm: forward, Jacobian, inverse with reasons for failure. Free of ROS."""
 
 from baxter_sim_kinematics.batch import BatchResult, solve_batch
+from baxter_sim_kinematics.budget import Budget
 from baxter_sim_kinematics.chain import Chain, wrench_from_torques
 from baxter_sim_kinematics.collision import CollisionChecker, Touch
 from baxter_sim_kinematics.errors import ChainError, InvalidPosture, InvalidTarget, KinematicsError, NoSolution, Reason
-from baxter_sim_kinematics.ik import solve, solve_all, warm_up
+from baxter_sim_kinematics.ik import Several, solve, solve_all, warm_up
 from baxter_sim_kinematics.posture_map import PostureMap
 from baxter_sim_kinematics.search import IkResult
-from baxter_sim_kinematics.target import pose_from_quaternion
+from baxter_sim_kinematics.target import Target, Targets, pose_from_quaternion
 
 __all__ = [
     "BatchResult",
+    "Budget",
     "Chain",
     "ChainError",
     "CollisionChecker",
@@ -22,6 +24,9 @@ __all__ = [
     "NoSolution",
     "PostureMap",
     "Reason",
+    "Several",
+    "Target",
+    "Targets",
     "Touch",
     "pose_from_quaternion",
     "solve",

@@ -2,9 +2,9 @@
 """``python3 -m baxter_sim_kinematics``: compile everything into the cache, so that no start has to wait for it."""
 import numpy as np
 
-from baxter_sim_kinematics import Chain, solve_batch, warm_up
+from baxter_sim_kinematics import Chain, Targets, solve_batch, warm_up
 
 # Compiled code does not depend on the robot: any chain will do.
 chain = Chain("base", "tip", [("turn", "revolute", "tip", np.eye(4), (0, 0, 1), -1.0, 1.0)])
 warm_up(chain)
-solve_batch(chain, [np.eye(4)], [0.0], free_axis=(0, 0, 1))
+solve_batch(chain, Targets([np.eye(4)], free_axis=(0, 0, 1)), [0.0])

@@ -5,8 +5,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from baxter_sim_kinematics.errors import NoSolution, Reason
-from baxter_sim_kinematics.search import IkResult
+from baxter_sim_kinematics.errors import Attempt, NoSolution, Reason
+from baxter_sim_kinematics.search import Collection, IkResult
 
 # Solutions that are looked at between two searches for more; the first are mostly free.
 _CHUNK = 6
@@ -30,7 +30,7 @@ class CollisionChecker(Protocol):
 
 def first_free(search, found, checker):
     """Return the IkResult of ``found`` if it is clear, else of a clear solution, of the first ones that are met the
-    nearest to the goal. Raises NoSolution that names the links that touch in most of the solutions.
+    nearest to the preferred posture. Raises NoSolution that names the links that touch in most of the solutions.
 
     All starts that ``search`` may make are made before it gives up.
     """
@@ -39,16 +39,16 @@ def first_free(search, found, checker):
     if touch is None:
         return IkResult(found.q, found.residual_m, found.residual_rad, found.iterations, found.starts - 1)
     touches = Counter([touch[:3]])
-    solutions = np.empty((search.max_starts + 1, len(search.chain)))
+    solutions = np.empty((int(search.budget.max_starts) + 1, len(search.chain)))
     solutions[0] = found.q
     held, start, iterations = 1, 0, found.iterations
-    while start < search.max_starts:
+    while start < search.budget.max_starts:
         room = solutions[: min(held + _CHUNK, len(solutions))]
-        count, used, more = search.gather(room, held, start, False)
+        count, used, more = search.gather(room, Collection(held, start, settle=False))
         start, iterations = start + used, iterations + more
         new = solutions[held:count]
         held = count
-        for q in new[np.argsort(np.linalg.norm(new - search.goal, axis=1), kind="stable")]:
+        for q in new[np.argsort(np.linalg.norm(new - search.preferred, axis=1), kind="stable")]:
             touch = checker.contact(names, q)
             if touch is None:
                 return IkResult(q.copy(), *search.residual(q), iterations, start - 1)
@@ -59,5 +59,5 @@ def first_free(search, found, checker):
     reason = Reason.WORLD_COLLISION if with_world else Reason.SELF_COLLISION
     raise NoSolution(
         search.target.pose, reason, "%s touches %s in %d of the %d postures that reach the pose, and none of them is "
-        "clear; move the target or turn it" % (link_a, link_b, times, sum(touches.values())), found.residual_m,
-        found.residual_rad, found.q, pair=(link_a, link_b), nearest=search.chain.fk(found.q))
+        "clear; move the target or turn it" % (link_a, link_b, times, sum(touches.values())),
+        Attempt(found.q, search.chain.fk(found.q), found.residual_m, found.residual_rad), pair=(link_a, link_b))

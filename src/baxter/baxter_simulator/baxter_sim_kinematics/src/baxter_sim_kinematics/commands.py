@@ -15,7 +15,7 @@ from baxter_sim_kinematics.chain import Chain
 from baxter_sim_kinematics.errors import KinematicsError, NoSolution
 from baxter_sim_kinematics.ik import solve_all
 from baxter_sim_kinematics.reach import Settings, compute, yoshikawa
-from baxter_sim_kinematics.target import pose_from_quaternion
+from baxter_sim_kinematics.target import Target, pose_from_quaternion
 from urdf_model import UrdfError, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
 
@@ -151,8 +151,8 @@ def _ik(parser, options):
     robot, chain = _chain(options)
     seed = chain.mid_range if options.seed is None else options.seed
     try:
-        results = solve_all(chain, target, seed, options.solutions, position_only=options.position_only,
-                            free_axis=options.free_axis, checker=_self_checker(robot) if options.clear else None)
+        results = solve_all(chain, Target(target, options.position_only, options.free_axis), seed, options.solutions,
+                            checker=_self_checker(robot) if options.clear else None)
     except NoSolution as failure:
         if options.json:
             print(json.dumps({"solutions": [], "reason": failure.reason.value, "detail": failure.detail,

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What can go wrong in this package, each error with the values that it is about."""
 import enum
+from typing import NamedTuple
+
+import numpy as np
 
 
 class KinematicsError(Exception):
@@ -41,6 +44,15 @@ class Reason(enum.Enum):
     WORLD_COLLISION = "collision with the world"
 
 
+class Attempt(NamedTuple):
+    """Joint values q (n,), the tip's pose (4, 4) there, and how far that is from the target."""
+
+    q: np.ndarray
+    pose: np.ndarray
+    residual_m: float
+    residual_rad: float
+
+
 class NoSolution(KinematicsError):
     """Inverse kinematics found no posture for ``target``.
 
@@ -54,16 +66,13 @@ class NoSolution(KinematicsError):
     pair: the two links that touch (only for collisions; a link of the world as "model/link").
     """
 
-    def __init__(self, target, reason, detail, residual_m, residual_rad, best, joints=(), excess=(), pair=(), *,
-                 nearest):
-        super().__init__("%s: %s%s" % (reason.value, detail, _nearest_sentence(nearest, residual_m, residual_rad)))
+    def __init__(self, target, reason, detail, attempt, *, joints=(), excess=(), pair=()):
+        """``attempt``: the best :class:`Attempt`."""
+        super().__init__("%s: %s%s" % (reason.value, detail, _nearest_sentence(attempt)))
         self.target = target
         self.reason = reason
         self.detail = detail
-        self.residual_m = residual_m
-        self.residual_rad = residual_rad
-        self.best = best
-        self.nearest = nearest
+        self.best, self.nearest, self.residual_m, self.residual_rad = attempt
         self.joints = tuple(joints)
         self.excess = tuple(excess)
         self.pair = tuple(pair)
@@ -75,8 +84,8 @@ def _restored(kind, args, values):
     return error
 
 
-def _nearest_sentence(nearest, residual_m, residual_rad):
-    if residual_m < 1e-5 and residual_rad < 1e-5:
+def _nearest_sentence(attempt):
+    if attempt.residual_m < 1e-5 and attempt.residual_rad < 1e-5:
         return ""
     return " (the nearest pose in reach is at %.3f %.3f %.3f, %.4f m and %.4f rad away)" % (
-        *nearest[:3, 3], residual_m, residual_rad)
+        *attempt.pose[:3, 3], attempt.residual_m, attempt.residual_rad)

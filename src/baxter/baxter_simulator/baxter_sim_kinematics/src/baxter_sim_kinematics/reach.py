@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from baxter_sim_kinematics.batch import solve_batch
+from baxter_sim_kinematics.budget import Budget
 from baxter_sim_kinematics.errors import KinematicsError
 from urdf_model.transforms import matrix_from_quaternion
 
@@ -109,6 +110,7 @@ def cell_values(chain, settings, centres):
     Manipulability is Yoshikawa's sqrt(det(J J^T)), the mean over the orientations that are reached.
     """
     rotations = settings.rotations()
+    budget = Budget(candidates=1, max_starts=settings.starts, tolerance_m=1e-5, tolerance_rad=1e-5)
     share, manipulability = np.zeros(len(centres)), np.full(len(centres), math.nan)
     for k, centre in enumerate(centres):
         # Where the outstretched arm does not get to there is nothing to search.
@@ -116,8 +118,7 @@ def cell_values(chain, settings, centres):
             continue
         targets = np.tile(np.eye(4), (len(rotations), 1, 1))
         targets[:, :3, :3], targets[:, :3, 3] = rotations, centre
-        found = solve_batch(chain, targets, chain.mid_range, candidates=1, max_starts=settings.starts, threads=1,
-                            tolerance_m=1e-5, tolerance_rad=1e-5)
+        found = solve_batch(chain, targets, chain.mid_range, budget=budget, threads=1)
         share[k] = found.solved.mean()
         if found.solved.any():
             manipulability[k] = np.mean([yoshikawa(chain.jacobian(q)) for q in found.q[found.solved]])

@@ -6,20 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from baxter_sim_kinematics import kernels
+from baxter_sim_kinematics.budget import Budget
 from baxter_sim_kinematics.target import METRES_PER_RADIAN
 
-# Random starts before a pose counts as unreachable. Of 100,000 random reachable Baxter poses none needed more than 100.
-MAX_STARTS = 200
-# Iterations of one start. Most arrive within 15; one that makes no progress is left earlier.
-MAX_ITERATIONS = 100
-# Starts that have to arrive before the service takes the nearest to the seed: 0.5 ms a pose, the true nearest 97 times
-# in 100.
-SERVICE_CANDIDATES = 16
 # Solutions that differ by less than this in every joint [rad or m] are the same one.
 APART = 0.05
-# Starts and iterations for the nearest pose that can be reached; 40 starts agree with 400 to a millimetre.
-_NEAREST_STARTS = 40
-_NEAREST_ITERATIONS = 100
+# For the nearest pose that can be reached; 40 starts agree with 400 to a millimetre.
+_NEAREST = Budget(max_starts=40, max_iterations=100)
 
 
 class IkResult(NamedTuple):
@@ -44,42 +37,53 @@ class Found(NamedTuple):
     q: np.ndarray
 
 
+class Collection(NamedTuple):
+    """How :meth:`Search.gather` fills its rows.
+
+    held: rows that are full already. first_start: number of the start to begin with. settle: each solution moves along
+    its self-motion to the point nearest the preferred posture. apart: two solutions differ by that in some joint [rad
+    or m].
+    """
+
+    held: int = 0
+    first_start: int = 0
+    settle: bool = True
+    apart: float = APART
+
+
 class Search:
-    """``seed`` (n,): where it starts. ``goal`` (n,): the posture to which solutions should be near."""
+    """A :class:`Target`, a Chain and a :class:`Budget`.
 
-    def __init__(self, chain, target, seed, goal, tolerance_m, tolerance_rad, max_starts=MAX_STARTS,
-                 max_iterations=MAX_ITERATIONS):
-        """Raises ValueError for tolerances or budgets with which nothing can be found."""
-        if not (tolerance_m > 0.0 and tolerance_rad > 0.0 and 1 <= max_starts < math.inf
-                and 1 <= max_iterations < math.inf):
-            raise ValueError("tolerances must be positive and max_starts, max_iterations finite and at least 1")
-        self.chain, self.target, self.seed, self.goal = chain, target, seed, goal
-        self.max_starts, self.max_iterations = int(max_starts), int(max_iterations)
-        self._tolerances = (float(tolerance_m), float(tolerance_rad))
+    ``seed`` (n,): where it starts; ``posture`` (n,): the one that solutions should be near, the seed where None.
+    Raises InvalidPosture for values that do not fit the chain.
+    """
 
-    def run(self, candidates, max_starts, max_iterations=MAX_ITERATIONS, limits=None, seed=None, goal=None, rows=None):
-        """Return what is Found. ``limits``: (lower, upper) in place of the chain's; ``rows``: of the error that
-        count.
+    def __init__(self, chain, target, seed, posture, budget):
+        self.chain, self.target, self.budget = chain, target, budget
+        self.seed = chain.posture(seed)
+        self.preferred = self.seed if posture is None else chain.posture(posture)
+
+    def run(self, *, budget=None, limits=None, postures=None, rows=None):
+        """Return what is Found, with the search's own groups where others are not given.
+
+        ``limits``: (lower, upper) in place of the chain's; ``postures``: (seed, preferred); ``rows``: the Rows of the
+        error that count.
         """
         q = np.empty(len(self.chain))
-        target = self.target
-        outcome = kernels.search(
-            self.chain.arrays, limits or self.chain.limit_arrays,
-            target.arrays if rows is None else (target.rotation, target.position, rows, target.basis), self._tolerances,
-            self.seed if seed is None else seed, self.goal if goal is None else goal, max_iterations, max_starts,
-            candidates, q)
+        target = self.target.arrays
+        if rows is not None:
+            target = (*target[:2], rows.value, target[3])
+        outcome = kernels.search(self.chain.arrays, limits or self.chain.limit_arrays, target,
+                                 (budget or self.budget).effort, postures or (self.seed, self.preferred), q)
         return Found(*outcome, q)
 
-    def gather(self, solutions, held, first_start, walked, max_starts=None, limits=None, apart=APART):
-        """Fill rows ``held`` and on of ``solutions`` (m, n) with solutions that differ; start number ``first_start``
-        first.
+    def gather(self, solutions, collection, *, budget=None, limits=None):
+        """Fill rows of ``solutions`` (m, n) with solutions that differ, as a :class:`Collection` says.
 
         Returns (rows filled, starts used, iterations).
         """
-        return kernels.gather(
-            self.chain.arrays, limits or self.chain.limit_arrays, self.target.arrays, self._tolerances, self.seed,
-            self.goal, self.max_iterations, first_start, self.max_starts if max_starts is None else max_starts, walked,
-            float(apart), held, solutions)
+        return kernels.gather(self.chain.arrays, limits or self.chain.limit_arrays, self.target.arrays,
+                              (budget or self.budget).effort, (self.seed, self.preferred), tuple(collection), solutions)
 
     def residual(self, q):
         """Return the pose error of ``q`` (n,): [m], [rad]."""
@@ -88,8 +92,8 @@ class Search:
     def nearest(self):
         """Return (q, error [m], error [rad]): inside the limits, the tip as near the target as it gets."""
         q = np.empty(len(self.chain))
-        errors = kernels.nearest(self.chain.arrays, self.chain.limit_arrays, self.target.arrays, self.seed,
-                                 METRES_PER_RADIAN, _NEAREST_ITERATIONS, _NEAREST_STARTS, q)
+        errors = kernels.nearest(self.chain.arrays, self.chain.limit_arrays, self.target.arrays, _NEAREST.effort,
+                                 METRES_PER_RADIAN, self.seed, q)
         return (q, *errors)
 
     def free_limits(self, joint=None, by=math.inf):

@@ -41,12 +41,13 @@ def pose_from_quaternion(position, quaternion_xyzw):
 class Target:
     """A pose (4, 4) of the tip in the base frame, checked, and how much of it counts.
 
-    rotation (3, 3), orthonormal; position (3,) [m]; rows: 6 all, 5 all but a turn about an axis of the tip, 3 the
-    position alone; basis (3, 3): as the kernels want it; arrays: all four, as they want them.
+    rotation (3, 3), orthonormal; position (3,) [m]; rows: which :class:`~baxter_sim_kinematics.kernels.Rows` of the
+    pose error count; arrays: rotation, position, rows, basis, as the kernels take them.
     """
 
     def __init__(self, pose, position_only=False, free_axis=None):
-        """``free_axis`` (3,): the axis of the tip, in the tip's frame, about which any turn will do.
+        """``position_only``: any orientation will do. ``free_axis`` (3,): any turn about this axis of the tip, in the
+        tip's frame, will do, e.g. (0, 0, 1) for a gripper that may come from any side.
 
         Raises InvalidTarget for what is no pose, ValueError for an axis that is no direction.
         """
@@ -56,24 +57,69 @@ class Target:
             matrix = np.empty(0)
         if matrix.shape != (4, 4):
             raise InvalidTarget("the target must be a 4 x 4 pose matrix, got %r" % (pose,), pose)
-        self.rotation, self.position, self.basis = np.empty((3, 3)), np.empty(3), _NO_AXIS
+        self.rotation, self.position, basis = np.empty((3, 3)), np.empty(3), _NO_AXIS
         if not kernels.split_pose(matrix, ROUNDED, self.rotation, self.position):
             raise InvalidTarget("the target must hold a finite position, a rotation, and 0 0 0 1 in its last row, "
                                 "got\n%s" % matrix, pose)
-        self.rows = 6
+        self.rows = rows_of(position_only, free_axis)
         if free_axis is not None:
-            self.rows, self.basis = 5, np.empty((3, 3))
-            kernels.fill_basis(self.rotation, _direction(free_axis), self.basis)
-        if position_only:
-            self.rows = 3
-        self.arrays = self.rotation, self.position, self.rows, self.basis
+            basis = np.empty((3, 3))
+            kernels.fill_basis(self.rotation, _direction(free_axis), basis)
+        self.arrays = self.rotation, self.position, self.rows.value, basis
+
+    @classmethod
+    def of(cls, target):
+        """Return ``target``, a Target or a pose (4, 4) of which everything counts, as a Target."""
+        return target if isinstance(target, cls) else cls(target)
 
     @property
     def pose(self):
         """A new (4, 4) of what was asked for, made orthonormal."""
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = self.rotation, self.position
-        return pose
+        return rigid(self.rotation, self.position)
+
+
+class Targets:
+    """Many poses (m, 4, 4), and how much of each counts: a :class:`Target` each, checked together.
+
+    arrays: rotations (m, 3, 3), positions (m, 3) [m], rows, bases (m, 3, 3), as the kernels take them.
+    """
+
+    def __init__(self, poses, position_only=False, free_axis=None):
+        """Raises InvalidTarget, with the number of the pose, for what is none; ValueError as Target does."""
+        try:
+            matrices = np.array(poses, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InvalidTarget("the targets must be an array (m, 4, 4) of numbers, got %r" % (poses,), poses) from None
+        if matrices.shape == (0,):
+            matrices = np.empty((0, 4, 4))
+        if matrices.ndim != 3 or matrices.shape[1:] != (4, 4):
+            raise InvalidTarget("the targets must be an array (m, 4, 4), got one of shape %s" % (matrices.shape,),
+                                poses)
+        count = len(matrices)
+        rotations, positions, bases = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3, 3))
+        axis = None if free_axis is None else _direction(free_axis)
+        for k in range(count):
+            if not kernels.split_pose(matrices[k], ROUNDED, rotations[k], positions[k]):
+                raise InvalidTarget("target %d must hold a finite position, a rotation, and 0 0 0 1 in its last row, "
+                                    "got\n%s" % (k, matrices[k]), matrices[k])
+            if axis is not None:
+                kernels.fill_basis(rotations[k], axis, bases[k])
+        self.arrays = rotations, positions, rows_of(position_only, free_axis).value, bases
+
+    @classmethod
+    def of(cls, targets):
+        """Return ``targets``, Targets or poses (m, 4, 4) of which everything counts, as Targets."""
+        return targets if isinstance(targets, cls) else cls(targets)
+
+    def __len__(self):
+        return len(self.arrays[1])
+
+
+def rows_of(position_only, free_axis):
+    """Return the Rows of the pose error that count; of both wishes the position alone is the greater."""
+    if position_only:
+        return kernels.Rows.POSITION
+    return kernels.Rows.POSE if free_axis is None else kernels.Rows.FREE_TURN
 
 
 def _direction(axis):

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Why a pose has no solution: asked only when a search has found none, by searching again with something let go."""
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from baxter_sim_kinematics import kernels
-from baxter_sim_kinematics.errors import NoSolution, Reason
-from baxter_sim_kinematics.search import MAX_ITERATIONS, MAX_STARTS
+from baxter_sim_kinematics.budget import MAX_ITERATIONS, MAX_STARTS
+from baxter_sim_kinematics.errors import Attempt, NoSolution, Reason
+from baxter_sim_kinematics.kernels import Rows
+from baxter_sim_kinematics.search import Collection
 
 # A pose error that stays above this with limits lifted is no matter of more iterations [m or rad].
 _CLEARLY_OFF = 1e-4
@@ -28,7 +31,7 @@ def beyond_reach(chain, target):
     over, wrist_over = kernels.beyond_reach(target.rotation, target.position, chain.shoulder, chain.tip_reach_m,
                                             chain.wrist_in_tip, chain.wrist_reach_m)
     text = "the target lies at least %.3f m beyond the outstretched arm; move it"
-    if over <= 0.0 and chain.wrist_is_fixed and target.rows == 6:
+    if over <= 0.0 and chain.wrist_is_fixed and target.rows is Rows.POSE:
         over = wrist_over
         text = "in this orientation the wrist would have to be at least %.3f m beyond the outstretched arm; turn the " \
             "target or move it"
@@ -46,13 +49,14 @@ def explain(search, found):
     reach = beyond_reach(chain, target)
     if reach:
         raise _out_of_reach(search, reach)
-    if search.max_starts < MAX_STARTS or search.max_iterations < MAX_ITERATIONS:
-        full = search.run(1, MAX_STARTS)
+    budget = search.budget
+    if budget.max_starts < MAX_STARTS or budget.max_iterations < MAX_ITERATIONS:
+        full = search.run(budget=_budget(search, MAX_STARTS))
         if full.arrived:
             raise _failure(search, Reason.NOT_CONVERGED, "no start out of %d came within the tolerance after %d "
-                           "iterations from this seed; allow more" % (search.max_starts, search.max_iterations),
+                           "iterations from this seed; allow more" % (budget.max_starts, budget.max_iterations),
                            (found.q, found.residual_m, found.residual_rad))
-    lifted = search.run(1, MAX_STARTS, limits=search.free_limits(), seed=found.q, goal=found.q)
+    lifted = search.run(budget=_budget(search, MAX_STARTS), limits=search.free_limits(), postures=(found.q, found.q))
     if lifted.arrived:
         inside, over = _least_excess(search, found.q, lifted.q)
         inside = inside or (None if over else _settled(search, lifted.q))
@@ -63,8 +67,9 @@ def explain(search, found):
         raise _failure(search, Reason.JOINT_LIMIT, "%s; change the orientation or bring the target nearer to the "
                        "middle of the workspace" % sentences, search.nearest(), joints=named,
                        excess=[abs(over[name]) for name in named])
-    if max(lifted.residual_m, 0.0 if target.rows == 3 else lifted.residual_rad) > _CLEARLY_OFF:
-        if target.rows > 3 and search.run(1, _STARTS_TO_EXPLAIN, rows=3).arrived:
+    if max(lifted.residual_m, 0.0 if target.rows is Rows.POSITION else lifted.residual_rad) > _CLEARLY_OFF:
+        if target.rows is not Rows.POSITION and search.run(budget=_budget(search, _STARTS_TO_EXPLAIN),
+                                                               rows=Rows.POSITION).arrived:
             raise _out_of_reach(search, "the point can be reached, but not in this orientation; turn the target or "
                                 "move it into the workspace")
         raise _out_of_reach(search, "the arm does not get there even without its joint limits; move the target into "
@@ -74,14 +79,19 @@ def explain(search, found):
                    % found.starts, (found.q, found.residual_m, found.residual_rad))
 
 
+def _budget(search, starts):
+    """The search's tolerances, one solution, and the usual iterations whatever its own budget says."""
+    return replace(search.budget, candidates=1, max_starts=starts, max_iterations=MAX_ITERATIONS)
+
+
 def _out_of_reach(search, detail):
     return _failure(search, Reason.OUT_OF_REACH, detail, search.nearest())
 
 
 def _failure(search, reason, detail, nearest, joints=(), excess=()):
     q, residual_m, residual_rad = nearest
-    return NoSolution(search.target.pose, reason, detail, residual_m, residual_rad, q, joints, excess,
-                      nearest=search.chain.fk(q))
+    attempt = Attempt(q, search.chain.fk(q), residual_m, residual_rad)
+    return NoSolution(search.target.pose, reason, detail, attempt, joints=joints, excess=excess)
 
 
 def _least_excess(search, start, lifted):
@@ -104,7 +114,8 @@ def _least_excess(search, start, lifted):
     if not least:
         solutions = np.empty((_UNLIMITED, len(chain)))
         solutions[0] = lifted
-        count, _, _ = search.gather(solutions, 1, 0, True, max_starts=MAX_STARTS, limits=search.free_limits())
+        count, _, _ = search.gather(solutions, Collection(held=1), limits=search.free_limits(),
+                                    budget=replace(search.budget, max_starts=MAX_STARTS))
         least = min(filter(None, (_excess(chain, q) for q in solutions[:count])), key=_sum, default={})
     return None, least
 
@@ -114,13 +125,14 @@ def _alone(search, joint, bound, start):
     not get there within ``bound`` [rad or m] beyond its limits).
     """
     chain, limits = search.chain, search.free_limits(joint, bound)
-    found = search.run(1, _STARTS_TO_EXPLAIN, limits=limits, seed=start, goal=start)
+    found = search.run(budget=_budget(search, _STARTS_TO_EXPLAIN), limits=limits, postures=(start, start))
     if not found.arrived:
         return None, {}
     for _ in range(_PULLS):
         # Along the self-motion to where this joint is least beyond.
         wrapped = _wrapped(chain, found.q)
-        found = search.run(1, 1, limits=limits, seed=wrapped, goal=np.clip(wrapped, *chain.limit_arrays))
+        found = search.run(budget=_budget(search, 1), limits=limits,
+                           postures=(wrapped, np.clip(wrapped, *chain.limit_arrays)))
     over = _excess(chain, found.q)
     return (None if over else _settled(search, found.q)), over
 
@@ -131,7 +143,8 @@ def _sum(over):
 
 def _settled(search, q):
     """Return what is Found from ``q``, turned into the limits, if that arrives; else None."""
-    inside = search.run(1, 1, seed=np.clip(_wrapped(search.chain, q), *search.chain.limit_arrays))
+    start = np.clip(_wrapped(search.chain, q), *search.chain.limit_arrays)
+    inside = search.run(budget=_budget(search, 1), postures=(start, search.preferred))
     return inside if inside.arrived else None
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from baxter_sim_kinematics import Chain, NoSolution, Reason, solve
+from baxter_sim_kinematics import Chain, NoSolution, Reason, Target, solve
 from baxter_sim_kinematics.bullet_checker import BulletChecker, plausible_pairs
 from bullet_sim import Pose
 from urdf_model import parse_urdf
@@ -70,18 +70,18 @@ def test_answer_bends_around_what_stands_there(planar, checker):
     chain = Chain.from_robot(planar, "foot", "tip")
     target = rigid(np.eye(3), (1.8, 0.0, 0.0))
     seed = np.array([0.8, -0.8, -0.8])
-    options = {"position_only": True}
-    plain = solve(chain, target, seed, **options)
+    anyhow = Target(target, position_only=True)
+    plain = solve(chain, anyhow, seed)
     elbow = chain.link_frames(plain.q)["l2"][:2, 3]
     checker.world.spawn(box("post", "0.3 0.3 1"), "post", Pose((*elbow, 0)), static=True)
-    answer = solve(chain, target, seed, checker=checker, **options)
+    answer = solve(chain, anyhow, seed, checker=checker)
     assert checker.contact(_JOINTS, plain.q) is not None
     assert checker.contact(_JOINTS, answer.q) is None
     np.testing.assert_allclose(chain.fk(answer.q)[:3, 3], target[:3, 3], atol=2e-6)
     # A wall on both sides leaves nothing, and the verdict names it.
     checker.world.spawn(box("wall", "0.3 9 1"), "wall", Pose((1.0, 0.0, 0)), static=True)
     with pytest.raises(NoSolution, match="wall/box") as caught:
-        solve(chain, target, seed, checker=checker, **options)
+        solve(chain, anyhow, seed, checker=checker)
     assert caught.value.reason is Reason.WORLD_COLLISION
     assert caught.value.pair[1] == "wall/box"
 

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from baxter_sim_kinematics import (
+    Budget,
     Chain,
     InvalidPosture,
     InvalidTarget,
     NoSolution,
     PostureMap,
     Reason,
+    Target,
     pose_from_quaternion,
     solve,
 )
@@ -74,7 +76,7 @@ def test_poses_at_the_limits_are_reached_without_breaking_them(chain):
 def test_lab_request_gives_the_angles_of_the_lab_sheet(left):
     """Seeded at neutral, where the lab's arm is at that moment."""
     for candidates in (1, 2, 32):
-        result = solve(left, LAB_POSE, NEUTRAL, candidates=candidates)
+        result = solve(left, LAB_POSE, NEUTRAL, budget=Budget(candidates=candidates))
         assert_on_target(left, result.q, LAB_POSE)
         np.testing.assert_allclose(result.q, LAB_ANGLES, atol=0.3)
 
@@ -87,7 +89,7 @@ def test_demo_poses_are_reached_from_anywhere(chain, side):
 
 def test_seed_that_is_a_solution_is_the_answer(chain):
     for q in np.random.default_rng(8).uniform(chain.lower, chain.upper, (100, 7)):
-        np.testing.assert_allclose(solve(chain, chain.fk(q), q, candidates=8).q, q, atol=1e-6)
+        np.testing.assert_allclose(solve(chain, chain.fk(q), q, budget=Budget(candidates=8)).q, q, atol=1e-6)
 
 
 def test_answer_is_the_nearest_to_the_seed_on_its_self_motion(chain):
@@ -104,7 +106,7 @@ def test_answer_is_the_nearest_to_the_seed_on_its_self_motion(chain):
 
 def test_more_candidates_never_end_farther_from_the_seed(left):
     for q in np.random.default_rng(10).uniform(left.lower, left.upper, (50, 7)):
-        distances = [np.linalg.norm(solve(left, left.fk(q), NEUTRAL, candidates=count).q - NEUTRAL)
+        distances = [np.linalg.norm(solve(left, left.fk(q), NEUTRAL, budget=Budget(candidates=count)).q - NEUTRAL)
                      for count in (1, 4, 16)]
         assert distances[0] >= distances[1] >= distances[2]
 
@@ -132,7 +134,7 @@ def test_position_only_leaves_the_orientation_free(left):
     target = rigid(rpy_matrix(0, -math.pi / 2, 0), (1.15, 0.4, 0.2))
     with pytest.raises(NoSolution):
         solve(left, target, NEUTRAL)
-    result = solve(left, target, NEUTRAL, position_only=True)
+    result = solve(left, Target(target, position_only=True), NEUTRAL)
     np.testing.assert_allclose(left.fk(result.q)[:3, 3], target[:3, 3], atol=1.1e-6)
 
 
@@ -217,7 +219,7 @@ def _step(chain, i):
 
 def test_too_small_a_budget_is_not_mistaken_for_an_unreachable_pose(left):
     with pytest.raises(NoSolution, match="allow more") as caught:
-        solve(left, LAB_POSE, NEUTRAL, max_starts=1, max_iterations=2)
+        solve(left, LAB_POSE, NEUTRAL, budget=Budget(max_starts=1, max_iterations=2))
     assert caught.value.reason is Reason.NOT_CONVERGED
 
 

@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 
 from baxter_sim_kinematics import (
+    Budget,
     Chain,
     ChainError,
     InvalidPosture,
     InvalidTarget,
     NoSolution,
+    Several,
+    Target,
+    Targets,
     pose_from_quaternion,
     solve,
     solve_all,
@@ -87,22 +91,29 @@ def test_what_is_no_quaternion_is_refused(position, turn):
 
 
 @pytest.mark.parametrize("option", [
-    {"max_starts": math.inf}, {"max_iterations": math.nan}, {"candidates": math.inf}, {"tolerance_m": math.nan},
-    {"free_axis": "z"}, {"free_axis": (0, 1)}, {"free_axis": (math.inf, 0, 0)}, {"free_axis": (0, 0, 0)},
+    {"max_starts": math.inf}, {"max_starts": 0}, {"max_iterations": math.nan}, {"candidates": math.inf},
+    {"tolerance_m": math.nan}, {"tolerance_rad": 0.0},
 ], ids=str)
-def test_option_that_is_none_is_refused(left, option):
+def test_budget_with_which_nothing_is_found_is_refused(option):
+    name, value = *option, *option.values()
+    with pytest.raises(ValueError, match="%s must be .*, got %s" % (name, value)):
+        Budget(**option)
+
+
+@pytest.mark.parametrize("axis", ["z", (0, 1), (math.inf, 0, 0), (0, 0, 0)], ids=str)
+def test_axis_that_is_no_direction_is_refused(left, axis):
     pose = left.fk(left.mid_range)
-    with pytest.raises(ValueError, match="must be"):
-        solve(left, pose, left.mid_range, **option)
-    with pytest.raises(ValueError, match="must be"):
-        solve_batch(left, [pose], left.mid_range, **option)
+    for make in (lambda: Target(pose, free_axis=axis), lambda: Targets([pose], free_axis=axis)):
+        with pytest.raises(ValueError, match="the free axis must be a direction"):
+            make()
 
 
 def test_number_of_solutions_and_their_gap_are_numbers(left):
-    pose = left.fk(left.mid_range)
-    for options in ({"n_solutions": math.inf}, {"n_solutions": 0}, {"n_solutions": 2, "apart": math.nan}):
-        with pytest.raises(ValueError, match="must be|or more"):
-            solve_all(left, pose, left.mid_range, **options)
+    for options in ({"number": math.inf}, {"number": 0}, {"number": 2, "apart": math.nan}):
+        with pytest.raises(ValueError, match="must be"):
+            Several(**options)
+    with pytest.raises(ValueError, match="number of solutions must be finite and at least 1, got 0"):
+        solve_all(left, left.fk(left.mid_range), left.mid_range, 0)
 
 
 def test_batch_of_nothing_is_nothing(left):

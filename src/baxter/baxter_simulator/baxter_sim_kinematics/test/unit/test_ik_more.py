@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 from baxter_sim_kinematics import (
+    Budget,
     Chain,
     InvalidPosture,
     InvalidTarget,
     NoSolution,
     Reason,
+    Several,
+    Target,
+    Targets,
     Touch,
     solve,
     solve_all,
@@ -37,7 +41,7 @@ def test_distinct_solutions_are_solutions_and_distinct(chain):
     for settle in (True, False):
         several = []
         for target in poses(chain, 40, 41):
-            results = solve_all(chain, target, chain.mid_range, 8, settle=settle)
+            results = solve_all(chain, target, chain.mid_range, Several(8, settle=settle))
             assert 1 <= len(results) <= 8
             for k, result in enumerate(results):
                 assert_solution(chain, result.q, target)
@@ -57,7 +61,7 @@ def test_six_axes_have_as_many_solutions_as_the_books_say():
           for i, (origin, axis) in enumerate(joints)),
         ("tool", "fixed", "tip", rigid(np.eye(3), (0.1, 0, 0)), (0, 0, 1), None, None)])
     target = chain.fk([0.3, -0.5, 0.8, 0.4, 0.7, -0.2])
-    results = solve_all(chain, target, np.zeros(6), 20, max_starts=1000)
+    results = solve_all(chain, target, np.zeros(6), 20, budget=Budget(max_starts=1000))
     assert len(results) == 8
     for result in results:
         assert_solution(chain, result.q, target)
@@ -65,7 +69,7 @@ def test_six_axes_have_as_many_solutions_as_the_books_say():
 
 def test_first_of_several_is_no_farther_than_the_single_answer(left):
     for target in poses(left, 20, 42):
-        one = solve(left, target, left.mid_range, candidates=200).q
+        one = solve(left, target, left.mid_range, budget=Budget(candidates=200)).q
         several = solve_all(left, target, left.mid_range, 3)
         assert np.linalg.norm(several[0].q - left.mid_range) <= np.linalg.norm(one - left.mid_range) + 1e-4
 
@@ -74,7 +78,7 @@ def test_several_of_an_unreachable_pose_say_why(left):
     with pytest.raises(NoSolution) as caught:
         solve_all(left, rigid(np.eye(3), (3, 0, 0)), left.mid_range, 4)
     assert caught.value.reason is Reason.OUT_OF_REACH
-    with pytest.raises(ValueError, match="n_solutions"):
+    with pytest.raises(ValueError, match="number of solutions"):
         solve_all(left, left.fk(left.mid_range), left.mid_range, 0)
 
 
@@ -87,7 +91,7 @@ def test_free_axis_lets_the_tip_turn_about_it_and_nothing_else(chain):
     for target in poses(chain, 60, 44):
         axis = rng.normal(size=3)
         axis /= np.linalg.norm(axis)
-        tip = chain.fk(solve(chain, target, chain.mid_range, free_axis=2.0 * axis).q)
+        tip = chain.fk(solve(chain, Target(target, free_axis=2.0 * axis), chain.mid_range).q)
         np.testing.assert_allclose(tip[:3, 3], target[:3, 3], atol=1.1e-6)
         np.testing.assert_allclose(tip[:3, :3] @ axis, target[:3, :3] @ axis, atol=1.5e-6)
         turns.append(rotation_angle(tip[:3, :3].T @ target[:3, :3]))
@@ -105,13 +109,13 @@ def test_free_axis_reaches_what_the_full_pose_does_not(six_axes):
     turned = locked.fk(home) @ rigid(axis_rotation(np.array([0, 0, 1.0]), 1.0), (0, 0, 0))
     with pytest.raises(NoSolution):
         solve(locked, turned, home)
-    np.testing.assert_allclose(solve(locked, turned, home, free_axis=(0, 0, 1)).q, home, atol=0.02)
+    np.testing.assert_allclose(solve(locked, Target(turned, free_axis=(0, 0, 1)), home).q, home, atol=0.02)
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 0), (1, 0), "z", (math.nan, 0, 1)])
 def test_free_axis_that_is_no_direction_is_refused(left, axis):
     with pytest.raises(ValueError, match="direction|could not convert"):
-        solve(left, left.fk(left.mid_range), left.mid_range, free_axis=axis)
+        solve(left, Target(left.fk(left.mid_range), free_axis=axis), left.mid_range)
 
 
 # -- the null space ------------------------------------------------------------------------------------------------
@@ -123,7 +127,8 @@ def test_posture_draws_the_elbow(left):
     seed = left.mid_range
     for target in poses(left, 20, 46):
         near, far = rng.uniform(left.lower, left.upper, (2, 7))
-        answers = [solve(left, target, seed, posture=posture, candidates=64).q for posture in (near, far)]
+        answers = [solve(left, target, seed, posture=posture, budget=Budget(candidates=64)).q
+                   for posture in (near, far)]
         for q in answers:
             assert_solution(left, q, target)
         assert np.linalg.norm(answers[0] - near) <= np.linalg.norm(answers[1] - near) + 1e-6
@@ -158,9 +163,9 @@ def test_batch_gives_the_answers_of_single_calls_on_any_number_of_threads(chain)
 def test_batch_with_free_axis_and_posture(left):
     targets = poses(left, 20, 50)
     for options in ({"free_axis": (0, 0, 1)}, {"position_only": True}):
-        result = solve_batch(left, targets, left.mid_range, postures=left.lower, **options)
+        result = solve_batch(left, Targets(targets, **options), left.mid_range, postures=left.lower)
         for q, target in zip(result.q, targets, strict=True):
-            expected = solve(left, target, left.mid_range, posture=left.lower, **options).q
+            expected = solve(left, Target(target, **options), left.mid_range, posture=left.lower).q
             assert q.tobytes() == expected.tobytes()
 
 
@@ -176,7 +181,7 @@ def test_batch_of_nothing_and_bad_batches(left):
     with pytest.raises(InvalidPosture, match="3 finite postures of 7"):
         solve_batch(left, good, np.zeros((2, 7)))
     with pytest.raises(ValueError, match="at least 1"):
-        solve_batch(left, good, left.mid_range, max_starts=0)
+        solve_batch(left, good, left.mid_range, budget=Budget(max_starts=0))
 
 
 # -- other arms ----------------------------------------------------------------------------------------------------
@@ -197,7 +202,7 @@ def test_any_number_of_joints(count):
 
 
 def test_thousand_poses_of_a_desk_arm(six_axes):
-    result = solve_batch(six_axes, poses(six_axes, 1000, 53), six_axes.mid_range, candidates=1)
+    result = solve_batch(six_axes, poses(six_axes, 1000, 53), six_axes.mid_range, budget=Budget(candidates=1))
     assert result.solved.all()
 
 

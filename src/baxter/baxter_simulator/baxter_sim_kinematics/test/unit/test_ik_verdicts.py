@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from baxter_sim_kinematics import Chain, NoSolution, Reason, solve, solve_batch
+from baxter_sim_kinematics import Budget, Chain, NoSolution, Reason, Target, solve, solve_batch
 from urdf_model.transforms import axis_rotation, rigid, rotation_angle
 
 # The share of verdicts that must be right, of each kind of case.
@@ -115,7 +115,7 @@ def test_limit_of_the_whole_arm_is_named_with_what_would_do(left):
         q[joint] = left.upper[joint] + beyond
         target = left.fk(q)
         # Bad only if nobody gets there inside the limits, with ten times the effort of a request.
-        if solve_batch(left, [target], left.mid_range, candidates=1, max_starts=2000).solved[0]:
+        if solve_batch(left, [target], left.mid_range, budget=Budget(candidates=1, max_starts=2000)).solved[0]:
             continue
         failure = verdict(left, target, left.mid_range)
         if failure.reason is not Reason.JOINT_LIMIT or len(failure.joints) != 1 or failure.excess[0] > 1.05 * beyond:
@@ -129,7 +129,8 @@ def test_limit_of_the_whole_arm_is_named_with_what_would_do(left):
             (name, "revolute", "l%d" % i, rigid(left.arrays[0][i], left.arrays[1][i]), (0, 0, 1), lower[i], upper[i])
             for i, name in enumerate(left.joint_names)]
             + [("tool", "fixed", "tip", rigid(left.arrays[0][-1], left.arrays[1][-1]), (0, 0, 1), None, None)])
-        right.append(bool(solve_batch(wider, [target], failure.best, candidates=1, max_starts=2000).solved[0]))
+        patient = Budget(candidates=1, max_starts=2000)
+        right.append(bool(solve_batch(wider, [target], failure.best, budget=patient).solved[0]))
     assert_mostly(right)
 
 
@@ -139,7 +140,7 @@ def test_budget_that_is_too_small_is_called_that(chain):
     right = []
     while len(right) < 50:
         target = chain.fk(rng.uniform(chain.lower, chain.upper))
-        failure = verdict(chain, target, chain.mid_range, max_starts=1, max_iterations=3)
+        failure = verdict(chain, target, chain.mid_range, budget=Budget(max_starts=1, max_iterations=3))
         if failure is not None:
             right.append(failure.reason is Reason.NOT_CONVERGED)
     assert_mostly(right)
@@ -160,6 +161,6 @@ def test_nearest_pose_in_reach_is_the_nearest(left):
 
 def verdict_of_position(chain, position):
     with pytest.raises(NoSolution) as caught:
-        solve(chain, rigid(np.eye(3), position), chain.mid_range, position_only=True)
+        solve(chain, Target(rigid(np.eye(3), position), position_only=True), chain.mid_range)
     assert caught.value.reason is Reason.OUT_OF_REACH
     return caught.value

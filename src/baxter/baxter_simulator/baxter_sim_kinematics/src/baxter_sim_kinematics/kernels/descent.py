@@ -18,8 +18,9 @@ _TOUCHING = 1e-12
 
 
 @compiled
-def _fill_slope(jacobian, error, rows, lower, upper, q, slope):
+def _fill_slope(jacobian, error, rows, limits, q, slope):
     """Fill ``slope`` (n,) with J^T e. A joint at its limit and pushed outwards sits out: its column becomes 0."""
+    lower, upper = limits
     for i in range(q.shape[0]):
         value = 0.0
         for row in range(rows):
@@ -32,7 +33,7 @@ def _fill_slope(jacobian, error, rows, lower, upper, q, slope):
 
 
 @compiled
-def reach(arm, limits, target, tolerances, max_iterations, q, best):
+def reach(arm, limits, target, effort, q, best):
     """Levenberg-Marquardt from ``q`` (changed in place) towards the target, inside the limits.
 
     ``best`` gets the visited posture with the least error. Returns (solved, iterations, least error). The damping is in
@@ -41,12 +42,13 @@ def reach(arm, limits, target, tolerances, max_iterations, q, best):
     """
     n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
     target_rotation, target_position, rows, basis = target
-    axes, origins, rotation, position, jacobian, error = workspace(n)
-    normal, step, (tolerance_m, tolerance_rad) = np.empty((n, n)), np.empty(n), tolerances
+    lines, rotation, position, jacobian, error = workspace(n)
+    normal, step = np.empty((n, n)), np.empty(n)
+    tolerance_m, tolerance_rad, max_iterations, _, _ = effort
     least, mark = math.inf, math.inf
     best[:] = q
     for iteration in range(max_iterations):
-        place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position)
+        place_joints(rotations, offsets, prismatic, q, lines, rotation, position)
         fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
         size = length(error, 0, rows)
         if size < least:
@@ -60,8 +62,8 @@ def reach(arm, limits, target, tolerances, max_iterations, q, best):
             if least > 0.7 * mark:
                 return False, iteration + 1, least
             mark = least
-        fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
-        _fill_slope(jacobian, error, rows, lower, upper, q, step)
+        fill_task_jacobian(prismatic, lines, position, rows, basis, jacobian)
+        _fill_slope(jacobian, error, rows, limits, q, step)
         damp(jacobian, rows, _DAMPING * size * size + 1e-12, normal, step)
         for i in range(n):
             q[i] = min(max(q[i] + step[i], lower[i]), upper[i])
@@ -69,21 +71,20 @@ def reach(arm, limits, target, tolerances, max_iterations, q, best):
 
 
 @compiled
-def _fill_drift(jacobian, error, rows, lower, upper, seed, q, gram, pull, correction, drift, fix):
-    """Fill ``fix`` (n,), the minimum-norm correction of the pose error, and ``drift`` (n,), the part of (seed - q) that
-    the tip does not feel.
+def _fill_drift(jacobian, error, rows, limits, preferred, q, room):
+    """Of ``room``, (gram (6, 6), pull (6,), correction (6,), drift (n,), fix (n,)), fill fix, the minimum-norm
+    correction of the pose error, and drift, the part of (preferred - q) that the tip does not feel.
 
     Joints that the drift would push through their limit are taken out, one round at a time: their columns become 0.
-    ``gram`` (6, 6), ``pull`` and ``correction`` (6,) are space.
     """
-    n = q.shape[0]
+    n, (lower, upper), (gram, pull, correction, drift, fix) = q.shape[0], limits, room
     for _ in range(n):
         fill_gram(jacobian, rows, 1e-10, gram)
         for row in range(rows):
             correction[row] = error[row]
             value = 0.0
             for i in range(n):
-                value += jacobian[row, i] * (seed[i] - q[i])
+                value += jacobian[row, i] * (preferred[i] - q[i])
             pull[row] = value
         factorise(gram, rows)
         back_substitute(gram, rows, correction)
@@ -91,7 +92,7 @@ def _fill_drift(jacobian, error, rows, lower, upper, seed, q, gram, pull, correc
         taken_out = False
         for i in range(n):
             moves = False
-            drift[i], fix[i] = seed[i] - q[i], 0.0
+            drift[i], fix[i] = preferred[i] - q[i], 0.0
             for row in range(rows):
                 moves = moves or jacobian[row, i] != 0.0
                 drift[i] -= jacobian[row, i] * pull[row]
@@ -108,8 +109,9 @@ def _fill_drift(jacobian, error, rows, lower, upper, seed, q, gram, pull, correc
 
 
 @compiled
-def walk(arm, limits, target, tolerances, max_iterations, seed, q, best):
-    """Walk from the solution ``q`` towards ``seed`` without leaving the target: down the distance, in the null space.
+def walk(arm, limits, target, effort, preferred, q, best):
+    """Walk from the solution ``q`` towards ``preferred`` without leaving the target: down the distance, in the null
+    space.
 
     ``best`` (a solution on entry) gets the nearest solution met. Returns the iterations used. Each step is what
     :func:`_fill_drift` says, scaled by the step length that the last two steps suggest (Barzilai and Borwein, IMA J.
@@ -117,25 +119,26 @@ def walk(arm, limits, target, tolerances, max_iterations, seed, q, best):
     """
     n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
     target_rotation, target_position, rows, basis = target
-    axes, origins, rotation, position, jacobian, error = workspace(n)
-    gram, pull, correction = np.empty((6, 6)), np.empty(6), np.empty(6)
+    lines, rotation, position, jacobian, error = workspace(n)
     drift, last_q, last_drift, fix = np.empty(n), np.empty(n), np.zeros(n), np.empty(n)
-    closest, (tolerance_m, tolerance_rad) = distance(best, seed), tolerances
+    room = (np.empty((6, 6)), np.empty(6), np.empty(6), drift, fix)
+    tolerance_m, tolerance_rad, max_iterations, _, _ = effort
+    closest = distance(best, preferred)
     gain, longest, taken = 1.0, 0.4, 0.0
     for iteration in range(max_iterations):
-        place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position)
+        place_joints(rotations, offsets, prismatic, q, lines, rotation, position)
         fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
         there = on_target(error, rows, tolerance_m, tolerance_rad)
         if there:
-            gap = distance(q, seed)
+            gap = distance(q, preferred)
             if gap < closest:
                 closest = gap
                 best[:] = q
-        fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
-        _fill_drift(jacobian, error, rows, lower, upper, seed, q, gram, pull, correction, drift, fix)
+        fill_task_jacobian(prismatic, lines, position, rows, basis, jacobian)
+        _fill_drift(jacobian, error, rows, limits, preferred, q, room)
         size, strayed = length(drift, 0, n), length(fix, 0, n)
         if size < 1e-5 and there:
-            if distance(q, seed) < closest + 1e-4:
+            if distance(q, preferred) < closest + 1e-4:
                 best[:] = q
             return iteration
         if strayed > 0.3 * taken and taken > 1e-6:
@@ -180,11 +183,11 @@ def _approach(arm, limits, target, metres_per_radian, max_iterations, q):
     """
     n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
     target_rotation, target_position, rows, basis = target
-    axes, origins, rotation, position, jacobian, error = workspace(n)
+    lines, rotation, position, jacobian, error = workspace(n)
     normal, step, slope, tried = np.empty((n, n)), np.empty(n), np.empty(n), q.copy()
     damping, growth, cost = 1e-2, 2.0, math.inf
     for _ in range(max_iterations):
-        place_joints(rotations, offsets, prismatic, tried, axes, origins, rotation, position)
+        place_joints(rotations, offsets, prismatic, tried, lines, rotation, position)
         fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
         for row in range(3, rows):
             error[row] *= metres_per_radian
@@ -196,11 +199,11 @@ def _approach(arm, limits, target, metres_per_radian, max_iterations, q):
             damping, growth = max(damping * 0.3, 1e-9), 2.0
             if gained < 1e-10 * cost or cost < 1e-14:
                 break
-            fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian)
+            fill_task_jacobian(prismatic, lines, position, rows, basis, jacobian)
             for i in range(n):
                 for row in range(3, rows):
                     jacobian[row, i] *= metres_per_radian
-            _fill_slope(jacobian, error, rows, lower, upper, q, slope)
+            _fill_slope(jacobian, error, rows, limits, q, slope)
         else:
             damping, growth = damping * growth, growth * 2.0
             if damping > 1e6:
@@ -213,13 +216,14 @@ def _approach(arm, limits, target, metres_per_radian, max_iterations, q):
 
 
 @compiled
-def nearest(arm, limits, target, seed, metres_per_radian, max_iterations, max_starts, solution):
+def nearest(arm, limits, target, effort, metres_per_radian, seed, solution):
     """The posture inside the limits whose tip comes nearest to a target that cannot be reached.
 
     Near means sqrt(error [m]^2 + (metres_per_radian * error [rad])^2). Looked for from the seed and from random
     postures. Fills ``solution`` (n,); returns its pose error [m], [rad].
     """
     q, seed = np.empty(seed.shape[0]), clamped(seed, limits)
+    _, _, max_iterations, max_starts, _ = effort
     solution[:] = seed
     state, least = state_of(target, seed), math.inf
     for attempt in range(max_starts):

@@ -8,8 +8,10 @@ from baxter_sim_kinematics.kernels.compiled import compiled
 
 
 @compiled
-def place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position):
-    """Forward kinematics; fills ``axes``, ``origins`` (n, 3) of the joints and the tip's ``rotation``, ``position``."""
+def place_joints(rotations, offsets, prismatic, q, lines, rotation, position):
+    """Forward kinematics; fills the tip's ``rotation`` and ``position`` and the joints' ``lines`` (n, 6): the direction
+    of each joint's axis, then a point on it, the joint's origin.
+    """
     r00, r01, r02 = 1.0, 0.0, 0.0
     r10, r11, r12 = 0.0, 1.0, 0.0
     r20, r21, r22 = 0.0, 0.0, 1.0
@@ -47,20 +49,20 @@ def place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, posi
             r10, r11 = a10 * cosine + a11 * sine, a11 * cosine - a10 * sine
             r20, r21 = a20 * cosine + a21 * sine, a21 * cosine - a20 * sine
         r02, r12, r22 = a02, a12, a22
-        axes[i, 0], axes[i, 1], axes[i, 2] = a02, a12, a22
-        origins[i, 0], origins[i, 1], origins[i, 2] = x, y, z
+        lines[i, 0], lines[i, 1], lines[i, 2] = a02, a12, a22
+        lines[i, 3], lines[i, 4], lines[i, 5] = x, y, z
 
 
 @compiled
-def fill_jacobian(prismatic, axes, origins, position, jacobian):
+def fill_jacobian(prismatic, lines, position, jacobian):
     """Geometric Jacobian (6, n) of the point ``position``: linear rows first, base frame."""
-    for i in range(axes.shape[0]):
-        ax, ay, az = axes[i, 0], axes[i, 1], axes[i, 2]
+    for i in range(lines.shape[0]):
+        ax, ay, az = lines[i, 0], lines[i, 1], lines[i, 2]
         if prismatic[i]:
             jacobian[0, i], jacobian[1, i], jacobian[2, i] = ax, ay, az
             jacobian[3, i], jacobian[4, i], jacobian[5, i] = 0.0, 0.0, 0.0
         else:
-            dx, dy, dz = position[0] - origins[i, 0], position[1] - origins[i, 1], position[2] - origins[i, 2]
+            dx, dy, dz = position[0] - lines[i, 3], position[1] - lines[i, 4], position[2] - lines[i, 5]
             jacobian[0, i] = ay * dz - az * dy
             jacobian[1, i] = az * dx - ax * dz
             jacobian[2, i] = ax * dy - ay * dx
@@ -98,11 +100,10 @@ def joint_frames(rotations, offsets, prismatic, q):
 def tip_and_jacobian(rotations, offsets, prismatic, q):
     """Return the tip's pose (4, 4) in the base frame and its Jacobian (6, n)."""
     n = q.shape[0]
-    axes, origins = np.empty((n, 3)), np.empty((n, 3))
-    rotation, position = np.empty((3, 3)), np.empty(3)
+    lines, rotation, position = np.empty((n, 6)), np.empty((3, 3)), np.empty(3)
     pose, jacobian = np.zeros((4, 4)), np.empty((6, n))
-    place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position)
-    fill_jacobian(prismatic, axes, origins, position, jacobian)
+    place_joints(rotations, offsets, prismatic, q, lines, rotation, position)
+    fill_jacobian(prismatic, lines, position, jacobian)
     pose[:3, :3] = rotation
     pose[:3, 3] = position
     pose[3, 3] = 1.0

@@ -12,34 +12,35 @@ from baxter_sim_kinematics.kernels.task import pose_error
 
 
 @compiled
-def search(arm, limits, target, tolerances, seed, goal, max_iterations, max_starts, wanted, solution):
-    """Look for postures that put the tip on the target, and keep the one nearest ``goal`` (n,).
+def search(arm, limits, target, effort, postures, solution):
+    """Look for postures that put the tip on the target, and keep the one nearest the preferred posture.
 
     The first start is the seed, the others are random postures inside the limits whose generator is seeded by the
-    request itself, so the same request gives the same answer bit for bit. Ends after ``wanted`` starts that arrived.
+    request itself, so the same request gives the same answer bit for bit. Ends when as many starts have arrived as the
+    effort's ``candidates``.
 
     ``solution`` (n,) gets the answer, or the best attempt. Returns (starts that arrived, starts, iterations, the
     solution's pose error [m], [rad]).
     """
+    seed, preferred = clamped(postures[0], limits), clamped(postures[1], limits)
     q, best = np.empty(seed.shape[0]), np.empty(seed.shape[0])
-    seed, goal = clamped(seed, limits), clamped(goal, limits)
-    state = state_of(target, seed)
+    state, (_, _, _, max_starts, candidates) = state_of(target, seed), effort
     found, starts, iterations, least, nearest = 0, 0, 0, math.inf, math.inf
     for attempt in range(max_starts):
         starts += 1
         fill_start(attempt, state, limits, seed, q)
-        solved, used, size = reach(arm, limits, target, tolerances, max_iterations, q, best)
+        solved, used, size = reach(arm, limits, target, effort, q, best)
         iterations += used
         if solved:
-            turn_towards(arm, limits, goal, best)
+            turn_towards(arm, limits, preferred, best)
             q[:] = best
-            iterations += walk(arm, limits, target, tolerances, max_iterations, goal, q, best)
+            iterations += walk(arm, limits, target, effort, preferred, q, best)
             found += 1
-            gap = distance(best, goal)
+            gap = distance(best, preferred)
             if gap < nearest:
                 nearest = gap
                 solution[:] = best
-            if found >= wanted:
+            if found >= candidates:
                 break
         elif found == 0 and size < least:
             least = size
@@ -49,48 +50,45 @@ def search(arm, limits, target, tolerances, seed, goal, max_iterations, max_star
 
 
 @compiled
-def search_many(arm, limits, rotations, positions, rows, bases, tolerances, seeds, goals, max_iterations, max_starts,
-                wanted, first, last, solutions, outcomes):
-    """:func:`search` for the targets ``first`` to ``last`` - 1 of arrays with one entry a target.
+def search_many(arm, limits, targets, effort, postures, part, answers):
+    """:func:`search` for a ``part`` (first, last + 1) of the targets.
 
-    Fills their rows of ``solutions`` (m, n) and ``outcomes`` (m, 5): what search returns.
+    ``targets`` and ``postures`` have arrays with one entry per target. ``answers``: (solutions (m, n), outcomes (m, 5):
+    what search returns), of which the rows of this part are filled.
     """
-    for k in range(first, last):
-        target = (rotations[k], positions[k], rows, bases[k])
+    (rotations, positions, rows, bases), (seeds, preferred), (solutions, outcomes) = targets, postures, answers
+    for k in range(part[0], part[1]):
         found, starts, iterations, error_m, error_rad = search(
-            arm, limits, target, tolerances, seeds[k], goals[k], max_iterations, max_starts, wanted, solutions[k])
+            arm, limits, (rotations[k], positions[k], rows, bases[k]), effort, (seeds[k], preferred[k]), solutions[k])
         outcomes[k, 0], outcomes[k, 1], outcomes[k, 2] = found, starts, iterations
         outcomes[k, 3], outcomes[k, 4] = error_m, error_rad
 
 
 @compiled
-def gather(arm, limits, target, tolerances, seed, goal, max_iterations, first_start, max_starts, walked, apart, held,
-           solutions):
-    """Collect solutions of one target that differ: in at least one joint by ``apart`` [rad or m] from each other.
+def gather(arm, limits, target, effort, postures, collection, solutions):
+    """Collect solutions of one target that differ, as the ``collection`` says, in the rows of ``solutions`` (m, n).
 
-    Starts number ``first_start`` to ``max_starts`` - 1 of those that :func:`search` would try, until ``solutions``
-    (m, n), of which the first ``held`` rows hold some already, is full. With ``walked`` each is taken along its
-    self-motion to where it is nearest ``goal``; of two that are the same the first stays.
-    Returns (rows filled, starts, iterations).
+    Makes the starts that :func:`search` would make, from the collection's first to the effort's last, until the rows
+    are full; of two solutions that are the same the first stays. Returns (rows filled, starts, iterations).
     """
-    n = seed.shape[0]
+    seed, preferred = clamped(postures[0], limits), clamped(postures[1], limits)
+    n, (held, first_start, settle, apart) = seed.shape[0], collection
     q, best = np.empty(n), np.empty(n)
-    seed, goal = clamped(seed, limits), clamped(goal, limits)
-    state = state_of(target, seed)
+    state, (_, _, _, max_starts, _) = state_of(target, seed), effort
     starts, iterations = 0, 0
     for attempt in range(first_start, max_starts):
         if held >= solutions.shape[0]:
             break
         starts += 1
         fill_start(attempt, state, limits, seed, q)
-        solved, used, _ = reach(arm, limits, target, tolerances, max_iterations, q, best)
+        solved, used, _ = reach(arm, limits, target, effort, q, best)
         iterations += used
         if not solved:
             continue
-        turn_towards(arm, limits, goal, best)
-        if walked:
+        turn_towards(arm, limits, preferred, best)
+        if settle:
             q[:] = best
-            iterations += walk(arm, limits, target, tolerances, max_iterations, goal, q, best)
+            iterations += walk(arm, limits, target, effort, preferred, q, best)
         new = True
         for k in range(held):
             gap = 0.0

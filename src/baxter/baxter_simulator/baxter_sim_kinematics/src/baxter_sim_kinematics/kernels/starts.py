@@ -64,10 +64,10 @@ def fill_start(attempt, state, limits, seed, start):
 
 
 @compiled
-def turn_towards(arm, limits, goal, q):
-    """A joint without limits: of its many equal angles take the one nearest ``goal``."""
+def turn_towards(arm, limits, preferred, q):
+    """A joint without limits: of its many equal angles take the one nearest the posture ``preferred``."""
     _, _, prismatic = arm
     lower, upper = limits
     for i in range(q.shape[0]):
         if not prismatic[i] and lower[i] == -math.inf and upper[i] == math.inf:
-            q[i] -= 2.0 * math.pi * round((q[i] - goal[i]) / (2.0 * math.pi))
+            q[i] -= 2.0 * math.pi * round((q[i] - preferred[i]) / (2.0 * math.pi))

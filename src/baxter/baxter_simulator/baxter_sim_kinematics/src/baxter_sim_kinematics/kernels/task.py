@@ -7,6 +7,7 @@ import numpy as np
 from baxter_sim_kinematics.kernels.compiled import compiled
 from baxter_sim_kinematics.kernels.linear import length
 from baxter_sim_kinematics.kernels.motion import fill_jacobian, place_joints
+from baxter_sim_kinematics.kernels.rows import Rows
 
 
 @compiled
@@ -77,13 +78,13 @@ def fill_basis(target_rotation, axis, basis):
 def fill_error(rotation, position, target_rotation, target_position, rows, basis, error):
     """Pose error: translation [m], then the rotation vector [rad] that turns the tip into the target; base frame.
 
-    With 5 rows the rotation is the smallest that turns the tip's free axis into the target's; it has no part along that
-    axis, so that its components along the first two rows of ``basis`` are all of it.
+    With a free turn the rotation is the smallest that turns the tip's free axis into the target's; it has no part along
+    that axis, so that its components along the first two rows of ``basis`` are all of it.
     """
     for a in range(3):
         error[a] = target_position[a] - position[a]
     t, r = target_rotation, rotation
-    if rows == 5:
+    if rows == Rows.FREE_TURN:
         # The tip's axis, which is the target's in the tip's frame, now; then along the rows of the basis.
         x = t[0, 0] * basis[2, 0] + t[1, 0] * basis[2, 1] + t[2, 0] * basis[2, 2]
         y = t[0, 1] * basis[2, 0] + t[1, 1] * basis[2, 1] + t[2, 1] * basis[2, 2]
@@ -129,22 +130,22 @@ def fill_error(rotation, position, target_rotation, target_position, rows, basis
 @compiled
 def on_target(error, rows, tolerance_m, tolerance_rad):
     """Return whether a pose error is within the tolerances."""
-    return length(error, 0, 3) <= tolerance_m and (rows == 3 or length(error, 3, rows) <= tolerance_rad)
+    return length(error, 0, 3) <= tolerance_m and (rows == Rows.POSITION or length(error, 3, rows) <= tolerance_rad)
 
 
 @compiled
 def workspace(n):
-    """Return room for a posture's joint axes, origins (n, 3), tip rotation (3, 3), position (3,), jacobian (6, n) and
-    error (6,).
+    """Return room for a posture's joint lines (n, 6), tip rotation (3, 3), position (3,), jacobian (6, n) and error
+    (6,).
     """
-    return np.empty((n, 3)), np.empty((n, 3)), np.empty((3, 3)), np.empty(3), np.empty((6, n)), np.empty(6)
+    return np.empty((n, 6)), np.empty((3, 3)), np.empty(3), np.empty((6, n)), np.empty(6)
 
 
 @compiled
-def fill_task_jacobian(prismatic, axes, origins, position, rows, basis, jacobian):
+def fill_task_jacobian(prismatic, lines, position, rows, basis, jacobian):
     """:func:`fill_jacobian`, its angular rows along ``basis`` where a turn is free."""
-    fill_jacobian(prismatic, axes, origins, position, jacobian)
-    if rows == 5:
+    fill_jacobian(prismatic, lines, position, jacobian)
+    if rows == Rows.FREE_TURN:
         for i in range(jacobian.shape[1]):
             x, y, z = jacobian[3, i], jacobian[4, i], jacobian[5, i]
             for a in range(3):
@@ -156,8 +157,8 @@ def pose_error(arm, target, q):
     """Return the pose error of the posture ``q``: [m], [rad]."""
     rotations, offsets, prismatic = arm
     target_rotation, target_position, rows, basis = target
-    axes, origins, rotation, position, _, error = workspace(q.shape[0])
-    place_joints(rotations, offsets, prismatic, q, axes, origins, rotation, position)
+    lines, rotation, position, _, error = workspace(q.shape[0])
+    place_joints(rotations, offsets, prismatic, q, lines, rotation, position)
     fill_error(rotation, position, target_rotation, target_position, rows, basis, error)
     return length(error, 0, 3), length(error, 3, 6)
 
