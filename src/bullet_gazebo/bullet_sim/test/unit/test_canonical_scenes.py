@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Scenes with an answer on paper, at steps of 1 and 2 ms. The README's table says the tolerances; they live here."""
+import math
+
+import numpy as np
+import pytest
+
+from bullet_sim import Pose, World
+from urdf_model import Box, Link, Robot, Shape, parse_urdf
+from urdf_model.transforms import pose_matrix
+
+G = 9.81
+SOLID = """<robot name="%(name)s"><link name="it"><inertial><mass value="%(mass)g"/><inertia ixx="%(ixx)g" iyy="%(iyy)g"
+izz="%(izz)g"/></inertial><collision><geometry>%(shape)s</geometry></collision></link>
+<gazebo reference="it"><mu1>%(mu)g</mu1><mu2>%(mu)g</mu2></gazebo></robot>"""
+PENDULUM = """<robot name="pendulum"><link name="world"/><link name="rod"><inertial><origin xyz="0 0 -1"/>
+<mass value="1"/><inertia ixx="0.02" iyy="0.02" izz="0.02"/></inertial></link><joint name="swing" type="continuous">
+<parent link="world"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>"""
+FINGER = """<link name="%(n)s"><inertial><mass value="0.02"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial>
+<collision><origin xyz="0 %(y)g 0"/><geometry><box size="0.04 0.01 0.04"/></geometry></collision></link>
+<joint name="%(n)s" type="prismatic"><parent link="carrier"/><child link="%(n)s"/><axis xyz="0 1 0"/>
+<limit lower="%(lower)g" upper="%(upper)g" effort="20" velocity="1"/></joint>
+<gazebo reference="%(n)s"><kp>1e5</kp><kd>1</kd></gazebo>"""
+SHAKER = """<robot name="shaker"><link name="world"/><link name="carrier"><inertial><mass value="1"/><inertia ixx="0.01"
+iyy="0.01" izz="0.01"/></inertial></link><joint name="lift" type="prismatic"><parent link="world"/>
+<child link="carrier"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1000" velocity="10"/></joint>%s%s</robot>""" % (
+    FINGER % {"n": "l", "y": 0.02, "lower": 0.0, "upper": 0.05},
+    FINGER % {"n": "r", "y": -0.02, "lower": -0.05, "upper": 0.0})
+WHEEL = """<link name="%(n)s"><inertial><mass value="0.5"/><inertia ixx="0.0014" iyy="0.0014" izz="0.0025"/></inertial>
+<collision><geometry><cylinder radius="0.1" length="0.04"/></geometry></collision></link><joint name="%(n)s"
+type="continuous"><parent link="base"/><child link="%(n)s"/><origin xyz="%(x)g %(y)g 0" rpy="-1.5707963 0 0"/>
+<axis xyz="0 0 1"/></joint>"""
+CART = """<robot name="cart"><link name="base"><inertial><mass value="5"/><inertia ixx="0.05" iyy="0.08" izz="0.1"/>
+</inertial></link>%s</robot>""" % "".join(WHEEL % {"n": "%s%s" % (end, side), "x": x, "y": y}
+                                         for end, x in (("front", 0.2), ("rear", -0.2))
+                                         for side, y in (("left", 0.15), ("right", -0.15)))
+
+
+@pytest.fixture(params=[0.001, 0.002], ids=["1ms", "2ms"])
+def world(request):
+    world = World(time_step_s=request.param)
+    yield world
+    world.close()
+
+
+def run(world, seconds, each=lambda time_s: None):
+    begin = world.time_s
+    for _ in range(round(seconds / world.time_step_s)):
+        each(world.time_s - begin)
+        world.step()
+
+
+def solid(world, name, shape, mass, moments, mu=1.0, pose=None):
+    text = SOLID % {"name": name, "shape": shape, "mass": mass, "mu": mu,
+                    **dict(zip(("ixx", "iyy", "izz"), moments, strict=True))}
+    return world.spawn(parse_urdf(text), name, pose or Pose())
+
+
+def cube(world, name, mu, pose, side=0.2):
+    return solid(world, name, '<box size="%g %g %g"/>' % (side, side, side), 1.0, [side * side / 6.0] * 3, mu, pose)
+
+
+def ball(world, pose, radius=0.1, mass=2.0):
+    return solid(world, "ball", '<sphere radius="%g"/>' % radius, mass, [0.4 * mass * radius * radius] * 3, 1.0, pose)
+
+
+def slope(world, angle):
+    """A ramp that falls towards x, its surface through the origin; returns (along (3,), normal (3,))."""
+    place = pose_matrix((0.0, 0.0, 0.0), (0.0, angle, 0.0))
+    normal = place[:3, 2]
+    place[:3, 3] = -0.5 * normal
+    link = Link("link", collisions=[Shape(Box((60.0, 4.0, 1.0)), place, "c", None, "link")])
+    world.spawn(Robot("ramp", {"link": link}, {}, "link"), "ramp", static=True)
+    return place[:3, 0], normal
+
+
+def laid(angle, height, normal):
+    """The pose of something whose middle is ``height`` above the ramp."""
+    return Pose(tuple((height * normal).tolist()), (0.0, math.sin(angle / 2.0), 0.0, math.cos(angle / 2.0)))
+
+
+def test_free_fall(world):
+    box = cube(world, "box", 1.0, Pose((0, 0, 100)))
+    run(world, 2.0)
+    assert 100.0 - box.base_pose().position[2] == pytest.approx(G * 2.0 ** 2 / 2.0, abs=G * 2.0 * world.time_step_s)
+    assert box.base_twist()[0][2] == pytest.approx(-G * 2.0, rel=1e-6)
+
+
+def test_a_throw_keeps_its_horizontal_speed(world):
+    box = cube(world, "box", 1.0, Pose((0, 0, 100)))
+    box.set_base_twist((3.0, 0, 5.0), (0, 0, 2.0))
+    run(world, 1.0)
+    (x, _, z), (linear, angular) = box.base_pose().position, box.base_twist()
+    assert x == pytest.approx(3.0, rel=1e-6) and linear[0] == pytest.approx(3.0, rel=1e-6)
+    assert z == pytest.approx(100.0 + 5.0 - G / 2.0, abs=G * world.time_step_s)
+    assert angular[2] == pytest.approx(2.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.2, 0.3])
+def test_a_block_slides_down_a_slope(world, mu):
+    angle = math.radians(25.0)
+    along, normal = slope(world, angle)
+    box = cube(world, "box", mu, laid(angle, 0.1, normal))
+    run(world, 1.0)
+    expected = G * (math.sin(angle) - mu * math.cos(angle))
+    assert np.dot(box.base_twist()[0], along) == pytest.approx(expected, rel=0.02)
+    assert np.dot(box.base_pose().position, along) == pytest.approx(expected / 2.0, rel=0.03)
+
+
+def test_a_block_stays_on_a_slope_below_its_friction(world):
+    angle = math.radians(25.0)
+    along, normal = slope(world, angle)
+    box = cube(world, "box", 0.6, laid(angle, 0.1, normal))
+    run(world, 1.0)
+    before = np.dot(box.base_pose().position, along)
+    run(world, 5.0)
+    # tan 25 degrees is 0.47. Bullet's friction gives way by 0.3 mm/s at most.
+    assert np.dot(box.base_pose().position, along) == pytest.approx(before, abs=0.0015)
+
+
+def test_a_pendulum_has_its_period_and_keeps_its_energy(world):
+    pendulum = world.spawn(parse_urdf(PENDULUM), "pendulum")
+    amplitude, inertia = 0.3, 1.0 + 0.02
+    pendulum.set_joint_positions(np.arange(1), np.array([amplitude]))
+    crossings, last = [], [amplitude]
+
+    def look(time_s):
+        angle = pendulum.read_joints()[0][0]
+        if last[0] > 0.0 >= angle:
+            crossings.append(time_s - world.time_step_s * angle / (angle - last[0]))
+        last[0] = angle
+
+    run(world, 30.0, look)
+    period = np.diff(crossings).mean()
+    # Of a large swing, to the fourth power of the amplitude.
+    expected = 2.0 * math.pi * math.sqrt(inertia / G) * (1.0 + amplitude ** 2 / 16.0 + 11.0 * amplitude ** 4 / 3072.0)
+    assert period == pytest.approx(expected, rel=1e-3)
+    position, velocity, _ = pendulum.read_joints()
+    energy = 0.5 * inertia * velocity[0] ** 2 + G * (1.0 - math.cos(position[0]))
+    assert energy == pytest.approx(G * (1.0 - math.cos(amplitude)), rel=0.02)
+
+
+def test_a_stack_of_ten_boxes_stands_for_a_minute(world):
+    world.add_ground_plane()
+    boxes = [cube(world, "box%d" % i, 0.8, Pose((0, 0, 0.1 + 0.2 * i))) for i in range(10)]
+    run(world, 60.0)
+    for i, box in enumerate(boxes):
+        x, y, z = box.base_pose().position
+        assert (x, y) == pytest.approx((0.0, 0.0), abs=0.002), box.name
+        assert z == pytest.approx(0.1 + 0.2 * i, abs=0.002), box.name
+
+
+def test_a_ball_rolls_down_a_slope(world):
+    angle = math.radians(10.0)
+    along, normal = slope(world, angle)
+    it = ball(world, laid(angle, 0.1, normal))
+    run(world, 2.0)
+    speed = np.dot(it.base_twist()[0], along)
+    assert speed == pytest.approx(5.0 / 7.0 * G * math.sin(angle) * 2.0, rel=0.01)
+    assert it.base_twist()[1][1] * 0.1 == pytest.approx(speed, rel=0.01)
+
+
+def test_a_ball_that_slips_comes_to_roll(world):
+    world.add_ground_plane()
+    it = ball(world, Pose((0, 0, 0.1)))
+    it.set_base_twist((2.0, 0, 0), (0, 0, 0))
+    run(world, 2.0)
+    assert it.base_twist()[0][0] == pytest.approx(5.0 / 7.0 * 2.0, rel=0.02)
+    assert it.base_twist()[1][1] * 0.1 == pytest.approx(it.base_twist()[0][0], rel=0.01)
+
+
+@pytest.mark.parametrize(("acceleration", "holds"), [(15.0, True), (50.0, False)])
+def test_a_closed_gripper_is_shaken(world, acceleration, holds):
+    shaker = world.spawn(parse_urdf(SHAKER), "shaker", Pose((0, 0, 1)))
+    fingers, lift = shaker.index(["l", "r"]), shaker.index(["lift"])
+    shaker.set_joint_positions(fingers, np.array([0.005, -0.005]))
+    box = solid(world, "box", '<box size="0.04 0.04 0.04"/>', 0.2, [1e-4] * 3, 1.0, Pose((0, 0, 1)))
+    turn = 2.0 * math.pi * 5.0  # 5 Hz
+
+    def squeeze(time_s):
+        # 4 N at two sides carry 8 N by friction, that is 40 m/s2 of 0.2 kg; weight takes 9.81 of it.
+        shaker.drive_effort(fingers, np.array([-4.0, 4.0]))
+
+    def hold(time_s):
+        squeeze(time_s)
+        shaker.drive_velocity(lift, np.zeros(1), np.array([1000.0]))
+
+    def shake(time_s):
+        squeeze(time_s)
+        shaker.drive_velocity(lift, np.array([acceleration / turn * math.sin(turn * time_s)]), np.array([1000.0]))
+
+    run(world, 0.2, hold)
+    run(world, 2.0, shake)
+    slipped = box.base_pose().position[2] - 1.0 - shaker.read_joints()[0][lift[0]]
+    assert (abs(slipped) < 0.001) == holds
+
+
+def test_wheels_count_how_far_a_cart_goes(world):
+    world.add_ground_plane()
+    cart = world.spawn(parse_urdf(CART), "cart", Pose((0, 0, 0.1)))
+    wheels = np.arange(4)
+    run(world, 3.0, lambda time_s: cart.drive_velocity(wheels, np.full(4, min(time_s, 1.0) * 5.0), np.full(4, 5.0)))
+    travelled = cart.base_pose().position[0]
+    assert travelled == pytest.approx(0.1 * cart.read_joints()[0].mean(), rel=0.005)
+    assert travelled == pytest.approx(0.5 * 2.0 + 0.25, rel=0.02)
+    assert abs(cart.base_pose().position[1]) < 0.01
