@@ -241,3 +241,64 @@ def test_an_arc_is_added_exactly_in_one_step_or_in_many():
         parts.move(0.0015, 0.002, 0.001)
     assert (parts.x, parts.y, parts.heading) == pytest.approx((whole.x, whole.y, whole.heading), abs=1e-9)
     assert (whole.x, whole.y) == pytest.approx((0.75 * math.sin(2.0), 0.75 * (1.0 - math.cos(2.0))))
+
+
+# -- four wheels, all of them steered ---------------------------------------------------------------------------------
+
+_ENDS = {"%s_%s" % (end, side): (x, y) for end, x in (("front", 0.3), ("rear", -0.3))
+         for side, y in (("left", 0.2), ("right", -0.2))}
+STEERED = """<link name="s_%(name)s"/><joint name="steer_%(name)s" type="revolute"><parent link="base_link"/>
+<child link="s_%(name)s"/><origin xyz="%(x)s %(y)s 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="9"
+velocity="9"/></joint><link name="l_%(name)s"><collision><geometry><cylinder radius="0.11" length="0.05"/></geometry>
+</collision></link><joint name="roll_%(name)s" type="continuous"><parent link="s_%(name)s"/><child link="l_%(name)s"/>
+<origin xyz="0 %(out)s 0" rpy="-1.5708 0 0"/><axis xyz="0 0 1"/></joint>"""
+
+
+def four_wheels(beside=0.05, **parameters):
+    robot = parse_urdf('<robot name="r"><link name="base_link"/>%s</robot>' % "".join(
+        STEERED % {"name": name, "x": x, "y": y, "out": math.copysign(beside, y)} for name, (x, y) in _ENDS.items()))
+    joints = {"roll_" + name: (VELOCITY,) for name in _ENDS} | {"steer_" + name: (POSITION,) for name in _ENDS}
+    lists = {"%s_%s" % (end, what): ["%s_%s_%s" % (joint, end, side) for side in ("left", "right")]
+             for end in ("front", "rear") for what, joint in (("wheel", "roll"), ("steering", "steer"))}
+    return Vehicle("four_wheel_steering_controller/FourWheelSteeringController", joints, {**lists, **parameters}, robot)
+
+
+def test_four_wheels_look_at_the_point_that_they_turn_about():
+    vehicle = four_wheels().drive(0.1, 0.5, 1.0)
+    # Turning about (0, 0.5): the pivots are 0.3 m ahead or behind and 0.3 or 0.7 m beside it.
+    for name, angle, way in (("front_left", math.atan2(0.3, 0.3), math.hypot(0.3, 0.3) - 0.05),
+                             ("front_right", math.atan2(0.3, 0.7), math.hypot(0.3, 0.7) + 0.05),
+                             ("rear_left", -math.atan2(0.3, 0.3), math.hypot(0.3, 0.3) - 0.05),
+                             ("rear_right", -math.atan2(0.3, 0.7), math.hypot(0.3, 0.7) + 0.05)):
+        assert vehicle.command("steer_" + name, POSITION) == pytest.approx(angle), name
+        assert vehicle.command("roll_" + name) == pytest.approx(way / RADIUS), name
+
+
+@pytest.mark.parametrize(("linear", "angular"), [(0.5, 0.0), (0.5, 0.8), (-0.4, 0.5), (0.6, -0.3)])
+@pytest.mark.parametrize("beside", [0.0, 0.05])
+def test_four_wheels_count_what_was_commanded(linear, angular, beside):
+    vehicle = four_wheels(beside).drive(2.0, linear, angular)
+    assert vehicle.odom.twist.twist.linear.x == pytest.approx(linear, abs=1e-6)
+    assert vehicle.odom.twist.twist.angular.z == pytest.approx(angular, abs=1e-6)
+    assert vehicle.heading == pytest.approx(2.0 * angular, abs=0.03)
+    radius = linear / angular if angular else math.inf
+    far = radius * math.sin(2.0 * angular) if angular else linear * 2.0
+    assert vehicle.odom.pose.pose.position.x == pytest.approx(far, abs=0.03)
+
+
+def test_four_wheels_cannot_turn_on_the_spot():
+    vehicle = four_wheels().drive(0.5, 0.0, 1.0)
+    assert all(vehicle.command("roll_" + name) == vehicle.command("steer_" + name, POSITION) == 0.0 for name in _ENDS)
+
+
+def test_four_wheels_within_limits_and_after_the_time_out():
+    limits = {"linear": {"x": {"has_velocity_limits": True, "max_velocity": 0.2}}}
+    vehicle = four_wheels(**limits).drive(0.2, 1.0)
+    assert vehicle.command("roll_front_left") == pytest.approx(0.2 / RADIUS)
+    vehicle.drive(0.6)
+    assert vehicle.command("roll_front_left") == 0.0
+
+
+def test_four_wheels_want_two_joints_of_each_kind():
+    with pytest.raises(ControllerError, match="front_steering has 1 joints, expected a left and a right one"):
+        four_wheels(front_steering=["steer_front_left"])
