@@ -27,7 +27,7 @@ from gazebo_ros.model_plugin import PluginError
 from gazebo_ros.pacing import wake_on_time
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.publications import Publications
-from gazebo_ros.resources import ResourceFinder, model_folders
+from gazebo_ros.resources import ResourceFinder, model_folders, model_sizes, resource_folders
 from gazebo_ros.ros_objects import RosObjects
 from gazebo_ros.simulation import Simulation
 from gazebo_ros.snapshot import SnapshotError
@@ -102,8 +102,8 @@ def _build(log, cleanup, line):
     packages = rospkg.RosPack()
     share = packages.get_path("gazebo_ros")
     world_name = line.world_name or rospy.get_param("~world_name", "worlds/empty.world")
-    folders = ModelFolders(model_folders(packages))
-    description = read_world(find_world(world_name, [share, *_resource_folders()]), folders)
+    folders = ModelFolders(model_folders(packages), model_sizes(packages))
+    description = read_world(find_world(world_name, [share, *resource_folders(packages)]), folders)
     if description.warning:
         log.warn(description.warning)
     for problem in description.problems:
@@ -178,10 +178,6 @@ def _snapshot_writer(log):
     except SnapshotError as error:
         log.error("%s until there is room and the simulator is started again; everything else works" % error)
         return snapshot.NoSnapshot()
-
-
-def _resource_folders():
-    return [folder for folder in os.environ.get("GAZEBO_RESOURCE_PATH", "").split(":") if folder]
 
 
 def _end(log, code):

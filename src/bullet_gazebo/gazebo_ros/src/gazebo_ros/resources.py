@@ -5,13 +5,55 @@ from pathlib import Path
 from urllib.parse import unquote, urlparse
 
 import rospkg
+import yaml
+
+from urdf_model import XmlRefused, parse_xml
 
 
 def model_folders(packages=None, environ=os.environ):
     """Folders that ``model://NAME`` is looked for in, the user's own first, ours last. ``packages``: RosPack."""
-    listed = [Path(folder) for folder in environ.get("GAZEBO_MODEL_PATH", "").split(":") if folder]
-    ours = Path((packages or rospkg.RosPack()).get_path("gazebo_ros")) / "models"
-    return [*listed, Path.home() / ".gazebo" / "models", ours]
+    packages = packages or rospkg.RosPack()
+    ours = Path(packages.get_path("gazebo_ros")) / "models"
+    return [*_listed(environ, "GAZEBO_MODEL_PATH"), *exported_folders("gazebo_model_path", packages),
+            Path.home() / ".gazebo" / "models", ours]
+
+
+def resource_folders(packages=None, environ=os.environ):
+    """Folders that world files and ``file://media/...`` are looked for in, besides the present one: those of
+    ``GAZEBO_RESOURCE_PATH``, and what packages export. ``packages``: RosPack."""
+    return [*_listed(environ, "GAZEBO_RESOURCE_PATH"), *exported_folders("gazebo_media_path", packages)]
+
+
+def model_sizes(packages):
+    """What stands in for models of Gazebo's library, as :class:`sdf_model.ModelFolders` wants it."""
+    path = Path(packages.get_path("gazebo_ros")) / "config" / "model_sizes.yaml"
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+def exported_folders(attribute, packages=None):
+    """The folders (Paths) that packages name in ``<export><gazebo_ros attribute="${prefix}/models:..."/></export>``.
+
+    ``attribute``: gazebo_model_path or gazebo_media_path. A manifest that cannot be read names none.
+    """
+    packages = packages or rospkg.RosPack()
+    found = []
+    for name in sorted(packages.list()):
+        folder = Path(packages.get_path(name))
+        try:
+            text = (folder / "package.xml").read_bytes()
+            # Most of some hundred packages have nothing to say, and reading XML takes longer.
+            if attribute.encode() not in text:
+                continue
+            exports = parse_xml(text).findall("export/gazebo_ros")
+        except (OSError, XmlRefused):
+            continue
+        for value in (element.get(attribute, "") for element in exports):
+            found += [Path(part.replace("${prefix}", str(folder))) for part in value.split(":") if part]
+    return found
+
+
+def _listed(environ, variable):
+    return [Path(folder) for folder in environ.get(variable, "").split(":") if folder]
 
 
 class ResourceFinder:
@@ -21,6 +63,7 @@ class ResourceFinder:
         """``packages``: a ``rospkg.RosPack`` that has looked around already, which saves doing it again."""
         self._packages = packages or rospkg.RosPack()
         self._model_folders = model_folders(self._packages)
+        self._resource_folders = resource_folders(self._packages)
         self._found = {}
         self._may_look_anew = True
 
@@ -46,6 +89,9 @@ class ResourceFinder:
                 yield folder / url.netloc / unquote(url.path).lstrip("/")
         elif url.scheme == "file":
             yield Path("/" + (url.netloc + unquote(url.path)).lstrip("/"))
+            # Gazebo's own descriptions say file://media/...
+            for folder in self._resource_folders if url.netloc else ():
+                yield folder / (url.netloc + unquote(url.path))
         elif not url.scheme:
             yield Path(name)
 

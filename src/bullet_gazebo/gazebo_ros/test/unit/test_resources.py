@@ -5,7 +5,9 @@ import os
 import pytest
 import rospkg
 
-from gazebo_ros.resources import ResourceFinder
+from gazebo_ros.resources import ResourceFinder, exported_folders, model_folders, model_sizes, resource_folders
+from sdf_model import ModelFolders, parse_sdf_model
+from urdf_model import merge_fixed
 
 MESH = "package://made_later/meshes/part.stl"
 
@@ -53,3 +55,42 @@ def test_files_are_found_by_every_kind_of_name(tmp_path, monkeypatch):
     assert finder(str(mesh)) == str(mesh)
     assert finder("model://mug/other.stl") is None
     assert finder("http://mug/the mug.stl") is None
+
+
+@pytest.fixture
+def exporting(tmp_path, monkeypatch):
+    """A package that exports folders of models and media, as those made for Gazebo do; returns its folder."""
+    folder = tmp_path / "field"
+    for name in ("models/mug", "more", "media"):
+        (folder / name).mkdir(parents=True)
+    (folder / "models" / "mug" / "mug.stl").touch()
+    (folder / "media" / "part.stl").touch()
+    (folder / "package.xml").write_text("""<package><name>field</name><export>
+<gazebo_ros gazebo_model_path="${prefix}/models:${prefix}/more" gazebo_media_path="${prefix}"/>
+</export></package>""")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", "%s:%s" % (tmp_path, os.environ["ROS_PACKAGE_PATH"]))
+    return folder
+
+
+def test_packages_export_folders_of_models_and_media(exporting, monkeypatch):
+    monkeypatch.setenv("GAZEBO_MODEL_PATH", "/first")
+    assert exported_folders("gazebo_model_path") == [exporting / "models", exporting / "more"]
+    assert str(model_folders()[0]) == "/first" and exporting / "models" in model_folders()
+    assert exporting in resource_folders()
+    finder = ResourceFinder()
+    assert finder("model://mug/mug.stl") == str(exporting / "models" / "mug" / "mug.stl")
+    assert finder("file://media/part.stl") == str(exporting / "media" / "part.stl")
+
+
+def test_models_of_gazebos_library_have_stand_ins_of_their_size():
+    packages = rospkg.RosPack()
+    folders = ModelFolders([], model_sizes(packages))
+    for name, size in model_sizes(packages).items():
+        text = '<sdf version="1.6"><include><uri>model://%s</uri><name>it</name></include></sdf>' % name
+        model = parse_sdf_model(text, "lab.world", folders)
+        body, = merge_fixed(model.robot).links.values()
+        assert model.static == ("mass" not in size), name
+        assert model.static or body.inertial.mass == size["mass"], name
+        assert body.collisions[0].origin[:3, 3].tolist() == pytest.approx(size["centre"]), name
+        assert "model://%s is not there" % name in model.warning and "line 1" in model.warning
+

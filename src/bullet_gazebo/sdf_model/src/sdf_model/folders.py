@@ -8,10 +8,22 @@ from urdf_model import XmlRefused, bounds, parse_xml, read_file
 
 
 class ModelFolders:
-    """A path of folders, each with a folder per model; the first that has a model wins."""
+    """A path of folders, each with a folder per model; the first that has a model wins.
 
-    def __init__(self, folders):
+    ``sizes``: {model name: what stands in for it where no folder has it}, a dictionary with "box" (x, y, z), "cylinder"
+    (radius, length) or "sphere" (radius,) [m], "centre" (3,) [m] of that in the model, and "mass" [kg]; without a mass
+    it stands fast.
+    """
+
+    def __init__(self, folders, sizes=None):
         self.folders = [Path(folder) for folder in folders]
+        self._sizes = sizes or {}
+
+    def stand_in(self, uri):
+        """Return the text of an SDF that stands in for the model that ``uri`` (model://NAME) names, or None."""
+        scheme, _, rest = uri.partition("://")
+        name = rest.partition("/")[0]
+        return _of_size(name, self._sizes[name]) if scheme == "model" and name in self._sizes else None
 
     def find(self, uri, base=None):
         """Return the description file (Path) that ``uri`` names, or None.
@@ -35,6 +47,27 @@ class ModelFolders:
             if found is not None:
                 return found
         return None
+
+
+_SHAPES = {"box": "<box><size>%g %g %g</size></box>",
+           "cylinder": "<cylinder><radius>%g</radius><length>%g</length></cylinder>",
+           "sphere": "<sphere><radius>%g</radius></sphere>"}
+
+
+def _of_size(name, size):
+    kind = next(kind for kind in _SHAPES if kind in size)
+    shape = _SHAPES[kind] % tuple(size[kind])
+    # The inertia of the box around it.
+    x, y, z = {"box": lambda sides: sides, "cylinder": lambda r: (2 * r[0], 2 * r[0], r[1]),
+               "sphere": lambda r: (2 * r[0],) * 3}[kind](size[kind])
+    mass = size.get("mass")
+    weight = "" if mass is None else (
+        "<inertial><mass>%g</mass><inertia><ixx>%g</ixx><iyy>%g</iyy><izz>%g</izz></inertia></inertial>"
+        % (mass, mass * (y * y + z * z) / 12.0, mass * (x * x + z * z) / 12.0, mass * (x * x + y * y) / 12.0))
+    parts = "".join('<%s name="%s"><geometry>%s</geometry></%s>' % (tag, tag, shape, tag)
+                    for tag in ("collision", "visual"))
+    return ('<sdf version="1.6"><model name="%s"><static>%d</static><link name="link"><pose>%g %g %g 0 0 0</pose>%s%s'
+            "</link></model></sdf>" % (name, mass is None, *size["centre"], weight, parts))
 
 
 def description_file(folder):

@@ -116,6 +116,11 @@ class ModelReader:
             raise document.error(element, "more than %d files are included; do they include each other?"
                                  % bounds.INCLUDES)
         path = self._folders.find(uri, document.folder)
+        stand_in = self._folders.stand_in(uri) if path is None else None
+        if stand_in is not None:
+            document.mend(element, "%s is not there, a shape of its size stands in for it" % uri)
+            inner = Document(stand_in, "the stand-in of %s" % uri, None, document.notes)
+            return inner, inner.root.find("model")
         if path is None:
             looked = ", ".join(map(str, self._folders.folders)) or "no folder"
             raise document.error(

@@ -9,6 +9,7 @@ import functools
 import importlib
 import importlib.metadata
 import importlib.util
+import re
 import sys
 
 
@@ -56,8 +57,47 @@ def _without_inorder(main):
     return command
 
 
+# Elements of URDF that macros are named after, too; in these nothing is wrong.
+_OF_URDF = {"robot", "link", "joint", "inertial", "visual", "collision", "geometry", "box", "cylinder", "sphere", "mesh",
+            "origin", "mass", "inertia", "material", "color", "texture", "axis", "limit", "dynamics", "mimic", "parent",
+            "child", "safety_controller", "calibration", "gazebo", "transmission", "actuator", "sensor",
+            "plugin"}
+
+
+def _with_word_on_prefix(handle_macro_call):
+    """The engine's function, which passes over a macro's name without ``xacro:``, as all since ROS melodic do; with a
+    warning that names file and lines."""
+    told = set()
+
+    @functools.wraps(handle_macro_call)
+    def handle(node, macros, symbols):
+        handled = handle_macro_call(node, macros, symbols)
+        name = node.tagName
+        if not handled and name in macros and name not in _OF_URDF and name not in told:
+            told.add(name)
+            _engine.warning("<%s> is a macro, but is called without xacro: and left as it stands; write <xacro:%s> (%s)"
+                            % (name, name, _places(name)))
+        return handled
+
+    return handle
+
+
+def _places(name):
+    """Where an element stands in the files that are being read, as text."""
+    for path in reversed([path for path in _engine.filestack or () if path]):
+        try:
+            with open(path, encoding="utf-8") as file:
+                lines = [str(number) for number, line in enumerate(file, 1) if re.search(r"<%s[\s/>]" % name, line)]
+        except (OSError, UnicodeDecodeError):
+            continue
+        if lines:
+            return "%s line %s" % (path, ", ".join(lines))
+    return "in a file that is included"
+
+
 _engine = _load_engine(_engine_folder())
 _engine.main = _without_inorder(_engine.main)
+_engine.handle_macro_call = _with_word_on_prefix(_engine.handle_macro_call)
 _substitution_args = importlib.import_module("xacro.substitution_args")  # the engine's
 _substitution_args._eval_find = _find         # $(find PACKAGE)
 _substitution_args._eval_dict["find"] = _find  # $(eval find('PACKAGE'))

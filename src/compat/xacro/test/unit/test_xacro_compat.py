@@ -83,3 +83,20 @@ def test_missing_engine_is_said_with_the_way_to_install_it(tmp_path):
     code = "import sys; sys.path.append(%r); import xacro" % str(PACKAGE / "src")
     done = run([sys.executable, "-I", "-S", "-c", code], path=tmp_path)
     assert "xacro engine is not installed" in done.stderr and "pip install xacro" in done.stderr
+
+
+def test_a_macro_called_without_prefix_is_said_once_with_its_lines(probe):
+    source = probe / "urdf" / "probe.urdf.xacro"
+    source.write_text("""<robot name="probe" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:macro name="wheel" params="name"><link name="${name}"/></xacro:macro>
+<xacro:macro name="inertial"><inertial/></xacro:macro>
+<wheel name="left"/>
+<xacro:wheel name="right"/>
+<link name="base"><inertial/></link>
+<wheel
+  name="rear"/>
+</robot>""")
+    done = run(COMMANDS["xacro"], source, path=probe.parent)
+    assert done.returncode == 0 and '<link name="right"/>' in done.stdout
+    assert done.stderr.count("is a macro, but is called without xacro:") == 1
+    assert "write <xacro:wheel> (%s line 4, 7)" % source in done.stderr and "inertial" not in done.stderr
