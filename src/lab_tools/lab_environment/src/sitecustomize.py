@@ -9,6 +9,7 @@ import sys
 
 # Module that is amended when somebody imports it -> ours, whose `amend(module)` is called then.
 AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_environment.last_messages",
+           "rospy.impl.tcpros_base": "lab_environment.refused_connections",
            "roslaunch.parent": "lab_environment.launch_guard"}
 
 

@@ -8,25 +8,21 @@ from std_msgs.msg import Header
 
 from baxter_interface.goal_loop import can_be_answered
 
-from .msg import trajAction, trajActionGoal
+from . import versions
 
 # Size of a Header on the wire without its frame_id [bytes]: seq, stamp, length.
 _HEADER_SIZE = 16
 
 
-class _GoalOfAnyVersion(rospy.AnyMsg):
-    """Lets goals of another version in, so that they can be answered; tools still see the type that is served."""
-
-    __slots__ = []
-    _type = trajActionGoal._type
-
-
 class TrajServer(actionlib.ActionServer):
-    """``actionlib.ActionServer`` of ``traj`` with ``traj_id``; who speaks another version is told which one to use."""
+    """``actionlib.ActionServer`` of one ``versions.Version``; who speaks another one is told so on both sides."""
 
-    def __init__(self, name, goal_callback, cancel_callback):
-        super().__init__(name, trajAction, goal_callback, cancel_callback, auto_start=False)
-        self.ActionGoal = _GoalOfAnyVersion
+    def __init__(self, name, version, goal_callback, cancel_callback):
+        super().__init__(name, version.action, goal_callback, cancel_callback, auto_start=False)
+        self._version = version
+        # Lets goals of another version in, so that they can be answered; tools still see the type that is served.
+        self.ActionGoal = type("GoalOfAnyVersion", (rospy.AnyMsg,), {
+            "__slots__": [], "_type": version.action_goal._type})
         self._told = set()
 
     def has_client(self, handle):
@@ -37,8 +33,8 @@ class TrajServer(actionlib.ActionServer):
     def internal_goal_callback(self, message):
         """Goals come in here, as bytes."""
         header = message._connection_header
-        if header["md5sum"] == trajActionGoal._md5sum:
-            goal = trajActionGoal()
+        if header["md5sum"] == self._version.md5sum:
+            goal = self._version.action_goal()
             goal.deserialize(message._buff)
             goal._connection_header = header
             if can_be_answered(goal.goal_id):
@@ -49,7 +45,7 @@ class TrajServer(actionlib.ActionServer):
         goal_id = GoalID().deserialize(message._buff[start:])
         if not can_be_answered(goal_id):
             return
-        tracker = StatusTracker(goal=trajActionGoal(goal_id=goal_id))
+        tracker = StatusTracker(goal=self._version.action_goal(goal_id=goal_id))
         tracker.status.status = GoalStatus.REJECTED
         self._told.add(header["callerid"])
         tracker.status.text = self._wrong_version(header["callerid"], header["type"], header["md5sum"])
@@ -64,14 +60,16 @@ class TrajServer(actionlib.ActionServer):
         super().publish_status()
         for connection in self._connections():
             caller, version = connection.callerid_pub, connection.md5sum
-            if version and version != trajActionGoal._md5sum and caller not in self._told:
+            if version and version != self._version.md5sum and caller not in self._told:
                 self._told.add(caller)
                 rospy.logerr(self._wrong_version(caller, connection.type, version))
 
-    def _wrong_version(self, caller, kind, version):
-        return "%s speaks another version of the action (%s, md5sum %s); use baxter_traj_streamer/traj, whose goal " \
-            "has trajectory and traj_id (%s, md5sum %s)" % (
-                caller, kind, version, trajActionGoal._type, trajActionGoal._md5sum)
+    def _wrong_version(self, caller, kind, md5sum):
+        own, other = self._version, versions.of_goal(md5sum)
+        what_now = ("start the server with --action %s" % other.name if other is not None
+                    else "use %s in the program" % own.name)
+        return "%s speaks another version of the action (%s, md5sum %s) than this server (%s, md5sum %s): %s" % (
+            caller, kind, md5sum, own.name, own.md5sum, what_now)
 
     def _connections(self):
         # Only the implementation knows who is at the other end.

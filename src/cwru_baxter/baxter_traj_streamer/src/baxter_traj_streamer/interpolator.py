@@ -15,7 +15,6 @@ from .action_server import TrajServer
 from .errors import GoalRefused
 from .judging import judge
 from .motion import Motion
-from .msg import trajFeedback, trajResult
 from .settings import SIDES
 
 ACTION_NAME = "trajActionServer"
@@ -26,12 +25,14 @@ class Interpolator:
     """Streams one goal after the other; call :meth:`run` in the thread that shall do so.
 
     A goal that is refused disturbs nothing. An accepted one stops the goal before it, smoothly, and begins then.
+    version: what its clients speak, `versions.Version`.
     """
 
-    def __init__(self, robot, limits, settings):
+    def __init__(self, robot, limits, settings, version):
         self._robot = robot
         self._limits = limits
         self._settings = settings
+        self._version = version
         self._lock = threading.Condition()
         self._next = None
         self._current = None
@@ -39,7 +40,7 @@ class Interpolator:
         self._count = 0
         self._publishers = {side: rospy.Publisher("/robot/limb/%s/joint_command" % side, JointCommand, queue_size=1,
                                                   tcp_nodelay=True) for side in SIDES}
-        self._server = TrajServer(ACTION_NAME, self._on_goal, self._on_cancel)
+        self._server = TrajServer(ACTION_NAME, version, self._on_goal, self._on_cancel)
 
     def run(self):
         """Serve until the node is shut down."""
@@ -134,7 +135,7 @@ class Interpolator:
             target = motion.positions(now)
             self._command(plan.joint_names, target, JointCommand.RAW_POSITION_MODE)
             if self._settings.feedback and now >= feedback_due:
-                handle.publish_feedback(trajFeedback(fdbk=motion.percent(now)))
+                handle.publish_feedback(self._version.feedback(fdbk=motion.percent(now)))
                 feedback_due = now + _FEEDBACK_PERIOD_S
             if motion.is_at_rest(now):
                 settled_by = settled_by or now + self._settings.settle_time_s
@@ -149,7 +150,7 @@ class Interpolator:
                         return handle.set_canceled, stopped
                     if late is None:
                         if self._settings.feedback:
-                            handle.publish_feedback(trajFeedback(fdbk=100))
+                            handle.publish_feedback(self._version.feedback(fdbk=100))
                         return handle.set_succeeded, ""
                     return handle.set_aborted, late
             ticker.sleep()
@@ -179,4 +180,4 @@ class Interpolator:
 
     def _result(self, handle):
         """``return_val`` counts the goals that were followed, as the notes' server does."""
-        return trajResult(return_val=self._count, traj_id=handle.get_goal().traj_id)
+        return self._version.make_result(self._count, handle.get_goal())

@@ -12,8 +12,8 @@ from baxter_interface import startup
 from baxter_interface.patience import FIRST_NOTICE_S
 
 from .interpolator import ACTION_NAME
-from .msg import trajAction, trajGoal
 from .streamer import BaxterTrajStreamer
+from .versions import VERSIONS
 
 # How often is looked whether a goal is over [s, wall].
 _POLL_S = 0.01
@@ -30,10 +30,9 @@ class MoveFailed(Exception):
 class SentGoal:
     """A goal on its way. Looked at rather than waited on for events: an answer may be quicker than its question."""
 
-    def __init__(self, client, trajectory, traj_id, feedback):
+    def __init__(self, client, goal, feedback):
         self._client = client
-        self._handle = client.send_goal(trajGoal(trajectory=trajectory, traj_id=traj_id),
-                                        feedback_cb=lambda _, message: feedback(message.fdbk))
+        self._handle = client.send_goal(goal, feedback_cb=lambda _, message: feedback(message.fdbk))
 
     def cancel(self):
         """Ask the server to stop it."""
@@ -75,17 +74,30 @@ class TrajClient:
 
     def __init__(self):
         self.streamer = BaxterTrajStreamer()
-        self._action = actionlib.ActionClient(ACTION_NAME, trajAction)
+        self._action = self._version = None
 
     def wait_until_ready(self):
         """Wait for the server and for the robot to be enabled, whatever was started first, and say what for.
 
-        Raises ROSInterruptException when ROS shuts down.
+        Raises MoveFailed for a server of another action, ROSInterruptException when ROS shuts down.
         """
-        self._wait("%s: rosrun baxter_traj_streamer traj_interpolator_as" % ACTION_NAME,
+        self._wait("%s: rosrun baxter_traj_streamer traj_interpolator_as" % ACTION_NAME, self._connect)
+        self._wait("%s to answer" % ACTION_NAME,
                    lambda: self._action.wait_for_server(rospy.Duration(_POLL_S)))
         if why := self.streamer.robot.why_not_ready():
             self._wait("the robot: %s" % why, lambda: not self.streamer.robot.why_not_ready())
+
+    def _connect(self):
+        """Speak the server's version of the action; whether there is a server."""
+        if self._action is None:
+            kind = dict(rospy.get_published_topics()).get(rospy.resolve_name(ACTION_NAME + "/result"))
+            self._version = next((each for each in VERSIONS.values() if kind == each.name + "ActionResult"), None)
+            if kind is not None and self._version is None:
+                raise MoveFailed(GoalStatus.LOST, "%s serves %s; this program speaks %s" % (
+                    ACTION_NAME, kind.removesuffix("ActionResult"), " and ".join(VERSIONS)))
+            if self._version is not None:
+                self._action = actionlib.ActionClient(ACTION_NAME, self._version.action)
+        return self._action is not None
 
     def _wait(self, what, is_there):
         begin_s = time.monotonic()
@@ -104,7 +116,7 @@ class TrajClient:
 
         The arms move on when this program ends; see the setting stop_when_client_leaves.
         """
-        return SentGoal(self._action, trajectory, traj_id, feedback)
+        return SentGoal(self._action, self._version.make_goal(trajectory, traj_id), feedback)
 
     def move(self, trajectory, timeout_s=None):
         """Send a JointTrajectory and wait [s, ROS time; None: until the end]: the result, or None after ``timeout_s``.

@@ -10,7 +10,6 @@ import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from baxter_core_msgs.msg import JointCommand
-from baxter_traj_streamer.msg import trajAction
 from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -18,6 +17,7 @@ from baxter_traj_streamer.ros_settings import read_limits
 from baxter_traj_streamer.settings import SIDES
 from baxter_traj_streamer.streamer import BaxterTrajStreamer
 from baxter_traj_streamer.traj_client import SentGoal
+from baxter_traj_streamer.versions import NOTES, version
 from lab_testing import waiting
 
 DEADLINE_S = 30.0
@@ -31,8 +31,9 @@ SERVER = "/traj_interpolator_as"
 class Client:
     """One goal, with all that is told about it."""
 
-    def __init__(self):
-        self._action = actionlib.ActionClient("trajActionServer", trajAction)
+    def __init__(self, action=NOTES):
+        self._version = version(action)
+        self._action = actionlib.ActionClient("trajActionServer", self._version.action)
         assert self._action.wait_for_server(rospy.Duration(DEADLINE_S)), "no trajActionServer"
         self.feedback = []
         self.goal = None
@@ -42,7 +43,7 @@ class Client:
         trajectory.points = [JointTrajectoryPoint(positions=positions, time_from_start=rospy.Duration.from_sec(time_s))
                              for time_s, positions in points]
         self.feedback.clear()
-        self.goal = SentGoal(self._action, trajectory, traj_id, self.feedback.append)
+        self.goal = SentGoal(self._action, self._version.make_goal(trajectory, traj_id), self.feedback.append)
 
     def wait_until_moving(self):
         wait_until(lambda: any(percent >= 20 for percent in self.feedback), "the goal to be a fifth done")
@@ -56,6 +57,8 @@ class Client:
 class FakeRobotTest(unittest.TestCase):
     """Against the SDK's fake robot, enabled."""
 
+    # What the server speaks.
+    action = NOTES
     # What forget_commands moves.
     last_joints = ("right_w2", "left_w2")
 
@@ -64,7 +67,7 @@ class FakeRobotTest(unittest.TestCase):
         cls.streamer = BaxterTrajStreamer()
         cls.limits = read_limits()
         cls.enable = rospy.Publisher("/robot/set_super_enable", Bool, queue_size=1)
-        cls.asker = Client()
+        cls.asker = Client(cls.action)
         cls.commands = []
         cls.subscribers = [rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, cls.on_command)
                            for side in SIDES]
@@ -78,7 +81,7 @@ class FakeRobotTest(unittest.TestCase):
     def setUp(self):
         wait_until(lambda: self.enable.get_num_connections() > 0, "the robot to listen")
         self.set_enabled(True)
-        self.client = Client()
+        self.client = Client(self.action)
         self.forget_commands()
 
     def forget_commands(self):

@@ -132,7 +132,7 @@ class TrajStreamerTest(FakeRobotTest):
         try:
             other.stdin.write(text)
             other.stdin.close()
-            wait_until(lambda: any("cwru_action/trajActionGoal" in line and "use baxter_traj_streamer/traj" in line
+            wait_until(lambda: any("cwru_action/trajActionGoal" in line and "start the server with --action cwru_action/traj" in line
                                    for line in log), "a line about the version")
             wait_until(lambda: "goal of the other version" in states, "the goal's state")
         finally:
@@ -142,7 +142,7 @@ class TrajStreamerTest(FakeRobotTest):
                 subscriber.unregister()
         state, words = states["goal of the other version"]
         self.assertEqual(state, GoalStatus.REJECTED)
-        self.assertIn("traj_id", words)
+        self.assertIn("--action cwru_action/traj", words)
         self.assertEqual(self.commands, [])
 
     def test_goal_without_times_is_followed_as_fast_as_the_limits_allow(self):

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The two versions of the action ``traj`` that programs were written for.
+
+The notes' has a ``traj_id``. Case Western moved the action to another package in November 2015 and left ``traj_id``
+out; the book's ``baxter_trajectory_streamer/traj`` is the same on the wire. Only its clients have that package, so its
+messages are made from ours when the server or a client needs them.
+"""
+from typing import NamedTuple
+
+import genpy.dynamic
+
+from .msg import trajAction
+
+NOTES, CURRENT = "baxter_traj_streamer/traj", "cwru_action/traj"
+_ID_LINE = "int32 traj_id\n"
+
+
+class Version(NamedTuple):
+    """One version: its name and its message classes.
+
+    has_id: whether goal and result have a ``traj_id``.
+    """
+
+    name: str
+    action: type
+    action_goal: type
+    goal: type
+    result: type
+    feedback: type
+    has_id: bool
+
+    @property
+    def md5sum(self):
+        """Of the goal, by which a server and its clients know that they speak of the same."""
+        return self.action_goal._md5sum
+
+    def make_goal(self, trajectory, traj_id):
+        return self.goal(trajectory=trajectory, **self._with_id(traj_id))
+
+    def make_result(self, return_val, goal):
+        """``goal``: the message that the result answers."""
+        return self.result(return_val=return_val, **self._with_id(getattr(goal, "traj_id", None)))
+
+    def _with_id(self, traj_id):
+        return {"traj_id": traj_id} if self.has_id else {}
+
+
+def version(name):
+    """The Version of this name. Raises ValueError for an unknown one."""
+    if name not in VERSIONS:
+        raise ValueError("action '%s' is not known; choices are %s" % (name, ", ".join(VERSIONS)))
+    return VERSIONS[name]
+
+
+def of_goal(md5sum):
+    """The Version whose goals have this sum, or None."""
+    return next((each for each in VERSIONS.values() if each.md5sum == md5sum), None)
+
+
+def _version(name, action):
+    goal, result, feedback = action().action_goal, action().action_result, action().action_feedback
+    return Version(name, action, type(goal), type(goal.goal), type(result.result), type(feedback.feedback),
+                   "traj_id" in goal.goal.__slots__)
+
+
+def _without_id():
+    text = trajAction._full_text.replace(_ID_LINE, "").replace(NOTES, CURRENT)
+    return genpy.dynamic.generate_dynamic(CURRENT + "Action", text)[CURRENT + "Action"]
+
+
+VERSIONS = {NOTES: _version(NOTES, trajAction), CURRENT: _version(CURRENT, _without_id())}
