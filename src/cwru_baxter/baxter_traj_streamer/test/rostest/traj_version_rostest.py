@@ -51,7 +51,8 @@ class TrajVersionTest(FakeRobotTest):
         subscriber = rospy.Subscriber("/rosout", Log, lambda message: log.append((message.name, message.msg)))
         other = subprocess.Popen([sys.executable, "-c", NOTES_CLIENT])
         try:
-            wait_until(lambda: any("--action baxter_traj_streamer/traj" in text for _, text in log), "the server's line")
+            wait_until(lambda: any("--action baxter_traj_streamer/traj" in text for _, text in log),
+                       "the server's line")
             wait_until(lambda: any(name == "/client_of_the_notes" and "trajActionServer/result" in text
                                    for name, text in log), "the client's line")
         finally:
