@@ -58,7 +58,8 @@ def _without_inorder(main):
 
 
 # Elements of URDF that macros are named after, too; in these nothing is wrong.
-_OF_URDF = {"robot", "link", "joint", "inertial", "visual", "collision", "geometry", "box", "cylinder", "sphere", "mesh",
+_OF_URDF = {"robot", "link", "joint", "inertial", "visual", "collision", "geometry", "box", "cylinder", "sphere",
+            "mesh",
             "origin", "mass", "inertia", "material", "color", "texture", "axis", "limit", "dynamics", "mimic", "parent",
             "child", "safety_controller", "calibration", "gazebo", "transmission", "actuator", "sensor",
             "plugin"}
