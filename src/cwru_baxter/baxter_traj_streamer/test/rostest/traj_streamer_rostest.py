@@ -133,7 +133,8 @@ class TrajStreamerTest(FakeRobotTest):
             other.stdin.write(text)
             other.stdin.close()
             wait_until(lambda: any("cwru_action/trajActionGoal" in line
-                                   and "start the server with --action cwru_action/traj" in line for line in log), "a line about the version")
+                                   and "start the server with --action cwru_action/traj" in line for line in log),
+                       "a line about the version")
             wait_until(lambda: "goal of the other version" in states, "the goal's state")
         finally:
             other.terminate()
