@@ -34,6 +34,10 @@ class InvalidPosture(KinematicsError):
         self.value = value
 
 
+class InvalidSeed(KinematicsError):
+    """A request says nothing that a search could start from; the text says what would be right."""
+
+
 class Reason(enum.Enum):
     """Why a pose has no solution."""
 

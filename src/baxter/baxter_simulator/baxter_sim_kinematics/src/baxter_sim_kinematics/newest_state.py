@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The newest joint states of an arm, read only when they are asked for. Knows messages."""
+import struct
+
+import genpy
+from sensor_msgs.msg import JointState
+
+# std_msgs/Header on the wire: sequence number, then the stamp.
+_STAMP = struct.Struct("<4xII")
+
+
+class UnreadJointState(JointState):
+    """A JointState that stays as it came: of those that arrive only a few are read."""
+
+    def __init__(self):
+        """Leaves the fields out: nobody reads them, and making them costs as much as all else that is done here."""
+
+    def deserialize(self, buffer):
+        """Keep the bytes. Raises genpy.DeserializationError where they end within the header."""
+        if len(buffer) < _STAMP.size:
+            raise genpy.DeserializationError("joint states of %d bytes" % len(buffer))
+        self.serialized = bytes(buffer)
+        return self
+
+
+class NewestState:
+    """Takes UnreadJointStates; any thread may read the newest that has all of ``joint_names``."""
+
+    def __init__(self, joint_names, time_went_back):
+        """``time_went_back()`` is called when a state is older than the one before it."""
+        # A string on the wire is its length and its bytes. A grip of the fingers may come in a message of its own.
+        self._needed = [struct.pack("<I", len(name)) + name for name in map(str.encode, joint_names)]
+        self._time_went_back = time_went_back
+        self._serialized, self._stamp = None, (0, 0)
+        self._read = None, None  # what was read last, and out of what
+
+    def take(self, message):
+        stamp = _STAMP.unpack_from(message.serialized)
+        if stamp < self._stamp:
+            self._time_went_back()
+        if all(name in message.serialized for name in self._needed):
+            self._serialized, self._stamp = message.serialized, stamp
+
+    def read(self):
+        """Return the newest JointState, None where there is none yet. Raises genpy.DeserializationError."""
+        serialized = self._serialized
+        if serialized is None:
+            return None
+        source, state = self._read
+        if source is not serialized:  # a request with thousands of poses asks thousands of times
+            state = JointState().deserialize(serialized)
+            self._read = serialized, state
+        return state

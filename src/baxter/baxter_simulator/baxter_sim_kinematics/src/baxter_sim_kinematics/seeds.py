@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the searches of one request begin, and when another beginning is worth a try."""
+import enum
+from typing import NamedTuple
+
+from baxter_sim_kinematics.errors import InvalidPosture, InvalidSeed, NoSolution, Reason
+
+
+class SeedMode(enum.IntEnum):
+    """The numbers are those of baxter_core_msgs/SolvePositionIK, for a request's mode and for an answer's type."""
+
+    AUTO = 0
+    USER = 1
+    CURRENT = 2
+    NS_MAP = 3
+
+
+_TRIED = {
+    SeedMode.AUTO: (SeedMode.USER, SeedMode.CURRENT, SeedMode.NS_MAP),
+    SeedMode.USER: (SeedMode.USER,),
+    SeedMode.CURRENT: (SeedMode.CURRENT,),
+    SeedMode.NS_MAP: (SeedMode.NS_MAP,),
+}
+
+
+def seed_mode(number):
+    """Return the SeedMode of a number. Raises InvalidSeed."""
+    try:
+        return SeedMode(number)
+    except ValueError:
+        raise InvalidSeed("seed_mode %d is unknown; use 0 AUTO, 1 USER, 2 CURRENT or 3 NS_MAP" % number) from None
+
+
+class SeedRequest(NamedTuple):
+    """What a request says about seeds. given: (joint names, positions) per pose, as far as the caller sent them; a pair
+    of empty lists is no seed. poses: how many poses are asked for.
+    """
+
+    mode: SeedMode
+    given: list
+    poses: int
+
+
+class SeedPolicy:
+    """Tries seeds in the order of the mode. ``neutral`` (n,): stands in for a current posture that is not known."""
+
+    def __init__(self, chain, posture_map, neutral, current):
+        """``current()``: returns the posture (n,) of now, or raises InvalidPosture that says why it is not known."""
+        self._chain, self._posture_map, self._neutral, self._current = chain, posture_map, neutral, current
+        self._reported = None  # why the current posture was not known when it was asked for last, if it was not
+
+    def answer(self, request, index, target, solve, remarks):
+        """Return (SeedMode that led there, what ``solve(seed)`` returned) for pose number ``index`` of a SeedRequest.
+
+        ``target`` (4, 4): the pose, tip in base. A search that did not converge is begun again at the next seed; any
+        other diagnosis is about the pose and holds for every seed. Appends to ``remarks`` what the caller should know
+        besides. Raises NoSolution of the last search, InvalidSeed.
+        """
+        failure = None
+        for mode in _TRIED[request.mode]:
+            seed = self._seed(mode, request, index, target, remarks)
+            if seed is None:
+                continue
+            try:
+                return mode, solve(seed)
+            except NoSolution as error:
+                if error.reason is not Reason.NOT_CONVERGED:
+                    raise
+                failure = error
+        raise failure
+
+    def _seed(self, mode, request, index, target, remarks):
+        """Return the posture to start from, or None where AUTO has to do without a user's seed."""
+        if mode is SeedMode.NS_MAP:
+            return self._posture_map.nearest(target)
+        if mode is SeedMode.CURRENT:
+            return self._current_or_neutral(remarks)
+        demanded = request.mode is SeedMode.USER
+        names, positions = request.given[index] if index < len(request.given) else ((), ())
+        if not names and not positions:
+            if demanded:
+                raise InvalidSeed("seed_mode USER needs one seed_angles entry with the limb's joints for each pose, "
+                                  "this one has none (%d seeds for %d poses)" % (len(request.given), request.poses))
+            return None
+        try:
+            return self._chain.posture_by_name(list(names), list(positions))
+        except InvalidPosture as error:
+            if demanded:
+                raise InvalidSeed("its seed cannot be used: %s" % error) from None
+            remarks.append("the seed of pose %d is left out: %s" % (index + 1, error))
+            return None
+
+    def _current_or_neutral(self, remarks):
+        try:
+            current = self._current()
+        except InvalidPosture as error:
+            # Once, not with every request: it lasts until the robot speaks, and a log line costs as much as an answer.
+            if str(error) != self._reported:
+                self._reported = str(error)
+                remarks.append("%s; the neutral posture stands in for the current one" % error)
+            return self._neutral
+        self._reported = None
+        return current
