@@ -38,6 +38,18 @@ SIZES = {tuple(map(abs, angles)): name for name, angles in POSTURES.items() if a
 MIRRORED = {joint for joint, sign in baxter_model.MIRROR_SIGNS.items() if sign < 0}
 
 
+#: They cannot import the package, or serve the tool itself.
+HINTS_OF_THEIR_OWN = ("tools/", "src/baxter/baxter_tools/scripts/enable_robot.py", HOME)
+
+
+def test_hint_to_enable_or_reset_the_robot_has_one_wording():
+    found = [name for name in own_files()
+             if is_python(name) and not EXPECTATIONS.match(name)
+             and not name.startswith(("tests/", *HINTS_OF_THEIR_OWN))
+             and re.search(r"enable_robot\.py -[er]", (ROOT / name).read_text(encoding="utf-8"))]
+    assert found == [], "say it with baxter_model.readiness"
+
+
 def posture_in(numbers):
     """The name of a posture of the robot among seven numbers in a row, or None."""
     sizes = [abs(number) for number in numbers]

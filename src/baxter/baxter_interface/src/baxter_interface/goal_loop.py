@@ -12,6 +12,7 @@ import rospy
 
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
+from baxter_model.readiness import lost, why_not_ready
 
 from .presence import Presence
 from .resets import PUT_ELSEWHERE, Resets
@@ -154,13 +155,10 @@ class GoalLoop:
         if self._ending or rospy.is_shutdown():
             return "the action server was shut down"
         if self._presence.is_gone():
-            return "the robot was lost: nobody publishes its state any more"
+            return lost("its state")
         if not since_reset and self._resets.count != self._resets_before:
             return PUT_ELSEWHERE
-        state = self._robot.state()
-        if state.stopped:
-            return "the robot is stopped; reset and enable it: rosrun baxter_tools enable_robot.py -e"
-        return "" if state.enabled else "the robot is not enabled: rosrun baxter_tools enable_robot.py -e"
+        return why_not_ready(self._robot.state())
 
 
 def can_be_answered(goal_id):

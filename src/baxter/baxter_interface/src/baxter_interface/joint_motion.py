@@ -10,6 +10,8 @@ straight line in joint space.
 import math
 from dataclasses import dataclass
 
+from baxter_model.readiness import ENABLE
+
 from .settings import JOINT_ANGLE_TOLERANCE
 
 # 80 % of the joint speed limits of the robot's model (1.5 and 4.0 rad/s), so that the arm keeps up with its command.
@@ -107,8 +109,8 @@ class Move:
         if aborted:
             return Step(here, failure="stopped by the test it was given; %s" % self._worst(here))
         if self._lost_power(elapsed_s, powered):
-            return Step(None, failure="the robot is not enabled; %s. Enable it: rosrun baxter_tools enable_robot.py -e"
-                                      % self._worst(here))
+            return Step(None, failure="the robot is not enabled; %s; enable it: %s" % (
+                self._worst(here), ENABLE))
         if self._timeout_s is not None and elapsed_s >= self._timeout_s:
             text = "not there after %.1f s: %s" % (self._timeout_s, self._worst(here))
             if elapsed_s >= self._path.duration_s:

@@ -10,6 +10,7 @@ import rospy
 
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Ticker
+from baxter_model.readiness import ENABLE
 
 from . import startup
 from .joint_motion import DISABLED_GRACE_S
@@ -131,5 +132,4 @@ class EnabledRobot:
 
     def _loss(self):
         what = "stopped" if self.switch.state().stopped else "disabled, or restarted"
-        return RobotLost("lost the robot: it was %s. Enable it, and start this program again (rosrun baxter_tools "
-                         "enable_robot.py -e)" % what)
+        return RobotLost("lost the robot: it was %s; enable it, and start this program again: %s" % (what, ENABLE))

@@ -10,6 +10,7 @@ from baxter_core_msgs.msg import AssemblyState
 from std_msgs.msg import Bool, Empty
 
 from baxter_dataflow import wait_for
+from baxter_model.readiness import RESET
 
 from . import settings, startup
 from .version_check import VersionMismatch, require_compatible
@@ -138,7 +139,7 @@ class RobotEnable:
         if publisher.get_num_connections() == 0:
             return "nobody listens to %s (%s)" % (publisher.resolved_name, _brief(state))
         if state.stopped:
-            return "it is stopped; release its stop button and reset it: enable_robot.py -r (%s)" % _brief(state)
+            return "it is stopped; release its stop button and reset it: %s (%s)" % (RESET, _brief(state))
         return "it was asked but stays %s" % _brief(state)
 
 

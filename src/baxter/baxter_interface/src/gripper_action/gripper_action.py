@@ -9,6 +9,7 @@ from baxter_interface import CHECK_VERSION, Gripper, RobotEnable
 from baxter_interface.goal_loop import GoalLoop, Work
 from baxter_interface.gripper_types import OPEN, clip_percent
 from baxter_model import ELECTRIC, SUCTION
+from baxter_model.readiness import ENABLE
 
 # How many steps fingers that hold something are given to let go of it, before they count as stalled.
 STEPS_TO_BEGIN = 4
@@ -53,8 +54,8 @@ class GripperActionServer:
         if self._gripper.type() == ELECTRIC.name and not self._gripper.calibrated():
             self._gripper.calibrate(block=True)
             if not self._gripper.calibrated():
-                raise OSError(errno.EIO, "%s could not be calibrated: is the robot enabled "
-                              "(rosrun baxter_tools enable_robot.py -e)?" % self._gripper.name)
+                raise OSError(errno.EIO, "%s could not be calibrated: is the robot enabled (%s)?"
+                              % (self._gripper.name, ENABLE))
 
     def _begin(self, handle):
         command = handle.get_goal().command

@@ -10,10 +10,10 @@ from sensor_msgs.msg import JointState
 from baxter_interface import startup
 from baxter_interface.presence import Presence
 from baxter_interface.resets import PUT_ELSEWHERE, Resets
+from baxter_model.readiness import lost, why_not_ready
 
 # Joint states come 50 times a second or more; older ones [s, ROS time] are no basis for motion.
 STALE_AFTER_S = 0.5
-ENABLE_HINT = "enable it: rosrun baxter_tools enable_robot.py -e"
 
 
 class RobotWatch:
@@ -54,11 +54,7 @@ class RobotWatch:
             state, cuff = self._state, self._cuff
         if self.is_gone() or self._age_s() > STALE_AFTER_S:
             return "the robot reports no joint states on %s" % self._topic
-        if state.stopped:
-            return "the robot is stopped; reset and %s" % ENABLE_HINT
-        if not state.enabled:
-            return "the robot is not enabled; %s" % ENABLE_HINT
-        return "the %s cuff is squeezed" % self._side if cuff else ""
+        return why_not_ready(state) or ("the %s cuff is squeezed" % self._side if cuff else "")
 
     def trouble(self):
         """What has happened since :meth:`begin` that ends a motion, "" if nothing has."""
@@ -67,7 +63,7 @@ class RobotWatch:
         if event:
             return event
         if self.is_gone():
-            return "the robot was lost: nobody publishes %s any more" % self._topic
+            return lost(self._topic)
         age_s = self._age_s()
         if age_s > STALE_AFTER_S:
             return "the robot has reported no joint states for %.1f s" % age_s

@@ -10,6 +10,7 @@ from sensor_msgs.msg import JointState
 from baxter_interface import startup
 from baxter_interface.presence import Presence
 from baxter_interface.resets import Resets
+from baxter_model.readiness import lost, why_not_ready
 
 
 class RobotLink:
@@ -57,12 +58,8 @@ class RobotLink:
         if state is None:
             return "the robot does not report its state (/robot/state); is it running?"
         if self.is_gone():
-            return "the robot was lost: nobody publishes %s any more" % self._topic
-        if state.stopped:
-            return "the robot is stopped; release the button, then: rosrun baxter_tools enable_robot.py -r"
-        if not state.enabled:
-            return "the robot is disabled; rosrun baxter_tools enable_robot.py -e"
-        return ""
+            return lost(self._topic)
+        return why_not_ready(state)
 
     def _on_state(self, message):
         self._state = message

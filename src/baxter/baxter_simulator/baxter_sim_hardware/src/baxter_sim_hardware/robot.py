@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter's brain: who may move the arms, and what they do when nobody may."""
+from baxter_model.readiness import NOT_ENABLED
+
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
 from .errors import CommandRefused, HardwareError
 from .robot_state import RobotState
 
 DISABLED_BEHAVIOURS = ("hold", "sink")
-ENABLE_HINT = "the robot is disabled: enable it first (rosrun baxter_tools enable_robot.py -e)"
 
 
 class Baxter:
@@ -49,7 +50,7 @@ class Baxter:
     def command(self, side, mode, names, values, time_s, position, velocity):
         """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled."""
         if not self.state.enabled:
-            raise CommandRefused(ENABLE_HINT)
+            raise CommandRefused(NOT_ENABLED)
         return self.arms.command(side, mode, names, values, time_s, position, velocity)
 
     @property

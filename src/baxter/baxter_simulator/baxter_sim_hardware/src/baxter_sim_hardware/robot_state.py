@@ -8,6 +8,8 @@ failed is stopped with an error whose source is a fault.
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
+from baxter_model.readiness import RESET
+
 
 class State(Enum):
     """What the robot as a whole is doing."""
@@ -113,12 +115,11 @@ TRANSITIONS = {
 
 # What a person can do about a request that the table turned down.
 REFUSALS = {
-    (State.STOPPED, Event.ENABLE): "the robot is stopped: reset it first (rosrun baxter_tools enable_robot.py -r)",
+    (State.STOPPED, Event.ENABLE): "the robot is stopped: reset it first (%s)" % RESET,
     (State.ESTOP_PRESSED, Event.ENABLE): "the emergency stop is pressed: release it, then reset, then enable",
     (State.ESTOP_PRESSED, Event.RESET): "the emergency stop is pressed: release it, then reset",
-    (State.ESTOP_RELEASED, Event.ENABLE): "the emergency stop was released but not reset: "
-                                          "rosrun baxter_tools enable_robot.py -r",
-    (State.FAILED, Event.ENABLE): "the robot has failed: reset it first (rosrun baxter_tools enable_robot.py -r)",
+    (State.ESTOP_RELEASED, Event.ENABLE): "the emergency stop was released but not reset: %s" % RESET,
+    (State.FAILED, Event.ENABLE): "the robot has failed: reset it first (%s)" % RESET,
 }
 
 

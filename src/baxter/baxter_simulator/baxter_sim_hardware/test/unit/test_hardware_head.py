@@ -128,7 +128,7 @@ def test_disabled_robot_moves_no_head_and_stops_a_turn(lab):
     lab.run(0.5)
     assert pan(lab) == pytest.approx(stopped, abs=5e-3)
     assert not lab.last("head/head_state").isNodding
-    assert any("command_head_pan refused: the robot is disabled" in line for line in lab.log.lines)
+    assert any("command_head_pan refused: the robot is not enabled" in line for line in lab.log.lines)
     lab.plugin.reset()
     lab.run(0.1)
     assert pan(lab) == pytest.approx(stopped, abs=5e-3)

@@ -2,8 +2,8 @@
 """What every kind of gripper does with a command message: check it, echo it, hand it on."""
 import math
 
+from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.robot import ENABLE_HINT
 from rospy_limits.json_object import JsonRefused, read_object
 
 #: A sender's name, which goes out with every state of the gripper, is no longer than this [characters].
@@ -55,7 +55,7 @@ class Gripper:
         except JsonRefused as error:
             raise CommandRefused("args must be a JSON object: %s" % error) from None
         if needs_power and not enabled:
-            raise CommandRefused(ENABLE_HINT)
+            raise CommandRefused(NOT_ENABLED)
         getattr(self, method)(values)
 
     def no_op(self, values):

@@ -5,12 +5,12 @@ import copy
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 
 from baxter_model import CUSTOM, ELECTRIC, SUCTION
+from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.grippers.commands import CustomGripper
 from baxter_sim_hardware.grippers.electric import ElectricGripper
 from baxter_sim_hardware.grippers.hands import NoHand
 from baxter_sim_hardware.grippers.suction import SuctionGripper
-from baxter_sim_hardware.robot import ENABLE_HINT
 from baxter_sim_hardware.sensing.panel import BLOWERS, PUMPS, VACUUM_SENSORS
 from sim_time.stamps import stamp
 
@@ -74,7 +74,7 @@ class GripperTopics:
     def _valve(self, switch):
         def write(on):
             if on and not self._state.enabled:
-                raise CommandRefused(ENABLE_HINT)
+                raise CommandRefused(NOT_ENABLED)
             switch(on)
 
         return write

@@ -3,9 +3,9 @@
 from baxter_core_msgs.msg import HeadPanCommand, HeadState
 
 from baxter_model import HEAD_JOINT
+from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.head import TURNING_SPEED, Head
-from baxter_sim_hardware.robot import ENABLE_HINT
 
 _REQUESTS = {HeadPanCommand.REQUEST_PAN_ENABLE: True, HeadPanCommand.REQUEST_PAN_DISABLE: False}
 
@@ -52,7 +52,7 @@ class HeadTopics:
 
     def _require_enabled(self):
         if not self._state.enabled:
-            raise CommandRefused(ENABLE_HINT)
+            raise CommandRefused(NOT_ENABLED)
 
     def _head_state(self, time_s, part, snapshot):
         joint = self._index[0]

@@ -6,11 +6,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from baxter_model import BASE_FRAME, tip_of
+from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware import status
 from baxter_sim_hardware.arms import endpoint
 from baxter_sim_hardware.arms.joint_command import Mode
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.robot import ENABLE_HINT
 from baxter_sim_hardware.topics import convert
 from sim_time.stamps import stamp
 
@@ -126,7 +126,7 @@ class StatusTopics:
 
     def _stop_limb(self, side, msg, time_s):
         if not self._baxter.state.enabled:
-            raise CommandRefused(ENABLE_HINT)
+            raise CommandRefused(NOT_ENABLED)
         if msg.data:
             self._baxter.arms.stop_limb(side, *self._joints())
 
