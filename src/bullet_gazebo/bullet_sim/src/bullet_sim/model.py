@@ -223,8 +223,15 @@ class Model(Body):
         Raises BulletSimError out of bounds.
         """
         within(bounds.DAMPING, damping, "the damping of joint '%s'" % self.joint_names[index])
+        self._wanted_damping[index] = damping
         self.damping[index] = min(damping, self._damping_bounds()[index])
         pybullet.changeDynamics(self.body, index, jointDamping=self.damping[index], physicsClientId=self._client)
+
+    def step_changed(self):
+        """For World: ticks have another length, which bounds the damping of the joints."""
+        self._bounds = None
+        for index, wanted in self._wanted_damping.items():
+            self.set_damping(index, wanted)
 
     def set_limits(self, index, lower, upper):
         """Set how far joint ``index`` goes [rad or m]. Raises BulletSimError where ``lower`` is not below ``upper``."""
@@ -491,6 +498,7 @@ class Model(Body):
             self._reading = None
 
     def _set_damping(self, joints):
+        self._wanted_damping = {}  # index -> what was asked for
         self.damping = np.zeros(len(joints))  # (n,) as it acts, [Nm s/rad] or [N s/m]
         for index, joint in enumerate(joints):
             if joint.damping > 0.0:

@@ -65,6 +65,7 @@ class World:
         error=lambda text: None,
     ):
         self.time_step_s = within(bounds.TIME_STEP, time_step_s, "the time step")
+        self._step_since = 0, 0.0  # the tick and the time [s] that the present length of a tick counts from
         self.solver_iterations = solver_iterations
         self.tick = 0
         #: How many steps there have been, which a reset of the time does not take back.
@@ -96,7 +97,8 @@ class World:
     @property
     def time_s(self):
         """Simulated time since the world began [s]."""
-        return self.tick * self.time_step_s
+        tick, time_s = self._step_since
+        return time_s + (self.tick - tick) * self.time_step_s
 
     @property
     def gravity(self):
@@ -118,6 +120,18 @@ class World:
         within(bounds.SOLVER_ITERATIONS, iterations, "the number of solver iterations")
         pybullet.setPhysicsEngineParameter(numSolverIterations=iterations, physicsClientId=self._client)
         self.solver_iterations = iterations
+
+    def set_time_step(self, time_step_s):
+        """Have ticks last ``time_step_s`` [s] from the next one on; time goes on.
+
+        Raises BulletSimError out of bounds.
+        """
+        within(bounds.TIME_STEP, time_step_s, "the time step")
+        self._step_since = self.tick, self.time_s
+        self.time_step_s = time_step_s
+        pybullet.setPhysicsEngineParameter(fixedTimeStep=time_step_s, physicsClientId=self._client)
+        for model in self.models.values():
+            model.step_changed()
 
     def wake_all(self):
         """Have every resting body looked at again: Bullet does not notice what is changed from outside."""
@@ -253,6 +267,7 @@ class World:
     def reset_time(self):
         """Begin again at tick 0."""
         self.tick = 0
+        self._step_since = 0, 0.0
 
     def detect_contacts(self):
         """Find the contacts where everything stands now, without a step; ``contacts`` then returns them."""

@@ -87,6 +87,18 @@ def test_free_fall(world):
     assert box.base_twist()[0][2] == pytest.approx(-G * 2.0, rel=1e-6)
 
 
+def test_a_fall_goes_on_when_the_step_changes(world):
+    box = cube(world, "box", 1.0, Pose((0, 0, 100)))
+    run(world, 1.0)
+    world.set_time_step(0.0005)
+    run(world, 1.0)
+    assert world.time_s == pytest.approx(2.0, abs=1e-9)
+    assert box.base_twist()[0][2] == pytest.approx(-G * 2.0, rel=1e-6)
+    world.reset_time()
+    world.step()
+    assert world.time_s == pytest.approx(0.0005)
+
+
 def test_a_throw_keeps_its_horizontal_speed(world):
     box = cube(world, "box", 1.0, Pose((0, 0, 100)))
     box.set_base_twist((3.0, 0, 5.0), (0, 0, 2.0))

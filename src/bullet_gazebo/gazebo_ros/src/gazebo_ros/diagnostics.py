@@ -20,8 +20,12 @@ class Diagnostics:
         """``faults``: :class:`gazebo_ros.faults.Faults`."""
         self._simulation = simulation
         self._faults = faults
-        self._divisor = ticks_between(RATE_HZ, 1.0 / simulation.step_s)
+        self.step_changed()
         self._publisher = ros.publisher("/diagnostics", DiagnosticArray)
+
+    def step_changed(self):
+        """Ticks have another length than before."""
+        self._divisor = ticks_between(RATE_HZ, 1.0 / self._simulation.step_s)
 
     def on_tick(self):
         """Publish what is due at this tick."""

@@ -283,20 +283,22 @@ class GazeboServices:
         except (BulletSimError, ValueError) as error:
             return SetPhysicsPropertiesResponse(False, "SetPhysicsProperties: %s" % error)
         self._settings.show(**self._physics())
-        return SetPhysicsPropertiesResponse(True, "SetPhysicsProperties: gravity, update rate and solver "
-                                                  "iterations set; the rest of ode_config has no counterpart here")
+        return SetPhysicsPropertiesResponse(
+            True, "SetPhysicsProperties: time step, gravity, update rate and solver iterations set; the rest of "
+                  "ode_config has no counterpart here")
 
     def _set_physics(self, time_step, max_update_rate, gravity, iterations):
         """Raises ``ValueError`` or ``BulletSimError``."""
         simulation = self._simulation
-        if not abs(time_step - simulation.step_s) <= 1e-9:
-            raise ValueError("time_step %g s cannot be set while the world runs; it is %g s (the world file's "
-                             "max_step_size decides)" % (time_step, simulation.step_s))
         # All of it before any of it is set.
+        bounds.TIME_STEP.check(time_step, "time_step")
         bounds.UPDATE_RATE.check(max_update_rate, "max_update_rate")
         bounds.SOLVER_ITERATIONS.check(iterations, "sor_pgs_iters")
         bounds.GRAVITY.check(gravity, "gravity")
-        before = self._world.gravity, self._world.solver_iterations, simulation.real_time_factor
+        before = (self._world.gravity, self._world.solver_iterations, simulation.step_s,
+                  simulation.real_time_factor / simulation.step_s)
+        if not abs(time_step - simulation.step_s) <= 1e-9:
+            simulation.set_step(time_step)  # first, since a plugin may be in the way
         self._changes.note(("", "physics"), lambda: self._put_physics(*before))
         if iterations != self._world.solver_iterations:
             self._world.set_solver_iterations(iterations)
@@ -305,11 +307,14 @@ class GazeboServices:
         if abs(factor - simulation.real_time_factor) > 1e-9:
             simulation.real_time_factor = factor
 
-    def _put_physics(self, gravity, iterations, real_time_factor):
+    def _put_physics(self, gravity, iterations, step_s, update_rate):
+        simulation = self._simulation
         self._world.set_gravity(gravity)
         self._world.set_solver_iterations(iterations)
-        if real_time_factor != self._simulation.real_time_factor:
-            self._simulation.real_time_factor = real_time_factor
+        if step_s != simulation.step_s:
+            simulation.set_step(step_s)
+        if update_rate * step_s != simulation.real_time_factor:
+            simulation.real_time_factor = update_rate * step_s
 
     # -- the same for dynamic_reconfigure -------------------------------------------------------------------------
 
@@ -321,7 +326,6 @@ class GazeboServices:
 
     def _open_settings(self, ros):
         now = self._physics()
-        step_s = now["time_step"]
 
         def apply(values):
             try:
@@ -331,7 +335,8 @@ class GazeboServices:
                 raise ValueError(str(error)) from error
 
         return SettingsServer(ros, "/gazebo", [
-            Setting("time_step", step_s, step_s, step_s, "length of a step [s]; the world file decides"),
+            Setting("time_step", now["time_step"], bounds.TIME_STEP.low, bounds.TIME_STEP.high,
+                    "length of a step [s]"),
             Setting("max_update_rate", now["max_update_rate"], 0.0, bounds.UPDATE_RATE.high,
                     "steps per second [Hz]; 0: as many as can be"),
             # A slider shall be of use: Gazebo's own range, where the service takes more.

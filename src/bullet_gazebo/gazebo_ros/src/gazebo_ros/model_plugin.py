@@ -27,6 +27,8 @@ class ModelPlugin:
     dropped.
     """
 
+    #: Whether it works with the length of a tick alone that it was made with; the length stays then.
+    keeps_step = False
     #: Whether a model whose plugin refuses it is not spawned. A sensor is left out instead, with a warning.
     required = True
 
@@ -54,6 +56,9 @@ class ModelPlugin:
 
     def publish(self, time_s):
         """After the physics step: publish what is due. ``time_s`` is the time that the step reached."""
+
+    def step_changed(self, step_s):
+        """A tick lasts ``step_s`` [s] from the next one on, which ``update`` is told as ``dt``, too."""
 
     def joints_set(self):
         """A service has put the model's joints elsewhere (set_model_configuration); targets may want to follow.

@@ -165,6 +165,11 @@ def _build(log, cleanup, line):
     simulation.read_messages = inlets.service
     simulation.before_step = services.push
     simulation.on_tick = on_tick
+    def on_step_change():
+        publications.step_changed()
+        diagnostics.step_changed()
+
+    simulation.on_step_change = on_step_change
     simulation.on_time_reset = publications.time_was_reset
     cleanup.callback(simulation.unhost)
     return simulation

@@ -32,10 +32,9 @@ class Publications:
 
         ``snapshot``: :class:`SnapshotWriter`.
         """
-        tick_rate = 1.0 / simulation.step_s
-        self._clock_divisor = ticks_between(clock_rate, tick_rate)
-        self._states_divisor = ticks_between(STATES_RATE, tick_rate)
         self._simulation = simulation
+        self._clock_rate = clock_rate
+        self.step_changed()
         self._snapshot = snapshot
         self._log = log
         self._meter = RateMeter()
@@ -49,6 +48,12 @@ class Publications:
         self._link_states = ros.publisher("/gazebo/link_states", LinkStates)
         self._metrics = ros.publisher("/gazebo/performance_metrics", PerformanceMetrics)
         self.publish_clock()
+
+    def step_changed(self):
+        """Ticks have another length than before."""
+        tick_rate = 1.0 / self._simulation.step_s
+        self._clock_divisor = ticks_between(self._clock_rate, tick_rate)
+        self._states_divisor = ticks_between(STATES_RATE, tick_rate)
 
     def on_turn(self):
         """While the world stands still: keep that time out of the measured rate, and show what services change."""

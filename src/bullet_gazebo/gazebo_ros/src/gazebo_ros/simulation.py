@@ -61,6 +61,8 @@ class Simulation:
         #: Called once per turn of the loop, also while paused; before each physics step; after each tick; after time
         #: went back to zero; before models are put elsewhere, to read what has come in by then.
         self.on_turn = self.before_step = self.on_tick = self.on_time_reset = self.read_messages = lambda: None
+        #: Called after the length of a tick has changed.
+        self.on_step_change = lambda: None
         self.world = world
         self.board = board
         self.paused = paused
@@ -72,6 +74,7 @@ class Simulation:
         self._deliveries = deliveries
         self._step_s = world.time_step_s
         self._step_ns = round(world.time_step_s * 1e9)
+        self._step_since = 0, 0  # the tick and the time [ns] that the present length of a tick counts from
         self._pacer = Pacer(self._step_s, real_time_factor)
         self._advance = None
         self._delivered_before = {}
@@ -79,17 +82,35 @@ class Simulation:
     @property
     def time_ns(self):
         """Simulation time as an exact count of nanoseconds."""
-        return self.tick * self._step_ns
+        tick, time_ns = self._step_since
+        return time_ns + (self.tick - tick) * self._step_ns
 
     @property
     def time_s(self):
         """Simulation time [s]."""
-        return self.tick * self._step_ns * 1e-9
+        return self.time_ns * 1e-9
 
     @property
     def step_s(self):
         """Length of a tick [s]."""
         return self._step_s
+
+    def set_step(self, step_s):
+        """Have ticks last ``step_s`` [s] from the next one on; time goes on, at the same real-time factor.
+
+        Raises ``BulletSimError`` out of bounds, and ``ValueError`` where a plugin keeps the step that it was made for.
+        """
+        keeping = [hosted for hosted in self.plugins if hosted.plugin.keeps_step]
+        if keeping:
+            raise ValueError("time_step %g s cannot be set: %s is made for steps of %g s; delete it first"
+                             % (step_s, _names(keeping[0]), self._step_s))
+        self.world.set_time_step(step_s)
+        self._step_since = self.tick, self.time_ns
+        self._step_s, self._step_ns = step_s, round(step_s * 1e9)
+        self._pacer = Pacer(step_s, self.real_time_factor)
+        for hosted in self.plugins:
+            self._faults.guarded("%s, another time step" % _names(hosted), hosted.plugin.step_changed, step_s)
+        self.on_step_change()
 
     @property
     def real_time_factor(self):
@@ -170,7 +191,7 @@ class Simulation:
         self.world.reset_models()
         if time_too:
             self.world.reset_time()
-            self.tick = 0
+            self.tick, self._step_since = 0, (0, 0)
         for hosted in list(self.plugins):
             hosted.failed_at = []
             if hosted.has_failed:

@@ -351,7 +351,18 @@ class GazeboServices(unittest.TestCase):
         try:
             self.assertTrue(self.set_physics_properties(0.002, 500.0, gravity, before.ode_config).success)
             self.assertEqual(self.get_physics_properties().gravity.z, -1.62)
-            self.refused(self.set_physics_properties(0.001, 500.0, gravity, before.ode_config), "0.001", "0.002")
+        finally:
+            self.set_physics_properties(0.002, 500.0, before.gravity, before.ode_config)
+
+    def test_the_step_can_be_set_while_time_goes_on(self):
+        before = self.get_physics_properties()
+        now = self.get_world_properties().sim_time
+        try:
+            self.assertTrue(self.set_physics_properties(0.004, 250.0, before.gravity, before.ode_config).success)
+            after = self.get_physics_properties()
+            self.assertEqual((after.time_step, after.max_update_rate), (0.004, 250.0))
+            self.assertGreaterEqual(self.get_world_properties().sim_time, now)
+            self.refused(self.set_physics_properties(0.0, 250.0, before.gravity, before.ode_config), "time_step")
         finally:
             self.set_physics_properties(0.002, 500.0, before.gravity, before.ode_config)
 
@@ -363,8 +374,8 @@ class GazeboServices(unittest.TestCase):
                                  "sor_pgs_iters"])
         before = self.get_physics_properties()
         try:
-            answer = client.update_configuration({"gravity_z": -1.62, "sor_pgs_iters": 33, "time_step": 1.0})
-            self.assertEqual((answer["gravity_z"], answer["sor_pgs_iters"], answer["time_step"]), (-1.62, 33, 0.002))
+            answer = client.update_configuration({"gravity_z": -1.62, "sor_pgs_iters": 33, "time_step": 0.004})
+            self.assertEqual((answer["gravity_z"], answer["sor_pgs_iters"], answer["time_step"]), (-1.62, 33, 0.004))
             now = self.get_physics_properties()
             self.assertEqual((now.gravity.z, now.ode_config.sor_pgs_iters), (-1.62, 33))
             with self.assertRaises(dynamic_reconfigure.DynamicReconfigureCallbackException):

@@ -83,7 +83,7 @@ def write_world(folder, content):
 def test_the_empty_world_has_a_floor_and_needs_no_warning():
     world = world_file.read_world(world_file.find_world("worlds/empty.world", [WORLDS.parent]), MODELS)
     assert ([model.name for model in world.models], world.gravity, world.time_step_s) == (
-        ["ground_plane"], (0.0, 0.0, -9.81), 0.002)
+        ["ground_plane"], (0.0, 0.0, -9.81), 0.001)
     assert is_floor(world.models[0].robot) and [light.name for light in world.lights] == ["sun"]
     assert (world.warning, world.problems) == ("", [])
 

@@ -19,6 +19,9 @@ class FakeWorld:
         self.steps = 0
         self.resets = 0
 
+    def set_time_step(self, time_step_s):
+        self.time_step_s = time_step_s
+
     def step(self):
         self.steps += 1
 
@@ -141,6 +144,30 @@ def test_a_tick_is_update_step_publish_at_the_right_times(simulation):
 def test_time_is_exact_after_days(simulation):
     simulation.tick = 3 * 24 * 3600 * 500 + 1
     assert simulation.time_ns == 259200 * 10**9 + 2_000_000
+
+
+def test_the_length_of_a_tick_changes_and_time_goes_on(simulation):
+    plugin = host(simulation).plugin
+    changed = []
+    simulation.on_step_change = lambda: changed.append(simulation.step_s)
+    simulation.do_tick()
+    simulation.set_step(0.001)
+    simulation.do_tick()
+    simulation.set_step(0.004)
+    simulation.do_tick()
+    assert plugin.named("update") == [("update", 0.0, 0.002), ("update", 0.002, 0.001), ("update", 0.003, 0.004)]
+    assert simulation.time_ns == 7_000_000 and changed == [0.001, 0.004]
+    assert simulation.world.time_step_s == 0.004
+    simulation.reset(time_too=True)
+    simulation.do_tick()
+    assert simulation.time_ns == 4_000_000
+
+
+def test_a_plugin_may_keep_the_length_of_a_tick(simulation):
+    host(simulation).plugin.keeps_step = True
+    with pytest.raises(ValueError, match="libtest.so of model model is made for steps of 0.002 s"):
+        simulation.set_step(0.001)
+    assert simulation.step_s == simulation.world.time_step_s == 0.002
 
 
 CALLS = {"update": Simulation.do_tick, "publish": Simulation.do_tick,

@@ -80,6 +80,9 @@ class GazeboRosControl(ModelPlugin):
             self._last_update_s = time_s
         hardware.write(dt)
 
+    def step_changed(self, step_s):
+        self._period_s = self._control_period(self.context)
+
     def joints_set(self):
         if self._hardware is None:
             return

@@ -43,6 +43,9 @@ WARN_PERIOD_S = 5.0  # [simulated s] between two warnings of one kind
 class BaxterPlugin(ModelPlugin):
     """Wires one `Baxter` to one simulated model. Parameters: see launch/baxter_sdk_control.launch."""
 
+    # Its ramps and time-outs are counted in ticks.
+    keeps_step = True
+
     @classmethod
     def spawn_options(cls, robot, element):
         # The pedestal stands on the floor and stays there.
