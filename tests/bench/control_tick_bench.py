@@ -19,8 +19,9 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from bullet_sim import Pose, World
 from controller_manager import ControllerTable
 from controller_manager.manager import ControllerManager
-from controller_manager.testing import FakeLog, fake_context
+from controller_manager.testing import fake_context
 from gazebo_ros_control.hardware import SimulatedHardware
+from loop_ros.testing import FakeLog
 from urdf_model import parse_urdf
 
 DT = 0.002

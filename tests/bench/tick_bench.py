@@ -13,14 +13,14 @@ from baxter_core_msgs.msg import JointCommand
 from baxter_model import SIDES, joint_names, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
-from gazebo_ros.faults import Faults
-from gazebo_ros.loop_publisher import LoopPublisher, PublisherHub
-from gazebo_ros.mailbox import Queue, RequestBoard
 from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
 from gazebo_ros.publications import Publications
 from gazebo_ros.resources import ResourceFinder
 from gazebo_ros.simulation import HostedPlugin, Simulation
 from gazebo_ros.snapshot import SnapshotWriter
+from loop_ros.faults import Faults
+from loop_ros.mailbox import Queue, RequestBoard
+from loop_ros.publisher import LoopPublisher, PublisherHub
 from urdf_model import Box, Inertial, Link, Robot, Shape, parse_urdf
 
 # The same numbers on both arms.

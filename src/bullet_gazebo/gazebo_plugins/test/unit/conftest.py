@@ -3,9 +3,9 @@
 import pytest
 
 from bullet_sim import World
-from controller_manager.testing import FakeLog, FakeRos
 from gazebo_ros.model_plugin import PluginContext, PluginError, PluginSource
 from gazebo_ros.urdf_extras import plugins, sensor_plugins
+from loop_ros.testing import FakeLog, FakeRos
 from urdf_model import parse_urdf
 
 STEP_S = 0.001

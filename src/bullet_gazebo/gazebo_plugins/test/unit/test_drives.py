@@ -7,10 +7,10 @@ import pytest
 from geometry_msgs.msg import Twist, Vector3
 
 from bullet_sim import Pose, World
-from controller_manager.testing import FakeLog, FakeRos
 from gazebo_plugins.drives import DiffDrive, PlanarMove, SkidSteer
 from gazebo_ros.model_plugin import PluginContext, PluginError, PluginSource
 from gazebo_ros.urdf_extras import plugins
+from loop_ros.testing import FakeLog, FakeRos
 from urdf_model import parse_urdf
 
 DT = 0.002

@@ -28,8 +28,8 @@ from gazebo_msgs.srv import (
 from bullet_sim import BulletSimError, Pose
 from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg, vector_from_msg
 from gazebo_ros.entities import WORLD_FRAMES, UnknownEntity
-from gazebo_ros.faults import SURVIVED
 from gazebo_ros.jobs import TimedJobs
+from loop_ros.faults import SURVIVED
 from urdf_model import bounds
 
 _REFUSALS = (UnknownEntity, BulletSimError, ValueError)

@@ -17,7 +17,7 @@ class Diagnostics:
     """Call :meth:`on_tick` after each tick."""
 
     def __init__(self, simulation, faults, ros):
-        """``faults``: :class:`gazebo_ros.faults.Faults`."""
+        """``faults``: :class:`loop_ros.faults.Faults`."""
         self._simulation = simulation
         self._faults = faults
         self.step_changed()

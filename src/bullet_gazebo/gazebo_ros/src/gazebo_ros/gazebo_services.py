@@ -35,13 +35,13 @@ from gazebo_ros.body_services import BodyServices
 from gazebo_ros.changes import Changes
 from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg
 from gazebo_ros.entities import Entities, UnknownEntity
-from gazebo_ros.faults import SURVIVED, described
 from gazebo_ros.light_services import LightServices
-from gazebo_ros.mailbox import LoopEnded
 from gazebo_ros.simulation import AdvanceRefused
 from gazebo_ros.spawning import SpawnRefused
 from gazebo_ros.urdf_extras import unscoped
-from loop_reconfigure import Setting, SettingsServer
+from loop_ros.faults import SURVIVED, described
+from loop_ros.mailbox import LoopEnded
+from loop_ros.reconfigure import Setting, SettingsServer
 from sim_time.stamps import stamp_ns
 from urdf_model import bounds
 

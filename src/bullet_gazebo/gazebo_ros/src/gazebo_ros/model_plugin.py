@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from loop_ros.node_handle import NodeHandle
+
 
 class PluginError(Exception):
     """A plugin cannot serve this model; the text says what was found and what would be right."""
@@ -122,8 +124,8 @@ class PluginHost(NamedTuple):
 _NO_HOST = PluginHost()
 
 
-class PluginContext:
-    """What one plugin of one model is given.
+class PluginContext(NodeHandle):
+    """What one plugin of one model is given: a :class:`loop_ros.node_handle.NodeHandle`, and its model.
 
     Attributes
     ----------
@@ -142,104 +144,19 @@ class PluginContext:
     """
 
     def __init__(self, world, model, source, log, ros, parameters, host=_NO_HOST):
-        """``ros`` makes the communication objects, see :mod:`gazebo_ros.ros_objects`; ``parameters`` is the tree of the
-        parameter server at spawn time. ``source``: :class:`PluginSource`; ``host``: :class:`PluginHost`.
-        """
+        """``ros``: as for a NodeHandle; ``parameters``: the tree of the parameter server at spawn time; ``source``:
+        :class:`PluginSource`; ``host``: :class:`PluginHost`."""
         self.world = world
         self.model = model
-        self.robot, self.element, self.namespace, self.urdf_xml = source
+        self.robot, self.element, _, self.urdf_xml = source
+        super().__init__(ros, source.namespace)
         self.log = log
-        self._source = source
-        self._ros = ros
         self._parameters = parameters
         self._host = host
-        self._opened = []  # of (what it is: kind, name, type ..., the object)
-        self._kept = []  # the same, of the plugin before; see `begin_anew`
-        self._queues, self._noted = [], set()  # of the queues, the numbers of those that something came into
-
-    def resolve(self, name):
-        """Absolute ROS name: relative names live in the plugin's namespace."""
-        if name.startswith("/"):
-            return name
-        return "%s/%s" % (self.namespace, name)
-
-    def publisher(self, topic, msg_class, latch=False):
-        """A :class:`gazebo_ros.loop_publisher.LoopPublisher`; ``has_listeners`` and ``publish`` are for the loop."""
-        name = self.resolve(topic)
-        return self._opening(("publisher", name, msg_class, latch),
-                             lambda: self._ros.publisher(name, msg_class, latch=latch))
-
-    def mailbox(self, topic, msg_class):
-        """A subscription of which only the newest message counts: ``handle(function)`` calls ``function(message)`` if
-        one has come since, and drops and counts the message if that fails. ``take()`` -> message or None, unguarded."""
-        name = self.resolve(topic)
-        return self._opening(("mailbox", name, msg_class), lambda: self._ros.mailbox(name, msg_class))
-
-    def queue(self, topic, msg_class, depth):
-        """A subscription that loses nothing up to ``depth`` unread messages: ``handle(function)`` calls
-        ``function(message)`` for each, oldest first, and drops and counts a message on which that fails. ``drain()`` ->
-        list, unguarded."""
-        name = self.resolve(topic)
-
-        def make():
-            number = len(self._queues)
-            self._queues.append(self._ros.queue(name, msg_class, depth, lambda: self._noted.add(number)))
-            return self._queues[number]
-
-        return self._opening(("queue", name, msg_class, depth), make)
-
-    def mail(self):
-        """Loop thread: those of this context's :meth:`queue` objects that something came into since the last call, in
-        the order they were opened.
-
-        For a plugin with so many queues that asking each of them at every tick takes time.
-        """
-        if not self._noted:
-            return ()
-        numbers = sorted(self._noted)
-        # Before the queues are read: what comes in from here on is told again.
-        self._noted.difference_update(numbers)
-        return [self._queues[number] for number in numbers]
-
-    def service(self, name, srv_class, handler):
-        """Advertise a service; ``handler(request)`` runs in the loop thread between two ticks."""
-        return self._serving(self._ros.service, self.resolve(name), srv_class, handler)
-
-    def service_in_thread(self, name, srv_class, handler):
-        """Advertise a service that may take its time; ``handler(request)`` runs in a thread of its own.
-
-        It reaches the model through :meth:`call_in_loop` only.
-        """
-        return self._serving(self._ros.service_in_thread, self.resolve(name), srv_class, handler)
-
-    def call_in_loop(self, function, *arguments):
-        """Any thread but the loop's: have ``function(*arguments)`` called between two ticks; returns or raises what it
-        does. Raises ``rospy.ServiceException`` when the loop ends before."""
-        return self._ros.call_in_loop(function, *arguments)
-
-    def flush(self):
-        """Any thread but the loop's: wait until the topics and services opened so far are known to the ROS master."""
-        self._ros.flush()
-
-    def branch(self):
-        """A context for a part of the plugin that opens topics and services, and closes them, on its own."""
-        return PluginContext(self.world, self.model, self._source, self.log, self._ros, self._parameters, self._host)
 
     def plugins(self):
         """Loop thread: the :class:`ModelPlugin` objects that the model has now, in the order of its description."""
         return tuple(self._host.plugins())
-
-    def served(self):
-        """Absolute names of the services that the simulator serves now, this model's and all others: a list."""
-        return self._ros.served()
-
-    def withdraw(self, name):
-        """Loop thread: for good, no longer serve the service ``name`` nor listen to the topic of that name, whoever
-        opened it; for a plugin that guards what others may do in this world.
-
-        Returns the service's handler, for the caller's own requests; None where there is no such service.
-        """
-        return self._ros.withdraw(self.resolve(name))
 
     def screen(self, link, place, size_m, pixels):
         """A rectangle of the model that shows pictures to who draws the world; for a plugin's constructor.
@@ -248,8 +165,10 @@ class PluginContext:
         ``size_m``: width and height; ``pixels``: columns and rows. Returns a
         :class:`gazebo_ros.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """
+        # It belongs to the model and is closed with it.
         return self._opening(("screen", link, tuple(size_m), tuple(pixels)),
-                             lambda: self._host.add_screen(link, np.asarray(place, dtype=float), size_m, pixels))
+                             lambda: self._host.add_screen(link, np.asarray(place, dtype=float), size_m, pixels),
+                             closes=False)
 
     def param(self, name, default=None):
         """Value of a ROS parameter as it was when the model was spawned; relative names as in :meth:`resolve`."""
@@ -264,62 +183,3 @@ class PluginContext:
         """Stripped text of a child of the ``<plugin>`` element, or ``default`` where it is missing or empty."""
         text = self.element.findtext(tag)
         return text.strip() if text and text.strip() else default
-
-    def survived(self, place, error):
-        """Count an error that the plugin has dealt with: a line in the log now and then, a figure in /diagnostics.
-
-        ``place``: the topic or service, or in words what was being done.
-        """
-        self._ros.faults.note(place, error)
-
-    def begin_anew(self):
-        """From here to :meth:`end_anew`, what is opened again is what was open already."""
-        self._kept, self._opened = [*self._kept, *self._opened], []
-
-    def end_anew(self):
-        """Close what was open before :meth:`begin_anew` and has not been opened again."""
-        kept, self._kept = self._kept, []
-        _close_all(kept)
-
-    def close(self):
-        """Close every topic and service that was opened through this context."""
-        opened, self._opened, self._kept = [*self._kept, *self._opened], [], []
-        _close_all(opened)
-
-    def _opening(self, what, make):
-        """The object that was opened as ``what`` before, or a new one."""
-        for entry in self._kept:
-            if entry[0] == what:
-                self._kept.remove(entry)
-                break
-        else:
-            entry = what, make()
-        self._opened.append(entry)
-        return entry[1]
-
-    def _serving(self, advertise, name, srv_class, handler):
-        def make():
-            answering = _Answering(handler)
-            answering.service = advertise(name, srv_class, lambda request: answering.handler(request))
-            return answering
-
-        answering = self._opening(("service", advertise.__name__, name, srv_class), make)
-        answering.handler = handler
-        return answering
-
-
-class _Answering:
-    """A service whose handler can be replaced."""
-
-    def __init__(self, handler):
-        self.handler = handler
-
-    def close(self):
-        self.service.close()
-
-
-def _close_all(opened):
-    for what, thing in reversed(opened):
-        # Pictures on screens belong to the model and are closed with it.
-        if what[0] != "screen":
-            thing.close()

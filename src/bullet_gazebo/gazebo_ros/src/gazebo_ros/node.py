@@ -17,24 +17,24 @@ from bullet_sim import BulletSimError, World
 from gazebo_ros import snapshot
 from gazebo_ros.command_line import CommandLine
 from gazebo_ros.diagnostics import Diagnostics
-from gazebo_ros.faults import Faults
 from gazebo_ros.gazebo_services import GazeboServices
-from gazebo_ros.loop_log import LoopLog
-from gazebo_ros.loop_publisher import PublisherHub
-from gazebo_ros.loop_subscriber import InletHub
-from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.model_plugin import PluginError
 from gazebo_ros.pacing import wake_on_time
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.publications import Publications
 from gazebo_ros.resources import ResourceFinder, model_folders, model_sizes, resource_folders
-from gazebo_ros.ros_objects import RosObjects
 from gazebo_ros.simulation import Simulation
 from gazebo_ros.snapshot import SnapshotError
 from gazebo_ros.spawning import Library, Spawner
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
 from gazebo_ros.world_lights import WorldLights
 from lab_environment.single_instance import refusal, running_instance
+from loop_ros.faults import Faults
+from loop_ros.log import LoopLog
+from loop_ros.mailbox import RequestBoard
+from loop_ros.publisher import PublisherHub
+from loop_ros.ros_objects import RosObjects
+from loop_ros.subscriber import InletHub
 from rospy_limits.node import limit_ports
 from sdf_model import ModelFolders
 

@@ -8,8 +8,8 @@ import time
 import traceback
 from concurrent.futures import Future
 
-from gazebo_ros.faults import SURVIVED, described
 from gazebo_ros.pacing import Pacer
+from loop_ros.faults import SURVIVED, described
 
 # While the world is paused: how long the loop sleeps when nobody asks for anything, and while a lock-step request
 # waits for its topics [s].
@@ -55,7 +55,7 @@ class Simulation:
     def __init__(self, world, board, log, faults, real_time_factor=1.0, paused=False, deliveries=dict):
         """Ready to :meth:`run`.
 
-        ``board``: :class:`gazebo_ros.mailbox.RequestBoard`; ``faults``: :class:`gazebo_ros.faults.Faults`.
+        ``board``: :class:`loop_ros.mailbox.RequestBoard`; ``faults``: :class:`loop_ros.faults.Faults`.
         ``deliveries()`` -> how many messages have come in on each topic that something in this world listens to.
         """
         #: Called once per turn of the loop, also while paused; before each physics step; after each tick; after time

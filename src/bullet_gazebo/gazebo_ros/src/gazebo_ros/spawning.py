@@ -18,13 +18,13 @@ from bullet_sim.gathered import MOST_SHAPES
 from bullet_sim.world import is_fixed
 from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
-from gazebo_ros.faults import SURVIVED, described
 from gazebo_ros.model_plugin import PluginContext, PluginError, PluginHost, PluginSource
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.resources import ResourceFinder
 from gazebo_ros.shared_picture import NoPicture, PictureWriter
 from gazebo_ros.simulation import HostedPlugin
 from gazebo_ros.snapshot import SnapshotError
+from loop_ros.faults import SURVIVED, described
 from sdf_model import ModelFolders, SdfError, parse_sdf_model
 from urdf_model import Mesh, OutOfBounds, Plane, UrdfError, bounds, drawing_urdf, merge_fixed, parse_urdf
 

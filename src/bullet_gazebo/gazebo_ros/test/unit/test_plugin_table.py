@@ -5,9 +5,11 @@ import types
 from pathlib import Path
 
 import pytest
+from std_msgs.msg import String
 
-from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError, PluginSource
+from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginError, PluginHost, PluginSource
 from gazebo_ros.plugin_table import PluginTable
+from loop_ros.testing import FakeRos
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "model_plugins.yaml"
 
@@ -68,3 +70,27 @@ def test_names_in_a_context_are_relative_to_its_namespace():
     assert context.param("/settings/enable", False) is True
     assert context.param("/settings/missing", 7) == 7
     assert context.param("/settings/enable/deeper", 7) == 7
+
+
+def test_a_plugin_that_begins_anew_keeps_what_it_opened():
+    ros = FakeRos()
+    context = PluginContext(None, None, PluginSource(namespace="/robot"), None, ros, {},
+                            PluginHost(add_screen=lambda *_: object()))
+
+    class Plugin(ModelPlugin):
+        def __init__(self, context, topic="gone"):
+            super().__init__(context)
+            self.opened = (context.publisher("out", String), context.queue("in", String, depth=3),
+                           context.screen("glass", [[1.0]], (1.0, 2.0), (3, 4)))
+            self.own = context.publisher(topic, String)
+
+        def close(self):
+            raise RuntimeError("broken on purpose")
+
+    plugin = Plugin(context)
+    successor = plugin.successor("more")
+    assert all(one is other for one, other in zip(plugin.opened, successor.opened, strict=True))
+    assert plugin.own.is_closed and sorted(ros.publishers) == ["/robot/more", "/robot/out"]
+    # The picture on a screen is closed with the model: this one could not be.
+    context.close()
+    assert ros.publishers == ros.inboxes == {}

@@ -15,6 +15,7 @@ from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.ray_pattern import RAYS_PER_TICK, RayPattern, RayPatternError
 from gazebo_ros.urdf_extras import plugins
 from gazebo_ros.urdf_extras import sensor_plugins as found_in
+from loop_ros.testing import FakeRos
 from urdf_model import parse_urdf
 
 BOX = """<robot name="box"><link name="link"><inertial><mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01"
@@ -29,25 +30,6 @@ RAY = """<gazebo reference="link"><sensor type="ray" name="s">%s<update_rate>50<
 </sensor></gazebo>"""
 
 
-class Publisher:
-    def __init__(self):
-        self.has_listeners = True
-        self.sent = []
-
-    def publish(self, message):
-        self.sent.append(message)
-
-
-class Ros:
-    def __init__(self):
-        self.publishers = {}
-
-    def publisher(self, topic, msg_class, latch=False):
-        self.publishers[topic] = Publisher()
-        self.publishers[topic].msg_class = msg_class
-        return self.publishers[topic]
-
-
 class Lab:
     """A world with a floor, one model and its plugin."""
 
@@ -57,7 +39,7 @@ class Lab:
         robot = parse_urdf(urdf, "test")
         self.model = self.world.spawn(robot, "it", pose, static=static)
         element = (plugins(robot) + found_in(robot, warn=pytest.fail))[0]
-        self.ros = Ros()
+        self.ros = FakeRos()
         context = PluginContext(self.world, self.model, PluginSource(robot, element, "/ns", urdf), None, self.ros, {})
         try:
             self.plugin = plugin_class(context)
@@ -75,7 +57,7 @@ class Lab:
             self.plugin.update(self.world.time_s, 0.002)
             self.world.step()
             self.plugin.publish(self.world.time_s)
-        return self.publisher.sent
+        return self.publisher.messages
 
 
 @pytest.fixture
@@ -135,7 +117,7 @@ def test_a_range_finder_says_the_nearest_or_its_furthest(lab):
     wall(it.world, 2.0)
     last = it.run(0.05)[-1]
     assert last.range == pytest.approx(2.0, abs=1e-3)
-    assert (last.min_range, last.max_range, last.field_of_view) == (0.15, 5.0, 1.0)
+    assert (last.min_range, last.max_range, last.field_of_view) == pytest.approx((0.15, 5.0, 1.0))
 
 
 def test_an_imu_at_rest_feels_gravity_and_in_free_fall_nothing(lab):
@@ -185,7 +167,7 @@ def test_a_bumper_feels_the_weight(lab):
     for _ in range(100):
         it.model.apply_wrench("link", (3.0, 0.0, 0.0))
         it.run(0.002)
-    (state,) = it.publisher.sent[-1].states
+    (state,) = it.publisher.messages[-1].states
     # Friction holds against the push.
     assert state.total_wrench.force.x == pytest.approx(-3.0, abs=0.1)
 
@@ -227,9 +209,9 @@ def test_a_laser_may_look_all_round(lab):
     it = lab(BOX % ray, sensor_plugins.Laser, Pose((0, 0, 1)))
     wall(it.world, 1.0)
     scan = it.run(1.0)[-1]
-    assert (scan.angle_min, scan.angle_max) == (0.0, 6.28319)
+    assert (scan.angle_min, scan.angle_max) == pytest.approx((0.0, 6.28319))
     assert scan.ranges[0] == pytest.approx(1.0, abs=0.01) and math.isinf(scan.ranges[180])
-    assert scan.intensities == [0.0] * 360
+    assert scan.intensities == (0.0,) * 360
 
 
 def test_missing_elements_are_named(lab):

@@ -5,11 +5,12 @@ import time
 
 import pytest
 
-from gazebo_ros.faults import Faults
-from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros.simulation import AdvanceRefused, HostedPlugin, Simulation
 from lab_testing.waiting import wait_until
+from loop_ros.faults import Faults
+from loop_ros.mailbox import RequestBoard
+from loop_ros.testing import FakeLog
 
 
 class FakeWorld:
@@ -30,17 +31,6 @@ class FakeWorld:
 
     def reset_time(self):
         pass
-
-
-class FakeLog:
-    def __init__(self):
-        self.errors, self.infos = [], []
-
-    def error(self, text):
-        self.errors.append(text)
-
-    def info(self, text):
-        self.infos.append(text)
 
 
 class FakeContext:
@@ -180,7 +170,7 @@ CALLS = {"update": Simulation.do_tick, "publish": Simulation.do_tick,
 def test_a_plugin_that_raises_once_begins_anew(simulation, log, where, error):
     bad, good = host(simulation, fails_in=where, error=error), host(simulation)
     CALLS[where](simulation)
-    line, = log.errors
+    line, = log.of("error")
     assert "libtest.so" in line and where + "()" in line and "broken on purpose" in line and error.__name__ in line
     assert len(bad.plugin.named("restarted")) == 1 and not bad.plugin.named("hold")
     assert not bad.context.closed
@@ -189,7 +179,7 @@ def test_a_plugin_that_raises_once_begins_anew(simulation, log, where, error):
     simulation.do_tick()
     assert len(bad.plugin.named("update")) == before + 1 and (bad.has_failed, bad.failures) == (False, 1)
     assert good.plugin.named("update") and not good.plugin.named("restarted")
-    assert len(log.errors) == 1
+    assert len(log.of("error")) == 1
 
 
 def test_at_the_third_failure_within_ten_seconds_a_plugin_counts_as_failed_until_a_reset(simulation, log):
@@ -200,7 +190,8 @@ def test_at_the_third_failure_within_ten_seconds_a_plugin_counts_as_failed_until
     assert len(bad.plugin.named("update")) == 3 and len(bad.plugin.named("publish")) == 2
     assert bad.plugin.named("while_failed") == [("while_failed", time_s) for time_s in (0.006, 0.008, 0.01)]
     assert len(bad.plugin.named("hold")) == 1
-    assert len(log.errors) == 3 and "reset_world" in log.errors[-1] and "broken on purpose" in log.errors[-1]
+    assert len(log.of("error")) == 3
+    assert "reset_world" in log.of("error")[-1] and "broken on purpose" in log.of("error")[-1]
     assert len(good.plugin.named("update")) == 5 and simulation.world.steps == 5
     simulation.joints_were_set("model")
     assert not bad.plugin.named("joints_set")
@@ -210,7 +201,7 @@ def test_at_the_third_failure_within_ten_seconds_a_plugin_counts_as_failed_until
     assert not bad.has_failed and bad.plugin.calls[-2:] == [("restarted",), ("reset",)]
     simulation.do_tick()
     assert bad.plugin.calls[-2][0] == "update" and bad.plugin.calls[-1][0] == "publish"
-    assert "revived by a reset" in log.infos[-1]
+    assert "revived by a reset" in log.of("info")[-1]
 
 
 def test_failures_that_are_ten_seconds_apart_are_each_the_first(simulation):
@@ -239,7 +230,7 @@ def test_a_failed_plugin_can_ask_to_be_revived(simulation, log):
     assert bad.has_failed
     bad.plugin.fails_in, bad.plugin.wants_revival = None, True
     simulation.do_tick()
-    assert not bad.has_failed and "revived by a request" in log.infos[-1]
+    assert not bad.has_failed and "revived by a request" in log.of("info")[-1]
     simulation.do_tick()
     assert bad.plugin.calls[-1][0] == "publish"
 
@@ -247,7 +238,7 @@ def test_a_failed_plugin_can_ask_to_be_revived(simulation, log):
 def test_a_plugin_that_cannot_begin_anew_counts_as_failed_at_once(simulation, log):
     bad = host(simulation, fails_in="update", restart_fails=True)
     simulation.do_tick()
-    assert bad.has_failed and "cannot begin" in log.errors[-1]
+    assert bad.has_failed and "cannot begin" in log.of("error")[-1]
     bad.plugin.fails_in, bad.plugin.restart_fails = "while_failed", False
     simulation.do_tick()  # what it raises now is only counted
     bad.plugin.fails_in = None
@@ -262,8 +253,8 @@ def test_what_hangs_on_the_loop_may_raise(running, log, name):
 
     running.board.call(setattr, running, name, fail)
     running.paused = False
-    wait_until(lambda: running.tick > 20 and log.errors, "the world to go on")
-    assert "broken on purpose" in log.errors[0] and len(log.errors) == 1
+    wait_until(lambda: running.tick > 20 and log.of("error"), "the world to go on")
+    assert "broken on purpose" in log.of("error")[0] and len(log.of("error")) == 1
 
 
 def test_a_model_that_is_deleted_takes_its_failed_plugin_along(simulation):

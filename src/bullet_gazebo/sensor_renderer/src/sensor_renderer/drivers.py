@@ -10,7 +10,7 @@ import rospy
 from rosgraph.names import is_legal_name
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 
-from loop_reconfigure import Setting, SettingsServer
+from loop_ros.reconfigure import Setting, SettingsServer
 from sensor_renderer import convert
 from sensor_renderer.errors import SensorError
 from sensor_renderer.pictures import Cloud, Noise, millimetres, within
@@ -54,7 +54,7 @@ class Settings:
     has_listeners = False
 
     def __init__(self, name, settings, apply):
-        """As :class:`loop_reconfigure.SettingsServer`; ``apply`` is called in a service's thread."""
+        """As :class:`loop_ros.reconfigure.SettingsServer`; ``apply`` is called in a service's thread."""
         self._opened = []
         self._lock = threading.Lock()
         SettingsServer(self, name, settings, apply)

@@ -72,8 +72,7 @@ class ControllerContext:
 
     def __init__(self, name, root_namespace, parameters, ros, log, robot=None):
         """``parameters``: the tree below ``root_namespace``; ``ros``: makes topics and services from absolute names
-        (``publisher``, ``mailbox``, ``queue``, ``service``, ``close``, as ``gazebo_ros.model_plugin.PluginContext``).
-        """
+        (``loop_ros.protocol.Topics``); ``log``: ``loop_ros.protocol.Log``."""
         self.root_namespace = root_namespace
         self.namespace = "%s/%s" % (root_namespace, name)
         self.robot = robot

@@ -4,7 +4,7 @@ import genpy
 from control_msgs.msg import PidState
 
 from controller_manager.errors import ControllerError
-from loop_reconfigure import Setting, SettingsServer
+from loop_ros.reconfigure import Setting, SettingsServer
 from sim_time.stamps import stamp
 
 # How far a slider goes: gains, and ends of the integral term.
@@ -15,7 +15,7 @@ class TunablePids:
     """The joints of a :class:`controller_manager.pid.Pid` in the ROS graph, each under the name of its gains."""
 
     def __init__(self, topics, pid, names, publishing=()):
-        """``topics``: a ``ControllerContext`` or a ``PluginContext``; ``names``: one of each joint's gains, such as
+        """``topics``: ``loop_ros.protocol.Topics``; ``names``: one of each joint's gains, such as
         ``"pid"`` or ``"gains/joint_1"``; ``publishing``: those of them that have a topic ``state``."""
         self._pid = pid
         gains = pid.gains

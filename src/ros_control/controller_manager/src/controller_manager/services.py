@@ -40,9 +40,9 @@ class ControllerManagerServices:
     """
 
     def __init__(self, manager, find_table, host, robot):
-        """``host``: ``namespace``, ``log``, ``service_in_thread``, ``call_in_loop``, ``branch`` and ``flush`` as
-        ``gazebo_ros.model_plugin.PluginContext`` has them. ``find_table()`` -> :class:`ControllerTable`, asked at each
-        request, from any thread. ``robot``: ``urdf_model.Robot`` that controllers are told of."""
+        """``host``: a ``loop_ros.node_handle.NodeHandle`` that has a ``log`` too. ``find_table()`` ->
+        :class:`ControllerTable`, asked at each request, from any thread. ``robot``: ``urdf_model.Robot`` that
+        controllers are told of."""
         self._manager = manager
         self._find_table = find_table
         self._host = host

@@ -2,7 +2,8 @@
 """Controllers that have something to do while they do not run."""
 from controller_manager import JOINT_STATE, Controller
 from controller_manager.manager import STRICT, ControllerManager
-from controller_manager.testing import FakeHardware, FakeLog, fake_context
+from controller_manager.testing import FakeHardware, fake_context
+from loop_ros.testing import FakeLog
 
 
 class Answering(Controller):

@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from std_msgs.msg import Empty
 
 from controller_manager import (
     EFFORT,
@@ -16,7 +17,8 @@ from controller_manager import (
     SwitchResult,
 )
 from controller_manager.manager import BEST_EFFORT, STRICT, ControllerManager
-from controller_manager.testing import FakeHardware, FakeLog, fake_context
+from controller_manager.testing import FakeHardware, fake_context
+from loop_ros.testing import FakeLog
 
 DT = 0.002
 ROS = ("rospy", "actionlib", "sensor_msgs", "std_msgs", "controller_manager_msgs", "control_msgs")
@@ -95,18 +97,22 @@ class Robot:
         self.hardware = SlowHardware({"a": (POSITION,), "b": (POSITION,), "v": (VELOCITY,), "e": (EFFORT,)})
         self.log = FakeLog()
         self.manager = ControllerManager(self.hardware, self.log)
-        self.contexts = {}
+        self.ros, self.parameters = {}, {}
         self.time_s = 0.0
 
     def load(self, name, **parameters):
-        context, ros = fake_context(name, parameters, log=self.log)
-        self.contexts[name] = ros
-        ros.parameters = parameters
+        self.parameters[name] = parameters
+        context, self.ros[name] = fake_context(name, parameters, log=self.log)
+        context.publisher("open", Empty)
         self.manager.load(name, "test/Recorder", Recorder, context)
         return self.find(name).controller
 
     def find(self, name):
         return {loaded.name: loaded for loaded in self.manager.loaded}[name]
+
+    def has_closed(self, name):
+        """Whether the topics of a controller are closed."""
+        return self.ros[name].publishers == {}
 
     def state(self, name):
         return self.find(name).state
@@ -172,7 +178,7 @@ def test_a_name_is_loaded_once(robot):
 def test_a_refusing_constructor_leaves_nothing_behind(robot, parameters, text):
     with pytest.raises(Refused, match=text):
         robot.load("one", **parameters)
-    assert robot.manager.loaded == [] and robot.contexts["one"].closed
+    assert robot.manager.loaded == [] and robot.has_closed("one")
     robot.load("one")
 
 
@@ -186,7 +192,7 @@ def test_an_interface_that_no_joint_has_is_named():
 def test_unload_closes_and_forgets(robot):
     calls = robot.load("one").calls
     robot.manager.unload("one")
-    assert robot.manager.loaded == [] and calls == ["init", "close"] and robot.contexts["one"].closed
+    assert robot.manager.loaded == [] and calls == ["init", "close"] and robot.has_closed("one")
 
 
 def test_a_running_controller_cannot_be_unloaded(robot):
@@ -420,7 +426,7 @@ def test_a_failing_controller_is_reported_and_its_joints_are_held(robot, where, 
         assert robot.hardware.command[POSITION][1] == 0.25, "nor a position"
     if where == "update":
         assert bad.calls[-1] == "stopping", "who waits for a goal is told"
-    robot.contexts["bad"].parameters["fails_in"] = None
+    robot.parameters["bad"]["fails_in"] = None
     robot.switch(["bad"])
     robot.update()
     assert robot.state("bad") == "running" and robot.hardware.released[-1] is bad.claims
@@ -447,7 +453,7 @@ def test_close_releases_who_waits(robot):
     robot.update()
     switch = robot.manager.switch(["one"], [], STRICT)
     robot.manager.close()
-    assert switch.cancelled() and robot.contexts["one"].closed
+    assert switch.cancelled() and robot.has_closed("one")
     with pytest.raises(Refused, match="ended"):
         robot.load("two")
 

@@ -7,8 +7,9 @@ import pytest
 from geometry_msgs.msg import Twist, Vector3
 
 from bullet_sim import Pose, World
-from controller_manager.testing import FakeLog, fake_context
+from controller_manager.testing import fake_context
 from gazebo_ros_control.hardware import SimulatedHardware
+from loop_ros.testing import FakeLog
 from ros_controllers.diff_drive import DiffDriveController
 from urdf_model import parse_urdf
 

@@ -8,11 +8,13 @@ from std_msgs.msg import Bool
 
 from bullet_sim import Pose, World
 from controller_manager import POSITION, Controller
-from controller_manager.testing import FakeLog, FakeMailbox, fake_context
-from gazebo_ros.faults import Faults
-from gazebo_ros.mailbox import RequestBoard
+from controller_manager.testing import fake_context
+from gazebo_ros.model_plugin import PluginContext, PluginSource
 from gazebo_ros.simulation import HostedPlugin, Simulation
 from gazebo_ros_control.plugin import GazeboRosControl, _flat
+from loop_ros.faults import Faults
+from loop_ros.mailbox import RequestBoard
+from loop_ros.testing import FakeLog, FakeRos
 from urdf_model import parse_urdf
 
 DT = 0.002
@@ -23,6 +25,18 @@ URDF = """<robot name="arm"><link name="world"/><link name="l"><inertial><mass v
 <transmission name="t"><type>transmission_interface/SimpleTransmission</type><joint name="j">
   <hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint><actuator name="m"/>
 </transmission></robot>"""
+
+
+def tree_of(parameters):
+    """{absolute name: value} as the tree of the parameter server."""
+    tree = {}
+    for name, value in parameters.items():
+        *folders, last = name.strip("/").split("/")
+        branch = tree
+        for folder in folders:
+            branch = branch.setdefault(folder, {})
+        branch[last] = value
+    return tree
 
 
 class Recorder(Controller):
@@ -41,33 +55,18 @@ class Recorder(Controller):
 
 
 class Simulator:
-    """One robot with the plugin; also what the plugin takes for its context."""
+    """One robot with the plugin. ``parameters``: {absolute name: value}."""
 
     def __init__(self, elements="", parameters=None, urdf=URDF % 2):
         self.world = World(time_step_s=DT)
-        self.robot, self.urdf_xml, self.namespace = parse_urdf(urdf), urdf, "/lab/arm"
-        self.model = self.world.spawn(self.robot, "arm", Pose((0, 0, 0)))
-        self.element = ElementTree.fromstring("<plugin>%s</plugin>" % elements)
-        self.parameters = parameters or {}
-        self.log, self.inboxes, self.services = FakeLog(), {}, {}
-        self.plugin = GazeboRosControl(self)
+        robot = parse_urdf(urdf)
+        self.model = self.world.spawn(robot, "arm", Pose((0, 0, 0)))
+        self.log, self.ros = FakeLog(), FakeRos()
+        element = ElementTree.fromstring("<plugin>%s</plugin>" % elements)
+        self.context = PluginContext(self.world, self.model, PluginSource(robot, element, "/lab/arm", urdf), self.log,
+                                     self.ros, tree_of(parameters or {}))
+        self.plugin = GazeboRosControl(self.context)
         self.controller = None
-
-    # -- the context
-
-    def param(self, name, default=None):
-        return self.parameters.get(name if name.startswith("/") else "%s/%s" % (self.namespace, name), default)
-
-    def element_text(self, tag, default=None):
-        return self.element.findtext(tag, default)
-
-    def mailbox(self, topic, msg_class):
-        return self.inboxes.setdefault(topic, FakeMailbox())
-
-    def service_in_thread(self, name, srv_class, handler):
-        self.services[name] = handler
-
-    # -- what tests do
 
     def start(self):
         manager = self.plugin._manager
@@ -106,7 +105,7 @@ def test_controllers_run_at_every_step(simulate):
     controller = simulator.start()
     simulator.run(3)
     assert controller.updates == [(0.002, DT), (0.004, DT), (0.006, DT)]
-    assert sorted(simulator.services) == ["controller_manager/" + name for name in (
+    assert sorted(simulator.ros.served()) == ["/lab/arm/controller_manager/" + name for name in (
         "list_controller_types", "list_controllers", "load_controller", "reload_controller_libraries",
         "switch_controller", "unload_controller")]
     assert simulator.log.lines == []
@@ -169,13 +168,13 @@ def test_reset_and_both_ends_of_an_emergency_stop_restart_controllers(simulate):
     simulator.plugin.reset()
     simulator.run(2)
     assert len(controller.starts) == 2
-    simulator.inboxes["stop"].put(Bool(False))
+    simulator.ros.inboxes["/lab/arm/stop"].put(Bool(False))
     simulator.run(2)
     assert len(controller.starts) == 2, "nothing was stopped"
-    simulator.inboxes["stop"].put(Bool(True))
+    simulator.ros.inboxes["/lab/arm/stop"].put(Bool(True))
     simulator.run(2)
     assert len(controller.starts) == 3
-    simulator.inboxes["stop"].put(Bool(False))
+    simulator.ros.inboxes["/lab/arm/stop"].put(Bool(False))
     simulator.run(2)
     assert len(controller.starts) == 4
 
@@ -205,7 +204,7 @@ def test_a_description_without_hardware_is_one_error(simulate, found, other, tex
     urdf = (URDF % 2).replace(found, other)
     simulator = simulate(urdf=urdf)
     simulator.run(3)
-    assert len(simulator.log.lines) == 1 and simulator.services == {}
+    assert len(simulator.log.lines) == 1 and simulator.ros.served() == []
     assert "model 'arm' has no controllers" in simulator.log.of("error")[0] and text in simulator.log.of("error")[0]
 
 
@@ -234,7 +233,7 @@ class Loop:
         self.simulator = simulator
         self.simulation = Simulation(simulator.world, RequestBoard(), simulator.log, Faults(simulator.log), paused=True)
         self.simulation.tick = simulator.world.tick
-        self.hosted = HostedPlugin(simulator.plugin, simulator, "arm", "libgazebo_ros_control.so")
+        self.hosted = HostedPlugin(simulator.plugin, simulator.context, "arm", "libgazebo_ros_control.so")
         self.simulation.host(self.hosted)
 
     def run(self, ticks):

@@ -7,8 +7,8 @@ import pytest
 
 from bullet_sim import Pose, World
 from controller_manager import EFFORT, POSITION, VELOCITY, HardwareError
-from controller_manager.testing import FakeLog
 from gazebo_ros_control.hardware import SimulatedHardware
+from loop_ros.testing import FakeLog
 from urdf_model import parse_urdf
 
 DT = 0.002

@@ -7,7 +7,7 @@ from control_msgs.msg import GripperCommandAction, GripperCommandResult
 
 from controller_manager import EFFORT, POSITION, Controller, Gains, Pid
 from controller_manager.pid_tuning import TunablePids
-from ros_controllers.action_server import ActionServer
+from loop_ros.action_server import ActionServer
 
 
 class GripperController(Controller):

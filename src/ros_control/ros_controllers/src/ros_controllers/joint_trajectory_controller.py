@@ -28,7 +28,7 @@ from joint_trajectory import (
     joint_indices,
     merge_tolerances,
 )
-from ros_controllers.action_server import ActionServer
+from loop_ros.action_server import ActionServer
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
 

@@ -19,14 +19,14 @@ from controller_manager import EFFORT, POSITION, ControllerTable
 from controller_manager.manager import ControllerManager
 from controller_manager.services import ControllerManagerServices
 from controller_manager.testing import FakeHardware
-from gazebo_ros.faults import Faults
-from gazebo_ros.loop_log import LoopLog
-from gazebo_ros.loop_publisher import PublisherHub
-from gazebo_ros.loop_subscriber import InletHub
-from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.model_plugin import PluginContext, PluginSource
 from gazebo_ros.pacing import Pacer
-from gazebo_ros.ros_objects import RosObjects
+from loop_ros.faults import Faults
+from loop_ros.log import LoopLog
+from loop_ros.mailbox import RequestBoard
+from loop_ros.publisher import PublisherHub
+from loop_ros.ros_objects import RosObjects
+from loop_ros.subscriber import InletHub
 from urdf_model import parse_urdf
 
 DT = 0.002

@@ -57,8 +57,8 @@ def test_joint_states_are_alphabetical_and_complete():
     running.hardware.velocity[:], running.hardware.effort[:] = (1, 2, 3), (4, 5, 6)
     running.run(step=False)
     message = running.ros.publishers["/robot/joint_states"].messages[0]
-    assert message.name == ["a", "b", "c"] and message.position == [0.2, 0.1, 0.3]
-    assert message.velocity == [2.0, 1.0, 3.0] and message.effort == [5.0, 4.0, 6.0]
+    assert message.name == ["a", "b", "c"] and message.position == (0.2, 0.1, 0.3)
+    assert message.velocity == (2.0, 1.0, 3.0) and message.effort == (5.0, 4.0, 6.0)
     assert message.header.stamp.to_sec() == 0.0
     assert running.controller.claims == {JOINT_STATE: []}
 
@@ -89,7 +89,7 @@ def test_joint_states_of_chosen_and_extra_joints():
     running = joint_states(publish_rate=50, joints=["c"], extra_joints=[{"name": "x", "position": 1.5}, {"name": "y"}])
     running.run(step=False)
     message = running.ros.publishers["/robot/joint_states"].messages[0]
-    assert message.name == ["c", "x", "y"] and message.position == [0.3, 1.5, 0.0] and message.effort == [0.0] * 3
+    assert message.name == ["c", "x", "y"] and message.position == (0.3, 1.5, 0.0) and message.effort == (0.0,) * 3
 
 
 @pytest.mark.parametrize(("parameters", "text"), [
@@ -267,5 +267,6 @@ def test_a_command_that_a_controller_fails_on_is_dropped(kind, interface, parame
     running.send(object())  # as if something in it were of a kind that nobody thought of
     before = running.command(interface)
     running.run()
-    assert isinstance(running.ros.inboxes["/robot/arm/command"].faults[0], AttributeError)
+    (place, error), = running.ros.faults.noted
+    assert place == "/robot/arm/command" and isinstance(error, AttributeError)
     assert running.command(interface) == pytest.approx(before, abs=0.1)

@@ -11,7 +11,8 @@ from control_msgs.msg import FollowJointTrajectoryActionGoal, FollowJointTraject
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from controller_manager import EFFORT, POSITION, VELOCITY, ControllerError
-from controller_manager.testing import FakeHardware, FakeLog, fake_context
+from controller_manager.testing import FakeHardware, fake_context
+from loop_ros.testing import FakeLog
 from ros_controllers.joint_trajectory_controller import (
     EffortJointTrajectoryController,
     PositionJointTrajectoryController,

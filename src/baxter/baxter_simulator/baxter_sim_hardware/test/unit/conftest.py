@@ -13,29 +13,15 @@ import xacro
 from baxter_model import JOINTS, SIDES, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
-from gazebo_ros.mailbox import Queue
 from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
 from gazebo_ros.resources import ResourceFinder
+from loop_ros.testing import FakeLog, FakeRos
 from urdf_model import parse_urdf
 
 PACKAGE = Path(__file__).resolve().parents[2]
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 TICK_S = 0.002
 NAMESPACE = "/robot"
-
-
-class _Outbox:
-    def __init__(self, lab, topic):
-        self._lab, self.topic = lab, topic
-        # Of all but the pictures, which would fill the memory; tests of the screen listen themselves.
-        self.has_listeners = topic != "sim/screen"
-        self.messages = []  # (time_s, message)
-
-    def publish(self, message):
-        self.messages.append((self._lab.world.time_s, message))
-
-    def close(self):
-        del self._lab.outboxes[self.topic]
 
 
 class _Drawn:
@@ -47,56 +33,17 @@ class _Drawn:
         self.pixels = pixels.copy()
 
 
-class _Log:
-    def __init__(self):
-        self.lines = []
-
-    def _take(self, text):
-        self.lines.append(text)
-
-    info = warn = error = _take
-
-
-class _Service:
-    def __init__(self, services, name):
-        self._services, self._name = services, name
-
-    def close(self):
-        self._services.pop(self._name, None)
-
-
-class _Ros:
-    """What the plugin's context opens, kept in the Lab under the plugin's own names, instead of on a ROS master."""
-
-    def __init__(self, lab):
-        self._lab = lab
-        self.faults = self
-
-    def publisher(self, topic, msg_class, latch):
-        outbox = self._lab.outboxes[_own(topic)] = _Outbox(self._lab, _own(topic))
-        return outbox
-
-    def queue(self, topic, msg_class, depth, notice):
-        queue = self._lab.inboxes[_own(topic)] = Queue(depth, notice, lambda error: self.note(_own(topic), error))
-        return queue
-
-    def service(self, name, srv_class, handler):
-        self._lab.services[_own(name)] = handler
-        return _Service(self._lab.services, _own(name))
-
-    def note(self, place, error):
-        self._lab.faults.append((place, error))
-
-
-def _own(name):
-    return name.removeprefix(NAMESPACE + "/")
+def _own(by_name):
+    """{absolute name: ...} with the names as the plugin says them."""
+    return {name.removeprefix(NAMESPACE + "/"): value for name, value in by_name.items()}
 
 
 class Lab:
     """A world with Baxter in it, whose plugin has the simulator's own PluginContext.
 
     Arrays over the 14 arm joints are in the order of NAMES.
-    ``inboxes``, ``outboxes``, ``services``: {name as the plugin says it: queue, _Outbox, handler}.
+    ``ros``: its ``loop_ros.testing.FakeRos``. Nobody listens to the screen, whose pictures would fill the memory.
+    ``inboxes``, ``outboxes``, ``services``: {name as the plugin says it: its inboxes, publishers, services}.
     """
 
     def __init__(self, robot, pose="neutral", parameters=None, angles=None, meshes=False):
@@ -110,11 +57,10 @@ class Lab:
             angles = [poses().angles(pose, name.split("_")[0])[name] for name in NAMES]
         angles = np.clip(angles, self.model.lower[self.arm], self.model.upper[self.arm])
         self.model.set_joint_positions(self.arm, angles)
-        self.log = _Log()
-        self.inboxes, self.outboxes, self.services = {}, {}, {}
-        self.faults = []  # (place, error)
+        self.log = FakeLog()
+        self.ros = FakeRos(heard=lambda topic: topic != NAMESPACE + "/sim/screen", clock=lambda: self.world.time_s)
         source = PluginSource(robot, element, NAMESPACE)
-        self.context = PluginContext(self.world, self.model, source, self.log, _Ros(self),
+        self.context = PluginContext(self.world, self.model, source, self.log, self.ros,
                                      {"baxter_sim_hardware": parameters or {}}, PluginHost(self._screen))
         self.plugin = BaxterPlugin(self.context)
         self.effort_limit = self.model.max_effort[self.arm]
@@ -125,8 +71,25 @@ class Lab:
 
     # -- what tests do with it
 
+    @property
+    def inboxes(self):
+        return _own(self.ros.inboxes)
+
+    @property
+    def outboxes(self):
+        return _own(self.ros.publishers)
+
+    @property
+    def services(self):
+        return _own(self.ros.services)
+
+    @property
+    def faults(self):
+        """List of (place, error)."""
+        return self.ros.faults.noted
+
     def send(self, topic, message):
-        self.inboxes[topic].put(message)
+        self.ros.inboxes[self.context.resolve(topic)].put(message)
 
     def enable(self, on=True):
         self.send("set_super_enable", Bool(on))
@@ -174,7 +137,7 @@ class Lab:
         return self.model.read_joints()[1][self.arm]
 
     def last(self, topic):
-        return self.outboxes[topic].messages[-1][1]
+        return self.outboxes[topic].messages[-1]
 
     def close(self):
         self.world.close()

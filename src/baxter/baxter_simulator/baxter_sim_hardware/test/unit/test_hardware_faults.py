@@ -12,9 +12,9 @@ from std_msgs.msg import Bool, Empty, Float64
 
 from baxter_sim_hardware.robot_state import State
 from baxter_sim_hardware.topics import interface
-from gazebo_ros.faults import Faults
-from gazebo_ros.mailbox import RequestBoard
 from gazebo_ros.simulation import HostedPlugin, Simulation
+from loop_ros.faults import Faults
+from loop_ros.mailbox import RequestBoard
 
 TICK_S = 0.002
 INPUTS = [(row, name) for row in interface.TOPICS if not row.is_published for _, name in row.names()]
@@ -107,7 +107,7 @@ def test_a_handler_that_raises_costs_its_message_only(loop):
         send(topic, roslib.message.get_message_class(row.type)())
         loop.run(TICK_S)
         (where, error), = loop.lab.faults
-        assert where == topic and isinstance(error, RecursionError)
+        assert where == loop.lab.context.resolve(topic) and isinstance(error, RecursionError)
     assert loop.hosted.failures == 0
     assert loop.state() == ENABLED
 
@@ -115,7 +115,8 @@ def test_a_handler_that_raises_costs_its_message_only(loop):
 def test_a_message_that_cannot_be_made_leaves_the_others(loop):
     outputs = loop.plugin._outputs
     for topic in OUTPUTS:
-        loop.plugin._outputs = [(schedule, [(fail if publisher.topic == topic else make, part, publisher)
+        name = loop.lab.context.resolve(topic)
+        loop.plugin._outputs = [(schedule, [(fail if publisher.topic == name else make, part, publisher)
                                             for make, part, publisher in topics]) for schedule, topics in outputs]
         for outbox in loop.lab.outboxes.values():
             outbox.messages.clear()
@@ -125,7 +126,7 @@ def test_a_message_that_cannot_be_made_leaves_the_others(loop):
             schedule.set_rate(schedule.rate_hz)  # as if nothing had been published so far
         loop.plugin._idle_until_s = -math.inf
         loop.run(TICK_S)
-        assert [where for where, _ in loop.lab.faults] == ["publishing " + topic]
+        assert [where for where, _ in loop.lab.faults] == ["publishing " + name]
         assert [name for name in OUTPUTS if not loop.lab.outboxes[name].messages] == [topic]
     assert loop.hosted.failures == 0
 

@@ -186,7 +186,7 @@ def test_flags_stay_while_something_is_held(lab):
     seen = lab.outboxes["end_effector/left_gripper/state"].messages
     del seen[:]
     lab.run(2.0)
-    assert {(message.gripping, message.moving, message.missed) for _, message in seen} == {(1, 0, 0)}
+    assert {(message.gripping, message.moving, message.missed) for message in seen} == {(1, 0, 0)}
 
 
 def test_stop_keeps_what_is_held_and_closes_no_further_when_it_is_gone(lab):

@@ -144,7 +144,8 @@ def as_new(lab):
     lab.run(0.01)
     reset_world(lab)
     for inbox in lab.inboxes.values():
-        inbox.drain()
+        for queue in inbox.boxes:
+            queue.drain()
     lab.enable()
     lab.run(0.05)
     assert lab.last("state").enabled

@@ -23,7 +23,7 @@ FINGERS = tuple("%s_gripper_%s_finger_joint" % (hand, finger) for hand in "lr" f
 
 def intervals(lab, topic):
     """Time between messages [s]; the first may be shorter, because the grid of a rate does not begin at the spawn."""
-    return np.diff([time_s for time_s, _ in lab.outboxes[topic].messages])
+    return np.diff([time_s for time_s, _ in lab.outboxes[topic].timed])
 
 
 @pytest.mark.parametrize("mode, parameters, most_ticks", [
@@ -103,7 +103,7 @@ def test_first_joint_state_is_the_start_pose(make_lab):
         "right": (-0.272659, 1.047, -0.00123203, 0.49262, -0.0806423, -0.0620532, 0.0265941)}
     lab = make_lab(pose="start")
     lab.run(0.002)
-    message = lab.outboxes["joint_states"].messages[0][1]
+    message = lab.outboxes["joint_states"].messages[0]
     for side in SIDES:
         for joint, angle in zip(JOINTS, expected[side], strict=True):
             name = "%s_%s" % (side, joint)
@@ -113,7 +113,7 @@ def test_first_joint_state_is_the_start_pose(make_lab):
 def test_joint_states_names_and_lengths(make_lab):
     lab = make_lab()
     lab.run(0.5)
-    for _, message in lab.outboxes["joint_states"].messages:
+    for message in lab.outboxes["joint_states"].messages:
         assert message.name == sorted(("head_pan", *FINGERS, *NAMES))
         assert len(message.name) == 19
         assert len(message.position) == len(message.velocity) == len(message.effort) == 19

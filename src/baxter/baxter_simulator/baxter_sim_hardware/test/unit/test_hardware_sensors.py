@@ -37,9 +37,9 @@ def test_hand_range_measures_what_is_before_it(lab, side):
         return (lab.last("range/%s/state" % name).range, lab.last("analog_io/%s/state" % name).value,
                 lab.last("analog_io/%s/value_uint32" % name).data, scan.ranges[0])
 
-    assert read() == (65.535, 65535.0, 65535, np.inf)
+    assert read() == pytest.approx((65.535, 65535.0, 65535, np.inf))
     wall_before(lab, name, 0.5)
-    assert read() == (65.535, 65535.0, 65535, np.inf)
+    assert read() == pytest.approx((65.535, 65535.0, 65535, np.inf))
     lab.world.delete("wall")
     wall_before(lab, name, 0.25)
     metres, millimetres, whole, scanned = read()
@@ -47,7 +47,7 @@ def test_hand_range_measures_what_is_before_it(lab, side):
     assert metres == pytest.approx(0.25, abs=2e-3)
     message = lab.last("range/%s/state" % name)
     assert message.header.frame_id == name and message.radiation_type == message.INFRARED
-    assert (message.min_range, message.max_range) == (0.004, 0.4)
+    assert (message.min_range, message.max_range) == pytest.approx((0.004, 0.4))
     assert lab.last("analog_io/%s/state" % name).isInputOnly
 
 
@@ -296,13 +296,13 @@ FRAGMENT = '<robot name="tool"><link name="tool"/></robot>'
 
 def test_a_urdf_fragment_is_passed_on_once(make_lab):
     lab = make_lab()
-    sent = [message for _, message in lab.outboxes["urdf"].messages]
+    sent = lab.outboxes["urdf"].messages
     assert len(sent) == 1 and sent[0].link == ""
     fragment = URDFConfiguration(Time(3), "left_hand", "left_gripper_base", FRAGMENT)
     for _ in range(5):
         lab.send("urdf", fragment)
         lab.run(0.01)
-    assert [message for _, message in lab.outboxes["urdf"].messages][1:] == [fragment]
+    assert lab.outboxes["urdf"].messages[1:] == [fragment]
 
 
 @pytest.mark.parametrize("link, joint, xml, reason", [

@@ -1,24 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The fake context of the controllers' tests answers as the simulator's own does: the same cases for both."""
+"""The fake of all packages' tests answers as the simulator's own code does: the same cases for both."""
 import contextlib
+import inspect
 import threading
 from types import SimpleNamespace
 
 import genpy
 import pytest
 import rospy
-from geometry_msgs.msg import Point
-from std_msgs.msg import String
+from actionlib_msgs.msg import GoalID
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryActionGoal,
+    FollowJointTrajectoryResult,
+)
+from dynamic_reconfigure.encoding import decode_config, encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
+from geometry_msgs.msg import Point, PointStamped
+from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
-from controller_manager.testing import FakeLog, FakeRos
-from gazebo_ros import ros_objects
-from gazebo_ros.faults import Faults
-from gazebo_ros.loop_log import LoopLog
-from gazebo_ros.loop_publisher import PublisherHub
-from gazebo_ros.loop_subscriber import InletHub
-from gazebo_ros.mailbox import RequestBoard
-from gazebo_ros.model_plugin import PluginContext, PluginSource
+from loop_ros import protocol, ros_objects
+from loop_ros.action_server import ActionServer
+from loop_ros.faults import Faults
+from loop_ros.log import LoopLog
+from loop_ros.mailbox import Mailbox, Queue, RequestBoard
+from loop_ros.node_handle import NodeHandle
+from loop_ros.publisher import LoopPublisher, PublisherHub
+from loop_ros.reconfigure import Setting, SettingsServer
+from loop_ros.subscriber import InletHub
+from loop_ros.testing import FakeFaults, FakeLog, FakeMailbox, FakePublisher, FakeQueue, FakeRos
 
 TOPIC, SERVICE = "/topic", "/service"
 
@@ -27,24 +38,27 @@ class Fake:
     """What the tests do with the fake."""
 
     def __init__(self, _monkeypatch):
-        self.context = FakeRos()
+        self.ros = FakeRos(heard=lambda topic: False)
+        self.context = NodeHandle(self.ros)
         self.log = FakeLog()
 
     def listen(self, topic):
-        """Somebody listens; returns a function: the messages that he has got."""
-        return lambda: list(self.context.publishers[topic].messages)
+        """Somebody begins to listen; returns a function: the messages that came to it."""
+        publisher = self.ros.publishers[topic]
+        publisher.has_listeners = True
+        return lambda: list(publisher.messages)
 
     def send(self, topic, message):
-        self.context.inboxes[topic].put(message)
+        self.ros.inboxes[topic].put(message)
 
     def call(self, service, request):
-        return self.context.services[service](request)
+        return self.ros.services[service](request)
 
     def has_service(self, service):
-        return service in self.context.services
+        return service in self.ros.services
 
     def lines(self):
-        return [text for _, text in self.log.lines]
+        return self.log.lines
 
     def close(self):
         pass
@@ -77,13 +91,12 @@ class Real:
         monkeypatch.setattr(ros_objects, "rospy", SimpleNamespace(
             Publisher=self._publisher, Subscriber=self._subscriber, Service=self._service,
             ServiceException=rospy.ServiceException, is_shutdown=lambda: False))
-        monkeypatch.setattr("gazebo_ros.loop_publisher.Peer.of", classmethod(lambda cls, peer: SimpleNamespace(
+        monkeypatch.setattr("loop_ros.publisher.Peer.of", classmethod(lambda cls, peer: SimpleNamespace(
             transport=peer, send=peer.take, has_rest=False)))
         self.log = LoopLog(dict.fromkeys(("info", "warn", "error"), self._lines.append))
         self._board, self._hub = RequestBoard(), PublisherHub()
-        objects = ros_objects.RosObjects(self._hub, InletHub(), self._board, self.log, Faults(self.log))
-        self.context = PluginContext(None, None, PluginSource(), self.log, objects, {})
-        self._objects = objects
+        self.ros = ros_objects.RosObjects(self._hub, InletHub(), self._board, self.log, Faults(self.log))
+        self.context = NodeHandle(self.ros)
 
     def _publisher(self, topic, msg_class, latch=False, queue_size=None):
         impl = SimpleNamespace(connections=[], set_queue_size=lambda size: None,
@@ -101,7 +114,7 @@ class Real:
         return SimpleNamespace(shutdown=lambda reason: self._served.pop(name, None))
 
     def listen(self, topic):
-        self._objects.flush()
+        self.ros.flush()
         impl, msg_class = self._published[topic]
         peer = _Peer(msg_class)
         impl.connections = [peer]
@@ -109,13 +122,13 @@ class Real:
         return peer.messages
 
     def send(self, topic, message):
-        self._objects.flush()
+        self.ros.flush()
         for callback in self._subscribed[topic]:
             callback(message)
 
     def call(self, service, request):
         """From a thread, as rospy does, with the loop at work."""
-        self._objects.flush()
+        self.ros.flush()
         outcome = []
 
         def ask():
@@ -134,7 +147,7 @@ class Real:
         return outcome[0]
 
     def has_service(self, service):
-        self._objects.flush()
+        self.ros.flush()
         return service in self._served
 
     def lines(self):
@@ -143,6 +156,32 @@ class Real:
 
     def close(self):
         self.log.close()
+
+
+def parameters_of(owner, method):
+    """[(name, default)] of a method's parameters, without self."""
+    parameters = list(inspect.signature(getattr(owner, method)).parameters.values())
+    return [(each.name, "a function" if callable(each.default) and each.default is not each.empty else each.default)
+            for each in parameters if each.name != "self"]
+
+
+def methods_of(owner):
+    return [name for name, value in vars(owner).items() if inspect.isfunction(value) and not name.startswith("_")]
+
+
+@pytest.mark.parametrize(("declared", "made"), [
+    (protocol.LoopRos, ros_objects.RosObjects), (protocol.LoopRos, FakeRos), (protocol.Log, LoopLog),
+    (protocol.Log, FakeLog), (protocol.Topics, NodeHandle), (protocol.Publisher, LoopPublisher),
+    (protocol.Publisher, FakePublisher), (protocol.Mailbox, Mailbox), (protocol.Mailbox, FakeMailbox),
+    (protocol.Queue, Queue), (protocol.Queue, FakeQueue), (protocol.Faults, Faults), (protocol.Faults, FakeFaults),
+])
+def test_both_have_the_declared_methods(declared, made):
+    assert methods_of(declared)
+    for method in methods_of(declared):
+        found, wanted = parameters_of(made, method), parameters_of(declared, method)
+        if declared is protocol.Faults:  # each of them has its own words
+            found, wanted = [name for name, _ in found], [name for name, _ in wanted]
+        assert found == wanted, method
 
 
 @pytest.fixture(params=[Fake, Real], ids=["fake", "real"])
@@ -208,6 +247,28 @@ def test_a_listener_gets_messages_as_they_were_when_they_were_sent(side):
     assert [message.data for message in got()] == ["one", "two"]
 
 
+def test_messages_are_numbered_and_numbers_rounded_as_on_the_wire(side):
+    publisher = side.context.publisher(TOPIC, PointStamped)
+    got = side.listen(TOPIC)
+    message = PointStamped(Header(), Point(1, 2, 3))
+    for _ in range(2):
+        publisher.publish(message)
+    assert [each.header.seq for each in got()] == [1, 2]
+    assert isinstance(got()[0].point.x, float)
+
+
+@pytest.mark.parametrize(("latch", "texts"), [(True, ["newest", "more"]), (False, ["more"])])
+def test_a_late_listener_gets_the_last_message_of_a_latched_topic(side, latch, texts):
+    publisher = side.context.publisher(TOPIC, String, latch)
+    for text in ("old", "newest"):
+        publisher.publish(String(text))
+    assert not publisher.has_listeners
+    got = side.listen(TOPIC)
+    assert publisher.has_listeners
+    publisher.publish(String("more"))
+    assert [message.data for message in got()] == texts
+
+
 def test_a_message_that_cannot_be_sent_raises_where_it_is_published(side):
     publisher = side.context.publisher(TOPIC, Point)
     got = side.listen(TOPIC)
@@ -225,10 +286,66 @@ def test_a_service_answers_until_it_is_closed(side):
     assert not side.has_service(SERVICE)
 
 
-def test_a_handler_that_raises_is_an_error_for_the_client(side):
-    side.context.service(SERVICE, SetBool, lambda request: 1 / 0)
-    with pytest.raises((rospy.ServiceException, ZeroDivisionError)):
+@pytest.mark.parametrize("kind", ["service", "service_in_thread"])
+def test_a_handler_that_raises_is_an_error_for_the_client_and_counted(side, kind):
+    getattr(side.context, kind)(SERVICE, SetBool, lambda request: 1 / 0)
+    with pytest.raises(rospy.ServiceException, match="/service failed: ZeroDivisionError"):
         side.call(SERVICE, SetBoolRequest(True))
+    assert {place: fault.count for place, fault in side.ros.faults.places.items()} == {SERVICE: 1}
+
+
+def test_faults_of_messages_are_counted_by_topic(side):
+    side.context.queue(TOPIC, String, 3)
+    box = side.context.mailbox("/other", String)
+    side.send("/other", String("x"))
+    box.handle(lambda message: 1 / 0)
+    side.context.survived("drawing", ValueError("y"))
+    assert {place: fault.count for place, fault in side.ros.faults.places.items()} == {"/other": 1, "drawing": 1}
+
+
+def test_what_came_in_is_told_once_and_counts_on_after_the_end(side):
+    first, second = side.context.queue(TOPIC, String, 3), side.context.queue("/other", String, 3)
+    side.send("/other", String("x"))
+    assert side.context.mail() == [second] and not side.context.mail()
+    assert side.ros.deliveries() == {TOPIC: 0, "/other": 1}
+    again = side.context.queue("/other", String, 3)
+    second.close()
+    side.send("/other", String("y"))
+    assert [message.data for message in again.drain()] == ["y"] and second.drain() == first.drain() == []
+    assert side.ros.deliveries() == {TOPIC: 0, "/other": 2}
+
+
+def test_what_is_withdrawn_is_its_withdrawers_alone(side):
+    side.context.service(SERVICE, SetBool, lambda request: SetBoolResponse(request.data, "served"))
+    queue = side.context.queue(TOPIC, String, 3)
+    side.send(TOPIC, String("unread"))
+    assert side.context.served() == [SERVICE]
+    handler = side.context.withdraw(SERVICE)
+    assert handler(SetBoolRequest(True)) == SetBoolResponse(True, "served")
+    assert not side.has_service(SERVICE) and side.context.served() == []
+    assert side.context.withdraw(TOPIC) is None and side.context.withdraw("/nothing") is None
+    assert queue.drain() == [] and side.ros.deliveries() == {}
+
+
+def test_an_action_is_served(side):
+    begun = []
+    server = ActionServer(side.context, "/act", FollowJointTrajectoryAction, begun.append, None)
+    got = side.listen("/act/result")
+    side.send("/act/goal", FollowJointTrajectoryActionGoal(goal_id=GoalID(id="one")))
+    server.spin(1.0)
+    begun[0].accept()
+    begun[0].succeed(FollowJointTrajectoryResult(error_code=3), "done")
+    result, = got()
+    assert (result.result.error_code, result.status.text, result.status.goal_id.id) == (3, "done", "one")
+
+
+def test_settings_are_served(side):
+    applied = []
+    SettingsServer(side.context, "/pid", [Setting("p", 1.0, 0.0, 9.0)], applied.append)
+    got = side.listen("/pid/parameter_updates")
+    side.call("/pid/set_parameters", ReconfigureRequest(encode_config({"p": 20.0})))
+    assert applied == [{"p": 9.0}]
+    assert [decode_config(config)["p"] for config in got()] == [1.0, 9.0]
 
 
 def test_after_its_end_a_context_has_nothing_open(side):

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue, RequestBoard
-from gazebo_ros.model_plugin import PluginContext, PluginSource
 from lab_testing.waiting import wait_until
+from loop_ros.mailbox import LoopEnded, Mailbox, Queue, RequestBoard
+from loop_ros.node_handle import NodeHandle
 
 
 def test_only_the_newest_message_counts():
@@ -31,26 +31,26 @@ def test_a_queue_keeps_order_and_counts_what_it_lost():
     assert (queue.delivered, queue.lost) == (5, 2)
 
 
-def test_a_plugin_is_told_once_which_of_its_queues_have_mail():
+def test_an_owner_is_told_once_which_of_its_queues_have_mail():
     queues = {}
 
     def make(topic, msg_class, depth, notice):
         return queues.setdefault(topic, Queue(depth, notice))
 
     ros = SimpleNamespace(queue=make)
-    context = PluginContext(None, None, PluginSource(namespace="/robot"), None, ros, {})
-    first, second = context.queue("first", None, 10), context.queue("second", None, 10)
-    assert not context.mail()
+    handle = NodeHandle(ros, "/robot")
+    first, second = handle.queue("first", None, 10), handle.queue("second", None, 10)
+    assert not handle.mail()
     second.put("a")
     second.put("b")
-    assert context.mail() == [second] and not context.mail()
+    assert handle.mail() == [second] and not handle.mail()
     # What comes in before the queues are read is told again: better twice than not at all.
     first.put("c")
-    assert (first.drain(), second.drain(), context.mail()) == (["c"], ["a", "b"], [first])
+    assert (first.drain(), second.drain(), handle.mail()) == (["c"], ["a", "b"], [first])
     second.put("d")
     first.put("e")
-    assert context.mail() == [first, second]
-    assert not context.branch().mail()
+    assert handle.mail() == [first, second]
+    assert not handle.branch().mail()
 
 
 def test_what_counts_as_delivered_has_been_announced():

@@ -36,7 +36,7 @@ class _PollEntry(ctypes.Structure):
     _fields_ = (("fd", ctypes.c_int), ("events", ctypes.c_short), ("revents", ctypes.c_short))
 
 
-# Called without giving up the interpreter, as in `loop_publisher`: neither waits for anything.
+# Called without giving up the interpreter, as in `loop_ros.publisher`: neither waits for anything.
 _libc = ctypes.PyDLL(None, use_errno=True)
 _recv, _poll = _libc.recv, _libc.poll
 _recv.argtypes = [ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int]

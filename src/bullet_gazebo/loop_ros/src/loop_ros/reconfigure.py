@@ -59,8 +59,8 @@ class SettingsServer:
     def __init__(self, topics, name, settings, apply):
         """Open ``<name>/set_parameters``, ``<name>/parameter_descriptions`` and ``<name>/parameter_updates``.
 
-        ``topics`` makes them: ``publisher(topic, msg_class, latch)`` and ``service(name, srv_class, handler)``, such as
-        a ``PluginContext``. ``settings``: list of :class:`Setting`. ``apply(values)`` gets {name: value} of all of
+        ``topics`` makes them: a ``loop_ros.protocol.Topics``, of which ``publisher`` and ``service`` are called.
+        ``settings``: list of :class:`Setting`. ``apply(values)`` gets {name: value} of all of
         them when a client changes some; ``ValueError`` refuses.
         """
         self._name = name

@@ -7,9 +7,9 @@ import threading
 
 import pytest
 
-from gazebo_ros import loop_subscriber
-from gazebo_ros.loop_subscriber import Inlet, InletHub
 from lab_testing.waiting import wait_until
+from loop_ros import subscriber as subscribing
+from loop_ros.subscriber import Inlet, InletHub
 
 LARGEST_BYTES = 10_000_000
 
@@ -20,7 +20,7 @@ class Clock:
     now = 0.0
 
     def __call__(self):
-        self.now += loop_subscriber.LOOK_PERIOD_S
+        self.now += subscribing.LOOK_PERIOD_S
         return self.now
 
 
@@ -109,11 +109,11 @@ def test_who_sends_more_than_a_turn_takes_neither_holds_up_the_loop_nor_others(h
     with contextlib.suppress(BlockingIOError):
         while True:
             sent += line.far.send(message * 100)
-    assert sent > 20 * loop_subscriber.PORTION_BYTES
+    assert sent > 20 * subscribing.PORTION_BYTES
     other.far.sendall(framed(b"me too"))
     serve_until(hub, lambda: other.got, "the other one's message")
     # By the clock of these tests a turn reads two portions of a connection.
-    most = 2 * loop_subscriber.PORTION_BYTES / len(message) + 1
+    most = 2 * subscribing.PORTION_BYTES / len(message) + 1
     assert 0 < len(line.got) <= 2 * most
     before = len(line.got)
     hub.service()
@@ -132,10 +132,10 @@ def test_sockets_are_not_looked_at_more_often_than_said(line):
     assert line.got == [b"early"]
     line.far.sendall(framed(b"late"))
     wait_until(lambda: len(line.near.recv(100, socket.MSG_PEEK)) == 8, "the message to arrive", 10.0)
-    clock.now += 0.9 * loop_subscriber.LOOK_PERIOD_S
+    clock.now += 0.9 * subscribing.LOOK_PERIOD_S
     hub.service()
     assert line.got == [b"early"]
-    clock.now += 0.2 * loop_subscriber.LOOK_PERIOD_S
+    clock.now += 0.2 * subscribing.LOOK_PERIOD_S
     hub.service()
     assert line.got == [b"early", b"late"]
 

@@ -99,8 +99,7 @@ class ActionServer:
     def __init__(self, topics, name, action_class, on_goal, on_cancel):
         """Open the five topics below ``name``.
 
-        ``topics`` makes them: ``publisher(topic, msg_class, latch)`` and ``queue(topic, msg_class, depth)``, such as a
-        ``ControllerContext`` or a ``PluginContext``. ``action_class``: e.g. ``FollowJointTrajectoryAction``.
+        ``topics`` makes them: a ``loop_ros.protocol.Topics``. ``action_class``: e.g. ``FollowJointTrajectoryAction``.
         ``on_goal(handle)`` must accept or reject, at once or later; ``on_cancel(handle)`` should end the goal soon.
         """
         action = action_class()

@@ -13,49 +13,18 @@ from control_msgs.msg import (
     FollowJointTrajectoryResult,
 )
 
-from controller_manager.testing import FakeRos
-from ros_controllers.action_server import ActionServer, WrongState, _numbered
-
-
-class Topics:
-    """Keeps what is published, serialised and read back, because the server goes on changing its messages."""
-
-    def __init__(self):
-        self.ros = FakeRos()
-        self.sent = {}
-        self.latched = set()
-
-    def queue(self, topic, msg_class, depth):
-        self.ros.msg_class = msg_class
-        return self.ros.queue(topic, msg_class, depth)
-
-    def publisher(self, topic, msg_class, latch=False):
-        self.sent[topic] = []
-        if latch:
-            self.latched.add(topic)
-        return Recorder(self.sent[topic])
-
-
-class Recorder:
-    has_listeners = True
-
-    def __init__(self, sent):
-        self._sent = sent
-
-    def publish(self, message):
-        buffer = io.BytesIO()
-        message.serialize(buffer)
-        self._sent.append(type(message)().deserialize(buffer.getvalue()))
+from loop_ros.action_server import ActionServer, WrongState, _numbered
+from loop_ros.testing import FakeRos
 
 
 class Served:
     """A server whose owner accepts every goal (unless ``accepts`` is false) and leaves it at that."""
 
     def __init__(self, accepts=True):
-        self.topics = Topics()
+        self.ros = FakeRos()
         self.accepts = accepts
         self.begun, self.asked_to_end = [], []
-        self.server = ActionServer(self.topics, "act", FollowJointTrajectoryAction, self._on_goal,
+        self.server = ActionServer(self.ros, "act", FollowJointTrajectoryAction, self._on_goal,
                                    self.asked_to_end.append)
 
     def _on_goal(self, handle):
@@ -66,20 +35,22 @@ class Served:
     def send(self, name, stamp_s=1.0):
         message = FollowJointTrajectoryActionGoal()
         message.goal_id = GoalID(genpy.Time.from_sec(stamp_s), name)
-        self.topics.ros.inboxes["act/goal"].put(message)
+        self.ros.inboxes["act/goal"].put(message)
 
     def cancel(self, name="", stamp_s=0.0):
-        self.topics.ros.inboxes["act/cancel"].put(GoalID(genpy.Time.from_sec(stamp_s), name))
+        self.ros.inboxes["act/cancel"].put(GoalID(genpy.Time.from_sec(stamp_s), name))
 
     @property
     def statuses(self):
         """{goal id: state} as last published."""
-        return {status.goal_id.id: status.status for status in self.topics.sent["act/status"][-1].status_list}
+        newest = self.ros.publishers["act/status"].messages[-1]
+        return {status.goal_id.id: status.status for status in newest.status_list}
 
     @property
     def results(self):
         """List of (goal id, state)."""
-        return [(message.status.goal_id.id, message.status.status) for message in self.topics.sent["act/result"]]
+        messages = self.ros.publishers["act/result"].messages
+        return [(message.status.goal_id.id, message.status.status) for message in messages]
 
 
 @pytest.fixture
@@ -92,7 +63,7 @@ def test_goal_becomes_active_and_succeeds(served):
     served.server.spin(10.0)
     assert served.statuses == {"a": GoalStatus.ACTIVE}
     served.begun[0].succeed(FollowJointTrajectoryResult(error_code=7), "done")
-    message = served.topics.sent["act/result"][0]
+    message = served.ros.publishers["act/result"].messages[0]
     assert (message.result.error_code, message.status.text) == (7, "done")
     assert served.results == [("a", GoalStatus.SUCCEEDED)]
     assert served.statuses == {"a": GoalStatus.SUCCEEDED}
@@ -130,15 +101,15 @@ def test_feedback_carries_the_goal(served):
     served.send("a")
     served.server.spin(1.0)
     served.begun[0].publish_feedback(FollowJointTrajectoryFeedback(joint_names=["x"]))
-    message = served.topics.sent["act/feedback"][0]
+    message = served.ros.publishers["act/feedback"].messages[0]
     assert (message.status.goal_id.id, message.feedback.joint_names) == ("a", ["x"])
 
 
 def test_status_goes_out_five_times_a_second_and_is_latched(served):
     for tick in range(1000):
         served.server.spin(tick * 0.002)
-    assert len(served.topics.sent["act/status"]) == 10
-    assert served.topics.latched == {"act/status"}
+    assert len(served.ros.publishers["act/status"].messages) == 10
+    assert [topic for topic, publisher in served.ros.publishers.items() if publisher.keeps_last] == ["act/status"]
 
 
 def test_ended_goals_are_told_for_a_while(served):
@@ -274,7 +245,7 @@ def test_goals_and_cancels_of_one_tick_are_taken_in_the_order_of_arrival():
     def arrive(topic, numbered, message):
         buffer = io.BytesIO()
         message.serialize(buffer)
-        served.topics.ros.inboxes[topic].put(numbered().deserialize(buffer.getvalue()))
+        served.ros.inboxes[topic].put(numbered().deserialize(buffer.getvalue()))
 
     old, new = FollowJointTrajectoryActionGoal(), FollowJointTrajectoryActionGoal()
     old.goal_id.id, new.goal_id.id = "old", "new"
@@ -294,10 +265,10 @@ def test_numbered_messages_are_the_same_on_the_wire():
 def test_time_that_goes_back_does_not_cancel_or_silence_anything(served):
     served.cancel(stamp_s=100.0)
     served.server.spin(100.0)
-    published = len(served.topics.sent["act/status"])
+    published = len(served.ros.publishers["act/status"].messages)
     served.send("a", 0.5)
     served.server.spin(0.5)
-    assert len(served.topics.sent["act/status"]) > published
+    assert len(served.ros.publishers["act/status"].messages) > published
     assert served.statuses == {"a": GoalStatus.ACTIVE}
 
 
@@ -324,8 +295,9 @@ def test_a_goal_that_the_owner_fails_on_is_rejected_and_the_next_one_is_not(serv
     served.send("good")
     served.server.spin(10.0)
     assert served.statuses == {"bad": GoalStatus.REJECTED, "good": GoalStatus.ACTIVE}
-    assert "RecursionError: broken on purpose" in served.topics.sent["act/result"][0].status.text
-    assert isinstance(served.topics.ros.inboxes["act/goal"].faults[0], RecursionError)
+    assert "RecursionError: broken on purpose" in served.ros.publishers["act/result"].messages[0].status.text
+    (place, error), = served.ros.faults.noted
+    assert place == "act/goal" and isinstance(error, RecursionError)
 
 
 def test_a_cancel_request_that_the_owner_fails_on_ends_the_goal(served):
@@ -335,7 +307,8 @@ def test_a_cancel_request_that_the_owner_fails_on_ends_the_goal(served):
     served.cancel("a")
     served.server.spin(10.1)
     assert served.results == [("a", GoalStatus.ABORTED)]
-    assert isinstance(served.topics.ros.inboxes["act/cancel"].faults[0], ZeroDivisionError)
+    (place, error), = served.ros.faults.noted
+    assert place == "act/cancel" and isinstance(error, ZeroDivisionError)
 
 
 @pytest.mark.parametrize("topic", ["goal", "cancel"])
@@ -343,7 +316,7 @@ def test_an_id_that_cannot_be_sent_back_is_dropped_and_others_go_on(served, topi
     """As it is read from the wire: its stamp does not fit any more once the nanoseconds have been carried over."""
     goal_id = GoalID().deserialize(struct.pack("<III1s", 0xFFFFFFFF, 0xFFFFFFFF, 1, b"x"))
     message = goal_id if topic == "cancel" else FollowJointTrajectoryActionGoal(goal_id=goal_id)
-    served.topics.ros.inboxes["act/" + topic].put(message)
+    served.ros.inboxes["act/" + topic].put(message)
     served.send("a")
     served.server.spin(10.0)
     assert served.statuses == {"a": GoalStatus.ACTIVE}

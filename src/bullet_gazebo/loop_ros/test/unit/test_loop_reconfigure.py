@@ -5,41 +5,27 @@ import rospy
 from dynamic_reconfigure.encoding import decode_config, decode_description, encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
 
-from loop_reconfigure import Setting, SettingsServer
+from loop_ros.reconfigure import Setting, SettingsServer
+from loop_ros.testing import FakeRos
 
 SETTINGS = [Setting("p", 10.0, 0.0, 100.0, "gain"), Setting("steps", 3, 1, 9, "how many"),
             Setting("on", False, meaning="whether")]
 
 
-class Topics:
-    def __init__(self):
-        self.messages, self.services = {}, {}
-
-    def publisher(self, topic, msg_class, latch=False):
-        assert latch
-        sent = self.messages.setdefault(topic, [])
-        publisher = type("Publisher", (), {})()
-        publisher.publish = sent.append
-        return publisher
-
-    def service(self, name, srv_class, handler):
-        self.services[name] = handler
-
-
 @pytest.fixture
 def server():
-    topics, applied = Topics(), []
+    ros, applied = FakeRos(), []
 
     def take(values):
         if values["steps"] == 7:
             raise ValueError("7 steps are unlucky; take 6 or 8")
         applied.append(values)
 
-    server = SettingsServer(topics, "arm/pid", SETTINGS, take)
-    server.topics, server.applied = topics, applied
+    server = SettingsServer(ros, "arm/pid", SETTINGS, take)
+    server.ros, server.applied = ros, applied
     server.set = lambda **values: decode_config(
-        topics.services["arm/pid/set_parameters"](ReconfigureRequest(encode_config(values))).config)
-    server.told = lambda: decode_config(topics.messages["arm/pid/parameter_updates"][-1])
+        ros.services["arm/pid/set_parameters"](ReconfigureRequest(encode_config(values))).config)
+    server.told = lambda: decode_config(ros.publishers["arm/pid/parameter_updates"].messages[-1])
     return server
 
 
@@ -48,7 +34,7 @@ def of(config):
 
 
 def test_descriptions_are_what_clients_read(server):
-    description = decode_description(server.topics.messages["arm/pid/parameter_descriptions"][0])
+    description = decode_description(server.ros.publishers["arm/pid/parameter_descriptions"].messages[0])
     columns = ("name", "type", "min", "max", "default")
     assert [tuple(row[column] for column in columns) for row in description["parameters"]] == [
         ("p", "double", 0.0, 100.0, 10.0), ("steps", "int", 1, 9, 3), ("on", "bool", False, True, False)]
@@ -78,5 +64,5 @@ def test_what_is_wrong_changes_nothing(server, values, text):
 def test_changes_from_elsewhere_are_told_once(server):
     server.show(p=11.0)
     server.show(p=11.0)
-    assert of(server.told())["p"] == 11.0 and len(server.topics.messages["arm/pid/parameter_updates"]) == 2
+    assert of(server.told())["p"] == 11.0 and len(server.ros.publishers["arm/pid/parameter_updates"].messages) == 2
     assert server.applied == []

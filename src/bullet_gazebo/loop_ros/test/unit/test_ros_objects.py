@@ -14,13 +14,13 @@ from rospy.impl.tcpros_base import TCPROSTransport
 from rospy.impl.tcpros_pubsub import TCPROSSub, robust_connect_subscriber
 from std_msgs.msg import String
 
-from gazebo_ros.faults import Faults
-from gazebo_ros.loop_publisher import PublisherHub
-from gazebo_ros.loop_subscriber import InletHub
-from gazebo_ros.mailbox import RequestBoard
-from gazebo_ros.model_plugin import ModelPlugin, PluginContext, PluginHost, PluginSource
-from gazebo_ros.ros_objects import RosObjects, _read_in_loop
 from lab_testing.waiting import wait_until
+from loop_ros.faults import Faults
+from loop_ros.mailbox import RequestBoard
+from loop_ros.node_handle import NodeHandle
+from loop_ros.publisher import PublisherHub
+from loop_ros.ros_objects import RosObjects, _read_in_loop
+from loop_ros.subscriber import InletHub
 
 
 class Connection:
@@ -289,35 +289,25 @@ def test_a_message_that_a_handler_cannot_digest_is_counted_under_its_topic(scene
     assert ros.flush()
 
 
-def test_a_plugin_that_begins_anew_keeps_its_topics_and_services(scene_of_faults, registrations, services):
+def test_an_owner_that_begins_anew_keeps_its_topics_and_services(scene_of_faults, registrations, services):
     ros = scene_of_faults.ros
-    context = PluginContext(None, None, PluginSource(namespace="/robot"), None, ros, {},
-                            PluginHost(add_screen=lambda *_: object()))
+    handle = NodeHandle(ros, "/robot")
 
     def open_all(answer):
-        return (context.publisher("out", String), context.publisher("other", String, latch=True),
-                context.mailbox("in", String), context.queue("many", String, depth=3),
-                context.queue("many", String, depth=3), context.screen("glass", [[1.0]], (1.0, 2.0), (3, 4)),
-                context.service("ask", None, lambda request: answer))
+        return (handle.publisher("out", String), handle.publisher("other", String, latch=True),
+                handle.mailbox("in", String), handle.queue("many", String, depth=3),
+                handle.queue("many", String, depth=3), handle.service("ask", None, lambda request: answer))
 
-    class Plugin(ModelPlugin):
-        def __init__(self, context, answer="old"):
-            super().__init__(context)
-            self.opened = open_all(answer)
-            self.own = context.publisher("gone" if answer == "old" else "more", String)
-
-        def close(self):
-            raise RuntimeError("broken on purpose")
-
-    plugin = Plugin(context)
-    first, gone = plugin.opened, plugin.own
-    second = plugin.successor("new").opened
+    first, gone = open_all("old"), handle.publisher("gone", String)
+    handle.begin_anew()
+    second, _ = open_all("new"), handle.publisher("more", String)
+    handle.end_anew()
     assert all(one is other for one, other in zip(first, second, strict=True)) and gone.is_closed
     assert ros.flush()
     assert sorted(registrations.open) == sorted(
         "/robot/" + name for name in ("in", "many", "many", "more", "other", "out"))
     second[3].put(String("x"))
-    assert context.mail() == [second[3]]
+    assert handle.mail() == [second[3]]
     answers = []
     client = threading.Thread(target=lambda: answers.append(services["/robot/ask"](None)))
     client.start()
@@ -325,12 +315,12 @@ def test_a_plugin_that_begins_anew_keeps_its_topics_and_services(scene_of_faults
     client.join()
     assert answers == ["new"]
     # A beginning that got halfway loses nothing either.
-    context.begin_anew()
-    context.publisher("out", String)
-    context.begin_anew()
+    handle.begin_anew()
+    handle.publisher("out", String)
+    handle.begin_anew()
     assert open_all("newest")[0] is first[0]
-    context.end_anew()
-    context.close()
+    handle.end_anew()
+    handle.close()
     assert ros.flush() and registrations.open == [] and services == {}
 
 

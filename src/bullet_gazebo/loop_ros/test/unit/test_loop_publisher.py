@@ -6,9 +6,9 @@ import struct
 
 import pytest
 
-from gazebo_ros import loop_publisher
-from gazebo_ros.loop_publisher import STOPPED_RETRY_S, STOPPED_S, LoopPublisher, Peer, PublisherHub
 from lab_testing.waiting import wait_until
+from loop_ros import publisher as publishing
+from loop_ros.publisher import STOPPED_RETRY_S, STOPPED_S, LoopPublisher, Peer, PublisherHub
 
 
 class FakeTransport:
@@ -284,8 +284,8 @@ def test_two_publishers_of_one_topic_do_not_write_into_each_others_messages():
 
 @pytest.mark.parametrize("size", [8, 100_000])
 def test_a_peer_that_has_stopped_is_asked_now_and_then_and_served_when_it_reads_again(impl, monkeypatch, size):
-    now, asked, send = [0.0], [], loop_publisher._send
-    monkeypatch.setattr(loop_publisher, "_send", lambda *arguments: asked.append(now[0]) or send(*arguments))
+    now, asked, send = [0.0], [], publishing._send
+    monkeypatch.setattr(publishing, "_send", lambda *arguments: asked.append(now[0]) or send(*arguments))
     transport = impl.connect()
     peer = Peer(transport, clock=lambda: now[0])
     message = struct.pack("<I", size) + bytes(size)

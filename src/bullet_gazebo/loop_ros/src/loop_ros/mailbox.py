@@ -8,7 +8,7 @@ import collections
 import threading
 from concurrent.futures import CancelledError, Future
 
-from gazebo_ros.faults import SURVIVED
+from loop_ros.faults import SURVIVED
 
 
 def _raise(error):

@@ -10,10 +10,10 @@ import weakref
 
 import rospy
 
-from gazebo_ros.faults import SURVIVED, described
-from gazebo_ros.loop_publisher import LoopPublisher
-from gazebo_ros.loop_subscriber import Inlet
-from gazebo_ros.mailbox import LoopEnded, Mailbox, Queue
+from loop_ros.faults import SURVIVED, described
+from loop_ros.mailbox import LoopEnded, Mailbox, Queue
+from loop_ros.publisher import LoopPublisher
+from loop_ros.subscriber import Inlet
 from rospy_limits.messages import largest_message_bytes
 
 
@@ -120,17 +120,8 @@ class RosObjects:
     def _serve(self, name, srv_class, answer_in_thread, handler):
         service = self._services[name] = _Service(self, name, handler)
 
-        def answer(request):
-            try:
-                return answer_in_thread(request)
-            except rospy.ServiceException:
-                raise
-            except SURVIVED as error:
-                self.faults.note(name, error, "the request is answered with an error")
-                raise rospy.ServiceException("%s failed: %s" % (name, described(error))) from error
-
         def register():
-            service.registration = rospy.Service(name, srv_class, answer)
+            service.registration = rospy.Service(name, srv_class, answering(name, answer_in_thread, self.faults))
 
         self._jobs.put(register)
         return service
@@ -165,6 +156,21 @@ class RosObjects:
             except Exception as error:  # noqa: BLE001  (one bad name or a lost master must not end the thread)
                 if not rospy.is_shutdown():
                     self._log.error("cannot register with the ROS master: %s" % error)
+
+
+def answering(name, handler, faults):
+    """``handler`` as rospy is to call it: what it raises is counted and an error to the client, whatever it is."""
+
+    def answer(request):
+        try:
+            return handler(request)
+        except rospy.ServiceException:
+            raise
+        except SURVIVED as error:
+            faults.note(name, error, "the request is answered with an error")
+            raise rospy.ServiceException("%s failed: %s" % (name, described(error))) from error
+
+    return answer
 
 
 def _read_in_loop(impl, inlets, log, faults):

@@ -3,4 +3,4 @@ from distutils.core import setup
 
 from catkin_pkg.python_setup import generate_distutils_setup
 
-setup(**generate_distutils_setup(packages=["loop_reconfigure"], package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=["loop_ros"], package_dir={"": "src"}))

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the loop survives: counted by place, told now and then, shown on /diagnostics."""
+"""What the loop survives: counted by place, told in the log now and then."""
 import sys
 from types import SimpleNamespace
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
 
-from gazebo_ros.diagnostics import MESSAGES, Diagnostics
-from gazebo_ros.faults import LINE_PERIOD_S, Faults, described
-from gazebo_ros.loop_log import LONGEST_LINE, LoopLog
 from lab_testing.waiting import wait_until
+from loop_ros.faults import LINE_PERIOD_S, Faults, described
+from loop_ros.log import LONGEST_LINE, LoopLog
 
 
 class Clock:
@@ -59,31 +57,6 @@ def test_places_do_not_grow_for_ever(scene):
     for number in range(10000):
         scene.faults.note("/topic%d" % number, ValueError())
     assert len(scene.faults.places) < 1000 and "/topic9999" in scene.faults.places
-
-
-def test_diagnostics_tell_what_was_dropped_and_which_plugin_failed(scene):
-    hosted = SimpleNamespace(label="libbrain.so", model_name="baxter", failures=0, last_error="", has_failed=False)
-    simulation = SimpleNamespace(step_s=0.002, tick=0, time_ns=0, plugins=[hosted])
-    sent = []
-    publisher = SimpleNamespace(has_listeners=True, publish=sent.append)
-    diagnostics = Diagnostics(simulation, scene.faults, SimpleNamespace(publisher=lambda topic, msg_class: publisher))
-    for simulation.tick in range(1, 1001):
-        diagnostics.on_tick()
-    assert len(sent) == 2
-    status, = sent[-1].status
-    assert (status.name, status.level) == (MESSAGES, DiagnosticStatus.OK)
-
-    scene.faults.note("/robot/command", ValueError("wrong"))
-    hosted.failures, hosted.last_error = 1, "update() raised ValueError: x"
-    dropped, plugin = diagnostics.statuses()
-    assert dropped.level == plugin.level == DiagnosticStatus.WARN
-    pair, = dropped.values
-    assert (pair.key, pair.value) == ("/robot/command", "1, the newest: ValueError: wrong")
-    hosted.failures, hosted.has_failed = 3, True
-    plugin = diagnostics.statuses()[1]
-    assert plugin.level == DiagnosticStatus.ERROR and "libbrain.so of baxter" in plugin.name
-    assert {pair.key: pair.value for pair in plugin.values} == {"failures": "3",
-                                                                "newest": "update() raised ValueError: x"}
 
 
 def test_a_log_line_is_cut_and_can_be_written(scene):

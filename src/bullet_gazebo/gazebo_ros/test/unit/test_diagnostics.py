@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What goes out on /diagnostics, and when."""
+from types import SimpleNamespace
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from gazebo_ros.diagnostics import MESSAGES, Diagnostics
+from loop_ros.faults import Faults
+
+
+def test_diagnostics_tell_what_was_dropped_and_which_plugin_failed():
+    hosted = SimpleNamespace(label="libbrain.so", model_name="baxter", failures=0, last_error="", has_failed=False)
+    simulation = SimpleNamespace(step_s=0.002, tick=0, time_ns=0, plugins=[hosted])
+    sent, faults = [], Faults(SimpleNamespace(error=lambda text: None))
+    publisher = SimpleNamespace(has_listeners=True, publish=sent.append)
+    diagnostics = Diagnostics(simulation, faults, SimpleNamespace(publisher=lambda topic, msg_class: publisher))
+    for simulation.tick in range(1, 1001):
+        diagnostics.on_tick()
+    assert len(sent) == 2
+    status, = sent[-1].status
+    assert (status.name, status.level) == (MESSAGES, DiagnosticStatus.OK)
+
+    faults.note("/robot/command", ValueError("wrong"))
+    hosted.failures, hosted.last_error = 1, "update() raised ValueError: x"
+    dropped, plugin = diagnostics.statuses()
+    assert dropped.level == plugin.level == DiagnosticStatus.WARN
+    pair, = dropped.values
+    assert (pair.key, pair.value) == ("/robot/command", "1, the newest: ValueError: wrong")
+    hosted.failures, hosted.has_failed = 3, True
+    plugin = diagnostics.statuses()[1]
+    assert plugin.level == DiagnosticStatus.ERROR and "libbrain.so of baxter" in plugin.name
+    assert {pair.key: pair.value for pair in plugin.values} == {"failures": "3",
+                                                                "newest": "update() raised ValueError: x"}

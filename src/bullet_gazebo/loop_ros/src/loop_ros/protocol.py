@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What code in the loop may use of ROS.
+
+:class:`Topics` and :class:`Log` are for controllers, action servers and settings; plugins have a whole
+:class:`loop_ros.node_handle.NodeHandle`, which stands on :class:`LoopRos`. ``loop_ros.ros_objects.RosObjects`` is the
+simulator's, ``loop_ros.testing.FakeRos`` that of tests. Nothing here waits.
+"""
+from typing import Protocol
+
+
+class Publisher(Protocol):
+    """One topic that is published."""
+
+    #: Whether a subscriber is connected. A message is not worth making otherwise.
+    has_listeners: bool
+
+    def publish(self, message):
+        """Send ``message`` to all subscribers. Raises ``genpy.SerializationError`` for one that cannot be sent."""
+
+    def close(self):
+        """Stop publishing."""
+
+
+class Mailbox(Protocol):
+    """A subscription of which only the newest message counts."""
+
+    def take(self):
+        """The newest message since the last call, or None."""
+
+    def handle(self, take):
+        """Call ``take(message)`` for the newest message since the last call; one that it fails on is counted."""
+
+    def guarded(self, take, *arguments):
+        """Call ``take(*arguments)``; what it raises is counted as the fault of a message."""
+
+    def close(self):
+        """End the subscription and drop what is unread."""
+
+
+class Queue(Protocol):
+    """A subscription of which each message counts, up to a depth; beyond that the oldest are lost."""
+
+    def drain(self):
+        """All unread messages, oldest first: a list."""
+
+    def handle(self, take):
+        """Call ``take(message)`` for each unread message, oldest first; one that it fails on is dropped and counted."""
+
+    def guarded(self, take, *arguments):
+        """Call ``take(*arguments)``; what it raises is counted as the fault of a message."""
+
+    def close(self):
+        """End the subscription and drop what is unread."""
+
+
+class Service(Protocol):
+    """A service that is served."""
+
+    def close(self):
+        """No longer serve it. Closing it twice does no harm."""
+
+
+class Log(Protocol):
+    """Lines of the log. The throttled ones come at most once in ``period_s`` wall seconds from a place in the code."""
+
+    def info(self, text):
+        """A line at level info."""
+
+    def warn(self, text):
+        """A line at level warning."""
+
+    def error(self, text):
+        """A line at level error."""
+
+    def info_throttle(self, period_s, text):
+        """As ``info``."""
+
+    def warn_throttle(self, period_s, text):
+        """As ``warn``."""
+
+    def error_throttle(self, period_s, text):
+        """As ``error``."""
+
+
+class Topics(Protocol):
+    """Makes what one owner publishes, hears and serves. Names are absolute or relative to the owner's namespace."""
+
+    def publisher(self, topic, msg_class, latch=False) -> Publisher:
+        """Publish ``topic``; ``latch``: a late subscriber gets the last message."""
+
+    def mailbox(self, topic, msg_class) -> Mailbox:
+        """Subscribe to ``topic`` for the newest message."""
+
+    def queue(self, topic, msg_class, depth) -> Queue:
+        """Subscribe to ``topic`` for every message; ``depth``: how many unread ones are kept, at least 1."""
+
+    def service(self, name, srv_class, handler) -> Service:
+        """Serve ``name``; ``handler(request)`` runs in the loop between two ticks and returns the response."""
+
+    def close(self):
+        """Close all of it."""
+
+
+class Faults(Protocol):
+    """What the loop survives, counted by place."""
+
+    def note(self, place, error, consequence=""):
+        """Count ``error`` at ``place``: a topic, a service, a part of the loop."""
+
+
+class LoopRos(Protocol):
+    """Makes publishers, subscriptions and services from absolute names."""
+
+    faults: Faults
+
+    def publisher(self, topic, msg_class, latch=False, greet=False) -> Publisher:
+        """Publish ``topic``; ``latch``: a late subscriber gets the last message; ``greet``: the same, unannounced."""
+
+    def mailbox(self, topic, msg_class) -> Mailbox:
+        """As :meth:`Topics.mailbox`."""
+
+    def queue(self, topic, msg_class, depth, notice=lambda: None) -> Queue:
+        """As :meth:`Topics.queue`; ``notice()`` is called after each message, in any thread."""
+
+    def service(self, name, srv_class, handler) -> Service:
+        """As :meth:`Topics.service`."""
+
+    def service_in_thread(self, name, srv_class, handler) -> Service:
+        """Serve ``name``; ``handler(request)`` runs in a thread of its own."""
+
+    def served(self):
+        """Names of the services that are served now: a list."""
+
+    def withdraw(self, name):
+        """Close the service and the subscriptions of this name, whoever opened them; returns the service's handler, or
+        None where there is no such service."""
+
+    def call_in_loop(self, function, *arguments):
+        """Any thread but the loop's: have ``function(*arguments)`` called between two ticks, return or raise what it
+        does."""
+
+    def deliveries(self):
+        """How many messages the subscriptions have received: {topic: count}."""
+
+    def flush(self, timeout_s=10.0):
+        """Any thread but the loop's: wait until all that was opened is registered; returns whether it is."""

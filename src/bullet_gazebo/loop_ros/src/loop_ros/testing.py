@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""ROS for tests, without a master: what is published is kept, messages are put in by hand.
+
+``test_fake_ros.py`` asks the same of this and of the simulator's own. Mailboxes, queues, faults and the answers of
+services are the real code.
+"""
+import io
+
+from loop_ros.faults import Faults
+from loop_ros.mailbox import Mailbox, Queue
+from loop_ros.ros_objects import answering
+
+
+class FakeLog:
+    """``lines``: the texts of all levels, in their order. The throttled variants leave nothing out."""
+
+    def __init__(self):
+        self.lines, self._levels = [], []
+
+    def info(self, text):
+        self._take("info", text)
+
+    def warn(self, text):
+        self._take("warn", text)
+
+    def error(self, text):
+        self._take("error", text)
+
+    def info_throttle(self, period_s, text):
+        self._take("info", text)
+
+    def warn_throttle(self, period_s, text):
+        self._take("warn", text)
+
+    def error_throttle(self, period_s, text):
+        self._take("error", text)
+
+    def of(self, level):
+        """The texts of one level."""
+        return [text for found, text in zip(self._levels, self.lines, strict=True) if found == level]
+
+    def _take(self, level, text):
+        self.lines.append(text)
+        self._levels.append(level)
+
+
+class FakeFaults(Faults):
+    """``noted``: list of (place, error)."""
+
+    def __init__(self):
+        super().__init__(FakeLog())
+        self.noted = []
+
+    def note(self, place, error, consequence="it is left out"):
+        self.noted.append((place, error))
+        super().note(place, error, consequence)
+
+
+class FakeRos:
+    """A ``loop_ros.protocol.LoopRos`` that keeps what is open now, by absolute name; also a ``Topics``.
+
+    ``publishers``: {topic: the first open :class:`FakePublisher`}; ``inboxes``: {topic: :class:`FakeInbox`};
+    ``services``: {name: function of one request, which answers as a client is answered}; ``faults``:
+    :class:`FakeFaults`.
+    """
+
+    def __init__(self, heard=lambda topic: True, clock=lambda: 0.0):
+        """``heard(topic)``: whether somebody listens from the start; ``clock()``: see :attr:`FakePublisher.timed`."""
+        self.publishers, self.inboxes, self.services = {}, {}, {}
+        self.faults = FakeFaults()
+        self._heard, self._clock = heard, clock
+        self._handlers = {}  # name: (service, handler)
+        self._delivered_before = {}
+
+    def publisher(self, topic, msg_class, latch=False, greet=False):
+        first = self.publishers.get(topic)
+        sent = _Sent(self._heard(topic), self._clock) if first is None else first._sent
+        return FakePublisher(sent, msg_class, latch or greet, self.publishers, topic)
+
+    def mailbox(self, topic, msg_class):
+        return self._subscribe(topic, FakeMailbox(self._counting(topic)), msg_class)
+
+    def queue(self, topic, msg_class, depth, notice=lambda: None):
+        return self._subscribe(topic, FakeQueue(depth, notice, self._counting(topic)), msg_class)
+
+    def service(self, name, srv_class, handler):
+        service = _FakeService(self, name)
+        self._handlers[name] = service, handler
+        self.services[name] = answering(name, handler, self.faults)
+        return service
+
+    def service_in_thread(self, name, srv_class, handler):
+        return self.service(name, srv_class, handler)
+
+    def served(self):
+        return list(self.services)
+
+    def withdraw(self, name):
+        if name in self.inboxes:
+            self.inboxes[name].close()
+        service, handler = self._handlers.get(name, (None, None))
+        if service is not None:
+            service.close()
+        return handler
+
+    def call_in_loop(self, function, *arguments):
+        return function(*arguments)
+
+    def deliveries(self):
+        return {topic: self._delivered_before.get(topic, 0) + sum(box.delivered for box in inbox.boxes)
+                for topic, inbox in self.inboxes.items()}
+
+    def flush(self, timeout_s=10.0):
+        return True
+
+    def close(self):
+        for opened in [*self.publishers.values(), *self.inboxes.values()]:
+            opened.close()
+        for service, _ in list(self._handlers.values()):
+            service.close()
+
+    def _subscribe(self, topic, box, msg_class):
+        """What comes in on a topic comes to all who subscribe to it."""
+        inbox = self.inboxes.setdefault(topic, FakeInbox(msg_class))
+        inbox.boxes.append(box)
+
+        def leave():
+            if box in inbox.boxes:
+                self._delivered_before[topic] = self._delivered_before.get(topic, 0) + box.delivered
+                inbox.boxes.remove(box)
+            if not inbox.boxes:
+                self.inboxes.pop(topic, None)
+
+        box.leave = leave
+        return box
+
+    def _counting(self, topic):
+        return lambda error: self.faults.note(topic, error, "the message is dropped")
+
+
+class _Sent:
+    """What all publishers of a topic have sent while somebody listened."""
+
+    def __init__(self, heard, clock):
+        self.heard, self.clock = heard, clock
+        self.messages, self.times = [], []
+        self.last = None
+
+    def send(self, message):
+        self.messages.append(message)
+        self.times.append(self.clock())
+
+
+class FakePublisher:
+    """``messages``: what a subscriber has got, each read back from its bytes; one that cannot be sent raises.
+
+    ``has_listeners`` may be set: whether somebody is connected. Several publishers of a topic share both.
+    ``keeps_last``: whether a late subscriber gets the last message.
+    """
+
+    def __init__(self, sent, msg_class, keeps_last, publishers, topic):
+        self.topic, self.msg_class, self.is_closed = topic, msg_class, False
+        self.keeps_last = keeps_last
+        self._sent = sent
+        self._publishers = publishers
+        self._seq = 0
+        publishers.setdefault(topic, self)
+
+    @property
+    def messages(self):
+        return self._sent.messages
+
+    @property
+    def timed(self):
+        """[(the clock's time, message)]"""
+        return list(zip(self._sent.times, self._sent.messages, strict=True))
+
+    @property
+    def has_listeners(self):
+        return self._sent.heard and not self.is_closed
+
+    @has_listeners.setter
+    def has_listeners(self, heard):
+        late = heard and not self._sent.heard
+        self._sent.heard = heard
+        if late and self._sent.last is not None:
+            self._sent.send(self._sent.last)
+
+    def publish(self, message):
+        if self.is_closed or not (self.keeps_last or self._sent.heard):
+            return
+        if getattr(message, "_has_header", False):
+            self._seq += 1
+            message.header.seq = self._seq
+        buffer = io.BytesIO()
+        message.serialize(buffer)
+        received = type(message)().deserialize(buffer.getvalue())
+        if self._sent.heard:
+            self._sent.send(received)
+        if self.keeps_last:
+            self._sent.last = received
+
+    def close(self):
+        self.is_closed = True
+        if self._publishers.get(self.topic) is self:
+            del self._publishers[self.topic]
+
+
+class FakeInbox:
+    """All subscriptions of one topic: ``put`` a message to them."""
+
+    def __init__(self, msg_class):
+        self.msg_class, self.boxes = msg_class, []
+
+    def put(self, message):
+        for box in list(self.boxes):
+            box.put(message)
+
+    def close(self):
+        for box in list(self.boxes):
+            box.close()
+
+
+class FakeMailbox(Mailbox):
+    """A mailbox that ``leave()``s its topic when it is closed."""
+
+    def close(self):
+        super().close()
+        self.leave()
+
+
+class FakeQueue(Queue):
+    """A queue that ``leave()``s its topic when it is closed."""
+
+    def close(self):
+        super().close()
+        self.leave()
+
+
+class _FakeService:
+    def __init__(self, ros, name):
+        self._ros, self._name = ros, name
+
+    def close(self):
+        service, _ = self._ros._handlers.get(self._name, (None, None))
+        if service is self:
+            del self._ros._handlers[self._name], self._ros.services[self._name]

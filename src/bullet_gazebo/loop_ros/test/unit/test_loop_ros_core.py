@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What of the package must import where there is no rospy."""
+import subprocess
+import sys
+
+CORE = ("faults", "log", "mailbox", "node_handle", "protocol", "publisher", "subscriber")
+
+
+def test_the_core_loads_without_ros():
+    block = "import sys; sys.modules.update(dict.fromkeys(%r)); " % (("rospy", "rosgraph", "roslib", "std_msgs"),)
+    subprocess.run([sys.executable, "-c", block + "; ".join("import loop_ros." + name for name in CORE)], check=True)
