@@ -14,7 +14,6 @@ from labs import Lab
 from sensor_msgs.msg import Image, PointCloud2
 
 import xacro
-from gazebo_ros.drawing import DrawingCache
 from gazebo_ros.resources import ResourceFinder
 from lab_testing.waiting import wait_until
 from sensor_renderer.gl_renderer import GlRenderer
@@ -22,6 +21,7 @@ from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from urdf_model import merge_fixed, parse_urdf
 from urdf_model.transforms import inverse, pose_matrix
+from world_picture.drawing import DrawingCache
 
 SECONDS, PICTURES, NAIVE_PICTURES = 10.0, 40, 4
 SIZE = (640, 400)

@@ -17,11 +17,11 @@ from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
 from gazebo_ros.publications import Publications
 from gazebo_ros.resources import ResourceFinder
 from gazebo_ros.simulation import HostedPlugin, Simulation
-from gazebo_ros.snapshot import SnapshotWriter
 from loop_ros.faults import Faults
 from loop_ros.mailbox import Queue, RequestBoard
 from loop_ros.publisher import LoopPublisher, PublisherHub
 from urdf_model import Box, Inertial, Link, Robot, Shape, parse_urdf
+from world_picture.snapshot import SnapshotWriter
 
 # The same numbers on both arms.
 NEUTRAL = tuple(poses().angles("neutral", "left").values())

@@ -163,7 +163,7 @@ class PluginContext(NodeHandle):
 
         It hangs on ``link`` at ``place`` (4, 4): in its middle, x to the right and y up for who looks at it.
         ``size_m``: width and height; ``pixels``: columns and rows. Returns a
-        :class:`gazebo_ros.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
+        :class:`world_picture.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """
         # It belongs to the model and is closed with it.
         return self._opening(("screen", link, tuple(size_m), tuple(pixels)),

@@ -14,7 +14,6 @@ import rospkg
 import rospy
 
 from bullet_sim import BulletSimError, World
-from gazebo_ros import snapshot
 from gazebo_ros.command_line import CommandLine
 from gazebo_ros.diagnostics import Diagnostics
 from gazebo_ros.gazebo_services import GazeboServices
@@ -24,7 +23,6 @@ from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.publications import Publications
 from gazebo_ros.resources import ResourceFinder, model_folders, model_sizes, resource_folders
 from gazebo_ros.simulation import Simulation
-from gazebo_ros.snapshot import SnapshotError
 from gazebo_ros.spawning import Library, Spawner
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
 from gazebo_ros.world_lights import WorldLights
@@ -37,6 +35,8 @@ from loop_ros.ros_objects import RosObjects
 from loop_ros.subscriber import InletHub
 from rospy_limits.node import limit_ports
 from sdf_model import ModelFolders
+from world_picture import snapshot
+from world_picture.snapshot import SnapshotError
 
 # How long threads may hold the interpreter [s]. PyBullet keeps it during a step, and with the default of 5 ms one busy
 # thread would cost the loop more than half of its time.

@@ -6,11 +6,11 @@ import sys
 import numpy as np
 
 from bullet_sim.quiet_pybullet import pybullet
-from gazebo_ros.drawing import DrawingError
-from gazebo_ros.snapshot import SnapshotError
 from gazebo_ros.window_screen import WindowScreen
 from urdf_model import Box, Cylinder, Mesh, Sphere, merge_fixed, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix
+from world_picture.drawing import DrawingError
+from world_picture.snapshot import SnapshotError
 
 # Where the camera stands at the start: in front of a robot that looks along x, a little to its left.
 _CAMERA = {"cameraDistance": 1.9, "cameraYaw": 55.0, "cameraPitch": -15.0, "cameraTargetPosition": [0.25, 0.0, 0.85]}

@@ -9,8 +9,8 @@ import time
 import rospkg
 import rospy
 
-from gazebo_ros.snapshot import SnapshotError, SnapshotReader
 from rospy_limits.node import limit_ports
+from world_picture.snapshot import SnapshotError, SnapshotReader
 
 # Pictures a second; a robot that is watched needs no more, and without a graphics card each costs tens of ms.
 _FRAME_RATE = 20.0
@@ -60,8 +60,8 @@ def _keep_the_output_for_python():
 
 
 def _show(window, stop):
-    from gazebo_ros.drawing import DrawingCache
     from gazebo_ros.resources import ResourceFinder
+    from world_picture.drawing import DrawingCache
 
     reader = _wait_for_snapshot(stop)
     if reader is None:

@@ -7,7 +7,7 @@ import tempfile
 import numpy as np
 
 from bullet_sim.quiet_pybullet import pybullet
-from gazebo_ros.shared_picture import PictureReader
+from world_picture.shared_picture import PictureReader
 
 # PyBullet takes a texture number by number: more columns than this would cost more time than a picture of the window.
 _MOST_COLUMNS = 256

@@ -13,9 +13,9 @@ import rospy
 import rostest
 from gazebo_msgs.srv import GetWorldProperties
 
-from gazebo_ros import snapshot
 from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
+from world_picture import snapshot
 
 DEADLINE_S = 60.0
 # A subscriber of /clock that stops itself, as Ctrl-Z would, after the first message.

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is read in URDF and world files, and light meshes for drawing."""
+"""What is read in URDF and world files."""
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from gazebo_ros import drawing, urdf_extras, world_file
+from gazebo_ros import urdf_extras, world_file
 from gazebo_ros.spawning import is_floor
 from gazebo_ros.urdf_extras import ExtrasError
-from lab_testing.meshes import sphere
 from sdf_model import ModelFolders
 from urdf_model import parse_urdf
 
@@ -113,30 +112,11 @@ def test_a_missing_world_says_where_it_was_looked_for(tmp_path):
         world_file.find_world("nowhere.world", [tmp_path])
 
 
-@pytest.mark.parametrize(("size_m", "least", "most"), [
-    (0.05, 100, 250), (drawing.USUAL_M, 250, 500), (3.0, 750, 1250)])
-def test_a_mesh_is_thinned_by_its_size_once_and_then_found_again(tmp_path, size_m, least, most):
-    trimesh = pytest.importorskip("trimesh")
-    path = tmp_path / "ball.stl"
-    vertices, faces = sphere(60)
-    trimesh.Trimesh(vertices * size_m / 2.0, faces).export(str(path))
-    cache = drawing.DrawingCache(tmp_path / "cache", triangles=500)
-    part, = cache.parts(path)
-    written = Path(part.path).stat().st_mtime_ns
-    assert least < Path(part.path).read_text(encoding="ascii").count("\nf ") <= most
-    assert cache.parts(path) == [part] and Path(part.path).stat().st_mtime_ns == written
-
-
-def test_an_unreadable_mesh_names_its_path(tmp_path):
-    with pytest.raises(drawing.DrawingError, match="missing.stl"):
-        drawing.DrawingCache(tmp_path).parts(tmp_path / "missing.stl")
-
-
 def test_the_core_loads_without_ros():
     """Everything but the node and its conversions must import where there is no ROS."""
     block = "import sys; sys.modules.update(dict.fromkeys(%r)); " % (
         ("rospy", "rosgraph", "roslib", "gazebo_msgs", "geometry_msgs", "std_msgs", "std_srvs", "rosgraph_msgs"),)
-    names = ("pacing", "model_plugin", "plugin_table", "snapshot",
-             "simulation", "entities", "urdf_extras", "world_file", "drawing", "jobs", "spawning")
+    names = ("pacing", "model_plugin", "plugin_table", "simulation", "entities", "urdf_extras", "world_file", "jobs",
+             "spawning")
     imports = "; ".join("import gazebo_ros.%s" % name for name in names)
     subprocess.run([sys.executable, "-c", block + imports], check=True)

@@ -8,9 +8,9 @@ import sys
 import numpy as np
 import pytest
 
-from gazebo_ros.shared_picture import PictureWriter
 from lab_testing import virtual_screen
 from lab_testing.waiting import wait_until
+from world_picture.shared_picture import PictureWriter
 
 # The screen stands upright and looks along x, where the window's camera is.
 LEAN = [[0, 0, 1, 0.3], [1, 0, 0, 0.0], [0, 1, 0, 0.9], [0, 0, 0, 1]]
@@ -19,7 +19,7 @@ BODY = {"name": "tv", "joints": [], "urdf": """<robot name="tv"><link name="l"><
 WINDOW = """import json, sys
 import numpy as np
 from gazebo_ros import window
-from gazebo_ros.drawing import DrawingCache
+from world_picture.drawing import DrawingCache
 view = window.Window(DrawingCache(), lambda uri: None, print)
 values = np.array([0, 0, 0, 0, 0, 0, 1.0])
 view.set_scene([json.loads(sys.argv[1])], values)

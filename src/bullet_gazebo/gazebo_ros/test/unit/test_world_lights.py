@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from gazebo_ros.entities import UnknownEntity
-from gazebo_ros.shared_picture import PictureReader, PictureWriter
-from gazebo_ros.snapshot import SnapshotError
 from gazebo_ros.world_lights import WorldLights
 from sdf_model import Light, Scene
 from urdf_model.transforms import pose_matrix
+from world_picture.shared_picture import PictureReader, PictureWriter
+from world_picture.snapshot import SnapshotError
 
 SUN = Light("sun", "directional", pose_matrix((1.0, 2.0, 3.0), (0.0, 0.0, np.pi / 2)), (0.8, 0.8, 0.8, 1.0),
             (0.2, 0.2, 0.2, 1.0), (0.9, 0.01, 0.001), (1.0, 0.0, -1.0), True)

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazebo_ros.drawing import DrawingError
-from gazebo_ros.shared_picture import PictureReader
-from gazebo_ros.snapshot import SnapshotError
 from sensor_renderer import triangles
 from sensor_renderer.light import Light
 from urdf_model import Mesh, merge_fixed, parse_urdf
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, rigid
+from world_picture.drawing import DrawingError
+from world_picture.shared_picture import PictureReader
+from world_picture.snapshot import SnapshotError
 
 DEFAULT_COLOUR = (0.7, 0.7, 0.7, 1.0)
 #: How far the floor reaches [m]; its colour.
@@ -30,7 +30,7 @@ class Part(NamedTuple):
 class Screen(NamedTuple):
     """A rectangle that shows a picture. ``offset`` (4, 4) in the frame of ``link``: in its middle, x to the right and y
     up for who looks at it; ``size``: width, height [m]; ``picture``:
-    :class:`gazebo_ros.shared_picture.PictureReader`."""
+    :class:`world_picture.shared_picture.PictureReader`."""
 
     link: str
     offset: np.ndarray
@@ -82,7 +82,8 @@ class Mirror:
     """All bodies of the world."""
 
     def __init__(self, drawings, find_mesh, warn):
-        """``drawings``: a ``gazebo_ros.drawing.DrawingCache``; ``find_mesh(uri)`` -> path or None; ``warn(text)``."""
+        """``drawings``: a ``world_picture.drawing.DrawingCache``; ``find_mesh(uri)`` -> path or None;
+        ``warn(text)``."""
         self._drawings = drawings
         self._find_mesh = find_mesh
         self._warn = warn
@@ -96,7 +97,7 @@ class Mirror:
         self.version = 0
 
     def set_scene(self, listed, light=None):
-        """Show what :meth:`gazebo_ros.snapshot.SnapshotWriter.write_scene` lists; what is known already stays."""
+        """Show what :meth:`world_picture.snapshot.SnapshotWriter.write_scene` lists; what is known already stays."""
         self.light = Light.of_scene(light or {})
         known = self._bodies
         self._bodies = {}

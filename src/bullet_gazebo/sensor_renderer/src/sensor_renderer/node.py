@@ -11,14 +11,14 @@ import rospkg
 import rospy
 import yaml
 
-from gazebo_ros.drawing import DrawingCache
 from gazebo_ros.resources import ResourceFinder
-from gazebo_ros.snapshot import SnapshotError, SnapshotReader
 from rospy_limits.node import limit_ports
 from sensor_renderer.errors import RenderingError, SensorError
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.sensor_element import SensorEntry
+from world_picture.drawing import DrawingCache
+from world_picture.snapshot import SnapshotError, SnapshotReader
 
 # How often the snapshot is looked at while somebody listens, and while nobody does; how often a simulator is looked
 # for [s].

@@ -29,7 +29,7 @@ def of_primitive(geometry):
 
 
 def of_wavefront(path):
-    """Triangles of a Wavefront file of bare vertices and triangles, as ``gazebo_ros.drawing`` writes them."""
+    """Triangles of a Wavefront file of bare vertices and triangles, as ``world_picture.drawing`` writes them."""
     vertices, faces = [], []
     with open(path, encoding="ascii") as file:
         for line in file:

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from gazebo_ros.drawing import DrawingCache
-from gazebo_ros.shared_picture import PictureWriter
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.light import MOST_LAMPS, Light
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from urdf_model.transforms import pose_matrix
+from world_picture.drawing import DrawingCache
+from world_picture.shared_picture import PictureWriter
 
 CUBE = """<robot name="cube"><link name="link"><visual><geometry><box size="0.2 0.2 0.2"/></geometry>
 <material name="r"><color rgba="0.9 0.9 0.9 1"/></material></visual></link></robot>"""

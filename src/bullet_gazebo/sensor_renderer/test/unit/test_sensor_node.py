@@ -6,9 +6,9 @@ import types
 import numpy as np
 import pytest
 
-from gazebo_ros.snapshot import SnapshotReader, SnapshotWriter
 from sensor_renderer.node import SensorRenderer
 from sim_time.pace import Pace
+from world_picture.snapshot import SnapshotReader, SnapshotWriter
 
 STAND = """<robot name="stand"><link name="eye"><visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual></link>
 </robot>"""

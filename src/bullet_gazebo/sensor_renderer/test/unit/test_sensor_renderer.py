@@ -7,7 +7,6 @@ import numpy as np
 import pybullet
 import pytest
 
-from gazebo_ros.drawing import DrawingCache
 from sensor_renderer import triangles
 from sensor_renderer.errors import SensorError
 from sensor_renderer.gl_renderer import GlRenderer
@@ -16,6 +15,7 @@ from sensor_renderer.pinhole import OPTICAL, Pinhole
 from sensor_renderer.tiny_renderer import TinyRenderer
 from urdf_model import Box, Cylinder, Sphere
 from urdf_model.transforms import inverse, pose_matrix
+from world_picture.drawing import DrawingCache
 
 CUBE_M = 0.1
 CUBE = """<robot name="cube"><link name="link"><visual><geometry><box size="0.1 0.1 0.1"/></geometry>

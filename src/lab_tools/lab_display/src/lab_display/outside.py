@@ -5,13 +5,13 @@ import math
 import cv2
 import numpy as np
 
-from gazebo_ros.drawing import DrawingCache
 from gazebo_ros.resources import ResourceFinder
-from gazebo_ros.snapshot import SnapshotReader
 from sensor_renderer.errors import RenderingError
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import Pinhole
+from world_picture.drawing import DrawingCache
+from world_picture.snapshot import SnapshotReader
 
 FIELD_OF_VIEW_RAD = 0.75
 # Where the camera stands when nobody says: seen from the middle of what is to be seen.
@@ -74,7 +74,7 @@ class Outside:
     """Draws the world of one snapshot folder. Belongs to the thread that made it."""
 
     def __init__(self, folder, warn):
-        """Raises gazebo_ros.snapshot.SnapshotError where there is no snapshot."""
+        """Raises world_picture.snapshot.SnapshotError where there is no snapshot."""
         self._reader = SnapshotReader(folder)
         self._finder = ResourceFinder()
         self._mirror = Mirror(DrawingCache(), self._finder, warn)

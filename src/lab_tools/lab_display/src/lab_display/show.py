@@ -16,10 +16,10 @@ from sensor_msgs.msg import Image, JointState
 
 from baxter_interface import startup
 from baxter_interface.patience import Condition, wait_in_order
-from gazebo_ros.snapshot import SnapshotError
 from live_plot.recording import Recording
 from urdf_model import parse_urdf
 from urdf_model.transforms import matrix_from_quaternion, rigid
+from world_picture.snapshot import SnapshotError
 
 from . import joint_plot
 from .matrices import FrameMatrix

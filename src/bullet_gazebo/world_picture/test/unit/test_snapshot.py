@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gazebo_ros import snapshot
-from gazebo_ros.shared_picture import PictureReader, PictureWriter
-from gazebo_ros.snapshot import SnapshotError, SnapshotReader, SnapshotWriter
+from world_picture import snapshot
+from world_picture.shared_picture import PictureReader, PictureWriter
+from world_picture.snapshot import SnapshotError, SnapshotReader, SnapshotWriter
 
 NO_ROOM = os.strerror(errno.ENOSPC)  # in the user's language
 
@@ -83,7 +83,7 @@ def test_a_folder_is_private(writer):
 
 WRITE_FOR_EVER = """
 import sys
-from gazebo_ros.snapshot import SnapshotWriter
+from world_picture.snapshot import SnapshotWriter
 writer = SnapshotWriter(sys.argv[1])
 print(writer.folder, flush=True)
 tick = 0

@@ -9,7 +9,7 @@ import struct
 
 import numpy as np
 
-from gazebo_ros.snapshot import SnapshotError, no_room, open_shared, reserve
+from world_picture.snapshot import SnapshotError, no_room, open_shared, reserve
 
 _HEADER = struct.Struct("<QQQ")
 _SEQUENCE = struct.Struct("<Q")
