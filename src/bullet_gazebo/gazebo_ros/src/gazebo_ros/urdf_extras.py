@@ -27,6 +27,8 @@ def sensor_plugins(robot, warn):
             link, inside = gazebo.get("reference"), sensor.findall("plugin")
             if link in robot.links:
                 found += inside
+            elif link in robot.joints and sensor.get("type") == "force_torque" and not inside:
+                pass  # hardware of a controller
             elif link in robot.joints:
                 warn("sensor '%s' of '%s' is on a joint, '%s', and is left out; sensors are served on links"
                      % (sensor.get("name", ""), robot.name, link))

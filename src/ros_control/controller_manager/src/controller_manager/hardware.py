@@ -28,6 +28,10 @@ class RobotHardware:
     interface_joints : dict
         {interface: tuple of its joints}, ``JOINT_STATE`` (all joints) included.
 
+    sensors : dict
+        {interface of a sensor: {name: sensor}}, empty unless the driver fills it; a sensor has ``frame``, and ``read()``
+        that is called at each update and returns what it measured, or None.
+
     A driver derives from this, fills the state before and reads the commands after ``ControllerManager.update``.
     """
 
@@ -44,6 +48,7 @@ class RobotHardware:
                 if interface not in COMMAND:
                     raise HardwareError("joint '%s' has the hardware interface '%s'; known are %s"
                                         % (name, interface, ", ".join(COMMAND)))
+        self.sensors = {}
         count = len(self.joint_names)
         self._index = {name: i for i, name in enumerate(self.joint_names)}
         self.position = np.zeros(count)

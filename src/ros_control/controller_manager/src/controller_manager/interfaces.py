@@ -8,3 +8,7 @@ EFFORT = "hardware_interface::EffortJointInterface"
 
 #: Interfaces that command a joint: who uses a joint through one of these claims it.
 COMMAND = (POSITION, VELOCITY, EFFORT)
+
+#: Interfaces that only say something; of sensors, see ``RobotHardware.sensors``.
+IMU_SENSOR = "hardware_interface::ImuSensorInterface"
+FORCE_TORQUE_SENSOR = "hardware_interface::ForceTorqueSensorInterface"

@@ -14,6 +14,7 @@ from controller_manager.pid_tuning import TunablePids
 from controller_manager.services import ControllerManagerServices
 from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros_control.hardware import SimulatedHardware
+from gazebo_ros_control.sensors import simulated_sensors
 from urdf_model import UrdfError, parse_urdf
 
 DEFAULT_SIM_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
@@ -53,6 +54,7 @@ class GazeboRosControl(ModelPlugin):
         if not hardware.joint_names:
             context.log.warn("model '%s': its description has no <transmission>, so no joint can be controlled"
                              % context.model.name)
+        hardware.sensors = simulated_sensors(context.world, context.model)
         for pid, joints in hardware.pids:
             TunablePids(context, pid, ["%s/%s" % (PID_GAINS, joint) for joint in joints])
         self._manager = ControllerManager(hardware, context.log)
