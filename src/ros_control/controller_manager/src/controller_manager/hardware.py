@@ -29,8 +29,8 @@ class RobotHardware:
         {interface: tuple of its joints}, ``JOINT_STATE`` (all joints) included.
 
     sensors : dict
-        {interface of a sensor: {name: sensor}}, empty unless the driver fills it; a sensor has ``frame``, and ``read()``
-        that is called at each update and returns what it measured, or None.
+        {interface of a sensor: {name: sensor}}, empty unless the driver fills it. A sensor has ``frame`` and
+        ``read()``, called at each update, which returns what it measured, or None.
 
     A driver derives from this, fills the state before and reads the commands after ``ControllerManager.update``.
     """
