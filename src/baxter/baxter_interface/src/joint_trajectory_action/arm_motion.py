@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baxter_control.pid import PID
-from joint_trajectory import Follower, Tolerances, bounds, merge_tolerances
+from joint_trajectory import Follower, GoalTolerances, Tolerances, bounds, merge_tolerances
 
 # How long a stop takes, from the velocity at hand to rest [s].
 STOP_DURATION_S = 0.25
@@ -14,6 +14,7 @@ STOP_DURATION_S = 0.25
 # too fast [rad]. The robot's own tucked pose lies 0.03 rad beyond, and recordings of moves at full speed have steps of
 # one reading, 0.015 to 0.03 rad.
 LIMIT_SLACK_RAD = 0.05
+_AS_SETTINGS = GoalTolerances()
 
 
 class Mode(enum.Enum):
@@ -77,13 +78,13 @@ class ArmMotion:
         self._now_s = 0.0
         self._output = np.zeros((3, len(self.joint_names)))
 
-    def begin(self, command, now_s, position, goal, settings, path=(), goal_tolerances=(), goal_time_s=0.0):
+    def begin(self, command, now_s, position, goal, settings, wanted=_AS_SETTINGS):
         """Follow ``command`` (:class:`joint_trajectory.Command`) from ``now_s`` [s] on.
 
-        ``position`` (n,): measured [rad]; ``goal``: any object. ``path``, ``goal_tolerances``: rows of (joint name,
-        position, velocity, acceleration), and ``goal_time_s``, as of :func:`joint_trajectory.merge_tolerances`; they
-        override ``settings`` (:class:`Settings`). Joints that the command does not name are left alone, or go on with
-        what they were told before. The goal before is forgotten: say so to its owner.
+        ``position`` (n,): measured [rad]; ``goal``: any object. ``wanted``: the goal's own
+        :class:`joint_trajectory.GoalTolerances`, which override ``settings`` (:class:`Settings`). Joints that the
+        command does not name are left alone, or go on with what they were told before. The goal before is forgotten:
+        say so to its owner.
 
         Returns the :class:`joint_trajectory.Replacement`. Raises :class:`joint_trajectory.TrajectoryError`; nothing
         has changed then.
@@ -92,7 +93,7 @@ class ArmMotion:
         defaults = Tolerances(bounds(count, position=settings.path),
                               bounds(count, position=settings.goal, velocity=settings.stopped_velocity),
                               settings.goal_time_s)
-        tolerances = merge_tolerances(defaults, self.joint_names, path, goal_tolerances, goal_time_s)
+        tolerances = merge_tolerances(defaults, self.joint_names, *wanted)
         # The end is commanded in the tick before it; whoever keeps up is still moving then.
         tolerances = tolerances._replace(goal_time_s=tolerances.goal_time_s + 2.0 * self._period_s)
         if not self.engaged:

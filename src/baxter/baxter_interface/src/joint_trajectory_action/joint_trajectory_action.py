@@ -22,24 +22,21 @@ from baxter_interface import Limb
 from baxter_interface.goal_loop import SHORTEST_GOAL_S, start
 from baxter_interface.joint_limits import read_joint_limits
 from joint_trajectory import (
-    AllPointsInPast,
-    Command,
-    JointNamesError,
+    ErrorCode,
     Limits,
     NoPoints,
     Outcome,
     TrajectoryError,
+    code_of_error,
+    code_of_outcome,
+    command_of,
     joint_indices,
+    tolerances_of,
 )
 
 from .arm_motion import LIMIT_SLACK_RAD, ArmMotion, Mode, Settings
 from .robot_watch import RobotWatch
 
-_ERROR_CODES = {
-    Outcome.SUCCEEDED: FollowJointTrajectoryResult.SUCCESSFUL,
-    Outcome.PATH_TOLERANCE_VIOLATED: FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
-    Outcome.GOAL_TOLERANCE_VIOLATED: FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED,
-}
 # How often an idle server looks whether the robot is still there [s, wall].
 _IDLE_S = 0.5
 # What taking up a goal costs for each of its points [s]; a long one begins so much later, and not with a jump.
@@ -114,9 +111,7 @@ class JointTrajectoryActionServer:
             if not trajectory.points:
                 raise NoPoints()
             joint_indices(trajectory.joint_names, self._names, allow_partial=True)
-            command = Command(trajectory.joint_names, (
-                (point.time_from_start.to_sec(), point.positions, point.velocities, point.accelerations)
-                for point in trajectory.points))
+            command = command_of(trajectory)
         except TrajectoryError as error:
             handle.set_accepted()
             self._refuse(handle, error)
@@ -207,7 +202,7 @@ class JointTrajectoryActionServer:
         try:
             replacement = self._motion.begin(
                 command, now_s, self._measured()[0], handle, Settings.from_config(self._config.config, self._names),
-                _rows(goal.path_tolerance), _rows(goal.goal_tolerance), goal.goal_time_tolerance.to_sec())
+                tolerances_of(goal))
         except TrajectoryError as error:
             return self._refuse(handle, error)
         if before is not None:
@@ -255,9 +250,9 @@ class JointTrajectoryActionServer:
 
     def _conclude(self, handle, verdict):
         if verdict.outcome is Outcome.SUCCEEDED:
-            handle.set_succeeded(FollowJointTrajectoryResult(_ERROR_CODES[verdict.outcome], ""))
+            handle.set_succeeded(FollowJointTrajectoryResult(code_of_outcome(verdict.outcome), ""))
         else:
-            self._abort(handle, _ERROR_CODES[verdict.outcome], verdict.text)
+            self._abort(handle, code_of_outcome(verdict.outcome), verdict.text)
 
     def _give_up(self, why):
         """End what is being done, and stop the arm, if it can still be commanded.
@@ -273,16 +268,12 @@ class JointTrajectoryActionServer:
             text = "%s %.3f s after the start; %s is %.4f rad from its end" % (
                 why, self._now_s() - self._motion.begin_s, *self._motion.farthest(self._measured()[0]))
             # The way was left; there is no code that says more.
-            self._abort(goal, FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED, text)
+            self._abort(goal, ErrorCode.PATH_TOLERANCE_VIOLATED.value, text)
         self._motion.release()
 
     def _refuse(self, handle, error):
         """End a goal that is not begun; `error`: an exception or a text."""
-        code = FollowJointTrajectoryResult.INVALID_GOAL
-        if isinstance(error, JointNamesError):
-            code = FollowJointTrajectoryResult.INVALID_JOINTS
-        elif isinstance(error, AllPointsInPast) and handle.get_goal().trajectory.header.stamp:
-            code = FollowJointTrajectoryResult.OLD_HEADER_TIMESTAMP
+        code = code_of_error(error, bool(handle.get_goal().trajectory.header.stamp))
         threading.Timer(SHORTEST_GOAL_S, self._abort, (handle, code, str(error))).start()
 
     def _abort(self, handle, code, text):
@@ -302,8 +293,3 @@ class JointTrajectoryActionServer:
         limits = read_joint_limits(self._names).values()
         lower, upper, velocity = zip(*limits, strict=True)
         return Limits(self._names, lower, upper, velocity, LIMIT_SLACK_RAD)
-
-
-def _rows(tolerances):
-    """control_msgs/JointTolerance[] as rows of (joint name, position, velocity, acceleration)."""
-    return [(entry.name, entry.position, entry.velocity, entry.acceleration) for entry in tolerances]

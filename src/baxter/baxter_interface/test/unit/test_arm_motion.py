@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baxter_interface import parameter_tables
-from joint_trajectory import BeyondPosition, Command, Limits, Outcome
+from joint_trajectory import BeyondPosition, Command, GoalTolerances, Limits, Outcome
 from joint_trajectory_action.arm_motion import STOP_DURATION_S, ArmMotion, Mode, Settings
 
 NAMES = ["left_%s" % joint for joint in ("s0", "s1", "e0")]
@@ -123,7 +123,8 @@ def test_blocked_joint_fails_the_goal_on_the_way_and_the_arm_stops_where_it_is()
 def test_goal_tolerance_and_goal_time():
     arm = Arm()
     arm.stuck[2] = True
-    arm.go([(1.0, *there(0.0, 0.0, 0.2))], goal_tolerances=[("left_e0", 0.1, 0.0, 0.0)], goal_time_s=0.3)
+    arm.go([(1.0, *there(0.0, 0.0, 0.2))], wanted=GoalTolerances(
+        goal=[("left_e0", 0.1, 0.0, 0.0)], goal_time_s=0.3))
     (at_s, verdict), = arm.run(2.0)
     assert verdict.outcome is Outcome.GOAL_TOLERANCE_VIOLATED
     assert "left_e0 goal error 0.2" in verdict.text and at_s == pytest.approx(1.32, abs=0.021)
@@ -132,7 +133,7 @@ def test_goal_tolerance_and_goal_time():
 def test_default_goal_tolerance_is_none_and_path_tolerance_can_be_lifted():
     arm = Arm(goal_time=0.0)
     arm.stuck[2] = True
-    arm.go([(1.0, *there(0.0, 0.0, 0.9))], path=[("left_e0", -1.0, 0.0, 0.0)])
+    arm.go([(1.0, *there(0.0, 0.0, 0.9))], wanted=GoalTolerances(path=[("left_e0", -1.0, 0.0, 0.0)]))
     (_, verdict), = arm.run(1.5)
     assert verdict.outcome is Outcome.SUCCEEDED
 

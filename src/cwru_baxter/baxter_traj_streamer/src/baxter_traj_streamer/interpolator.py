@@ -10,6 +10,7 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Ticker
 from baxter_interface import goal_loop
 from baxter_interface.resets import PUT_ELSEWHERE
+from joint_trajectory import rows_of_points
 
 from .action_server import TrajServer
 from .errors import GoalRefused
@@ -92,9 +93,7 @@ class Interpolator:
         if why:
             raise GoalRefused("robot", why)
         trajectory = handle.get_goal().trajectory
-        points = [(point.time_from_start.to_sec(), point.positions, point.velocities, point.accelerations)
-                  for point in trajectory.points]
-        return judge(trajectory.joint_names, points, self._limits, measured, self._settings)
+        return judge(trajectory.joint_names, rows_of_points(trajectory.points), self._limits, measured, self._settings)
 
     def _follow(self, handle):
         resets = self._robot.resets

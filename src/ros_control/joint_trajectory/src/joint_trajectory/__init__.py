@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Trajectories of joints: made of points, sampled, replaced in flight, watched. Free of ROS; time is an argument."""
+from .action_edge import (
+    ErrorCode,
+    GoalTolerances,
+    code_of_error,
+    code_of_outcome,
+    command_of,
+    rows_of_points,
+    tolerances_of,
+)
 from .command import Command, joint_indices
 from .errors import (
     AllPointsInPast,
@@ -34,8 +43,10 @@ __all__ = [
     "BeyondPosition",
     "BeyondVelocity",
     "Command",
+    "ErrorCode",
     "Follower",
     "GoalMonitor",
+    "GoalTolerances",
     "JointNamesError",
     "Limits",
     "MissingJoints",
@@ -54,10 +65,15 @@ __all__ = [
     "Verdict",
     "WrongSize",
     "bounds",
+    "code_of_error",
+    "code_of_outcome",
+    "command_of",
     "hold",
     "joint_indices",
     "merge_tolerances",
     "replace",
+    "rows_of_points",
     "smooth_velocities",
     "stop",
+    "tolerances_of",
 ]

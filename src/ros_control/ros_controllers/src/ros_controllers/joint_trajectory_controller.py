@@ -18,25 +18,21 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from controller_manager import EFFORT, POSITION, VELOCITY, Controller, ControllerError, Gains, Pid
 from controller_manager.pid_tuning import TunablePids
 from joint_trajectory import (
-    Command,
     Follower,
-    JointNamesError,
     Outcome,
     Tolerances,
     TrajectoryError,
     bounds,
+    code_of_error,
+    code_of_outcome,
+    command_of,
     joint_indices,
     merge_tolerances,
+    tolerances_of,
 )
 from loop_ros.action_server import ActionServer
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
-
-_ERROR_CODES = {
-    Outcome.SUCCEEDED: FollowJointTrajectoryResult.SUCCESSFUL,
-    Outcome.PATH_TOLERANCE_VIOLATED: FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
-    Outcome.GOAL_TOLERANCE_VIOLATED: FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED,
-}
 
 
 class JointTrajectoryController(Controller):
@@ -163,30 +159,28 @@ class JointTrajectoryController(Controller):
 
     def _on_goal(self, handle):
         if not self._runs:
-            self._reject(handle, FollowJointTrajectoryResult.INVALID_GOAL,
-                         "%s does not run; start it with the controller manager" % self.context.namespace)
+            self._reject(handle, "%s does not run; start it with the controller manager" % self.context.namespace)
             return
         goal = handle.goal
         before = self._follower.goal
         try:
-            tolerances = merge_tolerances(self._tolerances, self._joints, _rows(goal.path_tolerance),
-                                          _rows(goal.goal_tolerance), goal.goal_time_tolerance.to_sec())
+            tolerances = merge_tolerances(self._tolerances, self._joints, *tolerances_of(goal))
             # A joint that keeps up is still moving when the end is reached: it was told to stand only in this cycle.
             tolerances = tolerances._replace(goal_time_s=tolerances.goal_time_s + self._dt)
             self._follow(goal.trajectory, handle, tolerances)
-        except JointNamesError as error:
-            self._reject(handle, FollowJointTrajectoryResult.INVALID_JOINTS, str(error))
         except TrajectoryError as error:
-            self._reject(handle, FollowJointTrajectoryResult.INVALID_GOAL, str(error))
+            self._reject(handle, error)
         else:
             if before is not None:
                 before.cancel(text="another goal took its place")
             handle.accept()
             self._feedback_pace.restart()
 
-    def _reject(self, handle, code, text):
+    def _reject(self, handle, error):
+        """Turn a goal down; ``error``: an exception or a text."""
+        text = str(error)
         self.log.error("%s: goal rejected: %s" % (self.context.namespace, text))
-        handle.reject(FollowJointTrajectoryResult(code, text), text)
+        handle.reject(FollowJointTrajectoryResult(code_of_error(error), text), text)
 
     def _on_cancel(self, handle):
         if handle is self._follower.goal:
@@ -212,9 +206,7 @@ class JointTrajectoryController(Controller):
             joint_indices(message.joint_names, self._joints, self._allow_partial)
         if message.header.stamp:
             start_time = self._uptime + (message.header.stamp.to_sec() - self._time_s)
-        command = Command(message.joint_names, (
-            (point.time_from_start.to_sec(), point.positions, point.velocities, point.accelerations)
-            for point in message.points), start_time)
+        command = command_of(message, start_time)
         replacement = self._follower.accept(command, now, self._position, handle, tolerances)
         self._began = now if start_time is None else start_time
         if replacement is not None and replacement.late_s > 0.0:
@@ -224,7 +216,7 @@ class JointTrajectoryController(Controller):
     def _conclude(self, verdict):
         handle = self._follower.goal
         self._follower.release()
-        result = FollowJointTrajectoryResult(_ERROR_CODES[verdict.outcome], verdict.text)
+        result = FollowJointTrajectoryResult(code_of_outcome(verdict.outcome), verdict.text)
         if verdict.outcome is Outcome.SUCCEEDED:
             handle.succeed(result)
         else:
@@ -321,8 +313,3 @@ class EffortJointTrajectoryController(_PidTrajectoryController):
 def _take(pace, time_s):
     """Whether it is due; a rate of 0 Hz means never here."""
     return pace.rate > 0.0 and pace.take(time_s)
-
-
-def _rows(tolerances):
-    """``control_msgs/JointTolerance[]`` as rows for ``merge_tolerances``."""
-    return [(entry.name, entry.position, entry.velocity, entry.acceleration) for entry in tolerances]

@@ -12,6 +12,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from controller_manager import EFFORT, POSITION, VELOCITY, ControllerError
 from controller_manager.testing import FakeHardware, fake_context
+from joint_trajectory import ErrorCode
 from loop_ros.testing import FakeLog
 from ros_controllers.joint_trajectory_controller import (
     EffortJointTrajectoryController,
@@ -482,3 +483,10 @@ def test_query_tells_the_desired_state_at_a_time():
     arm.controller.stopping(arm.time)
     with pytest.raises(rospy.ServiceException, match="does not run"):
         ask(100.5)
+
+
+def test_error_codes_are_those_of_the_message():
+    assert {code.name: code.value for code in ErrorCode} == {
+        code.name: getattr(FollowJointTrajectoryResult, code.name) for code in ErrorCode}
+    assert len(ErrorCode) == sum(isinstance(value, int) for name, value in vars(FollowJointTrajectoryResult).items()
+                                 if name.isupper())

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Between control_msgs/FollowJointTrajectory and this package: rows of points and tolerances, codes of errors.
+
+Reads the fields of messages that it is given and imports none. Free of ROS.
+"""
+import enum
+from typing import NamedTuple
+
+from .command import Command
+from .errors import AllPointsInPast, JointNamesError
+from .goal_monitor import Outcome
+
+
+class ErrorCode(enum.IntEnum):
+    """``error_code`` of control_msgs/FollowJointTrajectoryResult."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+
+
+_OF_OUTCOME = {
+    Outcome.SUCCEEDED: ErrorCode.SUCCESSFUL,
+    Outcome.PATH_TOLERANCE_VIOLATED: ErrorCode.PATH_TOLERANCE_VIOLATED,
+    Outcome.GOAL_TOLERANCE_VIOLATED: ErrorCode.GOAL_TOLERANCE_VIOLATED,
+}
+
+
+class GoalTolerances(NamedTuple):
+    """What a goal asks for instead of the defaults, see :func:`joint_trajectory.merge_tolerances`.
+
+    path, goal: rows of (joint name, position, velocity, acceleration); goal_time_s [s].
+    """
+
+    path: tuple | list = ()
+    goal: tuple | list = ()
+    goal_time_s: float = 0.0
+
+
+def code_of_outcome(outcome):
+    """Return the ErrorCode of a goal that ended with an Outcome, a plain number."""
+    return _OF_OUTCOME[outcome].value
+
+
+def code_of_error(error, start_was_given=False):
+    """Return the ErrorCode of a goal that is refused for ``error``, an exception or a text; a plain number.
+
+    ``start_was_given``: the goal's header has a stamp, which is to blame where all points are in the past.
+    """
+    if isinstance(error, JointNamesError):
+        return ErrorCode.INVALID_JOINTS.value
+    if isinstance(error, AllPointsInPast) and start_was_given:
+        return ErrorCode.OLD_HEADER_TIMESTAMP.value
+    return ErrorCode.INVALID_GOAL.value
+
+
+def rows_of_points(points):
+    """Return trajectory_msgs/JointTrajectoryPoint[] as rows of (time from start [s], positions, velocities,
+    accelerations).
+    """
+    return [(point.time_from_start.to_sec(), point.positions, point.velocities, point.accelerations)
+            for point in points]
+
+
+def command_of(trajectory, start_time=None):
+    """Return the :class:`Command` of a trajectory_msgs/JointTrajectory. Raises TrajectoryError, as Command does."""
+    return Command(trajectory.joint_names, rows_of_points(trajectory.points), start_time)
+
+
+def tolerances_of(goal):
+    """Return the :class:`GoalTolerances` of a control_msgs/FollowJointTrajectoryGoal."""
+    return GoalTolerances(_rows(goal.path_tolerance), _rows(goal.goal_tolerance), goal.goal_time_tolerance.to_sec())
+
+
+def _rows(tolerances):
+    return [(entry.name, entry.position, entry.velocity, entry.acceleration) for entry in tolerances]
