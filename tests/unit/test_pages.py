@@ -149,3 +149,14 @@ def test_pains_page_answers_forty_rows_by_packages_and_tests_that_exist():
     names = {Path(path).name for path in tracked("*.test") + tracked("*.py")}
     named = set(re.findall(r"`([a-z]\w*\.(?:test|py))`", text)) - {"enable_robot.py"}
     assert named and named <= names
+
+
+def test_architecture_answers_where_to_look():
+    """Each answer is a file, and a name that is in it."""
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    table = text.split("## Where to look")[1].split("\n## ")[0]
+    answers = re.findall(r"^\| [^|]+\? \| \[([^]]+)\]\(([^)]+)\), `([^`]+)` \| [^|]+ \|$", table, re.MULTILINE)
+    assert len(answers) == table.count("\n| ") - 1 >= 10
+    for label, link, name in answers:
+        assert link.endswith("/" + label)
+        assert re.search(r"\b%s\b" % re.escape(name), (ROOT / "docs" / link).read_text(encoding="utf-8")), name
