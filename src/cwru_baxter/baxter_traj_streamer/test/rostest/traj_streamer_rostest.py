@@ -118,7 +118,7 @@ class TrajStreamerTest(FakeRobotTest):
         self.set_enabled(False)
         state, text, _ = self.client.end()
         self.assertEqual(state, GoalStatus.ABORTED)
-        self.assertIn("disabled", text)
+        self.assertIn("not enabled", text)
 
     def test_the_other_version_of_the_action_is_refused_with_a_line_that_says_which_to_use(self):
         from baxter_traj_streamer.msg import trajActionGoal
