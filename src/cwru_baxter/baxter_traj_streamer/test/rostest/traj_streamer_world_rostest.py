@@ -95,7 +95,7 @@ class TrajInTheWorldTest(unittest.TestCase):
         robot = client.streamer.robot
         joint = ["right_e1"]
         for interrupt, word in ((lambda: stop.publish(Empty()), "stopped"),
-                                (lambda: enable.publish(Bool(data=False)), "disabled")):
+                                (lambda: enable.publish(Bool(data=False)), "not enabled")):
             begin = client.here(joint)[0]
             way = -0.8 if begin > 1.2 else 0.8
             goal = client.send(joint_trajectory(joint, [0.0, 4.0], [[begin], [begin + way]]))

@@ -54,7 +54,7 @@ def test_senseless_commands_are_refused(command, args, text):
 
 @pytest.mark.parametrize("command, args", [("go", '{"position": 0}'), ("grip", ""), ("release", ""), ("calibrate", "")])
 def test_disabled_robot_moves_no_finger(command, args):
-    with pytest.raises(CommandRefused, match="disabled"):
+    with pytest.raises(CommandRefused, match="not enabled"):
         take(ElectricGripper(0.02, 1.0), command, args, enabled=False)
 
 

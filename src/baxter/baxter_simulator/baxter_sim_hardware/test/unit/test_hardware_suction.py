@@ -86,7 +86,7 @@ def test_senseless_commands_are_refused(command, args, text):
 
 
 def test_disabled_robot_sucks_not():
-    with pytest.raises(CommandRefused, match="disabled"):
+    with pytest.raises(CommandRefused, match="not enabled"):
         SuctionGripper().take("go", "", "", 0, False)
 
 
@@ -228,7 +228,7 @@ def test_the_valves_show_what_commands_do(lab):
 def test_a_disabled_robot_opens_no_valve(lab):
     lab.enable(False)
     assert switch(lab, "left_suck", True) == 0
-    assert "disabled" in lab.log.lines[-1]
+    assert "not enabled" in lab.log.lines[-1]
     assert switch(lab, "left_suck", False) == 0
 
 
