@@ -10,7 +10,7 @@ import xacro
 from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics import Chain
 from baxter_sim_kinematics.bullet_checker import BulletChecker
-from gazebo_ros.resources import ResourceFinder
+from model_files.resources import ResourceFinder
 from urdf_model import Robot, parse_urdf
 
 

@@ -14,8 +14,8 @@ from labs import Lab
 from sensor_msgs.msg import Image, PointCloud2
 
 import xacro
-from gazebo_ros.resources import ResourceFinder
 from lab_testing.waiting import wait_until
+from model_files.resources import ResourceFinder
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole

@@ -24,7 +24,7 @@ from baxter_interface.joint_motion import Move
 from baxter_sim_examples import BASE_HEIGHT_M, BLOCK_SIZE_M, TABLE_XY_M, BlockLost, Trial, block_urdf, pick_and_place
 from baxter_sim_kinematics import Chain, NoSolution, pose_from_quaternion, solve
 from bullet_sim import Pose
-from gazebo_ros.resources import model_folders
+from model_files.resources import model_folders
 from sdf_model import ModelFolders, parse_sdf_model
 from urdf_model import parse_urdf
 

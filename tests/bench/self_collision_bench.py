@@ -13,7 +13,7 @@ import xacro
 from baxter_model import SIDES, joint_names, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
-from gazebo_ros.resources import ResourceFinder
+from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 
 NAMES = [name for side in SIDES for name in joint_names(side)]

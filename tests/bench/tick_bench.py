@@ -15,11 +15,11 @@ from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
 from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
 from gazebo_ros.publications import Publications
-from gazebo_ros.resources import ResourceFinder
 from gazebo_ros.simulation import HostedPlugin, Simulation
 from loop_ros.faults import Faults
 from loop_ros.mailbox import Queue, RequestBoard
 from loop_ros.publisher import LoopPublisher, PublisherHub
+from model_files.resources import ResourceFinder
 from urdf_model import Box, Inertial, Link, Robot, Shape, parse_urdf
 from world_picture.snapshot import SnapshotWriter
 

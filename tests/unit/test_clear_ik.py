@@ -9,7 +9,7 @@ from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics import Chain, NoSolution, Reason, solve
 from baxter_sim_kinematics.bullet_checker import BulletChecker
 from bullet_sim import World
-from gazebo_ros.resources import ResourceFinder
+from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 from urdf_model.transforms import rigid
 

@@ -111,9 +111,12 @@ def test_a_package_below_imports_none_above():
     """What stands at the bottom of the house, and what must not be needed for a physical robot."""
     product = {(package, needed) for package, file, needed in USES if not is_in_tests(file)}
     assert {needed for package, needed in product if package == "baxter_model"} & set(PACKAGES) <= {"urdf_model"}
-    for low, below in (("loop_ros", {"rospy_limits", "sim_time"}), ("world_picture", {"bullet_sim", "urdf_model"})):
+    for low, below in (("loop_ros", {"rospy_limits", "sim_time"}), ("world_picture", {"bullet_sim", "urdf_model"}),
+                       ("model_files", {"urdf_model"})):
         assert {needed for package, needed in product if package == low} & set(PACKAGES) == below
-    simulator = {"baxter_sim_hardware", "gazebo_ros_control", "baxter_gazebo"}
+    viewers = {"sensor_renderer", "lab_display"}
+    assert {pair for pair in product if pair[0] in viewers and pair[1] == "gazebo_ros"} == set()
+    simulator = {"gazebo_ros", "baxter_sim_hardware", "gazebo_ros_control", "baxter_gazebo"}
     robot_side = {"baxter_model", "baxter_interface", "baxter_tools", "baxter_examples", "baxter_sim_kinematics"}
     assert {pair for pair in product if pair[0] in robot_side and pair[1] in simulator} == set()
 

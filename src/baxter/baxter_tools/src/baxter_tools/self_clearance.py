@@ -8,7 +8,7 @@ import numpy as np
 from baxter_model.description import finger_openings
 from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from bullet_sim import World
-from gazebo_ros.resources import ResourceFinder
+from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 
 

@@ -21,7 +21,6 @@ from gazebo_ros.model_plugin import PluginError
 from gazebo_ros.pacing import wake_on_time
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.publications import Publications
-from gazebo_ros.resources import ResourceFinder, model_folders, model_sizes, resource_folders
 from gazebo_ros.simulation import Simulation
 from gazebo_ros.spawning import Library, Spawner
 from gazebo_ros.world_file import WorldFileError, find_world, read_world
@@ -33,6 +32,7 @@ from loop_ros.mailbox import RequestBoard
 from loop_ros.publisher import PublisherHub
 from loop_ros.ros_objects import RosObjects
 from loop_ros.subscriber import InletHub
+from model_files.resources import ResourceFinder, model_folders, model_sizes, resource_folders
 from rospy_limits.node import limit_ports
 from sdf_model import ModelFolders
 from world_picture import snapshot

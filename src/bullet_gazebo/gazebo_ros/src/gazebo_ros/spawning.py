@@ -20,9 +20,9 @@ from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
 from gazebo_ros.model_plugin import PluginContext, PluginError, PluginHost, PluginSource
 from gazebo_ros.plugin_table import PluginTable
-from gazebo_ros.resources import ResourceFinder
 from gazebo_ros.simulation import HostedPlugin
 from loop_ros.faults import SURVIVED, described
+from model_files.resources import ResourceFinder
 from sdf_model import ModelFolders, SdfError, parse_sdf_model
 from urdf_model import Mesh, OutOfBounds, Plane, UrdfError, bounds, drawing_urdf, merge_fixed, parse_urdf
 from world_picture.shared_picture import NoPicture, PictureWriter

@@ -60,7 +60,7 @@ def _keep_the_output_for_python():
 
 
 def _show(window, stop):
-    from gazebo_ros.resources import ResourceFinder
+    from model_files.resources import ResourceFinder
     from world_picture.drawing import DrawingCache
 
     reader = _wait_for_snapshot(stop)

@@ -9,11 +9,12 @@ import pytest
 from gazebo_ros import urdf_extras, world_file
 from gazebo_ros.spawning import is_floor
 from gazebo_ros.urdf_extras import ExtrasError
+from model_files.resources import model_folders
 from sdf_model import ModelFolders
 from urdf_model import parse_urdf
 
 WORLDS = Path(__file__).resolve().parents[2] / "worlds"
-MODELS = ModelFolders([WORLDS.parent / "models"])
+MODELS = ModelFolders(model_folders())
 URDF = """<?xml version="1.0"?>
 <robot name="arm">
   <link name="base"/><link name="tip"/>

@@ -11,7 +11,7 @@ import rospkg
 import rospy
 import yaml
 
-from gazebo_ros.resources import ResourceFinder
+from model_files.resources import ResourceFinder
 from rospy_limits.node import limit_ports
 from sensor_renderer.errors import RenderingError, SensorError
 from sensor_renderer.gl_renderer import GlRenderer

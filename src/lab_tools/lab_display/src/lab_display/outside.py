@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 
-from gazebo_ros.resources import ResourceFinder
+from model_files.resources import ResourceFinder
 from sensor_renderer.errors import RenderingError
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror

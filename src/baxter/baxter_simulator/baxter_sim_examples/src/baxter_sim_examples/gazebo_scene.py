@@ -24,7 +24,7 @@ class GazeboScene:
 
     def __enter__(self):
         self._remove()
-        table = Path(rospkg.RosPack().get_path("gazebo_ros")) / "models" / TABLE / "model.sdf"
+        table = Path(rospkg.RosPack().get_path("model_files")) / "models" / TABLE / "model.sdf"
         self._spawn("sdf", TABLE, table.read_text(), Pose(Point(*TABLE_XY_M, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0)))
         self._spawn("urdf", BLOCK, block_urdf(self._trial.mass_kg, self._trial.friction), _pose(self._trial.source))
         return self

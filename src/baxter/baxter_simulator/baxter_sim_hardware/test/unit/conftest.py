@@ -14,8 +14,8 @@ from baxter_model import JOINTS, SIDES, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
 from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
-from gazebo_ros.resources import ResourceFinder
 from loop_ros.testing import FakeLog, FakeRos
+from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 
 PACKAGE = Path(__file__).resolve().parents[2]

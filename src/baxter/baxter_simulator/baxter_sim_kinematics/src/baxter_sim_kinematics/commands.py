@@ -174,7 +174,7 @@ def _ik(parser, options):
 
 def _self_checker(robot):
     from baxter_sim_kinematics.bullet_checker import self_checker
-    from gazebo_ros.resources import ResourceFinder
+    from model_files.resources import ResourceFinder
     return self_checker(robot, ResourceFinder())
 
 

@@ -13,7 +13,7 @@ from urdf_model import XmlRefused, parse_xml
 def model_folders(packages=None, environ=os.environ):
     """Folders that ``model://NAME`` is looked for in, the user's own first, ours last. ``packages``: RosPack."""
     packages = packages or rospkg.RosPack()
-    ours = Path(packages.get_path("gazebo_ros")) / "models"
+    ours = Path(packages.get_path("model_files")) / "models"
     return [*_listed(environ, "GAZEBO_MODEL_PATH"), *exported_folders("gazebo_model_path", packages),
             Path.home() / ".gazebo" / "models", ours]
 
@@ -26,7 +26,7 @@ def resource_folders(packages=None, environ=os.environ):
 
 def model_sizes(packages):
     """What stands in for models of Gazebo's library, as :class:`sdf_model.ModelFolders` wants it."""
-    path = Path(packages.get_path("gazebo_ros")) / "config" / "model_sizes.yaml"
+    path = Path(packages.get_path("model_files")) / "config" / "model_sizes.yaml"
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
 

@@ -5,7 +5,7 @@ import os
 import pytest
 import rospkg
 
-from gazebo_ros.resources import ResourceFinder, exported_folders, model_folders, model_sizes, resource_folders
+from model_files.resources import ResourceFinder, exported_folders, model_folders, model_sizes, resource_folders
 from sdf_model import ModelFolders, parse_sdf_model
 from urdf_model import merge_fixed
 
