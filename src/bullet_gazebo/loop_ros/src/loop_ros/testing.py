@@ -194,7 +194,7 @@ class FakePublisher:
             message.header.seq = self._seq
         buffer = io.BytesIO()
         message.serialize(buffer)
-        received = type(message)().deserialize(buffer.getvalue())
+        received = self.msg_class().deserialize(buffer.getvalue())
         if self._sent.heard:
             self._sent.send(received)
         if self.keeps_last:
