@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Baxter's brain costs: CPU time a tick of update() and publish(), on the real physics, without a master."""
+"""Cost of Baxter's control logic: CPU time of update() and publish() a tick, on the real physics, without a master."""
 import importlib.util
 import time
 from pathlib import Path

@@ -107,9 +107,9 @@ class FakeGripper:
 
     def _publish(self):
         arguments = time.monotonic(), SIDE, SimpleNamespace(position=())
-        properties = copy.copy(self._topics.makers["gripper_properties"](*arguments))
+        properties = copy.copy(self._topics.publishers["gripper_properties"](*arguments))
         properties.firmware_date = self._knobs["firmware_date"] or properties.firmware_date
-        state = self._topics.makers["gripper_state"](*arguments)
+        state = self._topics.publishers["gripper_state"](*arguments)
         if not self._knobs["acknowledges"]:
             state.command, state.command_sender, state.command_sequence = "", "", 0
         self._properties.publish(properties)
@@ -126,7 +126,7 @@ class FakeGripper:
     def _take(self, key, message):
         with self._lock:
             try:
-                self._topics.takers[key](SIDE, message, time.monotonic())
+                self._topics.handlers[key](SIDE, message, time.monotonic())
             except CommandRefused as refusal:
                 rospy.logwarn("%s", refusal)
 

@@ -70,7 +70,8 @@ class FakeParts:
         self._joint = PanJoint()
         # The robot is enabled here.
         self._head = HeadTopics(self._joint, SimpleNamespace(enabled=True), 1.0 / RATE_HZ)
-        self._makers, self._takers = {**panel.makers, **self._head.makers}, {**panel.takers, **self._head.takers}
+        self._publishers = {**panel.publishers, **self._head.publishers}
+        self._handlers = {**panel.handlers, **self._head.handlers}
         self._nods_on = False
         self._published = [
             *(("digital_io", name, self._publisher("digital_io/%s/state" % name, DigitalIOState)) for name in DIGITAL),
@@ -107,7 +108,7 @@ class FakeParts:
                 self._head.update()
                 now = time.monotonic()
                 for key, part, publisher in self._published:
-                    message = self._makers[key](now, part, self._joint)
+                    message = self._publishers[key](now, part, self._joint)
                     if key == "head_state":
                         self._nods_on = not self._knobs["nod_ends"] and (self._nods_on or message.isNodding)
                         message.isNodding |= self._nods_on
@@ -120,7 +121,7 @@ class FakeParts:
             if not self._knobs[knob]:
                 return
             try:
-                self._takers[key](None, message, time.monotonic())
+                self._handlers[key](None, message, time.monotonic())
             except CommandRefused as refusal:
                 rospy.logwarn("%s", refusal)
 

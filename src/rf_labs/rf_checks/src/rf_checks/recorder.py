@@ -151,7 +151,7 @@ class Recorder(ModelPlugin):
             return "the robot's plugin is gone"
         self._is_ordered = True
         try:
-            self._robot.start_over(time_s)
+            self._robot.start_over()
             self._handlers[_RESET](EmptyRequest())
             answer = self._handlers[_CONFIGURE](SetModelConfigurationRequest(
                 self._model.name, "robot_description", order["names"], order["positions"]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Baxter's brain: who may move the arms, and what they do when nobody may."""
+"""Baxter's control logic: arbitrates arm commands and defines the behaviour while disabled."""
 from baxter_model.readiness import NOT_ENABLED
 
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms

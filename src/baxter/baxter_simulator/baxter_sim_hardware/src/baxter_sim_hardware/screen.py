@@ -5,10 +5,8 @@ import numpy as np
 from urdf_model import Box
 
 from .errors import CommandRefused
-from .topics.row import Topic
 
 WIDTH, HEIGHT = 1024, 600
-SCREEN_RATE_HZ = 10.0
 #: The link whose only shape is the glass, a thin box that looks along its z.
 GLASS_LINK = "display"
 # How far before the glass pictures are, so that nobody sees glass instead [m].
@@ -17,13 +15,6 @@ _BEFORE_M = 0.0005
 # clients mean blue first.
 ENCODINGS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "8UC3": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)),
              "bgra8": (4, (2, 1, 0)), "8UC4": (4, (2, 1, 0)), "mono8": (1, (0, 0, 0)), "8UC1": (1, (0, 0, 0))}
-
-SCREEN_TOPICS = (
-    Topic("xdisplay", "xdisplay", "sensor_msgs/Image", None,
-          "a picture of up to 1024 x 600 for the head's screen, from its upper left corner: rgb8, bgr8, rgba8, bgra8, "
-          "mono8, 8UC1, 8UC3, 8UC4; it stays until the next one"),
-    Topic("screen", "sim/screen", "sensor_msgs/Image", SCREEN_RATE_HZ, "what the screen shows, 1024 x 600, rgb8"),
-)
 
 
 def on_glass(robot):

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Code of the robot that raises where nobody thought it could: at every place where a message or a tick enters."""
-import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -99,9 +98,9 @@ def test_no_gripper_command_ends_the_robot(loop):
 
 
 def test_a_handler_that_raises_costs_its_message_only(loop):
-    boxes, send = loop.plugin._letterboxes, loop.lab.send
-    for queue, (place, key, part, _) in list(boxes.items()):
-        boxes[queue] = place, key, part, fail
+    topics, send = loop.plugin._handling._topics, loop.lab.send
+    for queue, (place, key, component, _) in list(topics.items()):
+        topics[queue] = place, key, component, fail
     for row, topic in INPUTS:
         loop.lab.faults.clear()
         send(topic, roslib.message.get_message_class(row.type)())
@@ -113,18 +112,19 @@ def test_a_handler_that_raises_costs_its_message_only(loop):
 
 
 def test_a_message_that_cannot_be_made_leaves_the_others(loop):
-    outputs = loop.plugin._outputs
+    publishing, groups = loop.plugin._publishing, loop.plugin._publishing._groups
     for topic in OUTPUTS:
         name = loop.lab.context.resolve(topic)
-        loop.plugin._outputs = [(schedule, [(fail if publisher.topic == name else make, part, publisher)
-                                            for make, part, publisher in topics]) for schedule, topics in outputs]
+        publishing._groups = {
+            rate: (schedule, [(fail if publisher.topic == name else function, component, publisher)
+                              for function, component, publisher in topics])
+            for rate, (schedule, topics) in groups.items()}
         for outbox in loop.lab.outboxes.values():
             outbox.messages.clear()
             outbox.has_listeners = True
         loop.lab.faults.clear()
-        for schedule, _ in outputs:
-            schedule.set_rate(schedule.rate_hz)  # as if nothing had been published so far
-        loop.plugin._idle_until_s = -math.inf
+        for rate, (schedule, _) in groups.items():
+            publishing.set_rate(rate, schedule.rate_hz)  # as if nothing had been published so far
         loop.run(TICK_S)
         assert [where for where, _ in loop.lab.faults] == ["publishing " + name]
         assert [name for name in OUTPUTS if not loop.lab.outboxes[name].messages] == [topic]

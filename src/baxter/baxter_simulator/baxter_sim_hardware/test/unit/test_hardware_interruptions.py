@@ -84,13 +84,13 @@ def put_joints(lab):
 
 
 def estop(lab):
-    lab.plugin._press_estop(True)
+    lab.plugin._robot.press_estop(True)
 
 
 def estop_and_back(lab):
     estop(lab)
     lab.run(0.1)
-    lab.plugin._press_estop(False)
+    lab.plugin._robot.press_estop(False)
     lab.run(0.1)
     lab.send("set_super_reset", Empty())
     lab.run(0.1)
@@ -139,7 +139,7 @@ def as_new(lab):
     # Making messages for nobody takes most of a tick.
     for topic, outbox in lab.outboxes.items():
         outbox.has_listeners = topic == "state"
-    lab.plugin._press_estop(False)
+    lab.plugin._robot.press_estop(False)
     lab.send("set_super_reset", Empty())
     lab.run(0.01)
     reset_world(lab)
@@ -186,7 +186,7 @@ def test_nothing_moves_after_an_interruption_until_a_new_command(one_lab, motion
     lab.run(0.002)
     assert_rests(lab, brakes, "%s, %s" % (motion, interruption))
     # Enabled again, it stays where it is; and then it obeys.
-    lab.plugin._press_estop(False)
+    lab.plugin._robot.press_estop(False)
     lab.send("set_super_reset", Empty())
     lab.run(0.01)
     lab.enable()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the plugin publishes: rates, names, fields; and what it makes of messages."""
+import inspect
 import random
 from pathlib import Path
 
@@ -147,6 +148,32 @@ def test_state_follows_enable_stop_reset(make_lab):
     assert fields()[1:3] == (False, True)
 
 
+def test_messages_of_one_tick_are_handled_in_the_order_of_the_table(make_lab):
+    """However they came in: reset, enable, stop, then joint commands."""
+    lab = make_lab()
+    lab.command(1, lab.position + 0.1)
+    lab.send("set_super_enable", Bool(True))
+    lab.run(0.002)
+    assert not any("ignored" in line for line in lab.log.lines)  # it met an enabled robot
+    lab.send("set_super_stop", Empty())
+    lab.command(1, lab.position + 0.1)
+    lab.send("set_super_enable", Bool(True))
+    lab.send("set_super_reset", Empty())
+    lab.run(0.02)
+    assert lab.last("state").stopped
+    assert sum("joint command ignored: the robot is not enabled" in line for line in lab.log.lines) == 2  # one a limb
+    assert list(interface.HANDLED_LAST) == [
+        "set_super_reset", "set_super_enable", "set_super_stop", "joint_command"]
+
+
+def test_every_function_of_a_row_is_a_method_for_its_kind_of_topic():
+    assert len({row.key for row in interface.TOPICS}) == len(interface.TOPICS)
+    for part in interface.PARTS:
+        for row in part.TOPICS:
+            latched = row.rate == interface.LATCHED
+            assert len(inspect.signature(row.function).parameters) == (2 if latched else 4), row.key
+
+
 def test_enable_parameter_enables_from_the_first_message(make_lab):
     lab = make_lab(parameters={"enable": True})
     lab.run(0.002)
@@ -171,7 +198,7 @@ def test_endpoint_twist_is_the_tips_velocity(lab, side):
     assert message.header.stamp.to_sec() == pytest.approx(lab.world.time_s)
     index = lab.model.index([name for name in NAMES if name.startswith(side)])
     position, velocity, _ = lab.model.read_joints()
-    jacobian = lab.plugin._chains[side].jacobian(position[index])
+    jacobian = lab.plugin._arms._chains[side].jacobian(position[index])
     linear, angular = message.twist.linear, message.twist.angular
     twist = np.array((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
     np.testing.assert_allclose(twist, jacobian @ velocity[index], atol=1e-6)
@@ -286,7 +313,7 @@ def test_starting_over_leaves_nothing_of_what_was_set(make_lab):
     lab.send("limb/left/joint_command_timeout", Float64(9.0))
     lab.send("set_super_stop", Empty())
     lab.run(0.01)
-    lab.plugin.start_over(lab.world.time_s)
+    lab.plugin.start_over()
     arms = lab.plugin._baxter.arms
     assert (arms.speed_ratio("left"), arms.timeout("left")) == (1.0, 0.2)
     assert lab.plugin._baxter.state.state is State.DISABLED

@@ -8,7 +8,6 @@ motion explain, or its hand more than it may carry.
 """
 from baxter_model import JOINTS, is_part_of_arm
 from baxter_model.self_collision import BODY
-from baxter_sim_hardware.topics.row import STATE_RATE_HZ, Topic
 
 SUPPRESSION_S = 0.6  # [simulated s] the physical robot's: how long one suppress message counts
 AVOIDANCE, BODY_AVOIDANCE = "suppress_collision_avoidance", "suppress_body_avoidance"
@@ -26,18 +25,6 @@ SUPPRESSIONS = {
 # parameters. It gives no figure for w2; the wrist's others stand in.
 SQUISH_NM = dict(zip(JOINTS, (16.0, 24.0, 16.0, 16.0, 7.0, 7.0, 7.0), strict=True))
 HAND_FORCE_N, HAND_TORQUE_NM = 100.0, 30.0
-
-COLLISION_TOPICS = (
-    Topic("collision_avoidance_state", "limb/{limb}/collision_avoidance_state",
-          "baxter_core_msgs/CollisionAvoidanceState", STATE_RATE_HZ,
-          "the links of the robot that this arm touches, and whether the other arm is among them"),
-    Topic("collision_detection_state", "limb/{limb}/collision_detection_state",
-          "baxter_core_msgs/CollisionDetectionState", STATE_RATE_HZ,
-          "whether a joint feels more than 16 Nm (s0, e0, e1), 24 Nm (s1), 7 Nm (wrist) from outside, or the hand more "
-          "than 100 N or 30 Nm"),
-    *(Topic(kind, "limb/{limb}/" + kind, "std_msgs/Empty", None, "for 0.6 s: " + meaning)
-      for kind, meaning in SUPPRESSIONS.items()),
-)
 
 
 class Suppressions:

@@ -6,12 +6,9 @@ rest: it succeeds when what they exert is, on average, what their model says, an
 """
 import numpy as np
 
-from baxter_sim_hardware.topics.row import Topic
-
 from .collision import SQUISH_NM
 
 STATUS_RATE_HZ = 10.0
-UPDATER_RATE_HZ = 1.0
 KEEP_ALIVE_S = 1.5  # [simulated s] the physical robot wants a message faster than 1 Hz; clients send two a second
 DURATION_S = 5.0  # [simulated s] of a procedure
 # A joint of an arm on which nothing leans differs from its model by less than this part of what counts as a squeeze.
@@ -19,29 +16,8 @@ TOLERANCE = 0.1
 NOT_COMPLETE, FAILURE, SUCCESS = 0, 1, 2  # RobustControllerStatus.complete
 
 PROCEDURES = {"Tare": "tares", "CalibrateArm": "calibrates"}  # by the name of its topics
-TYPES = {"Tare": "TareEnable", "CalibrateArm": "CalibrateArmEnable"}
 
 UPDATER_IDLE, UPDATER_INVALID = 0, 1  # UpdateStatus.status
-
-MAINTENANCE_TOPICS = (
-    *(Topic("procedure_status_" + name, "/robustcontroller/{limb}/%s/status" % name,
-            "baxter_core_msgs/RobustControllerStatus", STATUS_RATE_HZ,
-            "how the procedure that %s the arm is getting on" % verb) for name, verb in PROCEDURES.items()),
-    Topic("plugins_loaded", "/robustcontroller/{limb}/rc_plugins_loaded", "std_msgs/Bool", UPDATER_RATE_HZ, "true"),
-    Topic("update_sources", "/usb/update_sources", "baxter_maintenance_msgs/UpdateSources", UPDATER_RATE_HZ,
-          "none: no stick is plugged into a simulated robot"),
-    Topic("usb_ready", "/usb/ready", "std_msgs/Bool", UPDATER_RATE_HZ, "false: no stick"),
-    Topic("updater_status", "/updater/status", "baxter_maintenance_msgs/UpdateStatus", UPDATER_RATE_HZ,
-          "idle, or invalid after an unknown update was to be started"),
-    Topic("update_status", "/update/status", "std_msgs/Int32", UPDATER_RATE_HZ, "the same as a number"),
-    Topic("update_progress", "/update/progress", "std_msgs/Int32", UPDATER_RATE_HZ, "0 %"),
-    *(Topic("procedure_enable_" + name, "/robustcontroller/{limb}/%s/enable" % name,
-            "baxter_maintenance_msgs/" + TYPES[name], None,
-            "starts and keeps alive (at least once in 1.5 s) or ends the procedure that %s the arm" % verb)
-      for name, verb in PROCEDURES.items()),
-    Topic("updater_start", "/updater/start", "std_msgs/String", None, "starts an update by its id; none is known"),
-    Topic("updater_stop", "/updater/stop", "std_msgs/Empty", None, "back to idle"),
-)
 
 
 class Procedure:

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from baxter_sim_hardware.errors import CommandRefused
-from baxter_sim_hardware.topics.row import STATE_RATE_HZ, Topic
 
 # Infrared range of a hand: one ray along x of its frame [m, rad]; the physical robot's figures.
 RANGE_MIN_M, RANGE_MAX_M, RANGE_FIELD_RAD = 0.004, 0.4, 0.0872664600611
@@ -17,36 +16,10 @@ RANGE_NOTHING_M = 65.535  # what it reports where it sees nothing
 SONAR_COUNT = 12
 SONAR_MIN_M, SONAR_MAX_M = 0.05, 10.0
 SONAR_ELEVATIONS_RAD = (math.radians(-7.5), math.radians(7.5))
-SONAR_RATE_HZ = 10.0
 ALL_SONARS = (1 << SONAR_COUNT) - 1
 LIGHTS_OVERRIDE = 0x8000  # of set_lights: the low bits are the lights; without, each one shows that its sonar hears
 LIGHTS_S = 0.2  # [simulated s] one set_lights counts for so long; clients repeat it at about 100 Hz
 MAX_LEVEL = 100.0
-
-SENSOR_TOPICS = (
-    Topic("hand_range", "range/{limb}_hand_range/state", "sensor_msgs/Range", STATE_RATE_HZ,
-          "infrared, 0.004 to 0.4 m along x of `<limb>_hand_range`; 65.535 m where it sees nothing"),
-    Topic("hand_range_scan", "/sim/laserscan/{limb}_hand_range/state", "sensor_msgs/LaserScan", STATE_RATE_HZ,
-          "the same as a scan of one ray, as the vendor's simulator has it; `inf` where it sees nothing"),
-    Topic("accelerometer", "accelerometer/{limb}_accelerometer/state", "sensor_msgs/Imu", STATE_RATE_HZ,
-          "acceleration less gravity in `<limb>_hand_accelerometer` [m/s^2]: 9.81 upwards at rest; no rates, no "
-          "orientation"),
-    Topic("sonar", "sonar/head_sonar/state", "sensor_msgs/PointCloud", SONAR_RATE_HZ,
-          "a point in `sonar_ring` for each of the 12 sonars that is switched on and hears something within 10 m; "
-          "channels SensorId, Distance [m]"),
-    Topic("sonars_enabled", "sonar/head_sonar/sonars_enabled", "std_msgs/UInt16", SONAR_RATE_HZ,
-          "a bit for each sonar; 4095, all on, at the start"),
-    Topic("sonar_lights", "sonar/head_sonar/lights/state", "std_msgs/UInt16", SONAR_RATE_HZ,
-          "a bit for each light: those that `set_lights` asks for, else those whose sonar hears something"),
-    Topic("sonar_green_level", "sonar/head_sonar/lights/green_level", "std_msgs/Float32", SONAR_RATE_HZ, "0 to 100"),
-    Topic("sonar_red_level", "sonar/head_sonar/lights/red_level", "std_msgs/Float32", SONAR_RATE_HZ, "0 to 100"),
-    Topic("set_sonars_enabled", "sonar/head_sonar/set_sonars_enabled", "std_msgs/UInt16", None,
-          "a bit for each sonar, 0 to 4095"),
-    Topic("set_lights", "sonar/head_sonar/lights/set_lights", "std_msgs/UInt16", None,
-          "for 0.2 s: bit 15 and a bit for each light to be lit"),
-    Topic("set_green_level", "sonar/head_sonar/lights/set_green_level", "std_msgs/Float32", None, "0 to 100"),
-    Topic("set_red_level", "sonar/head_sonar/lights/set_red_level", "std_msgs/Float32", None, "0 to 100"),
-)
 
 
 def range_from_hit(distance):

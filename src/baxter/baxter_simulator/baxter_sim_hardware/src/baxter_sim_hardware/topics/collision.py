@@ -9,23 +9,30 @@ from baxter_sim_hardware.arms import collision
 from sim_time.pace import Schedule
 from sim_time.stamps import stamp
 
+from .row import STATE_RATE_HZ, Part, Topic
+
 CHECK_RATE_HZ = 100.0  # how often the arms look what they touch, and what is suppressed
 
 
-class CollisionTopics:
-    """makers and takers: as in PanelTopics. world, model: of bullet_sim; arms: `arms.Arms`; feel: function
+def _suppress(kind):
+    def handle(part, side, msg, time_s):
+        part.suppressions[side].take(kind, time_s)
+
+    return handle
+
+
+class CollisionTopics(Part):
+    """world, model: of bullet_sim; arms: `arms.Arms`; feel: function
     (side, snapshot) -> (torques (7,), wrench (6,)) from outside; is_squeezed: function(side) -> whether its cuff is."""
 
     def __init__(self, world, model, arms, feel, is_squeezed):
         self._world, self._model, self._arms = world, model, arms
         self._feel, self._is_squeezed = feel, is_squeezed
-        self._suppressions = {side: collision.Suppressions() for side in SIDES}
+        self.suppressions = {side: collision.Suppressions() for side in SIDES}
         self._schedule = Schedule(CHECK_RATE_HZ)
-        self.makers = {"collision_avoidance_state": self._avoidance, "collision_detection_state": self._detection}
-        self.takers = {kind: self._taker(kind) for kind in collision.SUPPRESSIONS}
 
     def reset(self):
-        for suppressions in self._suppressions.values():
+        for suppressions in self.suppressions.values():
             suppressions.reset()
 
     def update(self, time_s, enabled, position, velocity):
@@ -33,14 +40,11 @@ class CollisionTopics:
         if not self._schedule.due(time_s):
             return
         contacts = self._contacts()
-        for side, suppressions in self._suppressions.items():
+        for side, suppressions in self.suppressions.items():
             self._arms.set_yielding(side, bool(contacts and self._touched(contacts, side, time_s)[0]))
             self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
             floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
             self._arms.set_floating(side, floats, position, velocity)
-
-    def _taker(self, kind):
-        return lambda side, msg, time_s: self._suppressions[side].take(kind, time_s)
 
     def _contacts(self):
         """[(link, link)] of the robot's own contacts that overlap or press."""
@@ -48,7 +52,7 @@ class CollisionTopics:
                 if contact.distance <= 0.0 or contact.force > 0.0]
 
     def _touched(self, contacts, side, time_s):
-        suppressions = self._suppressions[side]
+        suppressions = self.suppressions[side]
         if suppressions.active(collision.AVOIDANCE, time_s):
             contacts = []
         elif suppressions.active(collision.BODY_AVOIDANCE, time_s):
@@ -60,8 +64,20 @@ class CollisionTopics:
         return CollisionAvoidanceState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME), other_arm, links)
 
     def _detection(self, time_s, side, snapshot):
-        suppressions = self._suppressions[side]
+        suppressions = self.suppressions[side]
         torques, wrench = self._feel(side, snapshot)
         collides = ((collision.is_squeezed(torques) and not suppressions.active(collision.CONTACT, time_s))
                     or (collision.is_overloaded(wrench) and not suppressions.active(collision.OVERWRENCH, time_s)))
         return CollisionDetectionState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME), collides)
+
+    TOPICS = (
+        Topic("collision_avoidance_state", "limb/{limb}/collision_avoidance_state",
+              "baxter_core_msgs/CollisionAvoidanceState", STATE_RATE_HZ, _avoidance,
+              "the links of the robot that this arm touches, and whether the other arm is among them"),
+        Topic("collision_detection_state", "limb/{limb}/collision_detection_state",
+              "baxter_core_msgs/CollisionDetectionState", STATE_RATE_HZ, _detection,
+              "whether a joint feels more than 16 Nm (s0, e0, e1), 24 Nm (s1), 7 Nm (wrist) from outside, or the hand "
+              "more than 100 N or 30 Nm"),
+        *(Topic(kind, "limb/{limb}/" + kind, "std_msgs/Empty", None, _suppress(kind), "for 0.6 s: " + meaning)
+          for kind, meaning in collision.SUPPRESSIONS.items()),
+    )

@@ -14,6 +14,8 @@ from baxter_sim_hardware.grippers.suction import SuctionGripper
 from baxter_sim_hardware.sensing.panel import BLOWERS, PUMPS, VACUUM_SENSORS
 from sim_time.stamps import stamp
 
+from .row import STATE_RATE_HZ, Part, Topic
+
 _MAKER = {"manufacturer": "Rethink Research Robot", "product": "SDK End Effector"}
 _PROPERTIES = {
     ElectricGripper: EndEffectorProperties(
@@ -33,18 +35,14 @@ _UNKNOWN = dict.fromkeys(_FLAGS, EndEffectorState.STATE_UNKNOWN)
 _LONGEST = 10000
 
 
-class GripperTopics:
-    """makers and takers: as in PanelTopics. hands: {side: one of `hands`}; state: the robot's RobotState."""
+class GripperTopics(Part):
+    """hands: {side: one of `hands`}; state: the robot's RobotState."""
 
     def __init__(self, hands, state):
         self._state = state
         self._hands = hands
         self._properties = {side: _PROPERTIES[type(hand.gripper)] for side, hand in self._hands.items()}
         self._told = {}  # {side: EndEffectorState of a tool that only a client knows}
-        self.makers = {"gripper_state": self._gripper_state,
-                       "gripper_properties": lambda time_s, side, snapshot: self._properties[side]}
-        self.takers = {"gripper_command": self._command, "gripper_set_properties": self._set_properties,
-                       "gripper_set_state": self._set_state}
 
     def update(self, joints):
         """One tick; joints: (position, velocity, effort) of the whole model."""
@@ -117,6 +115,27 @@ class GripperTopics:
         message.command, message.command_sender = gripper.command, gripper.sender
         message.command_sequence = gripper.sequence
         return message
+
+    def _gripper_properties(self, time_s, side, snapshot):
+        return self._properties[side]
+
+    TOPICS = (
+        Topic("gripper_state", "end_effector/{limb}_gripper/state", "baxter_core_msgs/EndEffectorState", STATE_RATE_HZ,
+              _gripper_state,
+              "position and force [%], moving, gripping, missed; sender and sequence of the last command; `state` of a "
+              "suction gripper is a JSON object: `vacuum sensor` (0 to 255), `vacuum`, `blowing`, `sucking`"),
+        Topic("gripper_properties", "end_effector/{limb}_gripper/properties", "baxter_core_msgs/EndEffectorProperties",
+              STATE_RATE_HZ, _gripper_properties,
+              "`ui_type` 1 suction, 2 electric, 3 where the arm carries no gripper; else what `set_properties` said"),
+        Topic("gripper_command", "end_effector/{limb}_gripper/command", "baxter_core_msgs/EndEffectorCommand", None,
+              _command, "configure, calibrate, clear_calibration, reset, reboot, go, stop, release, grip, "
+              "prepare_to_grip, set, no_op; arguments as a JSON object"),
+        Topic("gripper_set_properties", "end_effector/{limb}_gripper/rsdk/set_properties",
+              "baxter_core_msgs/EndEffectorProperties", None, _set_properties,
+              "what a tool is that only the client knows, on an arm without a gripper"),
+        Topic("gripper_set_state", "end_effector/{limb}_gripper/rsdk/set_state", "baxter_core_msgs/EndEffectorState",
+              None, _set_state, "the state of such a tool, which the robot then publishes"),
+    )
 
 
 def _require_short(msg):

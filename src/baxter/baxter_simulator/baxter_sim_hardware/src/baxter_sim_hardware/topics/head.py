@@ -7,19 +7,19 @@ from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.head import TURNING_SPEED, Head
 
+from .row import STATE_RATE_HZ, Part, Topic
+
 _REQUESTS = {HeadPanCommand.REQUEST_PAN_ENABLE: True, HeadPanCommand.REQUEST_PAN_DISABLE: False}
 
 
-class HeadTopics:
-    """makers and takers: as in PanelTopics. model: of bullet_sim; state: the robot's RobotState."""
+class HeadTopics(Part):
+    """model: of bullet_sim; state: the robot's RobotState."""
 
     def __init__(self, model, state, dt):
         self._model, self._state = model, state
         self._index = model.index([HEAD_JOINT])
         joint = self._index[0]
         self._head = Head(model.lower[joint], model.upper[joint], self._pan(), dt)
-        self.makers = {"head_state": self._head_state}
-        self.takers = {"command_head_pan": self._command_pan, "command_head_nod": self._command_nod}
 
     def _pan(self):
         return self._model.read_joints()[0][self._index[0]]
@@ -38,14 +38,14 @@ class HeadTopics:
             self._model.drive_position(self._index, setpoint[0], self._model.max_effort[self._index],
                                        velocity=setpoint[1])
 
-    def _command_pan(self, part, msg, time_s):
+    def _command_pan(self, component, msg, time_s):
         self._require_enabled()
         # A message of which only the target is set means: turn there. It disables nothing, although the request's
         # value for that is the 0 of a field that nobody set.
         request = msg.enable_pan_request if msg.speed_ratio else HeadPanCommand.REQUEST_PAN_VOID
         self._head.command_pan(msg.target, msg.speed_ratio, _REQUESTS.get(request))
 
-    def _command_nod(self, part, msg, time_s):
+    def _command_nod(self, component, msg, time_s):
         if msg.data:
             self._require_enabled()
             self._head.nod(time_s)
@@ -54,7 +54,16 @@ class HeadTopics:
         if not self._state.enabled:
             raise CommandRefused(NOT_ENABLED)
 
-    def _head_state(self, time_s, part, snapshot):
+    def _head_state(self, time_s, component, snapshot):
         joint = self._index[0]
         return HeadState(snapshot.position[joint], bool(abs(snapshot.velocity[joint]) > TURNING_SPEED),
                          self._head.is_nodding(time_s), self._head.pan_enabled)
+
+    TOPICS = (
+        Topic("head_state", "head/head_state", "baxter_core_msgs/HeadState", STATE_RATE_HZ, _head_state,
+              "pan [rad], turning, nodding, panning enabled"),
+        Topic("command_head_pan", "head/command_head_pan", "baxter_core_msgs/HeadPanCommand", None, _command_pan,
+              "target [rad]; speed ratio of 8.4 rad/s, where 0 means full speed; enable request"),
+        Topic("command_head_nod", "head/command_head_nod", "std_msgs/Bool", None, _command_nod,
+              "true begins a nod of 1 s"),
+    )

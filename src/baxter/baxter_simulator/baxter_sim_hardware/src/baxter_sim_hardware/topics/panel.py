@@ -15,50 +15,55 @@ from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.sensing.panel import ANALOG, BUTTONS, DIGITAL, ESTOP, LIGHTS, NAVIGATORS, Panel, navigator_name
 from sim_time.stamps import stamp
 
+from .row import STATE_RATE_HZ, Part, Topic
+
 PRESS_SERVICE = "sim/press"
 
 
-class PanelTopics:
-    """makers: {key of the interface table: function(time_s, part, snapshot) -> message};
-    takers: {key: function(part, message, time_s)}, which raise CommandRefused."""
+class PanelTopics(Part):
+    """Buttons, lights, wheels and the other channels."""
 
     def __init__(self, context, press_estop):
         """press_estop: function(whether the emergency stop is pressed now)."""
         self._panel, self._press_estop = Panel(), press_estop
-        self.reset = self._panel.reset
         self.attach, self.attach_valve = self._panel.attach, self._panel.attach_valve
-        self.makers = {
-            "digital_io": lambda time_s, name, _: self._digital(name),
-            "digital_io_states": lambda time_s, part, _: DigitalIOStates(
-                list(DIGITAL), [self._digital(name) for name in DIGITAL]),
-            "analog_io": lambda time_s, name, _: self._analog(name, time_s),
-            "analog_io_uint32": lambda time_s, name, _: UInt32(self._panel.read_analog(name)),
-            "analog_io_states": lambda time_s, part, _: AnalogIOStates(
-                list(ANALOG), [self._analog(name, time_s) for name in ANALOG]),
-            "navigator": lambda time_s, navigator, _: self._navigator(navigator),
-            "navigators_states": lambda time_s, part, _: NavigatorStates(
-                [navigator_name(navigator) for navigator in NAVIGATORS],
-                [self._navigator(navigator) for navigator in NAVIGATORS]),
-        }
-        self.takers = {
-            "digital_io_command": lambda part, msg, time_s: self._panel.set_digital(msg.name, msg.value),
-            "analog_io_command": lambda part, msg, time_s: self._panel.set_analog(msg.name, msg.value),
-        }
         context.service(PRESS_SERVICE, Press, self._press)
+
+    def reset(self):
+        self._panel.reset()
 
     def cuff_squeezed(self, side):
         """Whether somebody squeezes the cuff of one hand."""
         return self._panel.digital["%s_lower_cuff" % side]
 
-    def _digital(self, name):
+    def _digital(self, time_s, name, snapshot):
         return DigitalIOState(int(self._panel.read_digital(name)), DIGITAL[name])
 
-    def _analog(self, name, time_s):
+    def _all_digital(self, time_s, component, snapshot):
+        return DigitalIOStates(list(DIGITAL), [self._digital(time_s, name, snapshot) for name in DIGITAL])
+
+    def _analog(self, time_s, name, snapshot):
         return AnalogIOState(stamp(time_s), float(self._panel.read_analog(name)), ANALOG[name])
 
-    def _navigator(self, navigator):
+    def _analog_uint32(self, time_s, name, snapshot):
+        return UInt32(self._panel.read_analog(name))
+
+    def _all_analog(self, time_s, component, snapshot):
+        return AnalogIOStates(list(ANALOG), [self._analog(time_s, name, snapshot) for name in ANALOG])
+
+    def _navigator(self, time_s, navigator, snapshot):
         buttons, wheel, lights = self._panel.navigator(navigator)
         return NavigatorState(list(BUTTONS), buttons, wheel, list(LIGHTS), lights)
+
+    def _all_navigators(self, time_s, component, snapshot):
+        return NavigatorStates([navigator_name(navigator) for navigator in NAVIGATORS],
+                               [self._navigator(time_s, navigator, snapshot) for navigator in NAVIGATORS])
+
+    def _set_digital(self, component, msg, time_s):
+        self._panel.set_digital(msg.name, msg.value)
+
+    def _set_analog(self, component, msg, time_s):
+        self._panel.set_analog(msg.name, msg.value)
 
     def _press(self, request):
         try:
@@ -73,3 +78,27 @@ class PanelTopics:
         except CommandRefused as refusal:
             return PressResponse(False, str(refusal))
         return PressResponse(True, "")
+
+    TOPICS = (
+        Topic("digital_io", "digital_io/{digital}/state", "baxter_core_msgs/DigitalIOState", STATE_RATE_HZ, _digital,
+              "one button, light, ... : 0 or 1, and whether it is an input; `<limb>_suck` and `<limb>_blow` are the "
+              "valves of a suction gripper"),
+        Topic("digital_io_states", "digital_io_states", "baxter_core_msgs/DigitalIOStates", STATE_RATE_HZ,
+              _all_digital, "all of them"),
+        Topic("analog_io", "analog_io/{analog}/state", "baxter_core_msgs/AnalogIOState", STATE_RATE_HZ, _analog,
+              "one wheel (0 to 255, wraps), hand range [mm], vacuum sensor (0 to 255), or the integer that "
+              "`torso_fan`, `torso_lighting` were told"),
+        Topic("analog_io_uint32", "analog_io/{analog}/value_uint32", "std_msgs/UInt32", STATE_RATE_HZ, _analog_uint32,
+              "the same value"),
+        Topic("analog_io_states", "analog_io_states", "baxter_core_msgs/AnalogIOStates", STATE_RATE_HZ, _all_analog,
+              "all of them"),
+        Topic("navigator", "navigators/{navigator}_navigator/state", "baxter_core_msgs/NavigatorState", STATE_RATE_HZ,
+              _navigator,
+              "buttons ok, back, show; wheel; lights inner, outer: the same as in digital_io and analog_io"),
+        Topic("navigators_states", "navigators_states", "baxter_core_msgs/NavigatorStates", STATE_RATE_HZ,
+              _all_navigators, "all four"),
+        Topic("digital_io_command", "digital_io/command", "baxter_core_msgs/DigitalOutputCommand", None, _set_digital,
+              "switches one digital output, by name"),
+        Topic("analog_io_command", "analog_io/command", "baxter_core_msgs/AnalogOutputCommand", None, _set_analog,
+              "sets one analog output, by name, 0 to 65535"),
+    )

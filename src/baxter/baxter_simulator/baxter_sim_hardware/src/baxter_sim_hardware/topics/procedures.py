@@ -9,33 +9,39 @@ from baxter_sim_hardware.arms.procedures import PROCEDURES, STATUS_RATE_HZ, Proc
 from baxter_sim_hardware.errors import CommandRefused
 from sim_time.pace import Schedule
 
+from .row import Part, Topic
 
-class ProcedureTopics:
-    """makers and takers: as in PanelTopics. state: the robot's RobotState."""
+UPDATER_RATE_HZ = 1.0
+TYPES = {"Tare": "TareEnable", "CalibrateArm": "CalibrateArmEnable"}  # messages that ask for PROCEDURES
+
+
+def _status_of(name):
+    def status(part, time_s, side, snapshot):
+        procedure = part.procedures[name, side]
+        return RobustControllerStatus(procedure.is_enabled, procedure.complete, procedure.uid, procedure.timed_out,
+                                      list(procedure.errors), [])
+
+    return status
+
+
+def _take(name):
+    def handle(part, side, msg, time_s):
+        part.procedures[name, side].take(msg.isEnabled, msg.uid, time_s)
+
+    return handle
+
+
+class ProcedureTopics(Part):
+    """state: the robot's RobotState."""
 
     def __init__(self, state):
         self._state = state
-        self._procedures = {(name, side): Procedure() for name in PROCEDURES for side in SIDES}
+        self.procedures = {(name, side): Procedure() for name in PROCEDURES for side in SIDES}
         self._updater = Updater()
         self._schedule = Schedule(STATUS_RATE_HZ)
-        updater = self._updater
-        self.makers = {
-            **{"procedure_status_" + name: self._status(name) for name in PROCEDURES},
-            "plugins_loaded": lambda time_s, side, _: Bool(True),
-            "update_sources": lambda time_s, part, _: UpdateSources("", []),
-            "usb_ready": lambda time_s, part, _: Bool(False),
-            "updater_status": lambda time_s, part, _: UpdateStatus(updater.status, 0.0, updater.description),
-            "update_status": lambda time_s, part, _: Int32(updater.status),
-            "update_progress": lambda time_s, part, _: Int32(0),
-        }
-        self.takers = {
-            **{"procedure_enable_" + name: self._take(name) for name in PROCEDURES},
-            "updater_start": self._start_update,
-            "updater_stop": lambda part, msg, time_s: updater.reset(),
-        }
 
     def reset(self):
-        for procedure in self._procedures.values():
+        for procedure in self.procedures.values():
             procedure.reset()
         self._updater.reset()
 
@@ -43,20 +49,56 @@ class ProcedureTopics:
         """After a step: let procedures go on. feel: function(side) -> (7,) torques from outside [Nm], which costs."""
         if not self._schedule.due(time_s):
             return
-        for (_, side), procedure in self._procedures.items():
+        for (_, side), procedure in self.procedures.items():
             if procedure.is_enabled:
                 procedure.update(time_s, self._state.enabled, feel(side))
 
-    def _status(self, name):
-        def make(time_s, side, snapshot):
-            procedure = self._procedures[name, side]
-            return RobustControllerStatus(procedure.is_enabled, procedure.complete, procedure.uid, procedure.timed_out,
-                                          list(procedure.errors), [])
-        return make
-
-    def _take(self, name):
-        return lambda side, msg, time_s: self._procedures[name, side].take(msg.isEnabled, msg.uid, time_s)
-
-    def _start_update(self, part, msg, time_s):
+    def _start_update(self, component, msg, time_s):
         self._updater.start(msg.data)
         raise CommandRefused(self._updater.description)
+
+    def _stop_update(self, component, msg, time_s):
+        self._updater.reset()
+
+    def _plugins_loaded(self, time_s, side, snapshot):
+        return Bool(True)
+
+    def _update_sources(self, time_s, component, snapshot):
+        return UpdateSources("", [])
+
+    def _usb_ready(self, time_s, component, snapshot):
+        return Bool(False)
+
+    def _updater_status(self, time_s, component, snapshot):
+        return UpdateStatus(self._updater.status, 0.0, self._updater.description)
+
+    def _update_status(self, time_s, component, snapshot):
+        return Int32(self._updater.status)
+
+    def _update_progress(self, time_s, component, snapshot):
+        return Int32(0)
+
+    TOPICS = (
+        *(Topic("procedure_status_" + name, "/robustcontroller/{limb}/%s/status" % name,
+                "baxter_core_msgs/RobustControllerStatus", STATUS_RATE_HZ, _status_of(name),
+                "how the procedure that %s the arm is getting on" % verb) for name, verb in PROCEDURES.items()),
+        Topic("plugins_loaded", "/robustcontroller/{limb}/rc_plugins_loaded", "std_msgs/Bool", UPDATER_RATE_HZ,
+              _plugins_loaded, "true"),
+        Topic("update_sources", "/usb/update_sources", "baxter_maintenance_msgs/UpdateSources", UPDATER_RATE_HZ,
+              _update_sources,
+              "none: no stick is plugged into a simulated robot"),
+        Topic("usb_ready", "/usb/ready", "std_msgs/Bool", UPDATER_RATE_HZ, _usb_ready, "false: no stick"),
+        Topic("updater_status", "/updater/status", "baxter_maintenance_msgs/UpdateStatus", UPDATER_RATE_HZ,
+              _updater_status,
+              "idle, or invalid after an unknown update was to be started"),
+        Topic("update_status", "/update/status", "std_msgs/Int32", UPDATER_RATE_HZ,
+              _update_status, "the same as a number"),
+        Topic("update_progress", "/update/progress", "std_msgs/Int32", UPDATER_RATE_HZ, _update_progress, "0 %"),
+        *(Topic("procedure_enable_" + name, "/robustcontroller/{limb}/%s/enable" % name,
+                "baxter_maintenance_msgs/" + TYPES[name], None, _take(name),
+                "starts and keeps alive (at least once in 1.5 s) or ends the procedure that %s the arm" % verb)
+          for name, verb in PROCEDURES.items()),
+        Topic("updater_start", "/updater/start", "std_msgs/String", None,
+              _start_update, "starts an update by its id; none is known"),
+        Topic("updater_stop", "/updater/stop", "std_msgs/Empty", None, _stop_update, "back to idle"),
+    )

@@ -1,30 +1,40 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a row of the interface table says."""
+"""A row of the interface table, and what has such rows."""
+from collections.abc import Callable
 from dataclasses import dataclass
+from types import MethodType
 
 from baxter_model import SIDES
 from baxter_sim_hardware.sensing.panel import ANALOG, DIGITAL, NAVIGATORS
 
 STATE_RATE_HZ = 100.0  # the physical robot's state topics
-LATCHED = "latched"  # in place of a rate: once, and again for who comes later
+LATCHED = "latched"  # in place of a rate: published once, and again to each later subscriber
 JOINT_STATE_RATE = "joint_state_rate"  # in place of a rate: the parameter of that name
 ASSEMBLIES = (*SIDES, "head", "torso")
-PARTS = {"limb": SIDES, "digital": tuple(DIGITAL), "analog": tuple(ANALOG), "navigator": NAVIGATORS,
-         "assembly": ASSEMBLIES}
+COMPONENTS = {"limb": SIDES, "digital": tuple(DIGITAL), "analog": tuple(ANALOG), "navigator": NAVIGATORS,
+              "assembly": ASSEMBLIES}
 
 
 @dataclass(frozen=True)
 class Topic:
-    """One row. key: what the plugin calls it; name: below the robot's namespace unless it begins with a slash, with one
-    of PARTS in braces where there is a topic for each.
+    """One row.
 
-    rate: Hz, or LATCHED, or JOINT_STATE_RATE; None for topics that the robot listens to.
+    key: short name, used in log lines. name: below the robot's namespace unless it begins with a slash, with one of
+    COMPONENTS in braces where there is a topic for each. rate: Hz, or LATCHED, or JOINT_STATE_RATE; None for topics
+    that the robot subscribes to. function: the method of a `Part` behind the topic. Its arguments are
+
+    - (time_s, component, snapshot) for a topic with a rate; it returns the message;
+    - (publisher) for a latched topic; it is called once and publishes on its own;
+    - (component, message, time_s) for a topic that the robot subscribes to; it raises CommandRefused.
+
+    component: one of COMPONENTS, None where there is one topic; snapshot: `snapshot.Snapshot`.
     """
 
     key: str
     name: str
     type: str
     rate: object
+    function: Callable
     meaning: str
 
     @property
@@ -32,8 +42,27 @@ class Topic:
         return self.rate is not None
 
     def names(self):
-        """[(part or None, topic name)], one for each limb, component ... where the topic exists for each."""
-        for kind, parts in PARTS.items():
+        """[(component or None, topic name)], one for each limb, navigator ... where the topic exists for each."""
+        for kind, components in COMPONENTS.items():
             if "{%s}" % kind in self.name:
-                return [(part, self.name.format(**{kind: part})) for part in parts]
+                return [(component, self.name.format(**{kind: component})) for component in components]
         return [(None, self.name)]
+
+
+class Part:
+    """A part of the robot that has topics. TOPICS: its rows; their functions are methods of this class."""
+
+    TOPICS = ()
+
+    @property
+    def publishers(self):
+        """{key: bound function} of the rows that the robot publishes."""
+        return {row.key: MethodType(row.function, self) for row in self.TOPICS if row.is_published}
+
+    @property
+    def handlers(self):
+        """{key: bound function} of the rows that the robot subscribes to."""
+        return {row.key: MethodType(row.function, self) for row in self.TOPICS if not row.is_published}
+
+    def reset(self):
+        """The world went back to its start."""

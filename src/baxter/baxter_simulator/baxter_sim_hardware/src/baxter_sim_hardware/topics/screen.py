@@ -6,26 +6,27 @@ from std_msgs.msg import Header
 from baxter_sim_hardware.screen import GLASS_LINK, HEIGHT, WIDTH, Screen, on_glass
 from sim_time.stamps import stamp
 
+from .row import Part, Topic
+
 SCREEN_FRAME = "screen"
+SCREEN_RATE_HZ = 10.0
 
 
-class ScreenTopics:
-    """makers and takers: as in PanelTopics; `screen`: the Screen."""
+class ScreenTopics(Part):
+    """The head's screen; attribute `screen`: the Screen."""
 
     def __init__(self, context):
-        """`context`: the plugin's PluginContext; whoever draws the world gets the picture there."""
+        """`context`: the plugin's PluginContext; the renderers of the world get the picture there."""
         self.screen = Screen()
         glass = on_glass(context.robot)
         self._drawn = context.screen(GLASS_LINK, *glass, (WIDTH, HEIGHT)) if glass else None
-        self.makers = {"screen": self._image}
-        self.takers = {"xdisplay": self._show}
 
     def reset(self):
         """A dark screen."""
         self.screen.reset()
         self._draw()
 
-    def _show(self, part, msg, time_s):
+    def _show(self, component, msg, time_s):
         self.screen.show(msg.width, msg.height, msg.encoding, msg.step, msg.data)
         self._draw()
 
@@ -33,6 +34,14 @@ class ScreenTopics:
         if self._drawn is not None:
             self._drawn.show(self.screen.pixels)
 
-    def _image(self, time_s, part, snapshot):
+    def _image(self, time_s, component, snapshot):
         return Image(Header(stamp=stamp(time_s), frame_id=SCREEN_FRAME), HEIGHT, WIDTH, "rgb8", 0, 3 * WIDTH,
                      self.screen.pixels.tobytes())
+
+    TOPICS = (
+        Topic("xdisplay", "xdisplay", "sensor_msgs/Image", None, _show,
+              "a picture of up to 1024 x 600 for the head's screen, from its upper left corner: rgb8, bgr8, rgba8, "
+              "bgra8, mono8, 8UC1, 8UC3, 8UC4; it stays until the next one"),
+        Topic("screen", "sim/screen", "sensor_msgs/Image", SCREEN_RATE_HZ,
+              _image, "what the screen shows, 1024 x 600, rgb8"),
+    )

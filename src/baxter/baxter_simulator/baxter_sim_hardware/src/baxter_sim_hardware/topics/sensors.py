@@ -13,7 +13,10 @@ from baxter_sim_hardware.sensing.panel import RANGE_SENSORS
 from baxter_sim_kinematics import Chain
 from sim_time.stamps import stamp
 
+from .row import STATE_RATE_HZ, Part, Topic
+
 SONAR_FRAME = "sonar_ring"
+SONAR_RATE_HZ = 10.0
 _UNKNOWN = [-1.0] + [0.0] * 8  # the covariance of what an Imu does not measure
 
 
@@ -21,8 +24,8 @@ def accelerometer_frame(side):
     return "%s_hand_accelerometer" % side
 
 
-class SensorTopics:
-    """makers and takers: as in PanelTopics. world, model: of bullet_sim; robot: urdf_model.Robot; limb_index:
+class SensorTopics(Part):
+    """world, model: of bullet_sim; robot: urdf_model.Robot; limb_index:
     {side: (7,) indices of its joints in the model's}; dt: length of a tick [s].
 
     A robot whose description lacks a sensor's frame reports that it sees nothing and feels nothing there.
@@ -35,23 +38,9 @@ class SensorTopics:
                         for side in SIDES if accelerometer_frame(side) in robot.links}
         self._directions = sensors.sonar_directions()
         self._ring = sensors.SonarRing()
-        self.reset = self._ring.reset
-        self.makers = {
-            "hand_range": self._range,
-            "hand_range_scan": self._scan,
-            "accelerometer": self._accelerometer,
-            "sonar": self._sonar,
-            "sonars_enabled": lambda time_s, part, _: UInt16(self._ring.enabled),
-            "sonar_lights": self._lights,
-            "sonar_green_level": lambda time_s, part, _: Float32(self._ring.levels["green"]),
-            "sonar_red_level": lambda time_s, part, _: Float32(self._ring.levels["red"]),
-        }
-        self.takers = {
-            "set_sonars_enabled": lambda part, msg, time_s: self._ring.enable(msg.data),
-            "set_lights": lambda part, msg, time_s: self._ring.set_lights(msg.data, time_s),
-            "set_green_level": lambda part, msg, time_s: self._ring.set_level("green", msg.data),
-            "set_red_level": lambda part, msg, time_s: self._ring.set_level("red", msg.data),
-        }
+
+    def reset(self):
+        self._ring.reset()
 
     # -- hands
 
@@ -105,7 +94,7 @@ class SensorTopics:
         fractions = self._world.ray_test_batch(near, near + span * rays).reshape(self._directions.shape[:2]).min(axis=1)
         return np.where(fractions < 1.0, sensors.SONAR_MIN_M + span * fractions, np.inf)
 
-    def _sonar(self, time_s, part, snapshot):
+    def _sonar(self, time_s, component, snapshot):
         echoes = self._ring.echoes(self._distances())
         # The beam's axis lies in the plane of the ring.
         ahead = self._directions.sum(axis=1)
@@ -115,8 +104,60 @@ class SensorTopics:
                     ChannelFloat32("Distance", [float(distance) for _, distance in echoes])]
         return PointCloud(Header(stamp=stamp(time_s), frame_id=SONAR_FRAME), points, channels)
 
-    def _lights(self, time_s, part, snapshot):
+    def _lights(self, time_s, component, snapshot):
         mask = self._ring.overridden(time_s)
         if mask is None:
             mask = sum(1 << sensor for sensor, _ in self._ring.echoes(self._distances()))
         return UInt16(mask)
+
+    def _sonars_enabled(self, time_s, component, snapshot):
+        return UInt16(self._ring.enabled)
+
+    def _green_level(self, time_s, component, snapshot):
+        return Float32(self._ring.levels["green"])
+
+    def _red_level(self, time_s, component, snapshot):
+        return Float32(self._ring.levels["red"])
+
+    def _enable_sonars(self, component, msg, time_s):
+        self._ring.enable(msg.data)
+
+    def _set_lights(self, component, msg, time_s):
+        self._ring.set_lights(msg.data, time_s)
+
+    def _set_green_level(self, component, msg, time_s):
+        self._ring.set_level("green", msg.data)
+
+    def _set_red_level(self, component, msg, time_s):
+        self._ring.set_level("red", msg.data)
+
+    TOPICS = (
+        Topic("hand_range", "range/{limb}_hand_range/state", "sensor_msgs/Range", STATE_RATE_HZ, _range,
+              "infrared, 0.004 to 0.4 m along x of `<limb>_hand_range`; 65.535 m where it sees nothing"),
+        Topic("hand_range_scan", "/sim/laserscan/{limb}_hand_range/state", "sensor_msgs/LaserScan", STATE_RATE_HZ,
+              _scan,
+              "the same as a scan of one ray, as the vendor's simulator has it; `inf` where it sees nothing"),
+        Topic("accelerometer", "accelerometer/{limb}_accelerometer/state", "sensor_msgs/Imu", STATE_RATE_HZ,
+              _accelerometer,
+              "acceleration less gravity in `<limb>_hand_accelerometer` [m/s^2]: 9.81 upwards at rest; no rates, no "
+              "orientation"),
+        Topic("sonar", "sonar/head_sonar/state", "sensor_msgs/PointCloud", SONAR_RATE_HZ, _sonar,
+              "a point in `sonar_ring` for each of the 12 sonars that is switched on and hears something within 10 m; "
+              "channels SensorId, Distance [m]"),
+        Topic("sonars_enabled", "sonar/head_sonar/sonars_enabled", "std_msgs/UInt16", SONAR_RATE_HZ, _sonars_enabled,
+              "a bit for each sonar; 4095, all on, at the start"),
+        Topic("sonar_lights", "sonar/head_sonar/lights/state", "std_msgs/UInt16", SONAR_RATE_HZ, _lights,
+              "a bit for each light: those that `set_lights` asks for, else those whose sonar hears something"),
+        Topic("sonar_green_level", "sonar/head_sonar/lights/green_level", "std_msgs/Float32", SONAR_RATE_HZ,
+              _green_level, "0 to 100"),
+        Topic("sonar_red_level", "sonar/head_sonar/lights/red_level", "std_msgs/Float32", SONAR_RATE_HZ,
+              _red_level, "0 to 100"),
+        Topic("set_sonars_enabled", "sonar/head_sonar/set_sonars_enabled", "std_msgs/UInt16", None, _enable_sonars,
+              "a bit for each sonar, 0 to 4095"),
+        Topic("set_lights", "sonar/head_sonar/lights/set_lights", "std_msgs/UInt16", None, _set_lights,
+              "for 0.2 s: bit 15 and a bit for each light to be lit"),
+        Topic("set_green_level", "sonar/head_sonar/lights/set_green_level", "std_msgs/Float32", None,
+              _set_green_level, "0 to 100"),
+        Topic("set_red_level", "sonar/head_sonar/lights/set_red_level", "std_msgs/Float32", None,
+              _set_red_level, "0 to 100"),
+    )

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The arms in ROS messages: their commands and settings, where their end points and set-points are, what they feel."""
+import numpy as np
+
+from baxter_model import BASE_FRAME, tip_of
+from baxter_model.readiness import NOT_ENABLED
+from baxter_sim_hardware.arms import endpoint
+from baxter_sim_hardware.arms.joint_command import Mode
+from baxter_sim_hardware.errors import CommandRefused
+
+from . import convert
+from .row import JOINT_STATE_RATE, STATE_RATE_HZ, Part, Topic
+
+
+class ArmTopics(Part):
+    """baxter: `robot.Baxter`; chains: {side: Chain}; limb_index: {side: (7,) indices of its joints in the model's};
+    measured: function -> (position, velocity) of the arms' joints when this tick began, (n,) each.
+
+    Attribute `command_observers`: functions that are called in the loop with (side, message, JointCommand or None where
+    it was refused) for each joint command.
+    """
+
+    def __init__(self, baxter, chains, limb_index, measured, warnings):
+        self._baxter, self._chains, self._limb_index = baxter, chains, limb_index
+        self._measured, self._warnings = measured, warnings
+        names = np.array(baxter.arms.limits.names)
+        self._order = np.argsort(names)
+        self._reference_message = convert.JointStates(names[self._order].tolist())
+        self.command_observers = []
+
+    def feel(self, side, snapshot):
+        """(torques (7,) [Nm], wrench (6,) [N, Nm]) that the surroundings exert on one arm's joints and on its tip."""
+        index = self._limb_index[side]
+        jacobian = self._chains[side].jacobian(snapshot.position[index])
+        return (snapshot.own_effort[index] - snapshot.effort[index],
+                endpoint.contact_wrench(jacobian, snapshot.effort[index], snapshot.own_effort[index]))
+
+    # -- out
+
+    def _endpoint_state(self, time_s, side, snapshot):
+        index = self._limb_index[side]
+        pose, jacobian = self._chains[side].fk_and_jacobian(snapshot.position[index])
+        return convert.endpoint_state(
+            time_s, BASE_FRAME, pose, endpoint.twist(jacobian, snapshot.velocity[index]),
+            endpoint.contact_wrench(jacobian, snapshot.effort[index], snapshot.own_effort[index]))
+
+    def _commanded_endpoint(self, time_s, side, snapshot):
+        arms = self._baxter.arms
+        joints = arms.joints_of(side)
+        pose, jacobian = self._chains[side].fk_and_jacobian(arms.commanded_position[joints])
+        return convert.endpoint_state(time_s, BASE_FRAME, pose,
+                                      endpoint.twist(jacobian, arms.commanded_velocity[joints]), np.zeros(6))
+
+    def _gravity_compensation(self, time_s, side, snapshot):
+        index, arms = self._limb_index[side], self._baxter.arms
+        joints = arms.joints_of(side)
+        return convert.sea_joint_state(
+            time_s, BASE_FRAME, self._chains[side].joint_names,
+            (arms.commanded_position[joints], arms.commanded_velocity[joints], arms.commanded_torque[joints]),
+            (snapshot.position[index], snapshot.velocity[index], snapshot.effort[index]), snapshot.gravity[index])
+
+    def _reference_joint_states(self, time_s, component, snapshot):
+        arms, order = self._baxter.arms, self._order
+        return self._reference_message.message(
+            time_s, arms.commanded_position[order], arms.commanded_velocity[order], arms.commanded_torque[order])
+
+    # -- in
+
+    def _speed_ratio(self, side, msg, time_s):
+        self._baxter.arms.set_speed_ratio(side, msg.data)
+
+    def _timeout(self, side, msg, time_s):
+        self._baxter.arms.set_timeout(side, msg.data)
+
+    def _feed_forward(self, side, msg, time_s):
+        if not msg.velocities and len(msg.positions) == len(self._baxter.arms.joints_of(side)):
+            return  # a set-point alone: nothing to feed forward
+        self._baxter.arms.feed_forward(side, np.array(msg.velocities), time_s)
+
+    def _twist(self, side, msg, time_s):
+        position, velocity = self._measured()
+        chain, joints = self._chains[side], self._baxter.arms.joints_of(side)
+        pose, jacobian = chain.fk_and_jacobian(position[joints])
+        linear, angular = msg.twist.linear, msg.twist.angular
+        twist = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
+        # tf's old names begin with a slash; a slash alone names nothing.
+        frame = msg.header.frame_id.removeprefix("/")
+        if frame == tip_of(side):
+            twist = np.concatenate([pose[:3, :3] @ twist[:3], pose[:3, :3] @ twist[3:]])
+        elif msg.header.frame_id and frame != BASE_FRAME:
+            raise CommandRefused("twist in frame '%s'; it must be in %s or %s"
+                                 % (msg.header.frame_id, BASE_FRAME, tip_of(side)))
+        if not np.isfinite(twist).all():
+            raise CommandRefused("twist is %s; it must be finite numbers" % twist.tolist())
+        self._baxter.command(side, Mode.VELOCITY, chain.joint_names,
+                             endpoint.joint_velocities(jacobian, twist).tolist(), time_s, position, velocity)
+
+    def _stop(self, side, msg, time_s):
+        if not self._baxter.state.enabled:
+            raise CommandRefused(NOT_ENABLED)
+        if msg.data:
+            self._baxter.arms.stop_limb(side, *self._measured())
+
+    def _joint_command(self, side, msg, time_s):
+        position, velocity = self._measured()
+        try:
+            command = self._baxter.command(side, msg.mode, msg.names, msg.command, time_s, position, velocity)
+        except CommandRefused as refusal:
+            kind = (side, self._baxter.state.enabled)
+            self._warnings.warn(time_s, kind, "%s limb: joint command ignored: %s" % (side, refusal))
+            command = None
+        for observe in self.command_observers:
+            observe(side, msg, command)
+        if command is not None and command.clamped:
+            self._warnings.warn(time_s, (side, "clamped"), "%s limb: joint command clamped to the limits of %s" % (
+                side, ", ".join(command.clamped)))
+
+    TOPICS = (
+        Topic("endpoint_state", "limb/{limb}/endpoint_state", "baxter_core_msgs/EndpointState", STATE_RATE_HZ,
+              _endpoint_state, "`<limb>_gripper` in `base`: pose, twist (Jacobian times joint velocity), "
+              "wrench that the surroundings exert on the tip"),
+        Topic("gravity_compensation_torques", "limb/{limb}/gravity_compensation_torques",
+              "baxter_core_msgs/SEAJointState", STATE_RATE_HZ, _gravity_compensation,
+              "per joint, torso to wrist: set-points, measured state, torque that balances gravity"),
+        Topic("ref_joint_states", "ref_joint_states", "sensor_msgs/JointState", JOINT_STATE_RATE,
+              _reference_joint_states,
+              "set-points of the arms' joints, in alphabetical order; effort is what torque mode adds to gravity"),
+        Topic("commanded_endpoint_state", "limb/{limb}/commanded_endpoint_state", "baxter_core_msgs/EndpointState",
+              STATE_RATE_HZ, _commanded_endpoint, "the end point where the set-points are; no wrench is commanded"),
+        Topic("joint_command", "limb/{limb}/joint_command", "baxter_core_msgs/JointCommand", None, _joint_command,
+              "any subset of the limb's joints in any order; mode 1 position, 2 velocity, 3 torque, 4 raw position"),
+        Topic("set_speed_ratio", "limb/{limb}/set_speed_ratio", "std_msgs/Float64", None, _speed_ratio,
+              "0 to 1: position mode's share of the joints' velocity limits"),
+        Topic("joint_command_timeout", "limb/{limb}/joint_command_timeout", "std_msgs/Float64", None, _timeout,
+              "[s] > 0, 0.2 at start: age at which a velocity, torque or raw position command expires"),
+        Topic("inverse_dynamics_command", "limb/{limb}/inverse_dynamics_command",
+              "trajectory_msgs/JointTrajectoryPoint", None, _feed_forward,
+              "velocities (s0 to w2) of the raw set-points that come in with it: they are followed without lag"),
+        Topic("command_twist_stamped", "limb/{limb}/command_twist_stamped", "geometry_msgs/TwistStamped", None, _twist,
+              "velocity of the tip in `base` (or no frame) or in `<limb>_gripper`; expires like a joint velocity "
+              "command"),
+        Topic("command_velocity_tozero", "limb/{limb}/command_velocity_tozero", "std_msgs/Bool", None, _stop,
+              "true stops the limb, which then holds"),
+    )

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The robot as a whole in ROS messages: all its joints, its state, and the requests that change that state."""
+import itertools
+
+import numpy as np
+from std_msgs.msg import Empty, UInt32
+
+from baxter_sim_hardware.errors import CommandRefused
+from baxter_sim_hardware.robot_state import Event
+
+from . import convert
+from .row import JOINT_STATE_RATE, LATCHED, STATE_RATE_HZ, Part, Topic
+
+# What `sim/resets` says next. One for all robots of this process: another one in the same place says another number.
+_resets = itertools.count(1)
+
+
+class RobotTopics(Part):
+    """baxter: `robot.Baxter`; joint_names: of the whole model; read_arms: function -> (position, velocity) of the arms'
+    joints, (n,) measured; set_joint_state_rate: function(Hz).
+
+    Attribute `on_disabled`: functions that are called when the robot was disabled.
+    """
+
+    def __init__(self, baxter, joint_names, read_arms, set_joint_state_rate, context, warnings):
+        self._baxter, self._read_arms, self._set_rate = baxter, read_arms, set_joint_state_rate
+        self._world, self._log, self._warnings = context.world, context.log, warnings
+        self._order = np.argsort(joint_names)
+        self._joint_states_message = convert.JointStates([joint_names[i] for i in self._order])
+        self.on_disabled = []
+
+    def apply(self, event):
+        """Take an `Event`; a request that the robot's state refuses is logged."""
+        position, velocity = self._read_arms()
+        before = self._baxter.state.state
+        refusal = self._baxter.apply(event, position, velocity)
+        if refusal:
+            self._warnings.warn(self._world.time_s, event, "%s ignored: %s" % (event.value, refusal))
+        elif self._baxter.state.state is not before:
+            if not self._baxter.state.enabled:
+                for disabled in self.on_disabled:
+                    disabled()
+            self._log.info("Baxter is %s" % self._baxter.state.state.value)
+
+    def press_estop(self, pressed):
+        """The emergency stop button was pressed or released."""
+        self.apply(Event.ESTOP_PRESS if pressed else Event.ESTOP_RELEASE)
+
+    def announce_start(self):
+        """Tell subscribers that the robot publishes and listens."""
+        self._started.publish(Empty())
+
+    def announce_reset(self):
+        """Tell subscribers that the joints were put elsewhere."""
+        self._resets.publish(UInt32(next(_resets)))
+
+    # -- out
+
+    def _joint_states(self, time_s, component, snapshot):
+        order = self._order
+        return self._joint_states_message.message(
+            time_s, snapshot.position[order], snapshot.velocity[order], snapshot.effort[order])
+
+    def _assembly(self, time_s, component, snapshot):
+        return convert.assembly_state(self._baxter.state.assembly)
+
+    def _keep_started(self, publisher):
+        self._started = publisher
+
+    def _begin_resets(self, publisher):
+        self._resets = publisher
+        self.announce_reset()
+
+    # -- in
+
+    def _joint_state_publish_rate(self, component, msg, time_s):
+        if not 1 <= msg.data <= 1000:
+            raise CommandRefused("%d Hz; it must be from 1 to 1000" % msg.data)
+        self._set_rate(msg.data)
+
+    def _super_enable(self, component, msg, time_s):
+        self.apply(Event.ENABLE if msg.data else Event.DISABLE)
+
+    def _super_stop(self, component, msg, time_s):
+        self.apply(Event.STOP)
+
+    def _super_reset(self, component, msg, time_s):
+        self.apply(Event.RESET)
+
+    TOPICS = (
+        Topic("joint_states", "joint_states", "sensor_msgs/JointState", JOINT_STATE_RATE, _joint_states,
+              "all movable joints, names in alphabetical order [rad, m; rad/s, m/s; Nm, N]; "
+              "15 without grippers, 19 with two electric ones"),
+        Topic("joint_state_publish_rate", "joint_state_publish_rate", "std_msgs/UInt16", None,
+              _joint_state_publish_rate, "[Hz] 1 to 1000: rate of joint_states"),
+        Topic("state", "state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,
+              "enabled, stopped, ready, emergency stop"),
+        Topic("assembly_state", "assembly/{assembly}/state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ,
+              _assembly, "the same as `state`: assemblies are enabled and stopped together"),
+        Topic("limb_state", "limb/{limb}/state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,
+              "the same for the limb"),
+        Topic("head_assembly_state", "head/state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,
+              "the same for the head"),
+        Topic("set_super_enable", "set_super_enable", "std_msgs/Bool", None, _super_enable,
+              "true enables, false disables"),
+        Topic("set_super_stop", "set_super_stop", "std_msgs/Empty", None, _super_stop, "software stop"),
+        Topic("set_super_reset", "set_super_reset", "std_msgs/Empty", None, _super_reset,
+              "clears a stop; leaves the robot disabled"),
+        Topic("resets", "sim/resets", "std_msgs/UInt32", LATCHED, _begin_resets,
+              "a number that changes whenever the joints are put elsewhere: by a reset of the world or the simulation, "
+              "by set_model_configuration, by another robot in this one's place"),
+        Topic("started", "sim/started", "std_msgs/Empty", LATCHED, _keep_started,
+              "the robot stands, publishes and listens"),
+    )

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The robot's joints after a physics step, as messages show them."""
+
+
+class Snapshot:
+    """The model's joints after a step; what is costly is computed once, and only if a message asks for it.
+
+    position [rad, m], velocity, effort [Nm, N]: (n,) each, in the model's order; before: the same three when the step
+    began.
+    """
+
+    def __init__(self, model, before, dt):
+        self.position, self.velocity, self.effort = model.read_joints()
+        self.before = before
+        self._model, self._dt = model, dt
+        self._gravity = self._own_effort = None
+
+    @property
+    def gravity(self):
+        """(n,) what balances gravity [Nm, N]."""
+        if self._gravity is None:
+            self._gravity = self._model.gravity_efforts(self.position)
+        return self._gravity
+
+    @property
+    def own_effort(self):
+        """(n,) what the robot's own weight, motion and joint damping took in the last step [Nm, N]; the rest of the
+        effort went into what the robot touches."""
+        if self._own_effort is None:
+            position, velocity, _ = self.before
+            acceleration = (self.velocity - velocity) / self._dt
+            self._own_effort = self._model.inverse_dynamics(position, velocity, acceleration)
+            self._own_effort += self._model.damping * velocity
+        return self._own_effort
