@@ -17,6 +17,7 @@ from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.grippers.electric import OPEN, ElectricGripper
 from baxter_sim_hardware.grippers.hands import NoHand
 from baxter_sim_hardware.grippers.suction import SuctionGripper
+from baxter_sim_hardware.robot_state import RobotState, State
 from baxter_sim_hardware.topics.grippers import GripperTopics
 
 SIDE = "left"
@@ -93,7 +94,7 @@ class FakeGripper:
             kind = self._knobs["ui_type"]
             self._hand = HANDS[kind](self._knobs) if kind in HANDS else NoHand()
             # The robot is enabled here.
-            self._topics = GripperTopics({SIDE: self._hand}, SimpleNamespace(enabled=True))
+            self._topics = GripperTopics({SIDE: self._hand}, RobotState(State.ENABLED))
             if kind == EndEffectorProperties.PASSIVE_GRIPPER:
                 self._take("gripper_set_properties", EndEffectorProperties(id=CUSTOM_ID, ui_type=kind))
         return TriggerResponse(success=True)

@@ -12,7 +12,7 @@ from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
-from .arms.control import BRAKES_EFFORT_FACTOR
+from .arms.effort_bounds import BRAKES_EFFORT_FACTOR
 from .arms.joint_command import JointLimits
 from .errors import HardwareError
 from .grippers.hands import hand_of
@@ -77,13 +77,14 @@ class BaxterPlugin(ModelPlugin):
         self._warnings = Warnings(context.log)
         self._build_parts(context, {limb.side: model.index(limb.joint_names) for limb in limbs})
         if before is not None:
-            self._baxter.take_over(*self._read_arms())
+            self._measure()
+            self._baxter.take_over()
         elif self._switch("enable", False):
             self._robot.apply(Event.ENABLE)
         self._before = model.read_joints()
-        self._measured = None  # (position, velocity) of the arms' joints when this tick began, (n,) each
-        self._gravity, self._gravity_ticks = None, 0  # what balances gravity (n,), and how long that holds
-        self._servo = self._servo_index = None  # joints that were driven to a position last, and which those are
+        self._gravity_ticks = 0  # for so many ticks measured.gravity still holds
+        # The joints that were driven to a position last, as the arms and as the model number them.
+        self._driven = self._driven_index = None
         self._has_started = before is not None
         #: Called in the loop with (side, message, JointCommand or None where it was refused) for each joint command.
         self.command_observers = self._arms.command_observers
@@ -91,9 +92,9 @@ class BaxterPlugin(ModelPlugin):
     def _build_parts(self, context, limb_index):
         world, model, robot, baxter = context.world, context.model, context.robot, self._baxter
         chains = {side: Chain.from_robot(robot, base=BASE_FRAME, tip=tip_of(side)) for side in limb_index}
-        self._robot = RobotTopics(baxter, model.joint_names, self._read_arms, self._set_joint_state_rate, context,
+        self._robot = RobotTopics(baxter, model.joint_names, self._measure, self._set_joint_state_rate, context,
                                   self._warnings)
-        self._arms = ArmTopics(baxter, chains, limb_index, lambda: self._measured, self._warnings)
+        self._arms = ArmTopics(baxter, chains, limb_index, self._warnings)
         self._head = HeadTopics(model, baxter.state, self._dt)
         self._grippers = GripperTopics({side: hand_of(world, model, side, self._dt) for side in SIDES}, baxter.state)
         self._robot.on_disabled += [self._head.stop, self._grippers.stop]
@@ -159,25 +160,23 @@ class BaxterPlugin(ModelPlugin):
 
     def update(self, time_s, dt):
         self._before = self._model.read_joints()
-        position, velocity = self._measured = (
-            self._before[0][self._arm_index], self._before[1][self._arm_index])
+        arm, measured = self._arm_index, self._baxter.measured
+        measured.time_s, measured.position, measured.velocity = time_s, self._before[0][arm], self._before[1][arm]
         queues = self.context.mail()
         if queues:
             self._handling.handle(queues, time_s)
-        arm = self._arm_index
-        self._collision.update(time_s, self._baxter.state.enabled, position, velocity)
+        self._collision.update(time_s, self._baxter.state.enabled)
         self._gravity_ticks -= 1
         if self._gravity_ticks <= 0 or self._baxter.moves_by_gravity:
-            self._gravity = self._model.gravity_efforts(self._before[0])[arm]
+            measured.gravity = self._model.gravity_efforts(self._before[0])[arm]
             self._gravity_ticks = GRAVITY_TICKS
-        drives = self._baxter.update(time_s, position, velocity, self._gravity)
-        if len(drives.servo):
-            if drives.servo is not self._servo:
-                self._servo, self._servo_index = drives.servo, arm[drives.servo]
-            self._model.drive_position(self._servo_index, drives.servo_position, drives.servo_effort,
-                                       velocity=drives.servo_velocity)
-        if len(drives.motor):
-            self._model.drive_velocity(arm[drives.motor], drives.motor_velocity, drives.motor_effort)
+        drives = self._baxter.update()
+        if len(drives.position_driven):
+            if drives.position_driven is not self._driven:
+                self._driven, self._driven_index = drives.position_driven, arm[drives.position_driven]
+            self._model.drive_position(self._driven_index, drives.position, drives.effort, velocity=drives.velocity)
+        if len(drives.velocity_driven):
+            self._model.drive_velocity(arm[drives.velocity_driven], drives.push_velocity, drives.push_effort)
         self._head.update()
         self._grippers.update(self._before)
 
@@ -193,9 +192,12 @@ class BaxterPlugin(ModelPlugin):
     def _snapshot(self):
         return Snapshot(self._model, self._before, self._dt)
 
-    def _read_arms(self):
-        """(position, velocity) of the arms' joints, (n,) each."""
-        return tuple(values[self._arm_index] for values in self._model.read_joints()[:2])
+    def _measure(self):
+        """Renew what the arms know of their joints, between two ticks."""
+        position, velocity, _ = self._model.read_joints()
+        measured = self._baxter.measured
+        measured.time_s = self.context.world.time_s
+        measured.position, measured.velocity = position[self._arm_index], velocity[self._arm_index]
 
     # -- when it has raised
 
@@ -218,10 +220,10 @@ class BaxterPlugin(ModelPlugin):
 
     def joints_set(self):
         # What has come in by now was said to the robot where it was.
-        self._measured = self._read_arms()
+        self._measure()
         self._handling.handle(self.context.mail(), self.context.world.time_s)
         self._gravity_ticks = 0
-        self._baxter.arms.reset(self._measured[0])
+        self._baxter.arms.reset()
         self._head.reset()
         self._grippers.reset()
         self._robot.announce_reset()

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter's control logic: arbitrates arm commands and defines the behaviour while disabled."""
-from baxter_model.readiness import NOT_ENABLED
-
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
-from .errors import CommandRefused, HardwareError
+from .arms.measured import Measured
+from .errors import HardwareError
 from .robot_state import RobotState
 
 DISABLED_BEHAVIOURS = ("hold", "sink")
@@ -12,8 +11,11 @@ DISABLED_BEHAVIOURS = ("hold", "sink")
 class Baxter:
     """The robot's state and its arms, one tick at a time.
 
-    limbs, limits, position, dt: as for `Arms`; profile: 'sim' or 'robot' (speed ratio at start);
-    disabled: what arms do without power, 'hold' or 'sink'; state: a robot_state.State to begin in.
+    limbs, limits, dt: as for `Arms`; position: (n,) [rad] where the arms are; profile: 'sim' or 'robot' (speed ratio at
+    start); disabled: what arms do without power, 'hold' or 'sink'; state: a robot_state.State to begin in.
+
+    Attribute `measured`: the `Measured` that the caller renews before each tick, and before each event that comes
+    between two ticks.
     """
 
     def __init__(self, limbs, limits, position, dt=0.002, profile="sim", disabled="hold", state=None):
@@ -22,24 +24,24 @@ class Baxter:
         if disabled not in DISABLED_BEHAVIOURS:
             raise HardwareError("disabled is '%s'; choices are %s" % (disabled, ", ".join(DISABLED_BEHAVIOURS)))
         self.state = RobotState() if state is None else RobotState(state)
-        self.arms = Arms(limbs, limits, position, speed_ratio=SPEED_RATIO[profile], dt=dt)
-        self.arms.stop(position, 0.0 * position, brakes=True)
+        self.measured = Measured(position)
+        self.arms = Arms(limbs, limits, self.measured, speed_ratio=SPEED_RATIO[profile], dt=dt)
+        self.arms.stop(brakes=True)
         self._sinks = disabled == "sink"
         self._speed_ratio = SPEED_RATIO[profile]
 
-    def take_over(self, position, velocity):
-        """Begin with arms that are moving, (n,) measured: forget every command, bring them to rest, and hold them."""
-        self.arms.take_over(position, velocity)
-        self.arms.stop(position, velocity, brakes=not self.state.enabled)
+    def take_over(self):
+        """Begin with arms that are moving: forget every command, bring them to rest, and hold them."""
+        self.arms.take_over()
+        self.arms.stop(brakes=not self.state.enabled)
 
-    def apply(self, event, position, velocity):
-        """Take an enable, disable, stop, reset ... event; (n,) measured. Returns why it was turned down, or None."""
+    def apply(self, event):
+        """Take an enable, disable, stop, reset ... event. Raises CommandRefused where the state does not allow it."""
         was_enabled = self.state.enabled
-        refusal = self.state.apply(event)
+        self.state.apply(event)
         if self.state.enabled != was_enabled:
             # Nothing that was commanded before counts any more.
-            self.arms.stop(position, velocity, brakes=not self.state.enabled)
-        return refusal
+            self.arms.stop(brakes=not self.state.enabled)
 
     def restore_settings(self):
         """Speed ratios and command time-outs of all limbs as they were at the start."""
@@ -47,19 +49,18 @@ class Baxter:
             self.arms.set_speed_ratio(side, self._speed_ratio)
             self.arms.set_timeout(side, COMMAND_TIMEOUT_S)
 
-    def command(self, side, mode, names, values, time_s, position, velocity):
+    def command(self, side, mode, names, values):
         """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled."""
-        if not self.state.enabled:
-            raise CommandRefused(NOT_ENABLED)
-        return self.arms.command(side, mode, names, values, time_s, position, velocity)
+        self.state.require_enabled()
+        return self.arms.command(side, mode, names, values)
 
     @property
     def moves_by_gravity(self):
         """Whether drives follow from the torque that balances gravity, so that `update` needs it as it is now."""
         return self.arms.in_torque or (self._sinks and not self.state.enabled)
 
-    def update(self, time_s, position, velocity, gravity):
-        """Drives of the arms for this tick, as `Arms.update`; gravity may be ticks old unless `moves_by_gravity`."""
+    def update(self):
+        """Drives of the arms for this tick; measured.gravity may be ticks old unless `moves_by_gravity`."""
         if self._sinks and not self.state.enabled:
-            return self.arms.sink(position, velocity, gravity)
-        return self.arms.update(time_s, position, velocity, gravity)
+            return self.arms.sink()
+        return self.arms.update()

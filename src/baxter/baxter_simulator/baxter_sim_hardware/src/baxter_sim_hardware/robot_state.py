@@ -8,7 +8,9 @@ failed is stopped with an error whose source is a fault.
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
-from baxter_model.readiness import RESET
+from baxter_model.readiness import NOT_ENABLED, RESET
+
+from .errors import CommandRefused
 
 
 class State(Enum):
@@ -113,7 +115,7 @@ TRANSITIONS = {
     (State.FAILED, Event.ESTOP_RELEASE): State.FAILED,
 }
 
-# What a person can do about a request that the table turned down.
+# Requests that leave the state as it is, and what a person can do then.
 REFUSALS = {
     (State.STOPPED, Event.ENABLE): "the robot is stopped: reset it first (%s)" % RESET,
     (State.ESTOP_PRESSED, Event.ENABLE): "the emergency stop is pressed: release it, then reset, then enable",
@@ -142,8 +144,14 @@ class RobotState:
         """The robot's own program cannot go on."""
         self.state = State.FAILED
 
+    def require_enabled(self):
+        """Raises CommandRefused unless the robot is enabled."""
+        if not self.enabled:
+            raise CommandRefused(NOT_ENABLED)
+
     def apply(self, event):
-        """Take one event; return why it was turned down, or None when it was taken."""
+        """Take one event. Raises CommandRefused, which says what to do, where the state does not allow it."""
         refusal = REFUSALS.get((self.state, event))
+        if refusal is not None:
+            raise CommandRefused(refusal)
         self.state = TRANSITIONS[self.state, event]
-        return refusal

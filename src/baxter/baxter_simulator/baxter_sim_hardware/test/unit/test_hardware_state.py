@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every row of the enable/stop/reset table, and what each state puts on the wire."""
+import contextlib
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from baxter_sim_hardware import Event, RobotState, State
+from baxter_sim_hardware import CommandRefused, Event, RobotState, State
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "baxter_sim_hardware"
 # Written out independently of the code: (state, event, state after, is a refusal).
@@ -58,9 +59,9 @@ EVENTS = {"enable": Event.ENABLE, "disable": Event.DISABLE, "stop": Event.STOP, 
 def test_transition(row):
     before, event, after, refused = row.split()
     robot = RobotState(STATES[before])
-    refusal = robot.apply(EVENTS[event])
+    with pytest.raises(CommandRefused) if refused == "refused" else contextlib.nullcontext():
+        robot.apply(EVENTS[event])
     assert robot.state is STATES[after]
-    assert (refusal is not None) == (refused == "refused")
 
 
 def test_every_pair_has_a_row():
@@ -83,7 +84,15 @@ def test_wire_fields(name, fields):
 
 def test_refusal_says_what_to_do():
     robot = RobotState(State.STOPPED)
-    assert "reset" in robot.apply(Event.ENABLE)
+    with pytest.raises(CommandRefused, match="reset it first"):
+        robot.apply(Event.ENABLE)
+
+
+def test_what_needs_power_is_refused_in_every_other_state():
+    RobotState(State.ENABLED).require_enabled()
+    for state in set(State) - {State.ENABLED}:
+        with pytest.raises(CommandRefused, match="not enabled"):
+            RobotState(state).require_enabled()
 
 
 def test_stop_has_the_last_word_of_a_tick():

@@ -88,9 +88,7 @@ class CommandParser:
         mode: int; names: sequence of str; values: sequence of float, one for each name.
         Raises CommandRefused, naming what was wrong and what this limb accepts.
         """
-        fault = self._fault(mode, names, values)
-        if fault:
-            raise CommandRefused("%s; this limb's joints are %s" % (fault, ", ".join(self._names)))
+        self._check(mode, names, values)
         mode, index = Mode(mode), self._last[1]
         wanted = np.array(values, dtype=float)
         values = self._limits.clamp(mode, index, wanted)
@@ -100,27 +98,30 @@ class CommandParser:
             clamped = tuple(name for name, told in zip(names, outside, strict=True) if told)
         return JointCommand(mode, index, values, clamped)
 
-    def _fault(self, mode, names, values):
-        """What is wrong with a command, or None: then `_last` tells its joints."""
+    def _check(self, mode, names, values):
+        """Raises CommandRefused; else `_last` tells the command's joints."""
         if mode not in Mode._value2member_map_:
-            return "unknown mode %d; modes are %s" % (mode, ", ".join("%d %s" % (known, known.name) for known in Mode))
+            raise self._refusal("unknown mode %d; modes are %s" % (
+                mode, ", ".join("%d %s" % (known, known.name) for known in Mode)))
         if len(names) != len(values):
-            return "%d names but %d values, and each name needs one value" % (len(names), len(values))
+            raise self._refusal("%d names but %d values, and each name needs one value" % (len(names), len(values)))
         if not names:
-            return "no joints named"
+            raise self._refusal("no joints named")
         names = list(names)
-        # Who streams says the same names each time.
+        # A stream says the same names each time.
         if names != self._last[0]:
             unknown = [name for name in names if name not in self._index]
             if unknown:
-                return "unknown joint '%s'" % unknown[0]
+                raise self._refusal("unknown joint '%s'" % unknown[0])
             if len(set(names)) != len(names):
                 repeated = sorted(name for name, count in Counter(names).items() if count > 1)
-                return "%s named more than once" % ", ".join(repeated)
+                raise self._refusal("%s named more than once" % ", ".join(repeated))
             index = np.array([self._index[name] for name in names])
             index.setflags(write=False)
             self._last = names, index
         for name, value in zip(names, values, strict=True):
             if not math.isfinite(value):
-                return "the value for %s is %s, and it must be a finite number" % (name, value)
-        return None
+                raise self._refusal("the value for %s is %s, and it must be a finite number" % (name, value))
+
+    def _refusal(self, fault):
+        return CommandRefused("%s; this limb's joints are %s" % (fault, ", ".join(self._names)))

@@ -3,7 +3,6 @@
 import numpy as np
 
 from baxter_model import BASE_FRAME, tip_of
-from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.arms import endpoint
 from baxter_sim_hardware.arms.joint_command import Mode
 from baxter_sim_hardware.errors import CommandRefused
@@ -14,15 +13,15 @@ from .row import JOINT_STATE_RATE, STATE_RATE_HZ, Part, Topic
 
 class ArmTopics(Part):
     """baxter: `robot.Baxter`; chains: {side: Chain}; limb_index: {side: (7,) indices of its joints in the model's};
-    measured: function -> (position, velocity) of the arms' joints when this tick began, (n,) each.
+    warnings: `warnings.Warnings`.
 
     Attribute `command_observers`: functions that are called in the loop with (side, message, JointCommand or None where
     it was refused) for each joint command.
     """
 
-    def __init__(self, baxter, chains, limb_index, measured, warnings):
+    def __init__(self, baxter, chains, limb_index, warnings):
         self._baxter, self._chains, self._limb_index = baxter, chains, limb_index
-        self._measured, self._warnings = measured, warnings
+        self._warnings = warnings
         names = np.array(baxter.arms.limits.names)
         self._order = np.argsort(names)
         self._reference_message = convert.JointStates(names[self._order].tolist())
@@ -75,12 +74,11 @@ class ArmTopics(Part):
     def _feed_forward(self, side, msg, time_s):
         if not msg.velocities and len(msg.positions) == len(self._baxter.arms.joints_of(side)):
             return  # a set-point alone: nothing to feed forward
-        self._baxter.arms.feed_forward(side, np.array(msg.velocities), time_s)
+        self._baxter.arms.feed_forward(side, np.array(msg.velocities))
 
     def _twist(self, side, msg, time_s):
-        position, velocity = self._measured()
         chain, joints = self._chains[side], self._baxter.arms.joints_of(side)
-        pose, jacobian = chain.fk_and_jacobian(position[joints])
+        pose, jacobian = chain.fk_and_jacobian(self._baxter.measured.position[joints])
         linear, angular = msg.twist.linear, msg.twist.angular
         twist = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
         # tf's old names begin with a slash; a slash alone names nothing.
@@ -93,18 +91,16 @@ class ArmTopics(Part):
         if not np.isfinite(twist).all():
             raise CommandRefused("twist is %s; it must be finite numbers" % twist.tolist())
         self._baxter.command(side, Mode.VELOCITY, chain.joint_names,
-                             endpoint.joint_velocities(jacobian, twist).tolist(), time_s, position, velocity)
+                             endpoint.joint_velocities(jacobian, twist).tolist())
 
     def _stop(self, side, msg, time_s):
-        if not self._baxter.state.enabled:
-            raise CommandRefused(NOT_ENABLED)
+        self._baxter.state.require_enabled()
         if msg.data:
-            self._baxter.arms.stop_limb(side, *self._measured())
+            self._baxter.arms.stop_limb(side)
 
     def _joint_command(self, side, msg, time_s):
-        position, velocity = self._measured()
         try:
-            command = self._baxter.command(side, msg.mode, msg.names, msg.command, time_s, position, velocity)
+            command = self._baxter.command(side, msg.mode, msg.names, msg.command)
         except CommandRefused as refusal:
             kind = (side, self._baxter.state.enabled)
             self._warnings.warn(time_s, kind, "%s limb: joint command ignored: %s" % (side, refusal))

@@ -35,8 +35,8 @@ class CollisionTopics(Part):
         for suppressions in self.suppressions.values():
             suppressions.reset()
 
-    def update(self, time_s, enabled, position, velocity):
-        """Before a step: have the arms yield, float and fall as contacts, cuffs and messages say. (n,) measured."""
+    def update(self, time_s, enabled):
+        """Before a step: have the arms yield, float and fall as contacts, cuffs and messages say."""
         if not self._schedule.due(time_s):
             return
         contacts = self._contacts()
@@ -44,7 +44,7 @@ class CollisionTopics(Part):
             self._arms.set_yielding(side, bool(contacts and self._touched(contacts, side, time_s)[0]))
             self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
             floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
-            self._arms.set_floating(side, floats, position, velocity)
+            self._arms.set_floating(side, floats)
 
     def _contacts(self):
         """[(link, link)] of the robot's own contacts that overlap or press."""

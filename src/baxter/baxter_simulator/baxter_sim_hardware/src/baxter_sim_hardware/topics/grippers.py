@@ -5,7 +5,6 @@ import copy
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState
 
 from baxter_model import CUSTOM, ELECTRIC, SUCTION
-from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.grippers.commands import CustomGripper
 from baxter_sim_hardware.grippers.electric import ElectricGripper
@@ -71,8 +70,8 @@ class GripperTopics(Part):
 
     def _valve(self, switch):
         def write(on):
-            if on and not self._state.enabled:
-                raise CommandRefused(NOT_ENABLED)
+            if on:
+                self._state.require_enabled()
             switch(on)
 
         return write

@@ -3,8 +3,6 @@
 from baxter_core_msgs.msg import HeadPanCommand, HeadState
 
 from baxter_model import HEAD_JOINT
-from baxter_model.readiness import NOT_ENABLED
-from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.head import TURNING_SPEED, Head
 
 from .row import STATE_RATE_HZ, Part, Topic
@@ -39,7 +37,7 @@ class HeadTopics(Part):
                                        velocity=setpoint[1])
 
     def _command_pan(self, component, msg, time_s):
-        self._require_enabled()
+        self._state.require_enabled()
         # A message of which only the target is set means: turn there. It disables nothing, although the request's
         # value for that is the 0 of a field that nobody set.
         request = msg.enable_pan_request if msg.speed_ratio else HeadPanCommand.REQUEST_PAN_VOID
@@ -47,12 +45,8 @@ class HeadTopics(Part):
 
     def _command_nod(self, component, msg, time_s):
         if msg.data:
-            self._require_enabled()
+            self._state.require_enabled()
             self._head.nod(time_s)
-
-    def _require_enabled(self):
-        if not self._state.enabled:
-            raise CommandRefused(NOT_ENABLED)
 
     def _head_state(self, time_s, component, snapshot):
         joint = self._index[0]

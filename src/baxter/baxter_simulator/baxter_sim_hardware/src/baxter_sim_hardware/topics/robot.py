@@ -16,14 +16,14 @@ _resets = itertools.count(1)
 
 
 class RobotTopics(Part):
-    """baxter: `robot.Baxter`; joint_names: of the whole model; read_arms: function -> (position, velocity) of the arms'
-    joints, (n,) measured; set_joint_state_rate: function(Hz).
+    """baxter: `robot.Baxter`; joint_names: of the whole model; measure: function that renews baxter.measured;
+    set_joint_state_rate: function(Hz).
 
     Attribute `on_disabled`: functions that are called when the robot was disabled.
     """
 
-    def __init__(self, baxter, joint_names, read_arms, set_joint_state_rate, context, warnings):
-        self._baxter, self._read_arms, self._set_rate = baxter, read_arms, set_joint_state_rate
+    def __init__(self, baxter, joint_names, measure, set_joint_state_rate, context, warnings):
+        self._baxter, self._measure, self._set_rate = baxter, measure, set_joint_state_rate
         self._world, self._log, self._warnings = context.world, context.log, warnings
         self._order = np.argsort(joint_names)
         self._joint_states_message = convert.JointStates([joint_names[i] for i in self._order])
@@ -31,12 +31,14 @@ class RobotTopics(Part):
 
     def apply(self, event):
         """Take an `Event`; a request that the robot's state refuses is logged."""
-        position, velocity = self._read_arms()
+        self._measure()
         before = self._baxter.state.state
-        refusal = self._baxter.apply(event, position, velocity)
-        if refusal:
+        try:
+            self._baxter.apply(event)
+        except CommandRefused as refusal:
             self._warnings.warn(self._world.time_s, event, "%s ignored: %s" % (event.value, refusal))
-        elif self._baxter.state.state is not before:
+            return
+        if self._baxter.state.state is not before:
             if not self._baxter.state.enabled:
                 for disabled in self.on_disabled:
                     disabled()

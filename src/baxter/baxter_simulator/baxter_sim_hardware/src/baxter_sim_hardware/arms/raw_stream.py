@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""RAW_POSITION: set-points that come as a stream move on at the stream's own pace."""
+import numpy as np
+
+from .joint_modes import RAW_POSITION
+
+STREAM_GAP_S = 0.05  # raw commands that follow each other within this are one stream
+FEED_FORWARD_S = 0.05  # for so long a feed-forward velocity belongs to the raw commands that come in
+
+
+class RawStream:
+    """When the last raw set-points came, and the velocities that belong to them, for n joints.
+
+    limits: JointLimits; dt: length of a tick [s].
+    """
+
+    def __init__(self, limits, dt):
+        self._limits, self._dt = limits, dt
+        count = len(limits.names)
+        self._stamp = np.full(count, -np.inf)
+        self._velocity = np.zeros(count)  # [rad/s]
+        self._velocity_stamp = np.full(count, -np.inf)
+
+    def reset(self):
+        """Forget what has come: with the clock set back it would seem to have come just now."""
+        self._stamp[:] = self._velocity_stamp[:] = -np.inf
+
+    def feed_forward(self, index, velocities, time_s):
+        """At time_s [s] the set-points of joints `index` move at velocities [rad/s], clipped to the limits."""
+        limit = self._limits.velocity[index]
+        self._velocity[index] = np.clip(velocities, -limit, limit)
+        self._velocity_stamp[index] = time_s
+
+    def take(self, points, mode, command, time_s):
+        """Take a raw command at time_s [s]: its target moves there at the stream's own pace, or is there at once if
+        none runs. points: SetPoints; mode: (n,) of the joints, before the command; command: JointCommand."""
+        index = command.index
+        gap = np.maximum(time_s - self._stamp[index], self._dt)
+        goes_on = (mode[index] == RAW_POSITION) & (gap <= STREAM_GAP_S)
+        points.target[index] = np.where(goes_on, points.target[index], command.values)
+        limit = self._limits.velocity[index]
+        # With a feed-forward velocity the goal is where the next command will be, without the one that has just come.
+        is_fresh = goes_on & (time_s - self._velocity_stamp[index] <= FEED_FORWARD_S)
+        ahead = np.where(is_fresh, self._velocity[index] * np.minimum(gap, STREAM_GAP_S), 0.0)
+        goal = np.clip(command.values + ahead, self._limits.lower[index], self._limits.upper[index])
+        points.pace[index] = np.clip((goal - points.target[index]) / gap, -limit, limit)
+        points.goal[index] = goal
+        self._stamp[index] = time_s
