@@ -110,6 +110,7 @@ class FakeGripper:
         arguments = time.monotonic(), SIDE, SimpleNamespace(position=())
         properties = copy.copy(self._topics.publishers["gripper_properties"](*arguments))
         properties.firmware_date = self._knobs["firmware_date"] or properties.firmware_date
+        properties.ui_type = self._knobs["ui_type"]  # 0 as older robots say of a bare arm
         state = self._topics.publishers["gripper_state"](*arguments)
         if not self._knobs["acknowledges"]:
             state.command, state.command_sender, state.command_sequence = "", "", 0
