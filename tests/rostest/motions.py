@@ -269,8 +269,9 @@ class HeadMotion(Motion):
 def all_motions(bench):
     """Each way of moving; arms take turns, so that both are seen."""
     left, right = SIDES
-    neutral = "from baxter_interface import Limb, startup; startup.init_node('neutral'); " \
-        "Limb('%s').move_to_neutral()" % right
+    # The robots begin in neutral: move_to_neutral would be there already.
+    move = "from baxter_interface import Limb, startup; startup.init_node('move'); limb = Limb('%s'); " \
+        "limb.move_to_joint_positions({name: angle + 0.3 for name, angle in limb.joint_angles().items()})" % right
     return {
         **{"stream_%d" % mode: Stream(bench, SIDES[mode % 2], mode) for mode in (POSITION, VELOCITY, TORQUE, RAW)},
         "action_position": TrajectoryAction(bench, left, "position"),
@@ -279,10 +280,10 @@ def all_motions(bench):
         "streamer": StreamerAction(bench, right),
         "gripper": GripperMotion(bench, left),
         "head": HeadMotion(bench, left),
-        "neutral": ProgramMotion(bench, right, "move_to_neutral", "python3", "-c", neutral),
+        "sdk_move": ProgramMotion(bench, right, "move_to_joint_positions", "python3", "-c", move),
         "tuck": ProgramMotion(bench, left, "tuck_arms.py", "rosrun", "baxter_tools", "tuck_arms.py", "-t"),
     }
 
 
 all_motions.names = ("stream_1", "stream_2", "stream_3", "stream_4", "action_position", "action_velocity",
-                     "action_position_w_id", "streamer", "gripper", "head", "neutral", "tuck")
+                     "action_position_w_id", "streamer", "gripper", "head", "sdk_move", "tuck")
