@@ -66,4 +66,4 @@ def is_squeezed(torques):
 
 def is_overloaded(wrench):
     """Whether (6,) force [N] and torque [Nm] at the tip are more than a hand may feel."""
-    return sum(wrench[:3] ** 2) > HAND_FORCE_N ** 2 or sum(wrench[3:] ** 2) > HAND_TORQUE_NM ** 2
+    return bool(sum(wrench[:3] ** 2) > HAND_FORCE_N ** 2 or sum(wrench[3:] ** 2) > HAND_TORQUE_NM ** 2)
