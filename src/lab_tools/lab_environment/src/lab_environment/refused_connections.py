@@ -6,6 +6,9 @@ the publisher's, or with another version of it, hangs without a word.
 """
 import functools
 
+# A publisher that answers something else each time shall fill neither the memory nor the terminal.
+MOST_LINES, LONGEST_REASON = 100, 300
+
 
 def amend(tcpros_base):
     """Have rospy.impl.tcpros_base's subscribers log what publishers answer instead of data."""
@@ -15,9 +18,10 @@ def amend(tcpros_base):
     @functools.wraps(validate)
     def validate_and_tell(self, header):
         # Clients of services raise what they are answered.
-        reason, is_service = header.get("error"), self.protocol.direction == tcpros_base.BIDIRECTIONAL
+        reason = header.get("error", "")[:LONGEST_REASON]
+        is_service = self.protocol.direction == tcpros_base.BIDIRECTIONAL
         key = (self.name, self.endpoint_id, reason)
-        if reason and not is_service and key not in told:
+        if reason and not is_service and key not in told and len(told) < MOST_LINES:
             told.add(key)
             tcpros_base.logerr("%s: no data from %s, which answers: %s", self.name, self.endpoint_id, reason)
         return validate(self, header)

@@ -49,3 +49,11 @@ def test_a_service_raises_its_refusal_and_says_nothing(said):
     with pytest.raises(tcpros_base.TransportInitError):
         answered(TCPROSServiceClient("/wave", Empty), REASON)
     assert said == []
+
+
+def test_a_publisher_of_many_long_reasons_is_cut_short(said):
+    for number in range(150):
+        with pytest.raises(tcpros_base.TransportInitError):
+            answered(TCPROSSub("/chatter", String), {"error": "%d %s" % (number, "x" * 10000)})
+    assert len(said) == refused_connections.MOST_LINES
+    assert max(map(len, said)) < 400
