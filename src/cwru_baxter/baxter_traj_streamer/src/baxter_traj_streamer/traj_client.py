@@ -79,7 +79,7 @@ class TrajClient:
     def wait_until_ready(self):
         """Wait for the server and for the robot to be enabled, whatever was started first, and say what for.
 
-        Raises MoveFailed for a server of another action, ROSInterruptException when ROS shuts down.
+        Raises ValueError for a server of another action, ROSInterruptException when ROS shuts down.
         """
         self._wait("%s: rosrun baxter_traj_streamer traj_interpolator_as" % ACTION_NAME, self._connect)
         self._wait("%s to answer" % ACTION_NAME,
@@ -93,7 +93,7 @@ class TrajClient:
             kind = dict(rospy.get_published_topics()).get(rospy.resolve_name(ACTION_NAME + "/result"))
             self._version = next((each for each in VERSIONS.values() if kind == each.name + "ActionResult"), None)
             if kind is not None and self._version is None:
-                raise MoveFailed(GoalStatus.LOST, "%s serves %s; this program speaks %s" % (
+                raise ValueError("%s serves %s; this program speaks %s" % (
                     ACTION_NAME, kind.removesuffix("ActionResult"), " and ".join(VERSIONS)))
             if self._version is not None:
                 self._action = actionlib.ActionClient(ACTION_NAME, self._version.action)
