@@ -5,6 +5,9 @@ STAND_INS=(
     src/bullet_gazebo/gazebo_msgs
     src/ros_control/control_msgs
     src/ros_control/controller_manager_msgs
+    src/moveit/moveit_msgs
+    src/moveit/object_recognition_msgs
+    src/moveit/octomap_msgs
     src/compat/xacro
     src/compat/rqt_plot
     src/compat/joy
