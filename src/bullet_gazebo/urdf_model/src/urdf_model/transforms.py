@@ -24,6 +24,15 @@ def rpy_matrix(roll, pitch, yaw):
     )
 
 
+def rpy_from_matrix(matrix):
+    """Return fixed-axis roll, pitch, yaw [rad] of a rotation; where pitch is a right angle, roll is taken as zero."""
+    level = math.hypot(matrix[0, 0], matrix[1, 0])
+    pitch = math.atan2(-matrix[2, 0], level)
+    if level < 1e-9:
+        return 0.0, pitch, math.atan2(-matrix[0, 1], matrix[1, 1])
+    return math.atan2(matrix[2, 1], matrix[2, 2]), pitch, math.atan2(matrix[1, 0], matrix[0, 0])
+
+
 def pose_matrix(xyz=(0.0, 0.0, 0.0), rpy=(0.0, 0.0, 0.0)):
     """Return the (4, 4) matrix of a URDF ``origin``: translation [m] and fixed-axis roll, pitch, yaw [rad]."""
     return rigid(rpy_matrix(*rpy), xyz)

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Write a merged robot as URDF text, for those who draw it: bodies, joints, shapes and colours, nothing else."""
 
-import numpy as np
 from lxml import etree
 
 from .model import Box, Cylinder, Mesh, Plane, Sphere
-from .transforms import pose_matrix
+from .transforms import pose_matrix, rpy_from_matrix
 
 _SHEET_M = 0.002  # how thick a plane is drawn
 
@@ -55,16 +54,7 @@ def _add_shape(element, shape):
 
 
 def _add_origin(element, matrix):
-    etree.SubElement(element, "origin", xyz=_words(matrix[:3, 3]), rpy=_words(_rpy(matrix)))
-
-
-def _rpy(matrix):
-    """Return fixed-axis roll, pitch, yaw [rad] of a rotation; where pitch is a right angle, roll is taken as zero."""
-    level = float(np.hypot(matrix[0, 0], matrix[1, 0]))
-    pitch = float(np.arctan2(-matrix[2, 0], level))
-    if level < 1e-9:
-        return 0.0, pitch, float(np.arctan2(-matrix[0, 1], matrix[1, 1]))
-    return float(np.arctan2(matrix[2, 1], matrix[2, 2])), pitch, float(np.arctan2(matrix[1, 0], matrix[0, 0]))
+    etree.SubElement(element, "origin", xyz=_words(matrix[:3, 3]), rpy=_words(rpy_from_matrix(matrix)))
 
 
 def _words(values):

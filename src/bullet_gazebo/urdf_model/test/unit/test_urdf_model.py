@@ -19,6 +19,7 @@ from urdf_model.transforms import (
     pose_matrix,
     quaternion_from_matrix,
     rotation_angle,
+    rpy_from_matrix,
     rpy_matrix,
 )
 
@@ -212,6 +213,16 @@ def test_quaternions_and_matrices_are_the_same_rotation(roll, pitch, yaw):
     quaternion = quaternion_from_matrix(rotation)
     assert quaternion @ quaternion == pytest.approx(1.0) and quaternion[3] >= 0.0
     np.testing.assert_allclose(matrix_from_quaternion(quaternion), rotation, atol=1e-12)
+
+
+@given(angles, angles, angles)
+def test_roll_pitch_and_yaw_come_back_as_the_same_rotation(roll, pitch, yaw):
+    rotation = rpy_matrix(roll, pitch, yaw)
+    np.testing.assert_allclose(rpy_matrix(*rpy_from_matrix(rotation)), rotation, atol=1e-8)
+
+
+def test_roll_is_zero_where_pitch_is_a_right_angle():
+    assert rpy_from_matrix(rpy_matrix(0.3, math.pi / 2, 1.0)) == pytest.approx((0.0, math.pi / 2, 0.7))
 
 
 @given(st.floats(0, math.pi))
