@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: BSD-3-Clause
+from distutils.core import setup
+
+from catkin_pkg.python_setup import generate_distutils_setup
+
+PACKAGES = [
+    "motion_planning",
+    "motion_planning.model",
+    "motion_planning.srdf",
+]
+
+setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Groups of joints that are planned for together."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from baxter_sim_kinematics import Chain, ChainError
+from motion_planning.shapes import read_only
+
+if TYPE_CHECKING:
+    from motion_planning.srdf import EndEffector
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Some joints of a model, as the SRDF names them. It never changes.
+
+    joints: names of the k joints that can be moved; indices (k,): where they stand in the model's variables.
+    links: the links that hang on the group's joints, fixed ones included; moving_links: all links of the robot that
+    move with the group, whoever they belong to.
+    base, tip: ends of the chain that the group is, None where it is none; chain: its kinematics, None where nothing in
+    it moves or a joint mimics another, too. Limits are the model's.
+    subgroups: names of groups in it. states: name to {joint: value}.
+    end_effector: what the group is as an end effector, else None; end_effectors: names of those mounted on it.
+    all_joints: fixed and mimic joints too.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    indices: np.ndarray
+    links: tuple[str, ...]
+    moving_links: tuple[str, ...]
+    tip: str | None
+    base: str | None
+    chain: Chain | None
+    subgroups: tuple[str, ...]
+    states: dict[str, dict[str, float]]
+    end_effector: EndEffector | None
+    end_effectors: tuple[str, ...]
+    all_joints: tuple[str, ...]
+
+    def __len__(self):
+        return len(self.joints)
+
+
+def build_groups(robot, srdf, variables, warnings):
+    """Return {name: Group} of ``srdf``'s groups, in its order, for ``robot`` (limits as they shall hold).
+
+    ``variables``: {joint: index}. What cannot be used is told to ``warnings`` (list of sentences).
+    """
+    order = depth_first(robot)
+    rank = {joint.name: number for number, joint in enumerate(order)}
+    by_child = {joint.child: joint for joint in order}
+    members = {}
+
+    def members_of(name):
+        if name not in members:
+            entry = srdf.groups[name]
+            own = set(entry.joints) | {by_child[link].name for link in entry.links if link in by_child}
+            own.update(joint.name for chain in entry.chains for joint in robot.chain(*chain))
+            listed = sorted(own, key=rank.__getitem__)
+            for subgroup in entry.subgroups:
+                listed += [joint for joint in members_of(subgroup) if joint not in own]
+                own.update(listed)
+            members[name] = listed
+        return members[name]
+
+    groups = {}
+    for name, entry in srdf.groups.items():
+        joints = [robot.joints[joint] for joint in members_of(name)]
+        if not joints:
+            warnings.append("group '%s' holds no joint; it is left out" % name)
+            continue
+        active = tuple(joint.name for joint in joints if joint.name in variables)
+        base, tip = _ends(robot, joints, rank)
+        effectors = [effector for effector in srdf.end_effectors if effector.group == name]
+        links = tuple(joint.child for joint in joints)
+        groups[name] = Group(
+            name, active, read_only([variables[joint] for joint in active], np.int64), links,
+            _moving_links(robot, order, active), tip, base, _chain(robot, base, tip, active), entry.subgroups,
+            _states(srdf, name, active, warnings), effectors[0] if effectors else None,
+            tuple(effector.name for effector in srdf.end_effectors
+                  if effector.group != name and (effector.parent_group == name
+                                                 or not effector.parent_group and effector.parent_link in links)),
+            tuple(joint.name for joint in joints))
+    return groups
+
+
+def depth_first(robot):
+    """Return the joints of ``robot`` (urdf_model.Robot), fixed ones too, each before those that hang on it."""
+    below = {}
+    for joint in robot.joints.values():
+        below.setdefault(joint.parent, []).append(joint)
+    found, stack = [], below.get(robot.root, [])[::-1]
+    while stack:
+        joint = stack.pop()
+        found.append(joint)
+        stack.extend(below.get(joint.child, [])[::-1])
+    return found
+
+
+def _ends(robot, joints, rank):
+    """Return (base link, tip link) of the chain that ``joints`` are, (None, None) where they are none."""
+    joints = sorted(joints, key=lambda joint: rank[joint.name])
+    path = {joint.name for joint in robot.chain(joints[0].parent, joints[-1].child)} if _is_below(
+        robot, joints[-1].child, joints[0].parent) else set()
+    names = {joint.name for joint in joints}
+    if not names <= path or any(robot.joints[name].movable for name in path - names):
+        return None, None
+    return joints[0].parent, joints[-1].child
+
+
+def _is_below(robot, link, ancestor):
+    while link != ancestor:
+        joint = robot.parent_joint(link)
+        if joint is None:
+            return False
+        link = joint.parent
+    return True
+
+
+def _chain(robot, base, tip, active):
+    if base is None or not active:
+        return None
+    try:
+        return Chain.from_robot(robot, base, tip)
+    except ChainError:
+        return None
+
+
+def _moving_links(robot, order, active):
+    moving = set()
+    for joint in order:
+        mimicked = joint.mimic
+        if joint.parent in moving or joint.name in active or mimicked is not None and mimicked.joint in active:
+            moving.add(joint.child)
+    return tuple(link for link in (joint.child for joint in order) if link in moving)
+
+
+def _states(srdf, group, active, warnings):
+    states = {}
+    for state in srdf.states:
+        if state.group != group:
+            continue
+        foreign = [joint for joint in state.values if joint not in active]
+        if foreign:
+            warnings.append("state '%s' names %s, which group '%s' does not move; ignored there"
+                            % (state.name, ", ".join("'%s'" % joint for joint in foreign), group))
+        states[state.name] = {joint: value for joint, value in state.values.items() if joint in active}
+    return states

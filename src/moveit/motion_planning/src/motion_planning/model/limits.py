@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joint limits: the URDF's, narrowed and completed by a ``joint_limits.yaml``."""
+import math
+
+import numpy as np
+
+#: Where neither file says how fast a joint may move [rad/s, rad/s^2; m for a sliding one]: MoveIt's defaults.
+DEFAULT_VELOCITY, DEFAULT_ACCELERATION = 1.0, 1.0
+
+
+def narrow_limits(robot, joint_limits, warnings):
+    """Narrow the positions, and set the velocities, of ``robot``'s joints (in place) to what ``joint_limits`` says.
+
+    ``joint_limits``: {joint: {min_position, max_position, has_velocity_limits, max_velocity, has_acceleration_limits,
+    max_acceleration}}, or a mapping with that under "joint_limits". Returns {joint: acceleration limit}. What cannot
+    be used is told to ``warnings``.
+    """
+    accelerations = {}
+    table = joint_limits or {}
+    table = table.get("joint_limits", table) or {}
+    for name, entry in table.items():
+        joint = robot.joints.get(name)
+        if not isinstance(entry, dict) or joint is None:
+            if isinstance(entry, dict):
+                warnings.append("joint limits name '%s', which is no joint of the robot; ignored" % name)
+            continue
+        _narrow_position(joint, entry, warnings)
+        velocity = _positive(name, entry, "velocity", warnings)
+        if velocity is not None:
+            joint.limit.velocity = velocity if velocity > 0.0 else None
+        acceleration = _positive(name, entry, "acceleration", warnings)
+        if acceleration:
+            accelerations[name] = acceleration
+    return accelerations
+
+
+def limit_arrays(joints, accelerations):
+    """Return bounds (n, 2), velocity (n,), acceleration (n,), continuous (n,) bool of ``joints`` (urdf_model.Joint)."""
+    continuous = np.array([joint.type == "continuous" for joint in joints], dtype=bool)
+    bounds = np.array([(-math.pi, math.pi) if joint.type == "continuous" else (joint.limit.lower, joint.limit.upper)
+                       for joint in joints], dtype=float).reshape(-1, 2)
+    velocity = np.array([joint.limit.velocity or DEFAULT_VELOCITY for joint in joints], dtype=float)
+    acceleration = np.array([accelerations.get(joint.name, DEFAULT_ACCELERATION) for joint in joints], dtype=float)
+    return bounds, velocity, acceleration, continuous
+
+
+def _narrow_position(joint, entry, warnings):
+    low, high = (_number(joint.name, entry, key, warnings) for key in ("min_position", "max_position"))
+    if not entry.get("has_position_limits", True) or low is high is None:
+        return
+    if joint.type == "continuous" or joint.limit.lower is None:
+        warnings.append("joint '%s' is %s; its limits of position are ignored" % (joint.name, joint.type))
+        return
+    low = joint.limit.lower if low is None else max(low, joint.limit.lower)
+    high = joint.limit.upper if high is None else min(high, joint.limit.upper)
+    if low > high:
+        warnings.append("limits of position of joint '%s' leave nothing of the URDF's %g to %g; ignored"
+                        % (joint.name, joint.limit.lower, joint.limit.upper))
+        return
+    joint.limit.lower, joint.limit.upper = low, high
+
+
+def _positive(name, entry, what, warnings):
+    """The limit of ``what``: None where nothing is said, 0 where there shall be none."""
+    if entry.get("has_%s_limits" % what) is False:
+        return 0.0
+    value = _number(name, entry, "max_" + what, warnings)
+    if value is not None and value <= 0.0:
+        warnings.append("max_%s of joint '%s' is %g; expected more than 0; ignored" % (what, name, value))
+        return None
+    return value
+
+
+def _number(name, entry, key, warnings):
+    value = entry.get(key)
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        warnings.append("%s of joint '%s' is %r; expected a number; ignored" % (key, name, value))
+        return None
+    return float(value)

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A robot from URDF, SRDF and joint limits."""
+import math
+
+import numpy as np
+
+from motion_planning.model.errors import ModelError
+from motion_planning.model.group import build_groups, depth_first
+from motion_planning.model.kernels import fill_frames
+from motion_planning.model.limits import limit_arrays, narrow_limits
+from motion_planning.model.state import State
+from motion_planning.shapes import read_only
+from motion_planning.srdf import parse_srdf
+from urdf_model import UrdfError, parse_urdf
+
+_KINDS = {"revolute": 1, "continuous": 1, "prismatic": 2}
+
+
+class PlanningModel:
+    """The robot that is planned for. It never changes and may be used from any number of threads.
+
+    name: the URDF's. robot: urdf_model.Robot, its limits narrowed. srdf: srdf.Srdf. warnings: what was ignored.
+    root: root link. frame: the planning frame, that is the virtual joint's parent frame, or else the root.
+    virtual_joint: srdf.VirtualJoint or None.
+    variables: names of the n joints that can be moved (not fixed, not mimic), depth-first; index: {name: where}.
+    bounds (n, 2) [rad or m], -pi to pi for a joint that turns without end; velocity (n,), acceleration (n,) [per s,
+    per s^2]; continuous (n,) bool: turns without end.
+    links: names, depth-first, parents first; link_index: {name: where}.
+    groups: {name: Group}. end_effectors: {name: srdf.EndEffector}. passive: joints that nothing drives.
+    disabled: frozenset of sorted pairs of links that need not be checked against each other.
+    """
+
+    def __init__(self, robot, srdf, joint_limits=None):
+        """``joint_limits``: the mapping of a joint_limits.yaml. Raises ModelError. ``robot`` is changed by it."""
+        self.robot, self.srdf, self.name = robot, srdf, robot.name
+        self.warnings = [*robot.warnings, *srdf.warnings]
+        accelerations = narrow_limits(robot, joint_limits, self.warnings)
+        joints = depth_first(robot)
+        movable = [joint for joint in joints if joint.movable and joint.mimic is None]
+        self.variables = tuple(joint.name for joint in movable)
+        self.index = {name: number for number, name in enumerate(self.variables)}
+        arrays = limit_arrays(movable, accelerations)
+        self.bounds, self.velocity, self.acceleration = (read_only(array) for array in arrays[:3])
+        self.continuous = read_only(arrays[3], bool)
+        self.root = robot.root
+        self.virtual_joint = srdf.virtual_joints[0] if srdf.virtual_joints else None
+        self.frame = self.virtual_joint.parent_frame if self.virtual_joint else self.root
+        self.links = (self.root, *(joint.child for joint in joints))
+        self.link_index = {name: number for number, name in enumerate(self.links)}
+        self._set_kinematics(joints)
+        self.groups = build_groups(robot, srdf, self.index, self.warnings)
+        self.end_effectors = {effector.name: effector for effector in srdf.end_effectors}
+        self.passive = frozenset(srdf.passive_joints)
+        self.disabled = frozenset(pair_of(pair.link1, pair.link2) for pair in srdf.disabled)
+        self._enabled = frozenset(pair_of(*pair) for pair in srdf.enabled)
+        self._no_default = frozenset(srdf.no_default)
+
+    @classmethod
+    def from_xml(cls, urdf_xml, srdf_xml, joint_limits=None):
+        """Return the model of two texts (str or bytes) and the mapping of a joint_limits.yaml.
+
+        ``srdf_xml`` may be empty: no groups then. Raises ModelError for texts that are no URDF or no SRDF.
+        """
+        try:
+            robot = parse_urdf(urdf_xml)
+        except UrdfError as error:
+            raise ModelError(str(error)) from None
+        empty = "<robot name='%s'/>" % robot.name if srdf_xml is None or not srdf_xml.strip() else None
+        try:
+            srdf = parse_srdf(empty or srdf_xml, robot)
+        except ValueError as error:
+            raise ModelError(str(error)) from None
+        return cls(robot, srdf, joint_limits)
+
+    def _set_kinematics(self, joints):
+        count = len(self.links)
+        parents, variables = np.full(count, -1), np.full(count, -1)
+        origins, axes, kinds = np.tile(np.eye(4), (count, 1, 1)), np.zeros((count, 3)), np.zeros(count, dtype=np.int64)
+        factors = np.tile((1.0, 0.0), (count, 1))
+        for number, joint in enumerate(joints, 1):
+            parents[number] = self.link_index[joint.parent]
+            origins[number], axes[number] = joint.origin, joint.axis
+            kinds[number] = _KINDS.get(joint.type, 0)
+            source, factors[number] = self._driver(joint)
+            variables[number] = self.index.get(source, -1)
+        self.kinematics = tuple(read_only(array, array.dtype) for array in (
+            parents, origins, axes, kinds, variables, factors))
+
+    def _driver(self, joint):
+        """(name of the joint whose value counts, (multiplier, offset)) of ``joint``, through all that it mimics."""
+        multiplier, offset, seen = 1.0, 0.0, {joint.name}
+        while joint.mimic is not None:
+            offset += multiplier * joint.mimic.offset
+            multiplier *= joint.mimic.multiplier
+            joint = self.robot.joints[joint.mimic.joint]
+            if joint.name in seen:
+                raise ModelError("joint '%s' mimics itself through %s" % (joint.name, ", ".join(sorted(seen))))
+            seen.add(joint.name)
+        return joint.name, (multiplier, offset)
+
+    # -- poses --------------------------------------------------------------------------------------------------
+
+    def frames(self, q, base=None):
+        """Return the poses (l, 4, 4) of all ``links`` in the planning frame at ``q`` (n,).
+
+        ``base`` (4, 4): the root in the planning frame, identity where None. Mimic joints follow. Raises ModelError
+        for a wrong count.
+        """
+        frames = np.empty((len(self.links), 4, 4))
+        base = np.eye(4) if base is None else np.array(base, dtype=np.float64)
+        fill_frames(self.kinematics, self.checked(q), base, frames)
+        return frames
+
+    def frame_of(self, q, link, base=None):
+        """Return the pose (4, 4) of ``link`` in the planning frame. Raises ModelError for an unknown link."""
+        if link not in self.link_index:
+            raise ModelError("robot '%s' has no link '%s'" % (self.name, link))
+        return self.frames(q, base)[self.link_index[link]]
+
+    def checked(self, q):
+        """Return ``q`` as an array (n,) of floats. Raises ModelError for a wrong count."""
+        values = np.array(q, dtype=np.float64)  # of one memory layout, writable: numba compiles for each kind
+        if values.shape != (len(self.variables),):
+            raise ModelError("expected %d joint values (%s), got an array of shape %s"
+                             % (len(self.variables), ", ".join(self.variables), values.shape))
+        return values
+
+    # -- states -------------------------------------------------------------------------------------------------
+
+    def state(self, values=None, base=None, attached=None):
+        """Return a State: ``values`` {joint: value} or (n,), over :meth:`default_state`'s; ``base`` (4, 4)."""
+        q = self._defaults() if values is None or isinstance(values, dict) else self.checked(values)
+        state = State(q, base, attached or {}, self.variables)
+        return state.with_joints(values) if isinstance(values, dict) else state
+
+    def default_state(self):
+        """Return the State with every joint at 0, or in the middle of its limits where 0 is beyond them."""
+        return self.state()
+
+    def _defaults(self):
+        low, high = self.bounds[:, 0], self.bounds[:, 1]
+        return np.where((low <= 0.0) & (high >= 0.0), 0.0, 0.5 * (low + high))
+
+    def group(self, name):
+        """Return the Group ``name``. Raises ModelError, which names those that there are."""
+        if name not in self.groups:
+            raise ModelError("robot '%s' has no group '%s'; its groups are %s"
+                             % (self.name, name, ", ".join(self.groups) or "none"))
+        return self.groups[name]
+
+    def wrapped(self, q):
+        """Return ``q`` (n,) with joints that turn without end brought between -pi and pi."""
+        q = self.checked(q).copy()
+        turns = self.continuous
+        q[turns] = np.remainder(q[turns] + math.pi, 2.0 * math.pi) - math.pi
+        return q
+
+    def beyond_limits(self, q, margin=0.0, indices=None):
+        """Return [(joint, value, lower, upper)] of those of ``q`` (n,) beyond their limits by more than ``margin``.
+
+        ``indices``: only these variables count.
+        """
+        q = self.checked(q)
+        out = ((q < self.bounds[:, 0] - margin) | (q > self.bounds[:, 1] + margin) | ~np.isfinite(q)) & ~self.continuous
+        out |= ~np.isfinite(q)
+        where = np.flatnonzero(out) if indices is None else [index for index in indices if out[index]]
+        return [(self.variables[k], float(q[k]), *map(float, self.bounds[k])) for k in where]
+
+    # -- collisions ---------------------------------------------------------------------------------------------
+
+    def default_collision(self, link_a, link_b):
+        """Whether two links of the robot are checked against each other, as the SRDF says."""
+        pair = pair_of(link_a, link_b)
+        if link_a == link_b or pair in self.disabled:
+            return False
+        return pair in self._enabled or not (link_a in self._no_default or link_b in self._no_default)
+
+
+def pair_of(a, b):
+    """Return two names as a sorted pair, as sets of pairs have them."""
+    return (a, b) if a <= b else (b, a)

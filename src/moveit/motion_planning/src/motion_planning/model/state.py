@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the robot is and what it holds."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from motion_planning.model.errors import ModelError
+from motion_planning.shapes import read_only
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A state of a robot; it never changes.
+
+    q (n,): a value for each of ``variables`` [rad or m]. base (4, 4): the root link in the planning frame.
+    attached: id to the ``scene.AttachedBody`` that the robot holds. variables: names of the model's variables.
+    """
+
+    q: np.ndarray
+    base: np.ndarray = field(default_factory=lambda: np.eye(4))
+    attached: Mapping = field(default_factory=dict)
+    variables: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        object.__setattr__(self, "q", read_only(self.q))
+        object.__setattr__(self, "base", read_only(np.eye(4) if self.base is None else self.base))
+        if not isinstance(self.attached, MappingProxyType):
+            object.__setattr__(self, "attached", MappingProxyType(dict(self.attached)))
+
+    @property
+    def positions(self):
+        """A new dict: variable to value."""
+        return dict(zip(self.variables, self.q.tolist(), strict=True))
+
+    def with_joints(self, values):
+        """Return the state with ``values``, {joint: value}, in place. Raises ModelError for a joint that is not a
+        variable, and for a value that is not finite."""
+        q = self.q.copy()
+        for name, value in values.items():
+            if name not in self.variables:
+                raise ModelError("'%s' is no joint variable of the robot; expected one of %s"
+                                 % (name, ", ".join(self.variables)))
+            if not np.isfinite(value):
+                raise ModelError("the value of joint '%s' is %s; expected a finite number" % (name, value))
+            q[self.variables.index(name)] = value
+        return replace(self, q=q)
+
+    def with_q(self, q, indices=None):
+        """Return the state at ``q`` (n,), or with ``q`` (k,) at the ``indices`` (k,), as groups have them."""
+        if indices is not None:
+            whole = self.q.copy()
+            whole[indices] = q
+            q = whole
+        return replace(self, q=q)
+
+    def with_base(self, base):
+        """Return the state with the root link at ``base`` (4, 4) in the planning frame."""
+        return replace(self, base=base)
+
+    def with_attached(self, attached):
+        """Return the state with ``attached``, {id: AttachedBody}, and nothing else, in the robot's hands."""
+        return replace(self, attached=attached)

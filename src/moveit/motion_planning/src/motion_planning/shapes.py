@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shapes of planning beyond those of a URDF. Lengths in m; each in its own frame."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Cone:
+    """Along z, centred at half its height: the base at -length / 2, the apex at +length / 2."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Triangles as they are, hollow. vertices (n, 3) float64; triangles (m, 3) int64, indices of vertices.
+
+    Raises ValueError for no triangles, wrong shapes, indices out of range and numbers that are not finite.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+
+    def __post_init__(self):
+        vertices, triangles = read_only(self.vertices), read_only(self.triangles, np.int64)
+        if vertices.ndim != 2 or vertices.shape[1:] != (3,) or triangles.ndim != 2 or triangles.shape[1:] != (3,):
+            raise ValueError("a mesh needs vertices (n, 3) and triangles (m, 3), got %s and %s"
+                             % (vertices.shape, triangles.shape))
+        if not len(triangles):
+            raise ValueError("the mesh has %d vertices and no triangles" % len(vertices))
+        if triangles.min() < 0 or triangles.max() >= len(vertices):
+            raise ValueError("triangles of the mesh name vertices %d to %d, but it has %d"
+                             % (triangles.min(), triangles.max(), len(vertices)))
+        if not np.isfinite(vertices).all():
+            raise ValueError("the mesh has a vertex that is not finite")
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "triangles", triangles)
+
+
+@dataclass(frozen=True, eq=False)
+class Octree:
+    """Occupied cubes of an octree. resolution [m]: side of the smallest; boxes (n, 4): centre x y z, and side."""
+
+    resolution: float
+    boxes: np.ndarray
+
+    def __post_init__(self):
+        boxes = read_only(np.reshape(np.asarray(self.boxes, dtype=float), (-1, 4)))
+        if not self.resolution > 0.0 or not np.isfinite(boxes).all():
+            raise ValueError("an octree needs a positive resolution and finite boxes, got resolution %r"
+                             % (self.resolution,))
+        object.__setattr__(self, "boxes", boxes)
+
+
+def read_only(array, kind=np.float64):
+    """Return a contiguous copy of ``array`` that cannot be written, or ``array`` itself where it is one already."""
+    if isinstance(array, np.ndarray) and array.dtype == kind and array.flags.c_contiguous and not array.flags.writeable:
+        return array
+    copy = np.array(array, dtype=kind, order="C")
+    copy.flags.writeable = False
+    return copy

@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""SRDF: what planning needs to know of a robot beyond its URDF, as plain data."""
+from motion_planning.srdf.data import DisabledPair, EndEffector, GroupEntry, GroupState, Srdf, VirtualJoint
+from motion_planning.srdf.reader import SrdfError, parse_srdf
+
+__all__ = ["DisabledPair", "EndEffector", "GroupEntry", "GroupState", "Srdf", "SrdfError", "VirtualJoint", "parse_srdf"]
