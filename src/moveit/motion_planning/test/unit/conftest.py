@@ -24,6 +24,43 @@ GROUPS = """
 """
 
 
+MIX_URDF = """<robot name="mix">
+  <link name="base"/><link name="turret"/><link name="slide"/><link name="finger"/><link name="thumb"/>
+  <link name="eye"/>
+  <joint name="turn" type="continuous"><origin xyz="0 0 0.5" rpy="0 0 1"/><parent link="base"/><child link="turret"/>
+    <axis xyz="0 1 1"/></joint>
+  <joint name="look" type="fixed"><origin xyz="0 0 1"/><parent link="base"/><child link="eye"/></joint>
+  <joint name="push" type="prismatic"><parent link="turret"/><child link="slide"/><axis xyz="1 0 0"/>
+    <limit lower="0.1" upper="0.3" effort="1" velocity="0.4"/></joint>
+  <joint name="grip" type="revolute"><origin xyz="0 0.1 0"/><parent link="slide"/><child link="finger"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="0"/></joint>
+  <joint name="oppose" type="revolute"><origin xyz="0 -0.1 0"/><parent link="slide"/><child link="thumb"/>
+    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="2"/>
+    <mimic joint="grip" multiplier="-2" offset="0.25"/></joint>
+</robot>"""
+MIX_SRDF = """<robot name="mix">
+  <group name="arm"><chain base_link="base" tip_link="slide"/></group>
+  <group name="hand"><joint name="grip"/><link name="thumb"/></group>
+  <group name="listed"><joint name="push"/><joint name="turn"/></group>
+  <group name="ends"><joint name="grip"/><joint name="look"/></group>
+  <group_state name="out" group="arm"><joint name="push" value="0.3"/><joint name="grip" value="1"/></group_state>
+  <disable_collisions link1="turret" link2="base" reason="Adjacent"/>
+  <disable_default_collisions link="eye"/>
+  <enable_collisions link1="finger" link2="eye"/>
+</robot>"""
+
+
+@pytest.fixture(scope="session")
+def mix_texts():
+    """URDF and SRDF of a small robot with a joint of each kind, and one that mimics another."""
+    return MIX_URDF, MIX_SRDF
+
+
+@pytest.fixture(scope="session")
+def mix(mix_texts):
+    return PlanningModel.from_xml(*mix_texts)
+
+
 @pytest.fixture(scope="session")
 def packages():
     return rospkg.RosPack()

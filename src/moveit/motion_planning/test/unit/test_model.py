@@ -9,36 +9,6 @@ from baxter_sim_kinematics import Chain
 from motion_planning.model import ModelError, PlanningModel
 from urdf_model.transforms import axis_rotation, rigid
 
-URDF = """<robot name="mix">
-  <link name="base"/><link name="turret"/><link name="slide"/><link name="finger"/><link name="thumb"/>
-  <link name="eye"/>
-  <joint name="turn" type="continuous"><origin xyz="0 0 0.5" rpy="0 0 1"/><parent link="base"/><child link="turret"/>
-    <axis xyz="0 1 1"/></joint>
-  <joint name="look" type="fixed"><origin xyz="0 0 1"/><parent link="base"/><child link="eye"/></joint>
-  <joint name="push" type="prismatic"><parent link="turret"/><child link="slide"/><axis xyz="1 0 0"/>
-    <limit lower="0.1" upper="0.3" effort="1" velocity="0.4"/></joint>
-  <joint name="grip" type="revolute"><origin xyz="0 0.1 0"/><parent link="slide"/><child link="finger"/>
-    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="0"/></joint>
-  <joint name="oppose" type="revolute"><origin xyz="0 -0.1 0"/><parent link="slide"/><child link="thumb"/>
-    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="2"/>
-    <mimic joint="grip" multiplier="-2" offset="0.25"/></joint>
-</robot>"""
-SRDF = """<robot name="mix">
-  <group name="arm"><chain base_link="base" tip_link="slide"/></group>
-  <group name="hand"><joint name="grip"/><link name="thumb"/></group>
-  <group name="listed"><joint name="push"/><joint name="turn"/></group>
-  <group name="ends"><joint name="grip"/><joint name="look"/></group>
-  <group_state name="out" group="arm"><joint name="push" value="0.3"/><joint name="grip" value="1"/></group_state>
-  <disable_collisions link1="turret" link2="base" reason="Adjacent"/>
-  <disable_default_collisions link="eye"/>
-  <enable_collisions link1="finger" link2="eye"/>
-</robot>"""
-
-
-@pytest.fixture
-def mix():
-    return PlanningModel.from_xml(URDF, SRDF)
-
 
 def test_variables_are_what_can_be_moved_depth_first(mix):
     assert mix.variables == ("turn", "push", "grip")
@@ -49,13 +19,13 @@ def test_variables_are_what_can_be_moved_depth_first(mix):
     assert mix.default_state().q.tolist() == [0.0, 0.2, 0.0]
 
 
-def test_limits_are_narrowed_and_completed():
+def test_limits_are_narrowed_and_completed(mix_texts):
     limits = {"joint_limits": {
         "push": {"max_position": 0.25, "min_position": -5, "max_velocity": 0.7, "has_velocity_limits": True},
         "grip": {"has_acceleration_limits": True, "max_acceleration": 3, "min_position": 4, "max_position": 5},
         "turn": {"has_velocity_limits": False, "max_velocity": 9, "max_acceleration": -1, "max_position": 1.0},
         "nose": {"max_velocity": 1.0}}}
-    model = PlanningModel.from_xml(URDF, SRDF, limits)
+    model = PlanningModel.from_xml(*mix_texts, limits)
     assert model.bounds.tolist() == [[-math.pi, math.pi], [0.1, 0.25], [-1.0, 1.0]]
     assert model.velocity.tolist() == [1.0, 0.7, 1.0]  # none said, ours, the URDF's 0 means none
     assert model.acceleration.tolist() == [1.0, 1.0, 3.0]
@@ -124,20 +94,21 @@ def test_limits_that_are_broken_are_named(mix):
     np.testing.assert_allclose(mix.wrapped([math.pi + 0.5, 0.2, 0.0]), [0.5 - math.pi, 0.2, 0.0])
 
 
-def test_a_joint_that_mimics_itself_is_refused():
-    text = URDF.replace('<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="0"/>',
+def test_a_joint_that_mimics_itself_is_refused(mix_texts):
+    text = mix_texts[0].replace('<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="0"/>',
                         '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="0"/>'
                         '<mimic joint="oppose"/>')
     with pytest.raises(ModelError, match="mimics itself"):
-        PlanningModel.from_xml(text, SRDF)
+        PlanningModel.from_xml(text, mix_texts[1])
 
 
-def test_texts_that_are_none_are_refused():
+def test_texts_that_are_none_are_refused(mix_texts):
+    urdf, srdf = mix_texts
     with pytest.raises(ModelError, match="not a URDF"):
-        PlanningModel.from_xml("<sdf/>", SRDF)
+        PlanningModel.from_xml("<sdf/>", srdf)
     with pytest.raises(ModelError, match="not an SRDF"):
-        PlanningModel.from_xml(URDF, "<sdf/>")
-    assert PlanningModel.from_xml(URDF, "").groups == {}
+        PlanningModel.from_xml(urdf, "<sdf/>")
+    assert PlanningModel.from_xml(urdf, "").groups == {}
 
 
 def test_baxters_groups(baxter):

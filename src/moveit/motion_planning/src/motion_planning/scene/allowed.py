@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which two of a scene's links and objects may touch: MoveIt's allowed-collision matrix."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from motion_planning.model.planning_model import pair_of
+
+
+@dataclass(frozen=True, eq=False)
+class AllowedCollisions:
+    """What is said of pairs of names, and of one name with all others. It never changes.
+
+    entries: {sorted pair: may touch}; defaults: {name: may touch whatever it has no entry with}. A pair's entry comes
+    first; then defaults, of which a "must not" wins; what nothing is said of must not touch.
+    """
+
+    entries: Mapping = field(default_factory=dict)
+    defaults: Mapping = field(default_factory=dict)
+
+    def __post_init__(self):
+        for name in ("entries", "defaults"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @classmethod
+    def of(cls, model):
+        """Return what the SRDF of ``model`` says."""
+        entries = {pair_of(*pair): False for pair in model.srdf.enabled}
+        entries.update(dict.fromkeys(model.disabled, True))
+        return cls(entries, dict.fromkeys(model.srdf.no_default, True))
+
+    @classmethod
+    def from_matrix(cls, names, matrix, default_names=(), default_values=()):
+        """Return what a message says: ``matrix`` (n, n) bool for ``names`` (n), values for default names.
+
+        Raises ValueError for lists that do not fit each other.
+        """
+        if len(matrix) != len(names) or any(len(row) != len(names) for row in matrix):
+            raise ValueError("an allowed-collision matrix of %d names needs %d rows of %d values, got rows of %s"
+                             % (len(names), len(names), len(names), sorted({len(row) for row in matrix}) or "nothing"))
+        if len(default_names) != len(default_values):
+            raise ValueError("%d default names but %d default values" % (len(default_names), len(default_values)))
+        # The upper half counts: a sender fills both.
+        entries = {pair_of(a, b): bool(matrix[i][j]) for i, a in enumerate(names) for j, b in enumerate(names[i:], i)
+                   if i != j}
+        return cls(entries, dict(zip(default_names, map(bool, default_values), strict=True)))
+
+    def as_matrix(self):
+        """Return (names, matrix (n, n) bool, default names, default values), as a message has them.
+
+        A pair that nothing is said of stands there as its defaults have it.
+        """
+        names = sorted({name for pair in self.entries for name in pair})
+        matrix = np.array([[i != j and self.allowed(a, b) for j, b in enumerate(names)] for i, a in enumerate(names)],
+                          dtype=bool).reshape(len(names), len(names))
+        return names, matrix, list(self.defaults), list(self.defaults.values())
+
+    def allowed(self, a, b):
+        """Whether ``a`` and ``b`` may touch."""
+        entry = self.entries.get((a, b) if a <= b else (b, a))
+        if entry is not None:
+            return entry
+        said = [self.defaults[name] for name in (a, b) if name in self.defaults]
+        return bool(said) and all(said)
+
+    def with_entries(self, pairs):
+        """Return what there is with ``pairs``, {(name, name): may touch}, in place."""
+        return AllowedCollisions({**self.entries, **{pair_of(*pair): bool(value) for pair, value in pairs.items()}},
+                                 self.defaults)
+
+    def with_default(self, name, allow):
+        """Return what there is with ``name`` allowed to touch everything, or nothing; its entries stay."""
+        return AllowedCollisions(self.entries, {**self.defaults, name: bool(allow)})
+
+    def without(self, names):
+        """Return what there is without all that is said of ``names``."""
+        names = set(names)
+        if not names & {*self.defaults, *(name for pair in self.entries for name in pair)}:
+            return self
+        return AllowedCollisions({pair: value for pair, value in self.entries.items() if names.isdisjoint(pair)},
+                                 {name: value for name, value in self.defaults.items() if name not in names})

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Things in a scene: standing in the world, or held by the robot."""
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from motion_planning.errors import PlanningError
+from motion_planning.shapes import read_only
+
+#: The name that the octomap has in an AllowedCollisions and in contacts.
+OCTOMAP = "<octomap>"
+
+
+class SceneError(PlanningError):
+    """A change or a question that does not fit the scene."""
+
+
+@dataclass(frozen=True, eq=False)
+class WorldObject:
+    """Something with shapes; it never changes.
+
+    pose (4, 4): of the object in the planning frame, or in the link that holds it. shapes: ((shape, pose (4, 4) in the
+    object), ...), shapes of urdf_model (Box, Cylinder, Sphere, Plane) or of motion_planning.shapes.
+    subframes: {name: pose (4, 4) in the object}. type: (key, database), as ObjectType has them.
+    Raises SceneError for a pose that is none.
+    """
+
+    id: str
+    pose: np.ndarray
+    shapes: tuple
+    subframes: Mapping = field(default_factory=dict)
+    type: tuple[str, str] = ("", "")
+
+    def __post_init__(self):
+        object.__setattr__(self, "pose", _pose(self.pose, self.id))
+        object.__setattr__(self, "shapes", tuple((shape, _pose(pose, self.id)) for shape, pose in self.shapes))
+        if not isinstance(self.subframes, MappingProxyType):
+            checked = {name: _pose(pose, self.id) for name, pose in self.subframes.items()}
+            object.__setattr__(self, "subframes", MappingProxyType(checked))
+
+    def at(self, pose):
+        """Return the object at another ``pose`` (4, 4)."""
+        return replace(self, pose=pose)
+
+    def with_shapes_of(self, other):
+        """Return the object with the shapes and subframes of ``other``, given in the same frame, added where they are.
+
+        Raises SceneError for a pose that is none.
+        """
+        into = np.linalg.inv(self.pose) @ other.pose
+        shapes = (*self.shapes, *((shape, into @ pose) for shape, pose in other.shapes))
+        return replace(self, shapes=shapes,
+                       subframes={**self.subframes, **{name: into @ pose for name, pose in other.subframes.items()}})
+
+
+@dataclass(frozen=True, eq=False)
+class AttachedBody:
+    """An object that a link holds; the object's pose is in that link.
+
+    touch_links: the links that it may touch; the one that holds it always is among them.
+    detach_posture: what the caller wants to know when it is let go; nothing here looks at it.
+    """
+
+    object: WorldObject
+    link: str
+    touch_links: frozenset[str] = frozenset()
+    detach_posture: object = None
+
+    def __post_init__(self):
+        object.__setattr__(self, "touch_links", frozenset(self.touch_links) | {self.link})
+
+    @property
+    def id(self):
+        return self.object.id
+
+
+def _pose(pose, name):
+    matrix = read_only(pose)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        raise SceneError("a pose of object '%s' is %s; expected a finite (4, 4) matrix"
+                         % (name, np.asarray(pose).tolist()))
+    if abs(np.linalg.det(matrix[:3, :3]) - 1.0) > 1e-3 or not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0)):
+        raise SceneError("a pose of object '%s' holds no rotation: %s" % (name, matrix.tolist()))
+    return matrix
