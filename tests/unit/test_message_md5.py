@@ -6,6 +6,7 @@ into, ``action``); this test finds them all. It computes them from the definitio
 sourced workspace is needed.
 """
 import os
+from functools import cache
 from pathlib import Path
 
 import genmsg
@@ -34,6 +35,7 @@ def expected_sums(table):
     return {(kind, name): md5 for kind, sums in sections.items() for name, md5 in sums.items()}
 
 
+@cache
 def search_path():
     """Message folders of every ROS package: ours from the sources, the others from the installed ROS."""
     prefixes = [*filter(None, os.environ.get("CMAKE_PREFIX_PATH", "").split(":")), "/usr"]

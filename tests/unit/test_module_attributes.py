@@ -19,6 +19,7 @@ def module_paths():
     return {(path.parent.name, path.stem): path for path in FILES}
 
 
+@cache
 def tree_of(path):
     return ast.parse(path.read_text(encoding="utf-8"))
 
