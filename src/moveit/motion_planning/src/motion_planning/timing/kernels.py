@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Compiled inner loop of the time-optimal profile."""
+import numpy as np
+
+from numba_cache import compiler
+
+_compiled = compiler("motion_planning_timing", [__file__], nogil=True)
+_TINY = 1e-12
+
+
+@_compiled
+def _range_of_rate(x, gain, offset, limits, low, high):
+    """The range of u under |gain u + offset x| <= limits and low[0] + low[1] x <= u <= high[0] + high[1] x.
+
+    Returns both ends, each with its slope over x: lower, its slope, upper, its slope.
+    """
+    lower, lower_slope = low[0] + low[1] * x, low[1]
+    upper, upper_slope = high[0] + high[1] * x, high[1]
+    for j in range(len(gain)):
+        size = abs(gain[j])
+        if size < _TINY:
+            continue
+        slope = -offset[j] / gain[j]
+        reach = limits[j] / size
+        if slope * x - reach > lower:
+            lower, lower_slope = slope * x - reach, slope
+        if slope * x + reach < upper:
+            upper, upper_slope = slope * x + reach, slope
+    return lower, lower_slope, upper, upper_slope
+
+
+@_compiled
+def greatest_speeds(widths, derivatives, velocity, acceleration, stop):
+    """Squared speeds (n + 1,) at the ends of n intervals and accelerations (n,) within, both along the curve.
+
+    widths (n,); derivatives (4, n, k): first and second of the joints by the curve's parameter at the left end of
+    each interval, then at the right; velocity, acceleration (k,): limits; stop (n + 1,): where to be at rest.
+    """
+    left1, left2, right1, right2 = derivatives[0], derivatives[1], derivatives[2], derivatives[3]
+    n, k = left1.shape
+    limit = np.full(n + 1, np.inf)
+    gain, offset, limits = np.empty((n, 2 * k)), np.empty((n, 2 * k)), np.empty(2 * k)
+    for j in range(k):
+        limits[j] = acceleration[j]
+        limits[k + j] = acceleration[j]
+    for i in range(n):
+        for j in range(k):
+            if abs(left1[i, j]) > _TINY:
+                limit[i] = min(limit[i], (velocity[j] / left1[i, j]) ** 2)
+            if abs(right1[i, j]) > _TINY:
+                limit[i + 1] = min(limit[i + 1], (velocity[j] / right1[i, j]) ** 2)
+            gain[i, j], offset[i, j] = left1[i, j], left2[i, j]
+            gain[i, k + j], offset[i, k + j] = right1[i, j] + 2.0 * widths[i] * right2[i, j], right2[i, j]
+        for j in range(2 * k):
+            if abs(gain[i, j]) < _TINY and abs(offset[i, j]) > _TINY:
+                limit[i] = min(limit[i], limits[j] / abs(offset[i, j]))
+    for i in range(n + 1):
+        if stop[i]:
+            limit[i] = 0.0
+    squared, rates = np.zeros(n + 1), np.zeros(n)
+    low, high = np.empty(2), np.empty(2)
+    # Backwards: the greatest x from which what comes after can be kept. The room for u shrinks with x along straight
+    # lines, so Newton's method from above ends on the corner of two of them.
+    for i in range(n - 1, -1, -1):
+        low[0], low[1] = 0.0, -0.5 / widths[i]
+        high[0], high[1] = 0.5 * limit[i + 1] / widths[i], -0.5 / widths[i]
+        x = limit[i]
+        for _ in range(4 * k + 4):
+            lower, lower_slope, upper, upper_slope = _range_of_rate(x, gain[i], offset[i], limits, low, high)
+            gap, slope = lower - upper, lower_slope - upper_slope
+            if gap <= 1e-12 * (1.0 + abs(lower)):
+                break
+            if slope <= 0.0:
+                x = 0.0
+                break
+            x = max(0.0, x - gap / slope)
+        limit[i] = x
+    for i in range(n):
+        low[0], low[1] = 0.0, -0.5 / widths[i]
+        high[0], high[1] = 0.5 * limit[i + 1] / widths[i], -0.5 / widths[i]
+        _, _, upper, _ = _range_of_rate(squared[i], gain[i], offset[i], limits, low, high)
+        squared[i + 1] = min(limit[i + 1], max(0.0, squared[i] + 2.0 * widths[i] * upper))
+        rates[i] = 0.5 * (squared[i + 1] - squared[i]) / widths[i]
+    return squared, rates

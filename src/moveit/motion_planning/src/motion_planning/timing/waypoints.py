@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Times for given points: a cubic spline in time goes through all of them, within the limits."""
+import math
+
+import numpy as np
+
+from motion_planning.timing.timed import Timed
+
+_ROUNDS = 60
+# A segment is stretched by a little more than its excess, or the last rounds would crawl.
+_PUSH = 1.01
+
+
+def through_points(path, velocity, acceleration, rest_acceleration):
+    """Return a Timed through all points of ``path`` (m, k), m at least 2, from rest to rest; limits (k,).
+
+    rest_acceleration: also with acceleration 0 at both ends; a point is added behind the first and before the last.
+    Segments in which the spline exceeds a limit are stretched until none is left, or the rounds are used up; what is
+    left then is for :func:`within_limits`.
+    """
+    if rest_acceleration:
+        path = _with_end_points(path)
+    durations = _first_guess(path, velocity, acceleration)
+    best, best_length = None, math.inf
+    for _ in range(_ROUNDS):
+        timed = _spline(durations, path, rest_acceleration)
+        speeds, accelerations = timed.peaks()
+        excess = np.maximum((speeds / velocity).max(axis=1), np.sqrt((accelerations / acceleration).max(axis=1)))
+        worst = float(excess.max())
+        if timed.duration * max(1.0, worst) < best_length:
+            best, best_length = timed, timed.duration * max(1.0, worst)
+        if worst <= 1.0:
+            break
+        durations = durations * np.where(excess > 1.0, _PUSH * np.minimum(excess, 2.0), 1.0)
+    return best
+
+
+def _first_guess(path, velocity, acceleration):
+    """Durations (m - 1,) [s]: no shorter than the velocities ask for, and the ends' than the accelerations."""
+    steps = np.abs(np.diff(path, axis=0))
+    durations = (steps / velocity).max(axis=1)
+    for end in (0, -1):
+        durations[end] = max(durations[end], math.sqrt(2.0 * float((steps[end] / acceleration).max())))
+    return np.maximum(durations, 1e-4)
+
+
+def _with_end_points(path):
+    """Points near both ends, on the first and the last line, so that the ends' accelerations can be chosen."""
+    first, last = path[0] + 0.1 * (path[1] - path[0]), path[-1] + 0.1 * (path[-2] - path[-1])
+    return np.concatenate([path[:1], [first], path[1:-1], [last], path[-1:]])
+
+
+def _spline(durations, path, rest_acceleration):
+    """The Timed of a spline with two continuous derivatives, at rest at both ends.
+
+    Second derivatives solve a tridiagonal system (C. de Boor, A Practical Guide to Splines, chapter IV). With
+    ``rest_acceleration`` they are 0 at the ends, and the second and the last point but one move instead.
+    """
+    times = np.concatenate([[0.0], np.cumsum(durations)])
+    if rest_acceleration:
+        path = _moved_for_rest(durations, path)
+    accelerations = _second_derivatives(durations, path)
+    h = durations[:, None]
+    slopes = np.diff(path, axis=0) / h
+    velocities = np.empty_like(path)
+    velocities[:-1] = slopes - h * (2.0 * accelerations[:-1] + accelerations[1:]) / 6.0
+    velocities[-1] = slopes[-1] + h[-1] * (accelerations[-2] + 2.0 * accelerations[-1]) / 6.0
+    velocities[0] = velocities[-1] = 0.0
+    return Timed(times, path, velocities, accelerations)
+
+
+def _second_derivatives(h, path):
+    """(m, k) for clamped ends."""
+    m = len(path)
+    slopes = np.diff(path, axis=0) / h[:, None]
+    diagonal = np.concatenate([[2.0 * h[0]], 2.0 * (h[:-1] + h[1:]), [2.0 * h[-1]]])
+    right = 6.0 * np.concatenate([[slopes[0]], np.diff(slopes, axis=0), [-slopes[-1]]])
+    # Thomas's algorithm; the system is diagonally dominant.
+    for i in range(1, m):
+        factor = h[i - 1] / diagonal[i - 1]
+        diagonal[i] -= factor * h[i - 1]
+        right[i] -= factor * right[i - 1]
+    result = np.empty_like(right)
+    result[-1] = right[-1] / diagonal[-1]
+    for i in range(m - 2, -1, -1):
+        result[i] = (right[i] - h[i] * result[i + 1]) / diagonal[i]
+    return result
+
+
+def _moved_for_rest(h, path):
+    """``path`` with points 1 and m - 2 where a clamped spline has second derivative 0 at both ends.
+
+    The ends' second derivatives are affine in the two points, so four splines give the place.
+    """
+    def ends(moved_by_first, moved_by_last):
+        moved = path.copy()
+        moved[1] += moved_by_first
+        moved[-2] += moved_by_last
+        bends = _second_derivatives(h, moved)
+        return np.array([bends[0], bends[-1]])
+
+    rest = ends(0.0, 0.0)
+    first, last = ends(1.0, 0.0) - rest, ends(0.0, 1.0) - rest
+    system = np.array([first, last])  # (2 points, 2 ends, k)
+    moved = path.copy()
+    for joint in range(path.shape[1]):
+        offset = np.linalg.solve(system[:, :, joint].T, -rest[:, joint])
+        moved[1, joint] += offset[0]
+        moved[-2, joint] += offset[1]
+    return moved
