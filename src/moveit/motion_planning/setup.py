@@ -8,6 +8,7 @@ PACKAGES = [
     "motion_planning.model",
     "motion_planning.scene",
     "motion_planning.srdf",
+    "motion_planning.timing",
 ]
 
 setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joint paths along which a link moves in straight lines."""
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from baxter_sim_kinematics import Budget, Chain, InvalidTarget, KinematicsError, NoSolution, Target, solve
+from motion_planning.errors import PlanningError
+from urdf_model.transforms import axis_rotation, inverse, rigid, rotation_angle
+
+# Between two steps the link may be off its line by this much [m], [rad]; steps are halved until it is not.
+LINE_TOLERANCE_M = 1e-3
+LINE_TOLERANCE_RAD = 1e-2
+# A step is halved so often at most; what is off its line then is a jump of the joints.
+_HALVINGS = 8
+# A step turns the link by at most so many radians for each metre that it may move.
+_RADIANS_PER_METRE = 3.5
+# ``accept`` is asked at joint values at most this far apart [rad or m, in any joint].
+_RESOLUTION = 0.05
+_MOST_STEPS = 20000
+# Fewer points say nothing about the mean step, which the jump threshold multiplies.
+_FEWEST_FOR_JUMPS = 10
+# The descent from the step before; then with more starts, of which the nearest to the step before counts.
+_NEXT = Budget(candidates=1, max_starts=1)
+_THOROUGH = Budget(candidates=16)
+
+
+class CartesianError(PlanningError):
+    """A request that no path can be looked for, with the reason."""
+
+
+class Steps(NamedTuple):
+    """How a line is cut, and which of its points will do.
+
+    max_step: distance of two points at most [m]; turns follow in proportion; steps are halved where the link would
+    leave its line in between. jump_threshold: 0, or the most that a step may be of the mean step, in joint space;
+    looked at from ten points on. accept(q (k,)): None, or the sentence that says why not; asked along the steps too.
+    stop(): true ends the search.
+    """
+
+    max_step: float
+    jump_threshold: float = 0.0
+    accept: Callable | None = None
+    stop: Callable | None = None
+
+
+class CartesianPath(NamedTuple):
+    """joints (m, k): the group's joints, the start first; fraction 0 to 1 of the waypoints' legs; reason: why the
+    path ends before the last waypoint, or None."""
+
+    joints: np.ndarray
+    fraction: float
+    reason: str | None
+
+
+def cartesian_path(model, group, start, link, waypoints, steps):
+    """Return the :class:`CartesianPath` that moves ``link`` in straight lines through ``waypoints``.
+
+    model: PlanningModel; group: name; start: State. waypoints: poses (4, 4) of the link in the planning frame.
+    steps: :class:`Steps`. Each leg of the path counts the same in ``fraction``.
+
+    Raises CartesianError for a max_step that is not above 0, waypoints that are no poses, a link that the group does
+    not move alone, and too many steps.
+    """
+    max_step, jump_threshold = steps.max_step, steps.jump_threshold
+    if not (math.isfinite(max_step) and max_step > 0.0):
+        raise CartesianError("the greatest step must be above 0, got %g m" % max_step)
+    if not (math.isfinite(jump_threshold) and jump_threshold >= 0.0):
+        raise CartesianError("the jump threshold must be 0 or more, got %g" % jump_threshold)
+    follower = _Follower(model, model.groups[group], start, link, steps.accept)
+    waypoints = [follower.pose(i, waypoint) for i, waypoint in enumerate(waypoints)]
+    here = follower.pose_of_link(follower.q)
+    counts = [_steps(a, b, max_step) for a, b in zip([here, *waypoints], waypoints, strict=False)]
+    if sum(counts) > _MOST_STEPS:
+        raise CartesianError("steps of %g m make %d points, the most is %d; make the steps larger"
+                             % (max_step, sum(counts), _MOST_STEPS))
+    points, done, reason = [follower.q], [0.0], None
+    for leg, (goal, count) in enumerate(zip(waypoints, counts, strict=True)):
+        for step in range(count):
+            if steps.stop is not None and steps.stop():
+                reason = "stopped"
+            else:
+                line = _Line(here, goal)
+                reason = follower.advance(line, step / count, (step + 1) / count, points)
+            if reason is not None:
+                reason = "%s, on the way to waypoint %d of %d, after %.0f %% of it" % (
+                    reason, leg + 1, len(waypoints), 100.0 * step / count)
+                break
+            done += [(leg + (step + 1) / count) / len(waypoints)] * (len(points) - len(done))
+        if reason is not None:
+            break
+        here = goal
+    del points[len(done):]
+    path = CartesianPath(np.array(points), done[-1] if waypoints else 1.0, reason)
+    return _without_jump(path, done, jump_threshold, model.groups[group].joints)
+
+
+def _without_jump(path, done, threshold, names):
+    """The path up to its first step above the threshold; ``done``: the fraction at each point; names: of the joints."""
+    if threshold == 0.0 or len(path.joints) < _FEWEST_FOR_JUMPS:
+        return path
+    steps = np.diff(path.joints, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    over = np.flatnonzero(lengths > threshold * lengths.mean())
+    if not len(over):
+        return path
+    first = int(over[0])
+    most = int(np.abs(steps[first]).argmax())
+    reason = "step %d is %.2g times the mean step, above the jump threshold %g; joint '%s' moves most, by %.3f" % (
+        first + 1, lengths[first] / lengths.mean(), threshold, names[most], abs(steps[first, most]))
+    return CartesianPath(path.joints[:first + 1], done[first], reason)
+
+
+class _Line:
+    """Poses from one to another: the position on a line, the rotation about one axis."""
+
+    def __init__(self, begin, end):
+        self._begin, self._shift = begin, end[:3, 3] - begin[:3, 3]
+        turn = begin[:3, :3].T @ end[:3, :3]
+        self._angle = rotation_angle(turn)
+        self._axis = _axis(turn, self._angle)
+
+    def at(self, fraction):
+        rotation = self._begin[:3, :3] @ axis_rotation(self._axis, fraction * self._angle)
+        return rigid(rotation, self._begin[:3, 3] + fraction * self._shift)
+
+
+def _axis(rotation, angle):
+    if angle < 1e-9:
+        return np.array([0.0, 0.0, 1.0])
+    if angle < math.pi - 1e-3:
+        axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0],
+                         rotation[1, 0] - rotation[0, 1]])
+    else:
+        # Near a half turn the antisymmetric part vanishes; the symmetric one is 2 axis axis^T - 1.
+        symmetric = 0.5 * (rotation + rotation.T) + np.eye(3)
+        axis = symmetric[:, int(np.diag(symmetric).argmax())]
+        skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0],
+                         rotation[1, 0] - rotation[0, 1]])
+        axis = axis if axis @ skew >= 0.0 else -axis
+    return axis / np.linalg.norm(axis)
+
+
+def _steps(begin, end, max_step):
+    distance = np.linalg.norm(end[:3, 3] - begin[:3, 3])
+    angle = rotation_angle(begin[:3, :3].T @ end[:3, :3])
+    # The little taken off keeps 0.3 / 0.1 from becoming four.
+    return max(1, math.ceil(max(distance, angle / _RADIANS_PER_METRE) / max_step - 1e-6))
+
+
+class _Follower:
+    """Follows a line with the joints of one group that move the link. q (k,): where it has got to."""
+
+    def __init__(self, model, group, start, link, accept):
+        self._accept = accept
+        self._names = group.joints
+        self.q = np.array(start.q, dtype=float)[list(group.indices)]
+        base, joints = _moving(model, group, link)
+        self._chain = Chain.from_robot(model.robot, base, link)
+        self._columns = np.array([group.joints.index(joint) for joint in joints])
+        self._base = model.frame_of(start.q, base, start.base)
+        self._base_inverse = inverse(self._base)
+
+    def pose(self, number, waypoint):
+        """The waypoint, checked and made orthonormal. Raises CartesianError."""
+        try:
+            return Target(waypoint).pose
+        except InvalidTarget as error:
+            raise CartesianError("waypoint %d is no pose: %s" % (number + 1, error)) from None
+
+    def pose_of_link(self, q):
+        return self._base @ self._chain.fk(q[self._columns])
+
+    def advance(self, line, begin, end, points):
+        """Append the points from ``begin`` (excluded) to ``end`` on the line; return None, or why there are none."""
+        before = self.q
+        count = len(points)
+        reason = self._advance(line, begin, end, points, _HALVINGS)
+        if reason is not None:
+            del points[count:]
+            self.q = before
+        return reason
+
+    def _advance(self, line, begin, end, points, halvings):
+        goal = line.at(end)
+        try:
+            q = self._solve(goal)
+        except NoSolution as error:
+            return str(error)
+        middle = 0.5 * (self.q + q)
+        wanted, met = line.at(0.5 * (begin + end)), self.pose_of_link(middle)
+        off = np.linalg.norm(met[:3, 3] - wanted[:3, 3])
+        turned = rotation_angle(wanted[:3, :3].T @ met[:3, :3])
+        if off > LINE_TOLERANCE_M or turned > LINE_TOLERANCE_RAD:
+            if halvings == 0:
+                most = int(np.abs(q - self.q).argmax())
+                return "joint '%s' would have to jump by %.3f, from %.3f to %.3f" % (
+                    self._names[most], abs(q - self.q)[most], self.q[most], q[most])
+            half = 0.5 * (begin + end)
+            return (self._advance(line, begin, half, points, halvings - 1)
+                    or self._advance(line, half, end, points, halvings - 1))
+        if self._accept is not None:
+            pieces = max(1, math.ceil(float(np.abs(q - self.q).max()) / _RESOLUTION))
+            for piece in range(1, pieces + 1):
+                reason = self._accept(self.q + (q - self.q) * (piece / pieces))
+                if reason:
+                    return reason
+        self.q = q
+        points.append(q)
+        return None
+
+    def _solve(self, pose):
+        target, seed = Target(self._base_inverse @ pose), self.q[self._columns]
+        try:
+            found = solve(self._chain, target, seed, budget=_NEXT)
+        except NoSolution:
+            found = solve(self._chain, target, seed, budget=_THOROUGH)
+        q = self.q.copy()
+        q[self._columns] = found.q
+        return q
+
+
+def _moving(model, group, link):
+    """The link from which on the group's joints move ``link``, and these joints in order. Raises CartesianError."""
+    if link not in model.robot.links:
+        raise CartesianError("the robot has no link '%s'" % link)
+    way = model.robot.chain(model.root, link)
+    mine = [joint.name in group.joints for joint in way]
+    if not any(mine):
+        raise CartesianError("no joint of group '%s' moves link '%s'" % (group.name, link))
+    first = mine.index(True)
+    foreign = [joint.name for joint, owned in zip(way[first:], mine[first:], strict=True)
+               if not owned and joint.type != "fixed"]
+    if foreign:
+        raise CartesianError("link '%s' is moved by joint '%s' too, which is not in group '%s'"
+                             % (link, foreign[0], group.name))
+    base = way[first].parent
+    try:
+        joints = Chain.from_robot(model.robot, base, link).joint_names
+    except KinematicsError as error:
+        raise CartesianError(str(error)) from None
+    return base, joints
