@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The way to a running move_group: its actions, services and topics."""
+import threading
+import time
+from functools import cache
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from moveit_msgs import msg, srv
+from std_msgs.msg import String
+
+from .exception import MoveItCommanderException
+from .node import ensure_node
+
+ACTIONS = {"move_group": msg.MoveGroupAction, "execute_trajectory": msg.ExecuteTrajectoryAction,
+           "pickup": msg.PickupAction, "place": msg.PlaceAction}
+_RESULTS = {"move_group": msg.MoveGroupResult, "execute_trajectory": msg.ExecuteTrajectoryResult,
+            "pickup": msg.PickupResult, "place": msg.PlaceResult}
+SERVICES = {"apply_planning_scene": srv.ApplyPlanningScene, "compute_cartesian_path": srv.GetCartesianPath,
+            "compute_ik": srv.GetPositionIK, "get_planning_scene": srv.GetPlanningScene,
+            "query_planner_interface": srv.QueryPlannerInterfaces}
+TOPICS = {"attached_collision_object": msg.AttachedCollisionObject, "collision_object": msg.CollisionObject,
+          "planning_scene": msg.PlanningScene, "trajectory_execution_event": String}
+
+#: How long a service is waited for that move_group has not advertised yet [s].
+SERVICE_WAIT_S = 5.0
+_POLL_S = 0.05
+
+
+class Connection:
+    """To the move_group in one namespace. All methods can be called from several threads."""
+
+    def __init__(self, namespace):
+        self._namespace = namespace
+        self._clients, self._publishers = {}, {}
+        self._lock = threading.RLock()
+        self._running = set()
+
+    def name(self, name):
+        """The resolved name of one of move_group's actions, services or topics."""
+        return rospy.resolve_name("/".join(filter(None, [self._namespace, name])))
+
+    def wait_for_actions(self, names, seconds):
+        """Wait until the action servers answer. Raises RuntimeError after so many seconds of real time."""
+        deadline = time.monotonic() + seconds
+        for name in names:
+            client = self._client(name)
+            # A duration below 0 looks once: the client's own wait has no end while simulated time stands still.
+            while not client.wait_for_server(rospy.Duration(0, -1)):
+                if rospy.is_shutdown() or time.monotonic() > deadline:
+                    raise RuntimeError("Unable to connect to move_group action server '%s' within allotted time (%gs); "
+                                       "is move_group running?" % (self.name(name), seconds))
+                time.sleep(_POLL_S)
+
+    def start(self, name, goal):
+        """Send a goal and return at once; :meth:`cancel` ends it."""
+        done = threading.Event()
+        # Sent without our lock: actionlib holds a lock of its own while it calls _transition, which wants ours.
+        handle = self._client(name).send_goal(goal, transition_cb=lambda handle: self._transition(handle, done))
+        with self._lock:
+            # A handle that nobody holds is forgotten by actionlib.
+            if not done.is_set():
+                self._running.add(handle)
+        return handle, done
+
+    def _transition(self, handle, done):
+        if handle.get_comm_state() == actionlib.CommState.DONE:
+            done.set()
+            with self._lock:
+                self._running.discard(handle)
+
+    def run(self, name, goal):
+        """Send a goal, wait until it has ended, however long that takes, and return (result, text of its server).
+
+        The result says FAILURE where the server refused the goal, or is gone.
+        """
+        handle, done = self.start(name, goal)
+        client = self._client(name)
+        while not done.wait(_POLL_S):
+            if rospy.is_shutdown():
+                return _failure(name), "the program is shutting down"
+            if not client.result_sub.get_num_connections():
+                return _failure(name), "the action server '%s' is gone" % self.name(name)
+        text = handle.get_goal_status_text()
+        refused = handle.get_goal_status() in (GoalStatus.REJECTED, GoalStatus.RECALLED, GoalStatus.LOST)
+        return _failure(name) if refused else handle.get_result(), text
+
+    def cancel(self):
+        """Cancel what this program has sent and what has not ended yet."""
+        with self._lock:
+            running = tuple(self._running)
+        for handle in running:
+            handle.cancel()
+
+    def call(self, name, **fields):
+        """Call a service and return its answer. Raises MoveItCommanderException when there is none."""
+        full_name = self.name(name)
+        try:
+            rospy.wait_for_service(full_name, SERVICE_WAIT_S)
+            return rospy.ServiceProxy(full_name, SERVICES[name])(**fields)
+        except (rospy.ROSException, rospy.ServiceException) as error:
+            raise MoveItCommanderException("the service '%s' did not answer: %s" % (full_name, error)) from error
+
+    def publish(self, name, message):
+        """Publish on one of the topics that move_group listens to."""
+        self.advertise(name).publish(message)
+
+    def advertise(self, name):
+        """Return the publisher of a topic; one that exists beforehand loses no message to a late connection."""
+        with self._lock:
+            if name not in self._publishers:
+                self._publishers[name] = rospy.Publisher(self.name(name), TOPICS[name], queue_size=100)
+            return self._publishers[name]
+
+    def _client(self, name):
+        with self._lock:
+            if name not in self._clients:
+                self._clients[name] = actionlib.ActionClient(self.name(name), ACTIONS[name])
+            return self._clients[name]
+
+
+def _failure(name):
+    return _RESULTS[name](error_code=msg.MoveItErrorCodes(msg.MoveItErrorCodes.FAILURE))
+
+
+@cache
+def connect(namespace):
+    """Return the program's connection to the move_group in a namespace, the same one for every commander."""
+    ensure_node()
+    return Connection(namespace)

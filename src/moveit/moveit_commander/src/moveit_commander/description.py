@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the parameter server says about a robot: its planning model, and what is set for its groups."""
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import rospy
+import yaml
+
+from motion_planning.model import PlanningModel
+
+from .node import ensure_node
+
+
+@dataclass(frozen=True)
+class Description:
+    """model: a :class:`motion_planning.model.PlanningModel`; kinematics: group to its mapping of settings;
+    velocity_scaling, acceleration_scaling: what is sent unless told otherwise."""
+
+    model: object
+    kinematics: dict = field(default_factory=dict)
+    velocity_scaling: float = 0.1
+    acceleration_scaling: float = 0.1
+
+
+@lru_cache(maxsize=8)
+def _model(urdf, srdf, limits):
+    """Programs make several commanders of one robot; building its model takes longer than all the rest."""
+    return PlanningModel.from_xml(urdf, srdf, yaml.safe_load(limits))
+
+
+def _parameter_name(name, namespace):
+    """The full name of the robot's description: as the program's own names go, else in the namespace of move_group."""
+    if name.startswith("/"):
+        return name
+    return rospy.search_param(name) or rospy.resolve_name("/".join(filter(None, [namespace, name])))
+
+
+def load(robot_description, namespace):
+    """Return the :class:`Description` under the parameter ``robot_description`` and those named after it.
+
+    Raises RuntimeError when the URDF or the SRDF is not there or makes no model; the text says which.
+    """
+    ensure_node()
+    name = _parameter_name(robot_description, namespace)
+    urdf, srdf = (rospy.get_param(name + suffix, None) for suffix in ("", "_semantic"))
+    missing = [name + suffix for suffix, text in (("", urdf), ("_semantic", srdf)) if not text]
+    if missing:
+        raise RuntimeError("Unable to construct robot model. Please make sure all needed information is on the "
+                           "parameter server: there is no %s" % " and no ".join(missing))
+    planning = rospy.get_param(name + "_planning", None) or {}
+    try:
+        model = _model(urdf, srdf, yaml.safe_dump(planning.get("joint_limits") or {}))
+    except ValueError as error:
+        raise RuntimeError("Unable to construct robot model from %s: %s" % (name, error)) from error
+    return Description(model, rospy.get_param(name + "_kinematics", None) or {},
+                       float(planning.get("default_velocity_scaling_factor", Description.velocity_scaling)),
+                       float(planning.get("default_acceleration_scaling_factor", Description.acceleration_scaling)))

@@ -1,0 +1,363 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command language of moveit_commander_cmdline.py: one line in, one answer out."""
+import re
+import time
+from pathlib import Path
+
+from geometry_msgs.msg import PoseStamped
+
+from .exception import MoveItCommanderException
+from .planning_scene_interface import PlanningSceneInterface
+from .robot import RobotCommander
+
+__all__ = ["MoveGroupCommandInterpreter", "MoveGroupInfoLevel"]
+
+#: What `ground` puts under the robot: a slab of this size [m], its top a little below zero: nothing stands in it.
+_GROUND_SIZE, _GROUND_TOP = (3.0, 3.0, 0.1), -0.01
+_FILE = ".moveit_commander_states"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_SWITCHES = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
+
+_HELP = """\
+use NAME                 work with this group
+use, groups              the groups that were used
+id, which                the group in use
+joints, eef              its joints; its end effector's link
+current                  its joint values and poses now
+vars, show [NAME]        names of states; a state's values, or all of them
+group_state [NAME]       the same
+record NAME, delete NAME remember where it is now under a name; forget it
+x = y, x = [1 2 3], x[0] = 0.5   a new name for a state; values under a name; one of them
+save [FILE], load [FILE] write remembered states into a file; run the commands in a file
+plan NAME, plan rand     plan to a state, to a random one
+execute                  execute that plan
+go NAME, go rand         plan and execute
+go up|down|left|right|forward|backward D   move D metres along the planning frame's z, y or x
+rotate R P Y             plan and execute to this roll, pitch and yaw
+pick NAME, place NAME    pick an object up; put it down
+stop                     stop moving
+tolerance [D], time [S]  show or set the goal's tolerance; how long planning may take
+planner NAME             use this planner
+constrain [NAME]         hold stored constraints on the way; hold none
+allow looking|replanning true|false
+trace on|off             name what is done while it is done
+database                 where stored constraints are
+ground                   put a floor into the scene
+wait S                   wait
+help, quit"""
+
+
+class MoveGroupInfoLevel:
+    """How to understand an answer."""
+
+    FAIL, WARN, SUCCESS, INFO, DEBUG = 1, 2, 3, 4, 5
+
+
+class MoveGroupCommandInterpreter:
+    """Carries out commands for the groups of a robot.
+
+    robot, scene: a RobotCommander and a PlanningSceneInterface, made when they are not given.
+    """
+
+    DEFAULT_FILENAME = _FILE
+    # What go DIRECTION DISTANCE does: axis of the planning frame, sign.
+    GO_DIRS = {"up": (2, 1), "down": (2, -1), "left": (1, 1), "right": (1, -1), "forward": (0, 1), "backward": (0, -1)}
+
+    def __init__(self, robot=None, scene=None):
+        self._robot, self._scene = robot or RobotCommander(), scene or PlanningSceneInterface()
+        self._groups, self._group_name = {}, ""
+        self._plan = None
+        self._trace = False
+        # The first word of a command to what does it.
+        self._without_group = {"help": self._help, "id": self._which, "which": self._which, "groups": self._loaded,
+                               "use": self._use, "wait": self._wait, "trace": self._set_trace, "load": self._load,
+                               "ground": self._ground, "database": self._database, "quit": self._quit, "q": self._quit}
+        self._with_group = {"joints": self._joints, "eef": self._end_effector, "current": self._current,
+                            "vars": self._variables, "show": self._show, "group_state": self._show,
+                            "record": self._record, "delete": self._delete, "save": self._save, "plan": self._make_plan,
+                            "execute": self._execute, "go": self._go, "rotate": self._rotate, "pick": self._pick,
+                            "place": self._place, "stop": self._stop, "tolerance": self._tolerance,
+                            "time": self._time, "planner": self._planner, "constrain": self._constrain,
+                            "allow": self._allow}
+
+    def get_active_group(self):
+        """Return the MoveGroupCommander of the group in use, None before `use`."""
+        return self._groups.get(self._group_name)
+
+    def get_loaded_groups(self):
+        """Return the names of the groups that were used."""
+        return list(self._groups)
+
+    def get_help(self):
+        """Return what can be said."""
+        return _HELP
+
+    def get_keywords(self):
+        """Return {word: words that can follow}, for completion."""
+        known = self._known_names() if self._group_name else []
+        followers = {"use": self._robot.get_group_names(), "go": [*known, "rand", *self.GO_DIRS],
+                     "plan": [*known, "rand"], "show": known, "delete": known, "trace": ["on", "off"],
+                     "allow": ["looking", "replanning"]}
+        return {word: followers.get(word, []) for word in (*self._without_group, *self._with_group)}
+
+    def execute(self, cmd):
+        """Carry out one command and return (level of MoveGroupInfoLevel, answer)."""
+        text = cmd.partition("#")[0].strip()
+        if not text:
+            return MoveGroupInfoLevel.SUCCESS, ""
+        try:
+            answer = self._do(text)
+        except (MoveItCommanderException, RuntimeError, ValueError, OSError) as error:
+            return MoveGroupInfoLevel.FAIL, str(error)
+        if isinstance(answer, tuple):
+            return answer
+        return MoveGroupInfoLevel.SUCCESS, answer
+
+    def _do(self, text):
+        if "=" in text:
+            return self._assign(*(part.strip() for part in text.split("=", 1)))
+        word, *words = text.split()
+        word = word.lower()
+        if word in self._without_group:
+            return self._without_group[word](words)
+        if word not in self._with_group:
+            return MoveGroupInfoLevel.FAIL, "unknown command '%s'; help lists them" % text
+        self._group()
+        return self._with_group[word](words)
+
+    def _group(self):
+        group = self.get_active_group()
+        if group is None:
+            raise MoveItCommanderException("no group in use; use one of %s" % ", ".join(self._robot.get_group_names()))
+        return group
+
+    # -- without a group --------------------------------------------------------------------------------------------
+
+    def _help(self, words):
+        return MoveGroupInfoLevel.INFO, _HELP
+
+    def _which(self, words):
+        return MoveGroupInfoLevel.INFO, self._group_name or "no group in use"
+
+    def _loaded(self, words):
+        return MoveGroupInfoLevel.INFO, "\n".join(self._groups) or "no group in use"
+
+    def _use(self, words):
+        if not words:
+            return self._loaded(words)
+        name = words[0]
+        if not self._robot.has_group(name):
+            raise MoveItCommanderException("there is no group '%s'; the robot has %s"
+                                           % (name, ", ".join(self._robot.get_group_names())))
+        if name not in self._groups:
+            self._groups[name] = self._robot.get_group(name)
+        self._group_name = name
+        return "using group %s" % name
+
+    def _wait(self, words):
+        time.sleep(_number(words, "wait S"))
+        return ""
+
+    def _set_trace(self, words):
+        self._trace = _switch(words, "trace on|off")
+        return "trace is %s" % ("on" if self._trace else "off")
+
+    def _load(self, words):
+        path = Path(words[0] if words else self.DEFAULT_FILENAME)
+        answers = []
+        for line in path.read_text(encoding="utf-8").splitlines():
+            level, answer = self.execute(line)
+            if self._trace and line.strip():
+                answers.append(line)
+            if answer:
+                answers.append(answer)
+            if level == MoveGroupInfoLevel.FAIL:
+                return level, "\n".join(answers)
+        return "\n".join(answers) or "%s is done" % path
+
+    def _ground(self, words):
+        pose = PoseStamped()
+        pose.header.frame_id = self._robot.get_planning_frame()
+        pose.pose.position.z, pose.pose.orientation.w = _GROUND_TOP - 0.5 * _GROUND_SIZE[2], 1.0
+        # Held by the root link, which may touch it.
+        self._scene.attach_box(self._robot.get_root_link(), "ground", pose, _GROUND_SIZE)
+        return "there is a ground"
+
+    def _database(self, words):
+        return MoveGroupInfoLevel.INFO, "no data base of constraints"
+
+    def _quit(self, words):
+        return MoveGroupInfoLevel.INFO, "quit"
+
+    # -- with a group -----------------------------------------------------------------------------------------------
+
+    def _joints(self, words):
+        joints = self._group().get_active_joints()
+        return MoveGroupInfoLevel.INFO, "\n".join("%d = %s" % pair for pair in enumerate(joints))
+
+    def _end_effector(self, words):
+        return MoveGroupInfoLevel.INFO, self._group().get_end_effector_link() or "no end effector"
+
+    def _current(self, words):
+        group = self._group()
+        text = "joints = %s" % _list(group.get_current_joint_values())
+        if group.has_end_effector_link():
+            text += "\n%s pose = %s\nroll, pitch, yaw = %s" % (
+                group.get_end_effector_link(), group.get_current_pose(), _list(group.get_current_rpy()))
+        return MoveGroupInfoLevel.INFO, text
+
+    def _known_names(self):
+        return self._group().get_named_targets()
+
+    def _variables(self, words):
+        return MoveGroupInfoLevel.INFO, "\n".join(self._known_names()) or "no states"
+
+    def _show(self, words):
+        names = words[:1] or self._known_names()
+        return MoveGroupInfoLevel.INFO, "\n".join("%s = %s" % (name, _list(self._values(name))) for name in names)
+
+    def _values(self, name):
+        """Values of a state in the group's order; joints that a named state leaves out stand where they are."""
+        values = self._group().get_named_target_values(name)
+        joints = self._group().get_active_joints()
+        if set(values) != set(joints):
+            values = {**dict(zip(joints, self._group().get_current_joint_values(), strict=True)), **values}
+        return [values[joint] for joint in joints]
+
+    def _record(self, words):
+        self._group().remember_joint_values(_name(words, "record NAME"))
+        return "remembered as %s" % words[0]
+
+    def _delete(self, words):
+        name = _name(words, "delete NAME")
+        if name not in self._group().get_remembered_joint_values():
+            raise MoveItCommanderException("nothing is remembered as '%s'" % name)
+        self._group().forget_joint_values(name)
+        return "%s is forgotten" % name
+
+    def _save(self, words):
+        path = Path(words[0] if words else self.DEFAULT_FILENAME)
+        lines = []
+        for name, group in self._groups.items():
+            lines += ["use %s" % name, *("%s = %s" % (state, _list(values))
+                                         for state, values in group.get_remembered_joint_values().items())]
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return "written to %s" % path
+
+    def _assign(self, name, value):
+        group = self._group()
+        cell = re.fullmatch(r"(\w+)\[(\d+)\]", name)
+        if cell:
+            name, index = cell[1], int(cell[2])
+            values = self._values(name)
+            if index >= len(values):
+                raise MoveItCommanderException("'%s' has %d values; there is no [%d]" % (name, len(values), index))
+            values[index] = float(value)
+        elif value.startswith("["):
+            values = [float(number) for number in re.findall(_NUMBER, value)]
+        else:
+            values = self._values(value)
+        group.remember_joint_values(name, values)
+        return "%s = %s" % (name, _list(values))
+
+    def _target(self, words, usage):
+        name = _name(words, usage)
+        if name in ("rand", "random"):
+            self._group().set_random_target()
+        else:
+            self._group().set_named_target(name)
+
+    def _make_plan(self, words):
+        self._target(words, "plan NAME")
+        self._plan = self._group().plan()
+        return "planned" if self._plan[0] else (MoveGroupInfoLevel.FAIL, "no plan")
+
+    def _execute(self, words):
+        if self._plan is None:
+            raise MoveItCommanderException("there is no plan; plan NAME makes one")
+        plan, self._plan = self._plan, None
+        return _done(self._group().execute(plan), "executed", "not executed")
+
+    def _go(self, words):
+        group = self._group()
+        if len(words) == 2 and words[0] in self.GO_DIRS:
+            axis, sign = self.GO_DIRS[words[0]]
+            group.shift_pose_target(axis, sign * float(words[1]))
+        else:
+            self._target(words, "go NAME, or go DIRECTION DISTANCE")
+        done = group.go()
+        group.clear_pose_targets()
+        return _done(done, "moved", "did not move to %s" % " ".join(words))
+
+    def _rotate(self, words):
+        if len(words) != 3:
+            raise MoveItCommanderException("expected: rotate ROLL PITCH YAW")
+        group = self._group()
+        group.set_rpy_target([float(word) for word in words])
+        done = group.go()
+        group.clear_pose_targets()
+        return _done(done, "turned", "did not turn")
+
+    def _pick(self, words):
+        code = self._group().pick(_name(words, "pick NAME"))
+        return _done(code == 1, "picked %s up" % words[0], "did not pick %s up (%d)" % (words[0], code))
+
+    def _place(self, words):
+        code = self._group().place(_name(words, "place NAME"))
+        return _done(code == 1, "placed %s" % words[0], "did not place %s (%d)" % (words[0], code))
+
+    def _stop(self, words):
+        self._group().stop()
+        return "stopped"
+
+    def _tolerance(self, words):
+        if words:
+            self._group().set_goal_tolerance(_number(words, "tolerance D"))
+        return MoveGroupInfoLevel.INFO, "joints, position, orientation: %s" % _list(self._group().get_goal_tolerance())
+
+    def _time(self, words):
+        if words:
+            self._group().set_planning_time(_number(words, "time S"))
+        return MoveGroupInfoLevel.INFO, "%g s" % self._group().get_planning_time()
+
+    def _planner(self, words):
+        self._group().set_planner_id(_name(words, "planner NAME"))
+        return "planner is %s" % words[0]
+
+    def _constrain(self, words):
+        self._group().set_path_constraints(words[0] if words else None)
+        return "no constraints"
+
+    def _allow(self, words):
+        allow = {"looking": self._group().allow_looking, "replanning": self._group().allow_replanning}
+        if len(words) != 2 or words[0] not in allow:
+            raise MoveItCommanderException("expected: allow looking|replanning true|false")
+        value = _switch(words[1:], "allow %s true|false" % words[0])
+        allow[words[0]](value)
+        return "%s is %s" % (words[0], "allowed" if value else "not allowed")
+
+
+def _done(success, yes, no):
+    return yes if success else (MoveGroupInfoLevel.FAIL, no)
+
+
+def _name(words, usage):
+    if len(words) != 1:
+        raise MoveItCommanderException("expected: %s" % usage)
+    return words[0]
+
+
+def _number(words, usage):
+    if len(words) != 1 or not re.fullmatch(_NUMBER, words[0]):
+        raise MoveItCommanderException("expected: %s" % usage)
+    return float(words[0])
+
+
+def _switch(words, usage):
+    if len(words) != 1 or words[0].lower() not in _SWITCHES:
+        raise MoveItCommanderException("expected: %s" % usage)
+    return _SWITCHES[words[0].lower()]
+
+
+def _list(values):
+    return "[%s]" % " ".join("%.6g" % value for value in values)

@@ -1,0 +1,538 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Plans and moves one group of joints."""
+import genpy
+import numpy as np
+import rospy
+from geometry_msgs.msg import Pose, PoseStamped
+from moveit_msgs.msg import (
+    CollisionObject,
+    Constraints,
+    ExecuteTrajectoryGoal,
+    MoveItErrorCodes,
+    PlannerInterfaceDescription,
+    PositionIKRequest,
+    RobotState,
+    RobotTrajectory,
+)
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from baxter_sim_kinematics import NoSolution, solve
+from urdf_model.transforms import rpy_from_matrix, rpy_matrix
+
+from . import requests, scene_calls, states
+from .connection import connect
+from .conversions import list_to_pose, matrix_of, pose_of, pose_to_list
+from .description import load
+from .exception import MoveItCommanderException
+from .plan import Plan, trajectory_of
+from .requests import ORIENTATION, POSE, POSITION, Settings
+from .retiming import retimed
+from .targets import JointTarget, jacobian, random_values, within_limits
+from .tuning import Tunable
+
+__all__ = ["MoveGroupCommander"]
+
+_JOINTS = "joints"
+_OPTIONAL_ACTION_WAIT_S = 5.0
+_CODES = {value: name for name, value in vars(MoveItErrorCodes).items() if name.isupper() and isinstance(value, int)}
+
+
+class MoveGroupCommander(Tunable):
+    """Commander of one group of the robot. Positions in m, angles in rad, times in s, quaternions x, y, z, w.
+
+    name: the group, as the SRDF has it. robot_description: parameter with the URDF; SRDF, limits and settings lie
+    beside it. ns: namespace of move_group. wait_for_servers: how long its actions are waited for.
+    Raises RuntimeError for an unknown group, without a description, and when the actions do not come.
+    """
+
+    def __init__(self, name, robot_description="robot_description", ns="", wait_for_servers=5.0):
+        self._connection = connect(ns)
+        description = load(robot_description, ns)
+        self._model = description.model
+        if name not in self._model.groups:
+            raise RuntimeError("Group '%s' was not found; the robot has %s"
+                               % (name, ", ".join(self._model.groups) or "no groups"))
+        self._group = self._model.groups[name]
+        self._connection.advertise("trajectory_execution_event")
+        self._connection.wait_for_actions(["move_group", "execute_trajectory"], wait_for_servers)
+        own = description.kinematics.get(name) or {}
+        super().__init__(Settings(
+            velocity_scaling=description.velocity_scaling, acceleration_scaling=description.acceleration_scaling,
+            **{key + "_tolerance": float(own["goal_%s_tolerance" % key])
+               for key in ("joint", "position", "orientation") if "goal_%s_tolerance" % key in own}))
+        self._end_effector_link = self._group.tip or ""
+        self._reference_frame = self._model.frame
+        self._joint_target = JointTarget(self._model, self._group)
+        self._pose_targets = {}
+        self._kind = _JOINTS
+        self._remembered = {}
+        self._random = np.random.default_rng()
+
+    # -- the group --------------------------------------------------------------------------------------------------
+
+    def get_name(self):
+        """Return the group's name."""
+        return self._group.name
+
+    def get_active_joints(self):
+        """Return the names of the joints that can be moved, in the group's order."""
+        return list(self._group.joints)
+
+    def get_joints(self):
+        """Return the names of all joints of the group, fixed ones and those that mimic others, too."""
+        return list(self._group.all_joints)
+
+    def get_variable_count(self):
+        """Return the number of joint values of the group."""
+        return len(self._group)
+
+    def get_named_targets(self):
+        """Return the names of the SRDF's states of this group, and of remembered joint values."""
+        return [*self._group.states, *(name for name in self._remembered if name not in self._group.states)]
+
+    def has_end_effector_link(self):
+        """Tell whether the group has a link that poses are for."""
+        return bool(self._end_effector_link)
+
+    def get_end_effector_link(self):
+        """Return that link, "" where the group has none."""
+        return self._end_effector_link
+
+    def set_end_effector_link(self, link_name):
+        """Make poses be for this link. Raises MoveItCommanderException for a link that the robot has not."""
+        self._end_effector_link = self._known_link(link_name)
+
+    def get_interface_description(self):
+        """Return the PlannerInterfaceDescription of the planning pipeline; an empty one where there is none."""
+        found = self._connection.call("query_planner_interface").planner_interfaces
+        wanted = self._settings.pipeline_id
+        return next((one for one in found if wanted in ("", one.pipeline_id)), PlannerInterfaceDescription())
+
+    def get_pose_reference_frame(self):
+        """Return the frame that poses without one are in."""
+        return self._reference_frame
+
+    def set_pose_reference_frame(self, reference_frame):
+        """Set the frame that poses without one are in."""
+        self._reference_frame = reference_frame
+
+    def get_planning_frame(self):
+        """Return the frame that planning happens in."""
+        return self._model.frame
+
+    # -- where it is ------------------------------------------------------------------------------------------------
+
+    def get_current_state(self):
+        """Return the RobotState now. Raises MoveItCommanderException when move_group does not know it."""
+        return scene_calls.robot_state(self._connection)
+
+    def get_current_state_bounded(self):
+        """Return the RobotState now, every joint within its limits."""
+        return self.enforce_bounds(self.get_current_state())
+
+    def get_current_joint_values(self):
+        """Return the joint values now, in the group's order."""
+        return self._state_now().q[self._group.indices].tolist()
+
+    def get_current_pose(self, end_effector_link=""):
+        """Return the PoseStamped of a link now, in the planning frame; the end effector's unless one is named."""
+        return self._stamped(pose_of(self._frame_of(self._state_now(), end_effector_link)), self._model.frame)
+
+    def get_current_rpy(self, end_effector_link=""):
+        """Return [roll, pitch, yaw] of a link now, in the planning frame."""
+        return list(rpy_from_matrix(self._frame_of(self._state_now(), end_effector_link)))
+
+    def get_random_joint_values(self):
+        """Return joint values within the limits, evenly spread, in the group's order."""
+        return random_values(self._model, self._group, self._random).tolist()
+
+    def get_random_pose(self, end_effector_link=""):
+        """Return the PoseStamped, in the planning frame, of a link at random joint values."""
+        state = self._state_now().with_q(self.get_random_joint_values(), self._group.indices)
+        return self._stamped(pose_of(self._frame_of(state, end_effector_link)), self._model.frame)
+
+    def _state_now(self):
+        message = self.get_current_state()
+        unknown = [name for name in self._group.joints if name not in message.joint_state.name]
+        if unknown:
+            raise MoveItCommanderException("move_group does not know where %s stand; does somebody publish them on "
+                                           "the joint states that it listens to?" % ", ".join(unknown))
+        return states.state_of(self._model, message)
+
+    def _frame_of(self, state, link):
+        return self._model.frame_of(state.q, self._link(link, "get the pose of"), state.base)
+
+    def _link(self, link, purpose):
+        """The link that a caller means; the end effector's where he names none."""
+        if not link and not self._end_effector_link:
+            raise MoveItCommanderException("There is no end effector to %s: group '%s' has no single tip; name a link"
+                                           % (purpose, self._group.name))
+        return self._known_link(link) if link else self._end_effector_link
+
+    def _known_link(self, link):
+        if link not in self._model.links:
+            raise MoveItCommanderException("the robot has no link '%s'" % link)
+        return link
+
+    @staticmethod
+    def _stamped(pose, frame):
+        message = PoseStamped(pose=pose)
+        message.header.frame_id, message.header.stamp = frame, rospy.Time.now()
+        return message
+
+    # -- start ------------------------------------------------------------------------------------------------------
+
+    def set_start_state_to_current_state(self):
+        """Plan from where the robot stands when it plans."""
+        self._settings.start_state = None
+
+    def set_start_state(self, msg):
+        """Plan from this RobotState. Joints that it does not name stand where they are when it plans."""
+        names = msg.joint_state.name
+        partial = any(name not in names for name in self._model.variables)
+        self._settings.start_state = RobotState(
+            joint_state=msg.joint_state, multi_dof_joint_state=msg.multi_dof_joint_state,
+            attached_collision_objects=msg.attached_collision_objects, is_diff=msg.is_diff or partial)
+
+    # -- targets: joints --------------------------------------------------------------------------------------------
+
+    def get_joint_value_target(self):
+        """Return the target's joint values, in the group's order."""
+        return self._joint_target.values()
+
+    def set_joint_value_target(self, arg1, arg2=None, arg3=None):
+        """Set the joint values to reach; a pose is turned into joint values at once.
+
+        arg1: values in the group's order; {joint: value}; a JointState or RobotState; a joint's name, with its value as
+        arg2; a Pose or PoseStamped, with a link's name and whether the nearest pose will do (bool) as arg2 and arg3.
+        Raises MoveItCommanderException for values beyond the limits, names that are not there, poses out of reach.
+        """
+        if isinstance(arg1, Pose | PoseStamped):
+            options = [option for option in (arg2, arg3) if option is not None]
+            if not all(isinstance(option, str | bool) for option in options):
+                raise MoveItCommanderException("beside a pose, expected a link's name (str) and whether the nearest "
+                                               "pose will do (bool), got %r" % (options,))
+            link = next((option for option in options if isinstance(option, str)), "")
+            self._set_joints_at(arg1, link, any(option is True for option in options))
+        elif isinstance(arg1, str):
+            if arg2 is None or arg3 is not None:
+                raise MoveItCommanderException("expected one value for joint '%s'" % arg1)
+            self._joint_target.set_by_name({arg1: arg2}, self._settings.joint_tolerance)
+        elif arg2 is not None or arg3 is not None:
+            raise MoveItCommanderException("expected joint values alone, got more: %r, %r" % (arg2, arg3))
+        else:
+            self._set_joints(arg1)
+        self._kind = _JOINTS
+
+    def _set_joints(self, values):
+        tolerance = self._settings.joint_tolerance
+        if isinstance(values, RobotState | JointState):
+            joints = values.joint_state if isinstance(values, RobotState) else values
+            self._joint_target.set_robot(states.named_positions(joints), tolerance)
+        elif isinstance(values, dict):
+            self._joint_target.set_by_name(values, tolerance)
+        else:
+            self._joint_target.set_values(values, tolerance)
+
+    def _set_joints_at(self, pose, link, nearest):
+        link = self._link(link, "set the pose for")
+        stamped = self._in_reference_frame(pose)
+        request = PositionIKRequest(group_name=self._group.name, ik_link_name=link, pose_stamped=stamped)
+        request.robot_state = states.message_of(
+            self._model, self._state_now().with_q(self._joint_target.values(), self._group.indices))
+        answer = self._connection.call("compute_ik", ik_request=request)
+        if answer.error_code.val == MoveItErrorCodes.SUCCESS:
+            solution = states.named_positions(answer.solution.joint_state)
+            values = {name: solution[name] for name in self._group.joints}
+        elif nearest:
+            values = dict(zip(self._group.joints, self._nearest(stamped, link), strict=True))
+        else:
+            raise MoveItCommanderException("Error setting joint target: no joint values put '%s' at %s in '%s' (%s)" % (
+                link, ["%.4g" % value for value in pose_to_list(stamped.pose)], stamped.header.frame_id,
+                _CODES.get(answer.error_code.val, answer.error_code.val)))
+        self._joint_target.set_by_name(values, self._settings.joint_tolerance)
+
+    def _nearest(self, stamped, link):
+        """Joint values (k,) that bring the group's tip nearest to a pose in the frame of a link of the robot."""
+        chain, frame = self._group.chain, stamped.header.frame_id
+        if chain is None or link != self._group.tip or frame not in (*self._model.links, self._model.frame):
+            raise MoveItCommanderException(
+                "the nearest pose can be found for the tip of a chain alone, in the frame of a link; got link '%s' of "
+                "group '%s' in '%s'" % (link, self._group.name, frame))
+        now = self._state_now()
+        frames = [np.eye(4) if name == self._model.frame else self._model.frame_of(now.q, name, now.base)
+                  for name in (chain.base, frame)]
+        target = np.linalg.inv(frames[0]) @ frames[1] @ matrix_of(stamped.pose)
+        try:
+            return solve(chain, target, seed=np.clip(now.q[self._group.indices], chain.lower, chain.upper)).q
+        except NoSolution as failure:
+            return failure.best
+
+    def set_random_target(self):
+        """Set random joint values as the target."""
+        self.set_joint_value_target(self.get_random_joint_values())
+
+    def set_named_target(self, name):
+        """Set a remembered or a named state as the target. Raises MoveItCommanderException for an unknown name."""
+        self.set_joint_value_target(self.get_named_target_values(name))
+
+    def get_named_target_values(self, target):
+        """Return {joint: value} of a remembered or named state. Raises MoveItCommanderException for an unknown name."""
+        if target in self._remembered:
+            return dict(zip(self._group.joints, self._remembered[target], strict=True))
+        if target not in self._group.states:
+            raise MoveItCommanderException("group '%s' has no state '%s'; it has %s" % (
+                self._group.name, target, ", ".join(self.get_named_targets()) or "none"))
+        return dict(self._group.states[target])
+
+    def remember_joint_values(self, name, values=None):
+        """Remember joint values, those of now unless some are given, under a name."""
+        values = list(values) if values is not None else self.get_current_joint_values()
+        if len(values) != len(self._group):
+            raise MoveItCommanderException("group '%s' has %d joints, got %d values"
+                                           % (self._group.name, len(self._group), len(values)))
+        self._remembered[name] = values
+
+    def get_remembered_joint_values(self):
+        """Return {name: values}."""
+        return dict(self._remembered)
+
+    def forget_joint_values(self, name):
+        """Forget what was remembered under a name."""
+        self._remembered.pop(name, None)
+
+    # -- targets: poses ---------------------------------------------------------------------------------------------
+
+    def set_pose_target(self, pose, end_effector_link=""):
+        """Set the pose of a link to reach: Pose, PoseStamped, or x, y, z and roll, pitch, yaw or a quaternion."""
+        self.set_pose_targets([pose], end_effector_link)
+
+    def set_pose_targets(self, poses, end_effector_link=""):
+        """Set poses of a link, one of which is to be reached. Poses of other links stay targets besides."""
+        link = self._link(end_effector_link, "set the pose for")
+        poses = [self._in_reference_frame(pose) for pose in poses]
+        if not poses:
+            raise MoveItCommanderException("expected a pose for link '%s', got none" % link)
+        self._pose_targets[link], self._kind = poses, POSE
+
+    def set_rpy_target(self, rpy, end_effector_link=""):
+        """Set the orientation of a link to reach, [roll, pitch, yaw]."""
+        if len(rpy) != 3:
+            raise MoveItCommanderException("expected roll, pitch and yaw, got %d values" % len(rpy))
+        turn = np.eye(4)
+        turn[:3, :3] = rpy_matrix(*rpy)
+        self._set_part(ORIENTATION, end_effector_link, orientation=pose_of(turn).orientation)
+
+    def set_orientation_target(self, q, end_effector_link=""):
+        """Set the orientation of a link to reach, a quaternion [x, y, z, w]."""
+        if len(q) != 4:
+            raise MoveItCommanderException("expected a quaternion x, y, z, w, got %d values" % len(q))
+        self._set_part(ORIENTATION, end_effector_link, orientation=list_to_pose([0.0, 0.0, 0.0, *q]).orientation)
+
+    def set_position_target(self, xyz, end_effector_link=""):
+        """Set the position of a link to reach, [x, y, z]; any orientation will do."""
+        if len(xyz) != 3:
+            raise MoveItCommanderException("expected x, y, z, got %d values" % len(xyz))
+        self._set_part(POSITION, end_effector_link, position=list_to_pose([*xyz, 0.0, 0.0, 0.0]).position)
+
+    def _set_part(self, kind, link, **part):
+        link = self._link(link, "set the %s for" % kind)
+        targets = self._pose_targets.get(link)
+        pose = targets[0] if targets else self._in_reference_frame([0.0] * 6)
+        fields = {"position": pose.pose.position, "orientation": pose.pose.orientation, **part}
+        self._pose_targets[link], self._kind = [PoseStamped(header=pose.header, pose=Pose(**fields))], kind
+
+    def _in_reference_frame(self, pose):
+        """A PoseStamped as it is; a Pose or a list in the reference frame."""
+        if isinstance(pose, PoseStamped):
+            if pose.header.frame_id:
+                return pose
+            pose = pose.pose
+        return self._stamped(pose if isinstance(pose, Pose) else list_to_pose(pose), self._reference_frame)
+
+    def shift_pose_target(self, axis, value, end_effector_link=""):
+        """Set the pose now, shifted along axis 0 to 2 [m] or with roll, pitch or yaw (3 to 5) changed [rad]."""
+        if axis not in range(6):
+            raise MoveItCommanderException("expected an axis from 0 to 5, got %r" % (axis,))
+        frame = self._frame_of(self._state_now(), end_effector_link)
+        values = [*frame[:3, 3].tolist(), *rpy_from_matrix(frame)]
+        values[axis] += value
+        self.set_pose_target(self._stamped(list_to_pose(values), self._model.frame), end_effector_link)
+
+    def clear_pose_target(self, end_effector_link):
+        """Forget the poses of a link."""
+        self._pose_targets.pop(end_effector_link or self._end_effector_link, None)
+
+    def clear_pose_targets(self):
+        """Forget all poses to reach."""
+        self._pose_targets.clear()
+
+    def limit_max_cartesian_link_speed(self, speed, link_name=""):
+        """Limit the speed of a link [m/s], the end effector's unless one is named."""
+        self._settings.cartesian_speed = float(speed)
+        self._settings.cartesian_speed_link = self._link(link_name, "limit the speed of")
+
+    def clear_max_cartesian_link_speed(self):
+        """Limit no link's speed."""
+        self._settings.cartesian_speed, self._settings.cartesian_speed_link = 0.0, ""
+
+    # -- plan and move ----------------------------------------------------------------------------------------------
+
+    def construct_motion_plan_request(self):
+        """Return the MotionPlanRequest that plan() would send."""
+        if self._kind == _JOINTS:
+            goals = [requests.joint_goal(self._group.joints, self.get_joint_value_target(),
+                                         self.get_goal_joint_tolerance())]
+        else:
+            goals = requests.pose_goals(self._pose_targets, self._kind, self._settings)
+        return requests.motion_plan_request(self._group.name, self._model.frame, goals, self._settings)
+
+    def go(self, joints=None, wait=True):
+        """Plan and move; tell whether that succeeded, without waiting whether it was sent.
+
+        joints: what to reach if not the target that is set: joint values, {joint: value}, JointState, Pose, or the name
+        of a state. A bool alone is ``wait``.
+        """
+        if isinstance(joints, bool):
+            joints, wait = None, joints
+        goal = self._goal(joints, plan_only=False)
+        if not wait:
+            self._connection.start("move_group", goal)
+            return True
+        return self._ended("move_group", goal).error_code.val == MoveItErrorCodes.SUCCESS
+
+    def plan(self, joints=None):
+        """Plan, as :meth:`go` does; return (success, RobotTrajectory, planning time, MoveItErrorCodes).
+
+        The tuple can be used as the trajectory itself, too (:class:`Plan`).
+        """
+        result = self._ended("move_group", self._goal(joints, plan_only=True))
+        return Plan((result.error_code.val == MoveItErrorCodes.SUCCESS, result.planned_trajectory, result.planning_time,
+                     result.error_code))
+
+    def _goal(self, joints, plan_only):
+        if isinstance(joints, Pose | PoseStamped):
+            self.set_pose_target(joints)
+        elif isinstance(joints, str):
+            self.set_named_target(joints)
+        elif joints is not None:
+            self.set_joint_value_target(joints)
+        return requests.move_group_goal(self.construct_motion_plan_request(), self._settings, plan_only)
+
+    def _ended(self, action, goal):
+        """The result of a goal; a failure's cause is logged."""
+        result, text = self._connection.run(action, goal)
+        code = result.error_code.val
+        if code != MoveItErrorCodes.SUCCESS:
+            rospy.logwarn("%s of group '%s' failed: %s (%s)", action, self._group.name, text or "no reason given",
+                          _CODES.get(code, code))
+        return result
+
+    def compute_cartesian_path(self, waypoints, eef_step, jump_threshold=0.0, avoid_collisions=True,
+                               path_constraints=None):
+        """Return (RobotTrajectory, fraction) along straight lines through ``waypoints`` (Poses in the reference frame).
+
+        eef_step: largest distance between two points. jump_threshold: largest step of the joints, as a multiple of
+        the mean one; 0 for no check; it may be left out. fraction: how much of the way was possible, -1 for an error.
+        """
+        if isinstance(jump_threshold, bool):
+            shifted = avoid_collisions if isinstance(avoid_collisions, Constraints) else path_constraints
+            jump_threshold, avoid_collisions, path_constraints = 0.0, jump_threshold, shifted
+        fields = {"group_name": self._group.name, "link_name": self._end_effector_link, "max_step": float(eef_step),
+                  "waypoints": [self._in_reference_frame(pose).pose for pose in waypoints],
+                  "jump_threshold": float(jump_threshold), "avoid_collisions": bool(avoid_collisions),
+                  "path_constraints": path_constraints or Constraints(),
+                  "header": self._stamped(Pose(), self._reference_frame).header, "start_state": RobotState(),
+                  "cartesian_speed_limited_link": self._settings.cartesian_speed_link,
+                  "max_cartesian_speed": self._settings.cartesian_speed}
+        requests.set_start(fields["start_state"], self._settings)
+        answer = self._connection.call("compute_cartesian_path", **fields)
+        if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+            rospy.logwarn("no Cartesian path of group '%s': %s", self._group.name,
+                          _CODES.get(answer.error_code.val, answer.error_code.val))
+            return RobotTrajectory(), -1.0
+        return answer.solution, answer.fraction
+
+    def execute(self, plan_msg, wait=True):
+        """Execute a RobotTrajectory, JointTrajectory or plan; tell whether that succeeded, or was sent."""
+        goal = ExecuteTrajectoryGoal(trajectory_of(plan_msg))
+        if not wait:
+            self._connection.start("execute_trajectory", goal)
+            return True
+        return self._ended("execute_trajectory", goal).error_code.val == MoveItErrorCodes.SUCCESS
+
+    def stop(self):
+        """Stop moving: whatever move_group executes, and what this program has asked for."""
+        self._connection.publish("trajectory_execution_event", String("stop"))
+        self._connection.cancel()
+
+    # -- objects ----------------------------------------------------------------------------------------------------
+
+    def attach_object(self, object_name, link_name="", touch_links=()):
+        """Attach an object of the scene to a link, the end effector's unless one is named; tell whether that was done.
+
+        touch_links: links that may touch it, the carrying one unless some are named.
+        """
+        link = link_name or self._end_effector_link or self._group.links[0]
+        return scene_calls.attach(self._connection, scene_calls.attached_object(
+            object_name, link, CollisionObject.ADD, touch_links or [link]))
+
+    def detach_object(self, name=""):
+        """Put an object, or all that a link holds, or all that the group holds, back into the scene."""
+        if name:
+            what = [("", name)] if name not in self._model.links else [(name, "")]
+        else:
+            held = self.get_current_state().attached_collision_objects
+            what = [(one.link_name, one.object.id) for one in held if one.link_name in self._group.moving_links]
+        done = [scene_calls.attach(self._connection, scene_calls.attached_object(
+            object_name, link, CollisionObject.REMOVE)) for link, object_name in what]
+        return all(done)
+
+    def pick(self, object_name, grasp=(), plan_only=False):
+        """Grasp an object, by a Grasp or one of a list; return a number of MoveItErrorCodes."""
+        goal = requests.pickup_goal(self._group, object_name, requests.grasps_of(grasp), self._settings, plan_only)
+        return self._handle("pickup", goal)
+
+    def place(self, object_name, location=None, plan_only=False):
+        """Put an object down: at a Pose, PoseStamped, PlaceLocation, one of a list of these, or anywhere (None).
+
+        Returns a number of MoveItErrorCodes.
+        """
+        places = requests.place_locations(location, self._reference_frame, self._model.root, self._end_effector_link)
+        return self._handle("place", requests.place_goal(self._group, object_name, places, self._settings, plan_only))
+
+    def _handle(self, action, goal):
+        self._connection.wait_for_actions([action], _OPTIONAL_ACTION_WAIT_S)
+        return self._ended(action, goal).error_code.val
+
+    def set_support_surface_name(self, value):
+        """Name the object that things stand on which are picked up and placed."""
+        self._settings.support_surface = value
+
+    # -- computations -----------------------------------------------------------------------------------------------
+
+    def retime_trajectory(self, ref_state_in, traj_in, velocity_scaling_factor=1.0, acceleration_scaling_factor=1.0,
+                          algorithm="iterative_time_parameterization"):
+        """Return a RobotTrajectory along the same points with new times; empty for an unknown algorithm.
+
+        algorithm: also "iterative_spline_parameterization" and "time_optimal_trajectory_generation".
+        """
+        return retimed(self._model, trajectory_of(traj_in), (velocity_scaling_factor, acceleration_scaling_factor),
+                       algorithm)
+
+    def get_jacobian_matrix(self, joint_values, reference_point=None):
+        """Return the Jacobian (6, k), linear above angular, in the frame of the group's base.
+
+        reference_point: a point in the tip's frame, its origin unless one is given.
+        """
+        return jacobian(self._group, joint_values, (0.0, 0.0, 0.0) if reference_point is None else reference_point)
+
+    def enforce_bounds(self, robot_state_msg):
+        """Return the RobotState, every joint within its limits. Raises genpy.DeserializationError for an empty one."""
+        if not robot_state_msg.joint_state.name and not robot_state_msg.multi_dof_joint_state.joint_names:
+            raise genpy.DeserializationError("the robot state names no joints")
+        state = states.state_of(self._model, robot_state_msg)
+        result = states.message_of(self._model, state.with_q(within_limits(self._model, state.q)))
+        result.attached_collision_objects = robot_state_msg.attached_collision_objects
+        return result

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The rospy node that a program's commanders share."""
+import rospy
+
+
+def ensure_node():
+    """Start a node for a program that has none, as programs may that know commanders alone."""
+    if not rospy.core.is_initialized():
+        rospy.init_node("move_group_commander_wrappers", anonymous=True, disable_signals=True)

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What plan() returns: noetic's tuple, which melodic's programs can use as the trajectory that they expect."""
+from moveit_msgs.msg import RobotTrajectory
+
+
+class Plan(tuple):
+    """(success, RobotTrajectory, planning time [s], MoveItErrorCodes).
+
+    Every attribute of the trajectory is one of the plan, too (``plan.joint_trajectory.points``, ``plan.serialize``), so
+    that a plan can be executed, changed, put into a message or published where a program has taken it for a trajectory.
+    """
+
+    @property
+    def trajectory(self):
+        return self[1]
+
+    def __getattr__(self, name):
+        # Only names that a tuple has not; those of the interpreter's own are asked while a plan is copied.
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self[1], name)
+
+    def __setattr__(self, name, value):
+        setattr(self[1], name, value)
+
+
+def trajectory_of(plan):
+    """Return the RobotTrajectory in a Plan, a tuple like it, a RobotTrajectory or a JointTrajectory.
+
+    Raises TypeError for anything else.
+    """
+    if isinstance(plan, tuple):
+        found = [part for part in plan if isinstance(part, RobotTrajectory)]
+        plan = found[0] if found else plan
+    if getattr(plan, "_type", "") == "trajectory_msgs/JointTrajectory":
+        return RobotTrajectory(joint_trajectory=plan)
+    if not isinstance(plan, RobotTrajectory):
+        raise TypeError("expected a RobotTrajectory, a JointTrajectory or what plan() returns, got %s"
+                        % type(plan).__name__)
+    return plan

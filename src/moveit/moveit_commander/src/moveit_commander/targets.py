@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Joint values that a group is to reach. Knows neither ROS nor messages; angles in rad, lengths in m."""
+import numpy as np
+
+from motion_planning.model import ModelError
+
+from .exception import MoveItCommanderException
+
+
+class JointTarget:
+    """Values for every variable of a model, of which those of one group are the target.
+
+    It starts at the model's default state: every joint at 0, or in the middle of its limits where 0 is beyond them.
+    Every setter raises MoveItCommanderException, and changes nothing, for values that are beyond the limits by more
+    than ``tolerance``, and for names and numbers of values that do not fit.
+    """
+
+    def __init__(self, model, group):
+        self._model, self._group = model, group
+        self._state = model.default_state()
+
+    @property
+    def q(self):
+        """The whole model's values (n,)."""
+        return self._state.q
+
+    def values(self):
+        """The group's values, in the group's order."""
+        return self._state.q[self._group.indices].tolist()
+
+    def set_values(self, values, tolerance):
+        """Set all values of the group, given in the group's order."""
+        values = [float(value) for value in values]
+        if len(values) != len(self._group):
+            raise MoveItCommanderException("group '%s' has %d joints (%s), got %d values" % (
+                self._group.name, len(self._group), ", ".join(self._group.joints), len(values)))
+        self.set_by_name(dict(zip(self._group.joints, values, strict=True)), tolerance)
+
+    def set_by_name(self, values, tolerance):
+        """Set the values, {joint: value}, of some of the group's joints; the others stay as they are."""
+        foreign = [name for name in values if name not in self._group.joints]
+        if foreign:
+            raise MoveItCommanderException("group '%s' has no joint %s; its joints are %s" % (
+                self._group.name, ", ".join("'%s'" % name for name in foreign), ", ".join(self._group.joints)))
+        self._set(values, tolerance)
+
+    def set_robot(self, values, tolerance):
+        """Set the values, {joint: value}, of any joints of the robot; fixed and mimic joints are ignored."""
+        known = self._model.robot.joints
+        unknown = [name for name in values if name not in known]
+        if unknown:
+            raise MoveItCommanderException("the robot has no joint %s" % ", ".join("'%s'" % name for name in unknown))
+        self._set({name: value for name, value in values.items() if name in self._model.variables}, tolerance)
+
+    def _set(self, values, tolerance):
+        try:
+            state = self._state.with_joints({name: float(value) for name, value in values.items()})
+        except ModelError as error:
+            raise MoveItCommanderException(str(error)) from None
+        self.check(state.q, tolerance)
+        self._state = state
+
+    def check(self, q, tolerance):
+        """Raise MoveItCommanderException where the group's part of ``q`` (n,) is beyond the limits."""
+        beyond = self._model.beyond_limits(q, tolerance, self._group.indices)
+        if beyond:
+            raise MoveItCommanderException("Error setting joint target. Is it within bounds? " + "; ".join(
+                "%s = %g, limits are %g to %g" % one for one in beyond))
+
+
+def random_values(model, group, generator):
+    """Return values (k,) of the group within the limits, evenly spread. ``generator``: numpy.random.Generator."""
+    low, high = model.bounds[group.indices].T
+    if not np.isfinite(low).all() or not np.isfinite(high).all():
+        raise MoveItCommanderException("group '%s' has joints without limits" % group.name)
+    return generator.uniform(low, high)
+
+
+def within_limits(model, q):
+    """Return ``q`` (n,) with every joint inside its limits; joints that turn without end come to -pi to pi."""
+    q = model.wrapped(q)
+    return np.where(model.continuous, q, np.clip(q, model.bounds[:, 0], model.bounds[:, 1]))
+
+
+def jacobian(group, values, reference_point):
+    """Return the Jacobian (6, k) of a point of the group's tip, velocity [m/s] above angular velocity [rad/s].
+
+    Both in the frame of the link that the group's chain begins at. ``reference_point`` (3,): in the tip's frame [m].
+    Raises MoveItCommanderException for a group that is no chain.
+    """
+    if group.chain is None:
+        raise MoveItCommanderException("group '%s' is no chain of joints; it has no Jacobian" % group.name)
+    pose, matrix = group.chain.fk_and_jacobian(values)
+    shift = pose[:3, :3] @ np.asarray(reference_point, dtype=float)
+    matrix = np.array(matrix)
+    # v = v_tip + omega x shift
+    matrix[:3] += np.cross(matrix[3:].T, shift).T
+    return matrix
