@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+#: Levels of an octomap, from the cube around everything to the smallest.
+OCTREE_DEPTH = 16
+
 
 @dataclass(frozen=True)
 class Cone:
@@ -43,7 +46,11 @@ class TriangleMesh:
 
 @dataclass(frozen=True, eq=False)
 class Octree:
-    """Occupied cubes of an octree. resolution [m]: side of the smallest; boxes (n, 4): centre x y z, and side."""
+    """Occupied cubes of an octree. resolution [m]: side of the smallest; boxes (n, 4): centre x y z, and side.
+
+    Raises ValueError for a side that is not the resolution times a power of 2, a cube off the grid of its size, and one
+    farther from the origin than the tree has room for, 32768 times the resolution.
+    """
 
     resolution: float
     boxes: np.ndarray
@@ -53,6 +60,19 @@ class Octree:
         if not self.resolution > 0.0 or not np.isfinite(boxes).all():
             raise ValueError("an octree needs a positive resolution and finite boxes, got resolution %r"
                              % (self.resolution,))
+        sides = boxes[:, 3]
+        levels = np.rint(np.log2(np.maximum(sides, 1e-9) / self.resolution))
+        wrong = (np.abs(self.resolution * 2.0 ** levels - sides) > 1e-3 * sides) | (levels < 0)
+        wrong |= levels >= OCTREE_DEPTH
+        if wrong.any():
+            raise ValueError("a cube of the octree has side %g; expected the resolution, %g, times a power of 2"
+                             % (sides[wrong][0], self.resolution))
+        cells = boxes[:, :3] / sides[:, None] - 0.5
+        if (np.abs(cells - np.rint(cells)) > 0.1).any():
+            raise ValueError("a cube of the octree does not lie on the grid of its size")
+        if (np.abs(boxes[:, :3]) + 0.5 * sides[:, None] > self.resolution * 2 ** (OCTREE_DEPTH - 1) * 1.0001).any():
+            raise ValueError("a cube of the octree is more than %g m from its origin"
+                             % (self.resolution * 2 ** (OCTREE_DEPTH - 1)))
         object.__setattr__(self, "boxes", boxes)
 
 

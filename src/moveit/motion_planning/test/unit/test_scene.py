@@ -92,6 +92,10 @@ def test_shapes_are_checked():
             TriangleMesh(vertices, np.reshape(triangles, (-1, 3)))
     with pytest.raises(ValueError):
         Octree(0.0, [])
+    for boxes, words in (([(0.15, 0.15, 0.15, 0.3)], "power of 2"), ([(0.1, 0.05, 0.05, 0.1)], "on the grid"),
+                         ([(4e3 + 0.05, 0.05, 0.05, 0.1)], "from its origin"), ([(0.0, 0, 0, np.nan)], "finite")):
+        with pytest.raises(ValueError, match=words):
+            Octree(0.1, boxes)
     assert Octree(0.1, []).boxes.shape == (0, 4)
 
 
@@ -200,7 +204,7 @@ def test_matrices_go_there_and_back():
 
 
 def test_the_octomap_is_a_thing_of_its_own(scene):
-    with_map = scene.with_octomap(Octree(0.1, [[0, 0, 0, 0.1]]), at(1.0))
+    with_map = scene.with_octomap(Octree(0.1, [[0.05, 0.05, 0.05, 0.1]]), at(1.0))
     assert with_map.octomap.id == OCTOMAP and list(with_map.objects) == []
     assert with_map.with_octomap(None).octomap is None
 

@@ -1,0 +1,327 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Contacts and distances of a robot in a scene."""
+from __future__ import annotations
+
+import math
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import fcl
+import numpy as np
+
+from motion_planning.errors import PlanningError
+from motion_planning.exact import kernels
+from motion_planning.exact.geometry import grown, plane_overlap
+from motion_planning.exact.tables import ATTACHED, OBJECT, ROBOT, Fixed, Geometries, Movers, Part
+from motion_planning.model import ModelError
+from motion_planning.shapes import Octree, TriangleMesh
+from urdf_model import Mesh, Plane
+
+#: Tables of scenes that are kept: a scene is asked about many times, and so are the few that follow it.
+_KEPT = 12
+_ANY = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
+_ALL = fcl.CollisionRequest(num_max_contacts=50, enable_contact=True)
+_DISTANCE = fcl.DistanceRequest(enable_nearest_points=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Two things that touch. a_kind, b_kind: "robot" (a link), "object" (of the world) or "attached" (held).
+
+    point (3,) in the planning frame [m]; normal (3,): unit, from a to b; depth [m]: how far they overlap, where meshes
+    meet an estimate.
+    """
+
+    a: str
+    b: str
+    a_kind: str
+    b_kind: str
+    point: np.ndarray
+    normal: np.ndarray
+    depth: float
+
+    def __str__(self):
+        words = {ROBOT: "link", OBJECT: "object", ATTACHED: "attached object"}
+        return "%s '%s' and %s '%s' overlap by %.4f m" % (words[self.a_kind], self.a, words[self.b_kind], self.b,
+                                                          self.depth)
+
+
+class Nearest(NamedTuple):
+    """The least distance [m], 0 where something touches, of which two things, and the nearest point (3,) of each."""
+
+    distance: float
+    a: str
+    b: str
+    point_a: np.ndarray
+    point_b: np.ndarray
+
+
+class ExactChecker:
+    """Checks states of one robot in scenes. Any thread may call; one call at a time is worked on.
+
+    Shapes are checked as they are. Meshes and cubes of an octomap are what they are in FCL: a mesh is hollow, a cube
+    solid. A plane is endless and has no thickness, so that it can be a floor, a wall or a ceiling.
+    warnings: sentences about shapes that could not be read and are left out.
+    """
+
+    def __init__(self, model, meshes):
+        """``meshes``: function from the file name of a mesh to its shapes.TriangleMesh, or raises PlanningError."""
+        self.model = model
+        self.warnings = []
+        self._geometries = Geometries()
+        self._lock = threading.Lock()
+        self._tables = OrderedDict()
+        self._robot = self._robot_parts(meshes)
+        self._pairs = np.empty((256, 2), dtype=np.int64)
+
+    def free(self, scene, state=None, group=None):
+        """Whether nothing touches in ``state``, the scene's where None.
+
+        ``group``: name of a group; then only pairs of which one moves with it count. Raises ModelError for an unknown
+        group, and for joint values that do not fit the model or are not finite.
+        """
+        with self._lock:
+            query = self._query(scene, state, group)
+            for i, j in self._near(query):
+                if self._touches(query, i, j):
+                    return False
+        return True
+
+    def contacts(self, scene, state=None, group=None, most=100):
+        """Return a list of Contact, one for each two things that touch, the deepest of theirs; at most ``most``.
+
+        Arguments and errors are those of :meth:`free`.
+        """
+        found = {}
+        with self._lock:
+            query = self._query(scene, state, group)
+            for i, j in self._near(query):
+                contact = self._contact(query, i, j)
+                if contact is None:
+                    continue
+                key = contact.a, contact.b
+                if key not in found or found[key].depth < contact.depth:
+                    found[key] = contact
+                if len(found) >= most:
+                    break
+        return list(found.values())
+
+    def distance(self, scene, state=None, group=None):
+        """Return the least distance [m] of two things that must not touch: 0 where they do, inf where there are none.
+
+        Arguments and errors are those of :meth:`free`.
+        """
+        nearest = self.nearest(scene, state, group)
+        return math.inf if nearest is None else nearest.distance
+
+    def nearest(self, scene, state=None, group=None):
+        """Return the Nearest of two things that must not touch, None where there are none.
+
+        Arguments and errors are those of :meth:`free`.
+        """
+        best = None
+        with self._lock:
+            query = self._query(scene, state, group)
+            rows, least = kernels.gaps(query.robot, query.movers.arrays, query.pairs, query.active,
+                                       query.fixed.arrays, query.poses)
+            for k in np.argsort(least, kind="stable"):
+                if best is not None and least[k] >= best.distance:
+                    break
+                i, j = rows[k]
+                if query.may_touch(i, j):
+                    continue
+                distance, point_a, point_b = self._gap(query, i, j)
+                if best is None or distance < best.distance:
+                    best = Nearest(distance, query.movers.parts[i].name, query.part(j).name, point_a, point_b)
+                    if distance <= 0.0:
+                        break
+        return best
+
+    # -- a question about a state -------------------------------------------------------------------------------
+
+    def _query(self, scene, state, group):
+        state = scene.state if state is None else state
+        q = np.array(state.q, dtype=np.float64)
+        if q.shape != (len(self.model.variables),) or not math.isfinite(q.dot(q)):
+            self.model.checked(q)
+            raise ModelError("joint values are not all finite: %s" % dict(zip(self.model.variables, q.tolist(),
+                                                                              strict=True)))
+        movers = self._movers(scene, state)
+        pairs, active, memory = self._pairing(scene, movers, group)
+        return _Query((self.model.kinematics, q, np.array(state.base)), movers, pairs, active,
+                      self._fixed(scene), scene.allowed, memory)
+
+    def _near(self, query):
+        """List of [i, j] that may touch, as kernels.near has them, allowed ones left out."""
+        arguments = query.robot, query.movers.arrays, query.pairs, query.active, query.fixed.arrays, query.poses
+        count = kernels.near(*arguments, self._pairs)
+        if count > len(self._pairs):
+            self._pairs = np.empty((2 * count, 2), dtype=np.int64)
+            count = kernels.near(*arguments, self._pairs)
+        return [row for row in self._pairs[:count].tolist() if not query.may_touch(*row)]
+
+    def _touches(self, query, i, j):
+        a, b = query.object(i), query.object(j)
+        if a is None or b is None:
+            return query.plane_depth(i, j) >= 0.0
+        return fcl.collide(a, b, _ANY, fcl.CollisionResult()) > 0
+
+    def _contact(self, query, i, j):
+        a, b = query.object(i), query.object(j)
+        part, other = query.movers.parts[i], query.part(j)
+        names = part.name, other.name, part.kind, other.kind
+        if a is None or b is None:
+            depth = query.plane_depth(i, j)
+            if depth < 0.0:
+                return None
+            return Contact(*names, *query.plane_point(i, j), depth)
+        result = fcl.CollisionResult()
+        if not fcl.collide(a, b, _ALL, result):
+            return None
+        found = result.contacts
+        # Between triangles FCL's depths are those of their planes: the least one is the nearest to the truth.
+        both = isinstance(part.shape, TriangleMesh) and isinstance(other.shape, TriangleMesh)
+        one = (min if both else max)(found, key=lambda contact: abs(contact.penetration_depth))
+        # FCL changes the order for some pairs of shapes, and says so.
+        turned = one.o1 is query.geometry(j) and query.geometry(i) is not query.geometry(j)
+        normal = -one.normal if turned else one.normal
+        return Contact(*names, np.array(one.pos), np.array(normal), abs(one.penetration_depth))
+
+    def _gap(self, query, i, j):
+        a, b = query.object(i), query.object(j)
+        if a is None or b is None:
+            depth = query.plane_depth(i, j)
+            point, normal = query.plane_point(i, j)
+            return max(0.0, -depth), point + min(0.0, depth) * normal, point
+        if fcl.collide(a, b, _ANY, fcl.CollisionResult()):
+            middle = query.poses[i][:3, 3]
+            return 0.0, middle, middle
+        result = fcl.DistanceResult()
+        distance = fcl.distance(a, b, _DISTANCE, result)
+        return max(0.0, float(distance)), *map(np.array, result.nearest_points)
+
+    # -- tables -------------------------------------------------------------------------------------------------
+
+    def _robot_parts(self, meshes):
+        parts = []
+        for index, name in enumerate(self.model.links):
+            for collision in self.model.robot.links[name].collisions:
+                try:
+                    shape = _read(collision.geometry, meshes)
+                except PlanningError as error:
+                    self.warnings.append("%s; link '%s' is checked without it" % (error, name))
+                    continue
+                parts.append(Part(name, ROBOT, index, shape, collision.origin))
+        return parts
+
+    def _kept(self, key, held, make):
+        """``make()``, or what it gave for the same key; ``held`` are the things whose identities the key is of."""
+        entry = self._tables.get(key)
+        if entry is None:
+            entry = self._tables[key] = held, make()
+            while len(self._tables) > 3 * _KEPT:
+                self._tables.popitem(last=False)
+        else:
+            self._tables.move_to_end(key)
+        return entry[1]
+
+    def _movers(self, scene, state):
+        held = tuple(table for table in (state.attached, scene.link_padding, scene.link_scale) if table)
+        return self._kept(("movers", *map(id, held)), held, lambda: self._make_movers(scene, state))
+
+    def _make_movers(self, scene, state):
+        parts = self._robot
+        if scene.link_padding or scene.link_scale:
+            parts = [part._replace(shape=grown(part.shape, scene.link_padding.get(part.name, 0.0),
+                                               scene.link_scale.get(part.name, 1.0))) for part in parts]
+        bodies = state.attached.values()
+        held = [Part(body.id, ATTACHED, self.model.link_index[body.link], shape, body.object.pose @ pose)
+                for body in bodies for shape, pose in body.object.shapes]
+        return Movers(parts + held, self._geometries, {body.id: body.touch_links for body in bodies})
+
+    def _pairing(self, scene, movers, group):
+        held = movers, scene.allowed
+        return self._kept(("pairs", *map(id, held), group), held,
+                          lambda: self._make_pairing(scene.allowed, movers, group))
+
+    def _make_pairing(self, allowed, movers, group):
+        moving = None
+        if group is not None:
+            moving = {self.model.link_index[link] for link in self.model.group(group).moving_links}
+        active = np.array([moving is None or link in moving for link in movers.arrays[0].tolist()], dtype=bool)
+        return movers.pairs(self.model, allowed, moving), active, {}
+
+    def _fixed(self, scene):
+        held = scene.objects, scene.octomap
+        return self._kept(("fixed", *map(id, held)), held, lambda: self._make_fixed(scene))
+
+    def _make_fixed(self, scene):
+        things = [*scene.objects.values(), *([scene.octomap] if scene.octomap is not None else ())]
+        return Fixed([Part(thing.id, OBJECT, -1, shape, thing.pose @ pose) for thing in things
+                      for shape, pose in thing.shapes if not isinstance(shape, Octree) or len(shape.boxes)],
+                     self._geometries)
+
+
+class _Query:
+    """One state in one scene: where everything is, filled in as it is needed."""
+
+    def __init__(self, robot, movers, pairs, active, fixed, allowed, memory):
+        self.robot, self.movers, self.pairs, self.active, self.fixed = robot, movers, pairs, active, fixed
+        self.poses = np.empty((len(movers.parts), 4, 4))
+        self._allowed, self._memory, self._placed = allowed, memory, set()
+
+    def may_touch(self, i, j):
+        """Whether mover ``i`` may touch the fixed shape ``j`` < 0; two movers that may are not asked about."""
+        if j >= 0:
+            return False
+        key = self.movers.parts[i].name, self.fixed.parts[-1 - j].name
+        if key not in self._memory:
+            self._memory[key] = self._allowed.allowed(*key)
+        return self._memory[key]
+
+    def part(self, j):
+        return self.movers.parts[j] if j >= 0 else self.fixed.parts[-1 - j]
+
+    def geometry(self, j):
+        return self.movers.geometries[j] if j >= 0 else self.fixed.geometries[-1 - j]
+
+    def pose(self, j):
+        return self.poses[j] if j >= 0 else self.fixed.poses[-1 - j]
+
+    def object(self, j):
+        """The fcl.CollisionObject of a mover or fixed shape where it is, None for a plane."""
+        if j < 0:
+            return None if self.fixed.geometries[-1 - j] is None else self.fixed.object(-1 - j)
+        one = self.movers.objects[j]
+        if one is not None and j not in self._placed:
+            pose = self.poses[j]
+            one.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
+            self._placed.add(j)
+        return one
+
+    def plane_depth(self, i, j):
+        """How deep the two reach into each other, one of them a plane; below 0 how far they are apart."""
+        if isinstance(self.part(i).shape, Plane):
+            i, j = j, i
+        if isinstance(self.part(i).shape, Plane):
+            return -math.inf
+        return plane_overlap(self.pose(j), self.part(i).shape, self.pose(i))
+
+    def plane_point(self, i, j):
+        """(point (3,) on the plane below or above the other's middle, normal (3,) from mover ``i`` to ``j``)."""
+        is_plane = isinstance(self.part(i).shape, Plane)
+        plane, other = (self.pose(i), self.pose(j)) if is_plane else (self.pose(j), self.pose(i))
+        height = float(plane[:3, 2] @ (other[:3, 3] - plane[:3, 3]))
+        away = plane[:3, 2] if height >= 0.0 else -plane[:3, 2]
+        return other[:3, 3] - height * plane[:3, 2], away if is_plane else -away
+
+
+def _read(geometry, meshes):
+    if not isinstance(geometry, Mesh):
+        return geometry
+    mesh = meshes(geometry.filename)
+    if tuple(geometry.scale) == (1.0, 1.0, 1.0):
+        return mesh
+    return TriangleMesh(mesh.vertices * np.array(geometry.scale), mesh.triangles)

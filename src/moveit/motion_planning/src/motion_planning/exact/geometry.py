@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Shapes as FCL has them, the boxes around them, and what FCL has not: planes without a thickness."""
+from typing import NamedTuple
+
+import fcl
+import numpy as np
+
+from motion_planning.exact.octree import occupied_tree
+from motion_planning.shapes import Cone, Octree, TriangleMesh
+from urdf_model import Box, Cylinder, Plane, Sphere
+
+#: Half the side of a plane's box [m]: larger than any scene.
+_ENDLESS = 1e6
+
+
+class Bounds(NamedTuple):
+    """A box around a shape, along the shape's axes, and a ball about the same centre [m], in the shape's frame."""
+
+    centre: np.ndarray
+    half: np.ndarray
+    radius: float
+
+
+def bounds_of(shape):
+    """Return the :class:`Bounds` of a shape. Raises TypeError for what is none."""
+    zero = np.zeros(3)
+    if isinstance(shape, Box):
+        half = 0.5 * np.array(shape.size)
+        return Bounds(zero, half, float(np.linalg.norm(half)))
+    if isinstance(shape, Sphere):
+        return Bounds(zero, np.full(3, shape.radius), shape.radius)
+    if isinstance(shape, Cylinder | Cone):
+        half = np.array((shape.radius, shape.radius, 0.5 * shape.length))
+        return Bounds(zero, half, float(np.hypot(shape.radius, half[2])))
+    if isinstance(shape, TriangleMesh):
+        used = shape.vertices[np.unique(shape.triangles)]
+        low, high = used.min(axis=0), used.max(axis=0)
+        centre = 0.5 * (low + high)
+        return Bounds(centre, 0.5 * (high - low), float(np.linalg.norm(used - centre, axis=1).max()))
+    if isinstance(shape, Octree):
+        side = 0.5 * shape.boxes[:, 3:]
+        low, high = (shape.boxes[:, :3] - side).min(axis=0), (shape.boxes[:, :3] + side).max(axis=0)
+        half = 0.5 * (high - low)
+        return Bounds(0.5 * (low + high), half, float(np.linalg.norm(half)))
+    if isinstance(shape, Plane):
+        return Bounds(zero, np.array((_ENDLESS, _ENDLESS, 0.0)), 2.0 * _ENDLESS)
+    raise TypeError("%r is no shape that can collide" % (shape,))
+
+
+def fcl_geometry(shape):
+    """Return the FCL geometry of a shape; None for a plane, which :func:`plane_overlap` is for."""
+    if isinstance(shape, Plane):
+        return None
+    if isinstance(shape, Box):
+        return fcl.Box(*shape.size)
+    if isinstance(shape, Sphere):
+        return fcl.Sphere(shape.radius)
+    if isinstance(shape, Cylinder):
+        return fcl.Cylinder(shape.radius, shape.length)
+    if isinstance(shape, Cone):
+        return fcl.Cone(shape.radius, shape.length)
+    if isinstance(shape, TriangleMesh):
+        model = fcl.BVHModel()
+        model.beginModel(len(shape.triangles), len(shape.vertices))
+        model.addSubModel(shape.vertices, shape.triangles)
+        model.endModel()
+        return model
+    return fcl.OcTree(shape.resolution, occupied_tree(shape))
+
+
+def grown(shape, padding, scale):
+    """Return a shape scaled about its middle and then grown by ``padding`` [m] to every side."""
+    if padding == 0.0 and scale == 1.0:
+        return shape
+    if isinstance(shape, Box):
+        return Box(tuple(side * scale + 2.0 * padding for side in shape.size))
+    if isinstance(shape, Sphere):
+        return Sphere(shape.radius * scale + padding)
+    if isinstance(shape, Cylinder | Cone):
+        return type(shape)(shape.radius * scale + padding, shape.length * scale + 2.0 * padding)
+    if isinstance(shape, TriangleMesh):
+        middle = shape.vertices.mean(axis=0)
+        out = (shape.vertices - middle) * scale
+        lengths = np.linalg.norm(out, axis=1, keepdims=True)
+        return TriangleMesh(middle + out * (1.0 + padding / np.maximum(lengths, 1e-9)), shape.triangles)
+    return shape
+
+
+def plane_overlap(plane_pose, shape, pose):
+    """Return how deep a shape reaches through a plane [m], below 0 how far it stays away from it.
+
+    ``plane_pose`` (4, 4): the plane is the x-y plane of this frame, endless and without a thickness; ``pose`` (4, 4):
+    the shape's, in the same frame.
+    """
+    normal = plane_pose[:3, 2]
+    height = float(normal @ (pose[:3, 3] - plane_pose[:3, 3]))
+    low, high = _extent(shape, pose[:3, :3].T @ normal)
+    return min(height + high, -(height + low))
+
+
+def _extent(shape, direction):
+    """(lowest, highest) of a shape along the unit vector ``direction``, in the shape's frame, about its origin."""
+    if isinstance(shape, Sphere):
+        return -shape.radius, shape.radius
+    if isinstance(shape, Cylinder | Cone):
+        round_part = shape.radius * float(np.sqrt(max(0.0, 1.0 - direction[2] ** 2)))
+        up = 0.5 * shape.length * direction[2]
+        if isinstance(shape, Cylinder):
+            return -round_part - abs(up), round_part + abs(up)
+        return min(up, -up - round_part), max(up, -up + round_part)
+    if isinstance(shape, TriangleMesh):
+        along = shape.vertices @ direction
+    elif isinstance(shape, Octree):
+        reach = 0.5 * shape.boxes[:, 3] * np.abs(direction).sum()
+        middle = shape.boxes[:, :3] @ direction
+        along = np.concatenate([middle - reach, middle + reach])
+    else:
+        along = np.array((-1.0, 1.0)) * (bounds_of(shape).half @ np.abs(direction))
+    return float(along.min()), float(along.max())

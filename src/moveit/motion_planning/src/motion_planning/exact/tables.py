@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The shapes of a robot, of what it holds and of the world, as the compiled code and FCL want them."""
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import fcl
+import numpy as np
+
+from motion_planning.exact.geometry import bounds_of, fcl_geometry
+
+ROBOT, OBJECT, ATTACHED = "robot", "object", "attached"
+#: Fixed shapes of one chunk: all of them are passed over when the chunk's ball is far away.
+_CHUNK = 32
+
+
+class Part(NamedTuple):
+    """One shape of something. name: of the link or object; kind: ROBOT, OBJECT or ATTACHED; link: index of the link
+    that it moves with, -1 where it stands in the world; pose (4, 4): in that link, or in the planning frame."""
+
+    name: str
+    kind: str
+    link: int
+    shape: object
+    pose: np.ndarray
+
+
+class Geometries:
+    """FCL geometries and bounds of shapes, each made once as long as the shape lives."""
+
+    def __init__(self):
+        self._known = WeakKeyDictionary()
+
+    def of(self, shape):
+        """Return (FCL geometry or None, Bounds)."""
+        entry = self._known.get(shape)
+        if entry is None:
+            entry = self._known[shape] = fcl_geometry(shape), bounds_of(shape)
+        return entry
+
+
+class Movers:
+    """Shapes that move with the robot."""
+
+    def __init__(self, parts, geometries, touch):
+        """``parts``: [Part]; ``touch``: {name of something held: links that it may touch}."""
+        self.parts, self.touch = parts, touch
+        found = [geometries.of(part.shape) for part in parts]
+        self.objects = [None if shape is None else fcl.CollisionObject(shape) for shape, _ in found]
+        self.geometries = [shape for shape, _ in found]
+        count = len(parts)
+        self.arrays = (
+            np.array([part.link for part in parts], dtype=np.int64),
+            np.array([part.pose for part in parts], dtype=float).reshape(count, 4, 4),
+            np.array([bounds.centre for _, bounds in found], dtype=float).reshape(count, 3),
+            np.array([bounds.half for _, bounds in found], dtype=float).reshape(count, 3),
+            np.array([bounds.radius for _, bounds in found], dtype=float))
+
+    def pairs(self, model, allowed, moving):
+        """Return (p, 2) indices of movers that are checked against each other, of two things each.
+
+        ``moving``: set of link indices of which at least one is in each pair, None for all.
+        """
+        links = self.arrays[0]
+        may, found = {}, []
+        for i, a in enumerate(self.parts):
+            for j, b in enumerate(self.parts[:i]):
+                if moving is not None and links[i] not in moving and links[j] not in moving:
+                    continue
+                key = a.name, b.name
+                if key not in may:
+                    may[key] = self._may_touch(model, allowed, a, b)
+                if not may[key]:
+                    found.append((j, i))
+        return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+    def _may_touch(self, model, allowed, a, b):
+        if (a.name, a.kind) == (b.name, b.kind) or allowed.allowed(a.name, b.name):
+            return True
+        if a.kind == b.kind == ATTACHED:
+            return a.link == b.link
+        return any(held.kind == ATTACHED and other.kind == ROBOT and other.name in self.touch[held.name]
+                   for held, other in ((a, b), (b, a)))
+
+
+class Fixed:
+    """Shapes that stand in the world."""
+
+    def __init__(self, parts, geometries):
+        count = len(parts)
+        poses = np.array([part.pose for part in parts], dtype=float).reshape(count, 4, 4)
+        found = [geometries.of(part.shape) for part in parts]
+        local = np.array([bounds.centre for _, bounds in found], dtype=float).reshape(count, 3)
+        halves = np.array([bounds.half for _, bounds in found], dtype=float).reshape(count, 3)
+        radii = np.array([bounds.radius for _, bounds in found], dtype=float)
+        centres = np.einsum("nab,nb->na", poses[:, :3, :3], local) + poses[:, :3, 3]
+        order = _neighbours_together(centres, radii)
+        self.parts = [parts[k] for k in order]
+        self.geometries = [found[k][0] for k in order]
+        self.poses = poses[order]
+        self._objects = [None] * count
+        centres, radii = centres[order], radii[order]
+        starts = np.append(np.arange(0, count, _CHUNK), count)
+        balls = np.empty((len(starts) - 1, 4))
+        for chunk, (start, end) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
+            middle = 0.5 * (centres[start:end].min(axis=0) + centres[start:end].max(axis=0))
+            reach = np.linalg.norm(centres[start:end] - middle, axis=1) + radii[start:end]
+            balls[chunk, :3], balls[chunk, 3] = middle, reach.max()
+        self.arrays = (np.ascontiguousarray(self.poses[:, :3, :3]), centres, halves[order], radii, starts, balls)
+
+    def object(self, k):
+        """Return the fcl.CollisionObject of shape ``k``, made when it is first needed."""
+        if self._objects[k] is None:
+            pose = self.poses[k]
+            self._objects[k] = fcl.CollisionObject(self.geometries[k], fcl.Transform(pose[:3, :3], pose[:3, 3]))
+        return self._objects[k]
+
+
+def _neighbours_together(centres, radii):
+    """Order in which what is near each other comes together: large things first, then along a curve through cells."""
+    if len(centres) <= _CHUNK:
+        return np.arange(len(centres))
+    cell = np.floor((centres - centres.min(axis=0)) / max(1e-3, float(np.ptp(centres, axis=0).max())) * 1023.0)
+    cell = cell.astype(np.int64)
+    code = np.zeros(len(centres), dtype=np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    large = radii > 4.0 * np.median(radii)
+    return np.lexsort((code, ~large))

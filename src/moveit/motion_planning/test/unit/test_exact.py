@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What touches what, where and how deep: exact checks against what can be told without one, and against PyBullet."""
+import math
+
+import numpy as np
+import pybullet
+import pytest
+
+from motion_planning.exact import ExactChecker
+from motion_planning.model import MeshUnreadable, ModelError, PlanningModel
+from motion_planning.scene import OCTOMAP, Cone, Octree, Scene, TriangleMesh, WorldObject
+from urdf_model import Box, Cylinder, Plane, Sphere
+from urdf_model.transforms import axis_rotation, quaternion_from_matrix, rigid
+
+# Something with a shape that slides along x, and a finger that slides along y on top of it.
+SLIDER = """<robot name="slider"><link name="base"/>
+  <link name="car"><collision><geometry>%s</geometry></collision></link>
+  <link name="finger"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>
+  <joint name="x" type="prismatic"><parent link="base"/><child link="car"/><axis xyz="1 0 0"/>
+    <limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
+  <joint name="y" type="prismatic"><origin xyz="0 0 2"/><parent link="car"/><child link="finger"/><axis xyz="0 1 0"/>
+    <limit lower="-9" upper="9" effort="1" velocity="1"/></joint></robot>"""
+SEMANTIC = """<robot name="slider"><group name="car"><joint name="x"/></group><group name="finger"><joint name="y"/>
+  </group></robot>"""
+CORNERS = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
+SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+CUBE = TriangleMesh(CORNERS, [corners for a, b, c, d in SIDES for corners in ((a, b, c), (a, c, d))])
+# All of them reach 0.1 m along x.
+SHAPES = {"box": Box((0.2, 0.2, 0.2)), "sphere": Sphere(0.1), "cylinder": Cylinder(0.1, 0.2), "mesh": CUBE,
+          "octree": Octree(0.1, [(x, y, z, 0.1) for x in (-0.05, 0.05) for y in (-0.05, 0.05) for z in (-0.05, 0.05)])}
+XML = {"box": '<box size="0.2 0.2 0.2"/>', "sphere": '<sphere radius="0.1"/>', "mesh": '<mesh filename="cube"/>',
+       "cylinder": '<cylinder radius="0.1" length="0.2"/>'}
+
+
+def at(x=0.0, y=0.0, z=0.0):
+    return rigid(np.eye(3), (x, y, z))
+
+
+def thing(shape, x=0.0, y=0.0, z=0.0, name="thing"):
+    return WorldObject(name, at(x, y, z), ((shape, np.eye(4)),))
+
+
+def slider(kind="box"):
+    model = PlanningModel.from_xml(SLIDER % XML[kind], SEMANTIC)
+    return Scene(model), ExactChecker(model, {"cube": CUBE}.__getitem__)
+
+
+@pytest.mark.parametrize("mine", XML)
+@pytest.mark.parametrize("other", SHAPES)
+def test_contacts_of_each_two_shapes(mine, other):
+    scene, exact = slider(mine)
+    # A little to the side: exactly aligned faces have no one right answer.
+    scene = scene.with_object(thing(SHAPES[other], 1.0, 0.003, 0.002))
+    apart = scene.state.with_joints({"x": 0.79})
+    assert exact.free(scene, apart) and exact.contacts(scene, apart) == []
+    assert exact.distance(scene, apart) == pytest.approx(0.01, abs=1e-3)
+    for x, sign in ((0.81, 1.0), (1.19, -1.0)):
+        state = scene.state.with_joints({"x": x})
+        assert not exact.free(scene, state) and exact.distance(scene, state) == 0.0
+        (contact,) = exact.contacts(scene, state)
+        assert (contact.a, contact.b, contact.a_kind, contact.b_kind) == ("car", "thing", "robot", "object")
+        assert sign * contact.point[0] == pytest.approx(sign * (1.0 - sign * 0.1), abs=0.02)
+        assert np.linalg.norm(contact.normal) == pytest.approx(1.0)
+        if (mine, other) != ("mesh", "mesh"):  # what FCL says of two triangles is theirs alone
+            assert sign * contact.normal[0] > 0.9
+            assert contact.depth == pytest.approx(0.01, abs=2e-3)
+
+
+def test_cones():
+    scene, exact = slider("box")
+    scene = scene.with_object(thing(Cone(0.1, 0.4), 1.0))
+    # Its base is 0.2 m below its middle; at the height of the car's top it is half that of the base wide.
+    assert exact.free(scene, scene.state.with_joints({"x": 0.82}))
+    assert not exact.free(scene, scene.state.with_joints({"x": 0.84}))
+    assert exact.free(scene, scene.state.with_joints({"x": 1.18}))
+
+
+def test_words_of_a_contact():
+    scene, exact = slider()
+    (contact,) = exact.contacts(scene.with_object(thing(SHAPES["box"], 0.19)))
+    assert str(contact) == "link 'car' and object 'thing' overlap by 0.0100 m"
+
+
+def test_planes_have_no_thickness_and_no_end():
+    scene, exact = slider()
+    for height, free in ((-0.101, True), (-0.099, False), (0.099, False), (0.101, True), (1.94, True), (1.96, False)):
+        floor = scene.with_object(thing(Plane(), z=height))
+        assert exact.free(floor) is free
+        assert (exact.distance(floor) == 0.0) is not free
+    contacts = exact.contacts(scene.with_object(thing(Plane(), z=-0.09)))
+    assert [(one.a, one.b) for one in contacts] == [("car", "thing")]
+    np.testing.assert_allclose(contacts[0].normal, (0.0, 0.0, -1.0))
+    np.testing.assert_allclose(contacts[0].point, (0.0, 0.0, -0.09))
+    assert contacts[0].depth == pytest.approx(0.01)
+    wall = WorldObject("wall", rigid(axis_rotation((0.0, 1.0, 0.0), math.pi / 2), (0.15, 0, 0)),
+                       ((Plane(), np.eye(4)),))
+    assert exact.nearest(scene.with_object(wall)).distance == pytest.approx(0.05)
+    assert not exact.free(scene.with_object(wall), scene.state.with_joints({"x": 0.06}))
+
+
+@pytest.mark.parametrize("shape, reach", [(Sphere(0.1), 0.1), (Cylinder(0.05, 0.2), 0.1), (Cone(0.05, 0.2), 0.1),
+                                          (CUBE, 0.1), (Box((0.1, 0.1, 0.2)), 0.1)])
+def test_what_is_held_meets_planes(shape, reach):
+    scene, exact = slider()
+    held = scene.attach(thing(shape, z=-1.0, name="held"), "car")
+    for height, free in ((-1.0 - reach - 1e-3, True), (-1.0 - reach + 1e-3, False), (-1.0 + reach + 1e-3, True)):
+        assert exact.free(held.with_object(thing(Plane(), z=height))) is free
+
+
+def test_cubes_of_an_octomap_are_solid():
+    scene, exact = slider("sphere")
+    full = scene.with_octomap(Octree(0.05, [(2.4, 0.8, 0.8, 1.6), (-0.975, 0.025, 0.025, 0.05)]), at())
+    answers = {x: exact.free(full, full.state.with_joints({"x": x}))
+               for x in (-1.11, -1.08, -0.97, -0.5, 1.49, 1.51, 2.4, 3.29, 3.31)}
+    assert [x for x, free in answers.items() if not free] == [-1.08, -0.97, 1.51, 2.4, 3.29]
+    (contact,) = exact.contacts(full, full.state.with_joints({"x": 1.51}))
+    assert contact.b == OCTOMAP
+    allowed = full.with_allowed(full.allowed.with_entries({("car", OCTOMAP): True}))
+    assert exact.free(allowed, full.state.with_joints({"x": 2.4}))
+
+
+def test_an_octomap_without_a_cube_is_free():
+    scene, exact = slider()
+    assert exact.free(scene.with_octomap(Octree(0.1, [])))
+
+
+def test_what_is_held_moves_along_and_may_touch_who_holds_it():
+    scene, exact = slider()
+    held = scene.with_objects([thing(Sphere(0.15), z=0.2, name="cup"), thing(Box((0.2, 0.2, 0.2)), 3.0, z=0.3)])
+    assert [(one.a, one.b) for one in exact.contacts(held)] == [("car", "cup")]
+    held = held.attach("cup", "car")
+    assert exact.contacts(held) == []
+    (contact,) = exact.contacts(held, held.state.with_joints({"x": 2.8}))
+    assert (contact.a, contact.b, contact.a_kind, contact.b_kind) == ("cup", "thing", "attached", "object")
+    # Another link may not touch it unless it is said so, and two things in the same hand may touch.
+    finger = held.attach(thing(Sphere(0.08), z=-1.8, name="ball"), "finger")
+    assert {frozenset((one.a, one.b)) for one in exact.contacts(finger)} == {frozenset(("cup", "ball"))}
+    handed = finger.attach("ball", "car")
+    assert exact.contacts(handed) == []
+    low = thing(Sphere(0.05), z=-1.95, name="ball")
+    assert [(one.a, one.b) for one in exact.contacts(scene.attach(low, "finger"))] == [("car", "ball")]
+    assert exact.free(scene.attach(low, "finger", ["car"]))
+
+
+def test_what_may_touch_is_left_out():
+    scene, exact = slider()
+    touching = scene.with_object(thing(SHAPES["box"], 0.1))
+    said = touching.allowed
+    for allowed in (said.with_entries({("thing", "car"): True}), said.with_default("thing", True),
+                    said.with_default("car", True)):
+        assert exact.free(touching.with_allowed(allowed))
+        assert exact.distance(touching.with_allowed(allowed)) > 1.0
+    assert not exact.free(touching)
+
+
+def test_a_group_is_checked_without_what_does_not_move_with_it():
+    scene, exact = slider()
+    touching = scene.with_object(thing(SHAPES["box"], 0.1))
+    assert not exact.free(touching, group="car") and exact.free(touching, group="finger")
+    with pytest.raises(ModelError, match="no group 'leg'"):
+        exact.free(touching, group="leg")
+
+
+def test_padding_and_scale_of_links():
+    scene, exact = slider()
+    near = scene.with_object(thing(SHAPES["box"], 0.21))
+    assert exact.free(near)
+    assert not exact.free(near.with_padding({"car": 0.02})) and not exact.free(near.with_padding({}, {"car": 1.2}))
+    assert exact.free(near.with_padding({"finger": 0.02}, {"finger": 1.2}))
+    for kind in ("mesh", "sphere", "cylinder"):
+        scene, exact = slider(kind)
+        near = scene.with_object(thing(SHAPES["box"], 0.21))
+        assert exact.free(near) and not exact.free(near.with_padding({"car": 0.02}))
+
+
+def test_states_that_are_none():
+    scene, exact = slider()
+    with pytest.raises(ModelError, match="not all finite"):
+        exact.free(scene, scene.state.with_q([math.nan, 0.0]))
+    with pytest.raises(ModelError, match="expected 2 joint values"):
+        exact.free(scene, scene.state.with_q([0.0]))
+
+
+def test_the_number_of_contacts_is_bounded():
+    scene, exact = slider()
+    many = scene.with_objects([thing(Sphere(0.05), 0.001 * k, name="ball%d" % k) for k in range(60)])
+    assert len(exact.contacts(many)) == 60 and len(exact.contacts(many, most=7)) == 7
+
+
+def test_one_of_many_thousand_is_found():
+    scene, exact = slider()
+    generator = np.random.default_rng(1)
+    places = generator.uniform(-3.0, 3.0, (5_000, 3))
+    places[np.linalg.norm(places, axis=1) < 0.5] += 5.0
+    crowd = scene.with_objects([thing(Box((0.01, 0.01, 0.01)), *place, name="b%d" % k)
+                                for k, place in enumerate(places)])
+    crowd = crowd.with_objects([thing(Box((8.0, 8.0, 0.01)), z=-4.0, name="table")])
+    hit = crowd.with_object(thing(Box((0.01, 0.01, 0.01)), 0.1, name="needle"))
+    assert [one.b for one in exact.contacts(crowd, group="car")] == [
+        "b%d" % k for k, place in enumerate(places) if (np.abs(place) < 0.105).all()]
+    assert "needle" in [one.b for one in exact.contacts(hit)]
+
+
+def test_a_mesh_that_cannot_be_read_is_a_warning():
+    def unreadable(name):
+        raise MeshUnreadable("mesh %s is not there" % name)
+
+    model = PlanningModel.from_xml(SLIDER % XML["mesh"], SEMANTIC)
+    exact = ExactChecker(model, unreadable)
+    assert exact.warnings == ["mesh cube is not there; link 'car' is checked without it"]
+    assert exact.free(Scene(model).with_object(thing(SHAPES["box"])))
+
+
+# -- against code that shares nothing with it ---------------------------------------------------------------------
+
+MARGIN = 2e-3  # [m]; Bullet rounds its cylinders
+
+
+@pytest.fixture(scope="module")
+def bullet():
+    client = pybullet.connect(pybullet.DIRECT)
+    yield client
+    pybullet.disconnect(client)
+
+
+def bullet_body(shape, client):
+    if isinstance(shape, Box):
+        made = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.5 * side for side in shape.size],
+                                             physicsClientId=client)
+    elif isinstance(shape, Sphere):
+        made = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=shape.radius, physicsClientId=client)
+    else:
+        made = pybullet.createCollisionShape(pybullet.GEOM_CYLINDER, radius=shape.radius, height=shape.length,
+                                             physicsClientId=client)
+    return pybullet.createMultiBody(1.0, made, physicsClientId=client)
+
+
+def bullet_distances(shapes, poses, client):
+    """{(i, j): Bullet's distance [m]} of all pairs nearer than 5 cm."""
+    bodies = [bullet_body(shape, client) for shape in shapes]
+    for body, pose in zip(bodies, poses, strict=True):
+        pybullet.resetBasePositionAndOrientation(body, pose[:3, 3], quaternion_from_matrix(pose),
+                                                 physicsClientId=client)
+    found = {}
+    for i, a in enumerate(bodies):
+        for j, b in enumerate(bodies[:i]):
+            points = pybullet.getClosestPoints(a, b, 0.05, physicsClientId=client)
+            if points:
+                found[j, i] = min(point[8] for point in points)
+    for body in bodies:
+        pybullet.removeBody(body, physicsClientId=client)
+    return found
+
+
+def test_pybullet_agrees_about_baxter(baxter, meshes, bullet):
+    """Every pair of shapes but the two meshes, at random postures."""
+    exact = ExactChecker(baxter, meshes)
+    generator = np.random.default_rng(7)
+    scene = Scene(baxter)
+    links = [(name, shape) for name in baxter.links for shape in baxter.robot.links[name].collisions
+             if isinstance(shape.geometry, Box | Sphere | Cylinder)]
+    compared = touching = 0
+    for q in generator.uniform(*baxter.bounds.T, (25, len(baxter.variables))):
+        state = scene.state.with_q(q)
+        ours = {tuple(sorted((one.a, one.b))) for one in exact.contacts(scene, state, most=10_000)}
+        frames = baxter.frames(q)
+        distances = bullet_distances([shape.geometry for _, shape in links],
+                                     [frames[baxter.link_index[name]] @ shape.origin for name, shape in links], bullet)
+        theirs = {}
+        for (i, j), distance in distances.items():
+            pair = tuple(sorted((links[i][0], links[j][0])))
+            theirs[pair] = min(distance, theirs.get(pair, math.inf))
+        for pair, distance in theirs.items():
+            if pair[0] != pair[1] and abs(distance) > MARGIN:
+                assert (pair in ours) == (distance < 0.0), (pair, distance, q)
+                compared, touching = compared + 1, touching + (distance < 0.0)
+        only_ours = [pair for pair in ours if pair not in theirs and not {"torso", "pedestal"} & set(pair)]
+        assert only_ours == [], q
+    assert touching > 300 and compared - touching > 100
+
+
+@pytest.mark.parametrize("mine", ["box", "sphere", "cylinder"])
+@pytest.mark.parametrize("other", ["box", "sphere", "cylinder"])
+def test_pybullet_agrees_about_distances(mine, other, bullet):
+    scene, exact = slider(mine)
+    generator = np.random.default_rng(11)
+    for _ in range(40):
+        turn = axis_rotation((lambda v: v / np.linalg.norm(v))(generator.normal(size=3)), generator.uniform(0.0, 3.0))
+        pose = rigid(turn, generator.uniform(-0.3, 0.3, 3))
+        placed = scene.with_object(WorldObject("thing", pose, ((SHAPES[other], np.eye(4)),)))
+        nearest = exact.nearest(placed, group="car")
+        distance = bullet_distances([SHAPES[mine], SHAPES[other]], [np.eye(4), pose], bullet).get((0, 1))
+        if distance is None:
+            assert nearest.distance > 0.05 - MARGIN
+        elif distance < 0.0:
+            assert nearest.distance < MARGIN
+        else:
+            assert nearest.distance == pytest.approx(distance, abs=MARGIN)
+            assert np.linalg.norm(nearest.point_a - nearest.point_b) == pytest.approx(nearest.distance, abs=1e-4)
+
+
+def test_the_quick_way_finds_what_a_check_of_every_pair_finds(baxter, meshes):
+    """Nothing near is sorted out: balls and boxes against FCL alone."""
+    import fcl
+
+    exact = ExactChecker(baxter, meshes)
+    scene = Scene(baxter)
+    generator = np.random.default_rng(5)
+    for q in generator.uniform(*baxter.bounds.T, (15, len(baxter.variables))):
+        state = scene.state.with_q(q)
+        frames = baxter.frames(q)
+        objects = [(part, fcl.CollisionObject(geometry, fcl.Transform(pose[:3, :3], pose[:3, 3])))
+                   for part, geometry in zip(exact._movers(scene, state).parts, exact._movers(scene, state).geometries,
+                                             strict=True)
+                   for pose in [frames[part.link] @ part.pose]]
+        expected = {(a.name, b.name) for j, (b, second) in enumerate(objects) for a, first in objects[:j]
+                    if a.name != b.name and fcl.collide(first, second)}
+        assert {(one.a, one.b) for one in exact.contacts(scene, state, most=10_000)} == expected
