@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The commands of this package. They need no master."""
+import argparse
+import sys
+from pathlib import Path
+
+from model_files.resources import ResourceFinder
+from motion_planning.collision_pairs import ALWAYS_SHARE, TRIALS, disabled_pairs, summary
+from motion_planning.errors import PlanningError
+from motion_planning.model import MeshReader, PlanningModel
+from motion_planning.srdf import element_of, with_disabled_pairs
+
+
+def collisions_updater(arguments=None):
+    """``collisions_updater``: compute the disabled pairs of an SRDF. Returns the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="collisions_updater", description="Compute which pairs of links need not be checked against each other: "
+        "neighbours, what touches at rest or always, and what never does in many random states.")
+    parser.add_argument("--urdf", type=Path, required=True, help="the robot: URDF or xacro file")
+    parser.add_argument("--srdf", type=Path, required=True, help="SRDF file to be changed; or xacro, with --output")
+    parser.add_argument("--output", type=Path, help="file to write in place of --srdf")
+    parser.add_argument("--lines", action="store_true", help="print the elements and write nothing")
+    parser.add_argument("--trials", type=int, default=TRIALS, help="random states (default: %(default)s)")
+    parser.add_argument("--min-collision-fraction", type=float, default=ALWAYS_SHARE, dest="share",
+                        help="share of random states in which what touches always does (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the random states (default: %(default)s)")
+    options = parser.parse_args(arguments)
+    if options.trials < 1 or not 0.0 < options.share <= 1.0:
+        parser.error("--trials must be 1 or more, and --min-collision-fraction more than 0 and at most 1")
+    if options.srdf.suffix == ".xacro" and options.output is None and not options.lines:
+        parser.error("%s is xacro; say with --output where the SRDF shall go" % options.srdf)
+    try:
+        text = _text(options.srdf)
+        model = PlanningModel.from_xml(_text(options.urdf), text)
+        for warning in model.srdf.warnings:
+            print("warning: " + warning, file=sys.stderr)
+        pairs = disabled_pairs(model, MeshReader(ResourceFinder()), trials=options.trials, share=options.share,
+                               seed=options.seed)
+        if options.lines:
+            print("\n".join(map(element_of, pairs)))
+        else:
+            (options.output or options.srdf).write_text(with_disabled_pairs(text, pairs), encoding="utf-8")
+    except (PlanningError, OSError) as error:
+        print("collisions_updater: %s" % error, file=sys.stderr)
+        return 1
+    print(summary(pairs), file=sys.stderr)
+    return 0
+
+
+def _text(path):
+    if path.suffix != ".xacro":
+        return path.read_text(encoding="utf-8")
+    import xacro
+
+    try:
+        return xacro.process_file(str(path)).toprettyxml(indent="  ")
+    except Exception as error:  # its expressions are Python: they can raise anything
+        raise PlanningError("xacro cannot expand %s: %s" % (path, " ".join(str(error).split()))) from None
