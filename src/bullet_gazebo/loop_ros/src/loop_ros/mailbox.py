@@ -15,8 +15,11 @@ def _raise(error):
     raise error
 
 
-class _Box:
-    """What is common to both: handing messages to code that may fail on them."""
+class _Subscription:
+    """What is common to both: handing messages to code that may fail on them, and the end."""
+
+    #: Called once, when the subscription is closed.
+    on_close = None
 
     def guarded(self, take, *arguments):
         """Loop thread: call ``take(*arguments)`` for one message; one that it fails on is dropped and counted."""
@@ -25,8 +28,15 @@ class _Box:
         except SURVIVED as error:
             self._on_fault(error)
 
+    def close(self):
+        """End it and drop what is unread."""
+        ended, self.on_close = self.on_close, None
+        if ended is not None:
+            ended()
+        self._drop()
 
-class Mailbox(_Box):
+
+class Mailbox(_Subscription):
     """Newest wins: a later message replaces one that was not taken yet."""
 
     def __init__(self, on_fault=_raise):
@@ -51,12 +61,11 @@ class Mailbox(_Box):
         if self._newest:
             self.guarded(take, self._newest.pop())
 
-    def close(self):
-        """Drop what is left."""
+    def _drop(self):
         self._newest.clear()
 
 
-class Queue(_Box):
+class Queue(_Subscription):
     """Each message counts: oldest first, up to ``depth`` unread ones; beyond that the oldest are lost and counted."""
 
     def __init__(self, depth, notice=lambda: None, on_fault=_raise):
@@ -93,8 +102,7 @@ class Queue(_Box):
         for message in self.drain():
             self.guarded(take, message)
 
-    def close(self):
-        """Drop what is left."""
+    def _drop(self):
         self._messages.clear()
 
 

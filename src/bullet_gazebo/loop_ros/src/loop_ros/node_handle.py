@@ -48,7 +48,7 @@ class NodeHandle:
 
         return self._opening(("queue", name, msg_class, depth), make)
 
-    def mail(self):
+    def pending(self):
         """Loop thread: those of this handle's :meth:`queue` objects that something came into since the last call, in
         the order they were opened.
 

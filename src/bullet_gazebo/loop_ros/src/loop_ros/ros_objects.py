@@ -60,11 +60,11 @@ class RosObjects:
 
     def mailbox(self, topic, msg_class):
         """A :class:`Mailbox` that messages on ``topic`` fall into."""
-        return self._subscribe(_Inbox(Mailbox(self._counting(topic)), topic, self), msg_class)
+        return self._subscribe(Mailbox(self._counting(topic)), topic, msg_class)
 
     def queue(self, topic, msg_class, depth, notice=lambda: None):
         """A :class:`Queue` that messages on ``topic`` fall into; ``notice()`` is called after each, in any thread."""
-        return self._subscribe(_Inbox(Queue(depth, notice, self._counting(topic)), topic, self), msg_class)
+        return self._subscribe(Queue(depth, notice, self._counting(topic)), topic, msg_class)
 
     def service(self, name, srv_class, handler):
         """Advertise ``name``; ``handler(request)`` runs in the loop thread."""
@@ -126,27 +126,39 @@ class RosObjects:
         self._jobs.put(register)
         return service
 
-    def _subscribe(self, inbox, msg_class):
-        self._inboxes[inbox.topic] = [*self._inboxes.get(inbox.topic, ()), inbox]
+    def _subscribe(self, box, topic, msg_class):
+        """Have rospy put what comes in on ``topic`` into a :class:`Mailbox` or :class:`Queue`, until that is closed."""
+        self._inboxes[topic] = [*self._inboxes.get(topic, ()), box]
+        registered = []
 
         def register():
-            inbox.registration = rospy.Subscriber(inbox.topic, msg_class, inbox.put, tcp_nodelay=True)
+            registration = rospy.Subscriber(topic, msg_class, box.put, tcp_nodelay=True)
+            registered.append(registration)
             # A connection that rospy made before this line is read by rospy, in a thread of its own.
-            _read_in_loop(inbox.registration.impl, self._inlets, self._log, self.faults)
+            _read_in_loop(registration.impl, self._inlets, self._log, self.faults)
 
+        def unregister():
+            for registration in registered:
+                registration.unregister()
+
+        def end():
+            self._forget(topic, box)
+            self._jobs.put(unregister)
+
+        box.on_close = end
         self._jobs.put(register)
-        return inbox
+        return box
 
     def _counting(self, topic):
         return lambda error: self.faults.note(topic, error, "the message is dropped")
 
-    def _forget(self, inbox):
-        self._delivered_before[inbox.topic] = self._delivered_before.get(inbox.topic, 0) + inbox.delivered
-        left = [other for other in self._inboxes.get(inbox.topic, ()) if other is not inbox]
+    def _forget(self, topic, box):
+        self._delivered_before[topic] = self._delivered_before.get(topic, 0) + box.delivered
+        left = [other for other in self._inboxes.get(topic, ()) if other is not box]
         if left:
-            self._inboxes[inbox.topic] = left
+            self._inboxes[topic] = left
         else:
-            self._inboxes.pop(inbox.topic, None)
+            self._inboxes.pop(topic, None)
 
     def _work(self):
         while True:
@@ -227,35 +239,6 @@ class _Attention(rospy.SubscribeListener):
 
     def peer_subscribe(self, topic_name, topic_publish, peer_publish):
         self._hub.attention.append(self._publisher)
-
-
-class _Inbox:
-    """A mailbox or a queue together with its subscription."""
-
-    def __init__(self, box, topic, objects):
-        self.topic = topic
-        self.registration = None
-        self.put = box.put
-        self.handle, self.guarded = box.handle, box.guarded
-        self._box = box
-        self._objects = objects
-        if isinstance(box, Mailbox):
-            self.take = box.take
-        else:
-            self.drain = box.drain
-
-    @property
-    def delivered(self):
-        return self._box.delivered
-
-    @property
-    def lost(self):
-        return self._box.lost
-
-    def close(self):
-        self._objects._forget(self)
-        self._objects.later(lambda: self.registration.unregister())
-        self._box.close()
 
 
 class _Service:

@@ -78,10 +78,10 @@ class FakeRos:
         return FakePublisher(sent, msg_class, latch or greet, self.publishers, topic)
 
     def mailbox(self, topic, msg_class):
-        return self._subscribe(topic, FakeMailbox(self._counting(topic)), msg_class)
+        return self._subscribe(topic, Mailbox(self._counting(topic)), msg_class)
 
     def queue(self, topic, msg_class, depth, notice=lambda: None):
-        return self._subscribe(topic, FakeQueue(depth, notice, self._counting(topic)), msg_class)
+        return self._subscribe(topic, Queue(depth, notice, self._counting(topic)), msg_class)
 
     def service(self, name, srv_class, handler):
         service = _FakeService(self, name)
@@ -131,7 +131,7 @@ class FakeRos:
             if not inbox.boxes:
                 self.inboxes.pop(topic, None)
 
-        box.leave = leave
+        box.on_close = leave
         return box
 
     def _counting(self, topic):
@@ -219,22 +219,6 @@ class FakeInbox:
     def close(self):
         for box in list(self.boxes):
             box.close()
-
-
-class FakeMailbox(Mailbox):
-    """A mailbox that ``leave()``s its topic when it is closed."""
-
-    def close(self):
-        super().close()
-        self.leave()
-
-
-class FakeQueue(Queue):
-    """A queue that ``leave()``s its topic when it is closed."""
-
-    def close(self):
-        super().close()
-        self.leave()
 
 
 class _FakeService:

@@ -29,7 +29,7 @@ from loop_ros.node_handle import NodeHandle
 from loop_ros.publisher import LoopPublisher, PublisherHub
 from loop_ros.reconfigure import Setting, SettingsServer
 from loop_ros.subscriber import InletHub
-from loop_ros.testing import FakeFaults, FakeLog, FakeMailbox, FakePublisher, FakeQueue, FakeRos
+from loop_ros.testing import FakeFaults, FakeLog, FakePublisher, FakeRos
 
 TOPIC, SERVICE = "/topic", "/service"
 
@@ -172,8 +172,8 @@ def methods_of(owner):
 @pytest.mark.parametrize(("declared", "made"), [
     (protocol.LoopRos, ros_objects.RosObjects), (protocol.LoopRos, FakeRos), (protocol.Log, LoopLog),
     (protocol.Log, FakeLog), (protocol.Topics, NodeHandle), (protocol.Publisher, LoopPublisher),
-    (protocol.Publisher, FakePublisher), (protocol.Mailbox, Mailbox), (protocol.Mailbox, FakeMailbox),
-    (protocol.Queue, Queue), (protocol.Queue, FakeQueue), (protocol.Faults, Faults), (protocol.Faults, FakeFaults),
+    (protocol.Publisher, FakePublisher), (protocol.Mailbox, Mailbox),
+    (protocol.Queue, Queue), (protocol.Faults, Faults), (protocol.Faults, FakeFaults),
 ])
 def test_both_have_the_declared_methods(declared, made):
     assert methods_of(declared)
@@ -306,7 +306,7 @@ def test_faults_of_messages_are_counted_by_topic(side):
 def test_what_came_in_is_told_once_and_counts_on_after_the_end(side):
     first, second = side.context.queue(TOPIC, String, 3), side.context.queue("/other", String, 3)
     side.send("/other", String("x"))
-    assert side.context.mail() == [second] and not side.context.mail()
+    assert side.context.pending() == [second] and not side.context.pending()
     assert side.ros.deliveries() == {TOPIC: 0, "/other": 1}
     again = side.context.queue("/other", String, 3)
     second.close()

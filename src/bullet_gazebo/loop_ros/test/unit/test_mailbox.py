@@ -31,7 +31,7 @@ def test_a_queue_keeps_order_and_counts_what_it_lost():
     assert (queue.delivered, queue.lost) == (5, 2)
 
 
-def test_an_owner_is_told_once_which_of_its_queues_have_mail():
+def test_an_owner_is_told_once_which_of_its_queues_have_messages():
     queues = {}
 
     def make(topic, msg_class, depth, notice):
@@ -40,17 +40,17 @@ def test_an_owner_is_told_once_which_of_its_queues_have_mail():
     ros = SimpleNamespace(queue=make)
     handle = NodeHandle(ros, "/robot")
     first, second = handle.queue("first", None, 10), handle.queue("second", None, 10)
-    assert not handle.mail()
+    assert not handle.pending()
     second.put("a")
     second.put("b")
-    assert handle.mail() == [second] and not handle.mail()
+    assert handle.pending() == [second] and not handle.pending()
     # What comes in before the queues are read is told again: better twice than not at all.
     first.put("c")
-    assert (first.drain(), second.drain(), handle.mail()) == (["c"], ["a", "b"], [first])
+    assert (first.drain(), second.drain(), handle.pending()) == (["c"], ["a", "b"], [first])
     second.put("d")
     first.put("e")
-    assert handle.mail() == [first, second]
-    assert not handle.branch().mail()
+    assert handle.pending() == [first, second]
+    assert not handle.branch().pending()
 
 
 def test_what_counts_as_delivered_has_been_announced():
@@ -58,6 +58,17 @@ def test_what_counts_as_delivered_has_been_announced():
     queue = Queue(3, lambda: seen.append((queue.delivered, list(queue._messages))))
     queue.put("a")
     assert seen == [(0, ["a"])] and queue.delivered == 1
+
+
+@pytest.mark.parametrize("box", [Mailbox(), Queue(3)])
+def test_the_end_of_a_subscription_is_told_once_and_drops_what_is_unread(box):
+    ends, got = [], []
+    box.on_close = lambda: ends.append(box)
+    box.put("a")
+    box.close()
+    box.close()
+    box.handle(got.append)
+    assert ends == [box] and got == []
 
 
 def test_a_queue_without_room_is_refused():

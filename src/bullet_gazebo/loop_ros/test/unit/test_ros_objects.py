@@ -307,7 +307,7 @@ def test_an_owner_that_begins_anew_keeps_its_topics_and_services(scene_of_faults
     assert sorted(registrations.open) == sorted(
         "/robot/" + name for name in ("in", "many", "many", "more", "other", "out"))
     second[3].put(String("x"))
-    assert handle.mail() == [second[3]]
+    assert handle.pending() == [second[3]]
     answers = []
     client = threading.Thread(target=lambda: answers.append(services["/robot/ask"](None)))
     client.start()

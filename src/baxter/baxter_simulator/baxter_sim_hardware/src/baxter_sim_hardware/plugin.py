@@ -162,7 +162,7 @@ class BaxterPlugin(ModelPlugin):
         self._before = self._model.read_joints()
         arm, measured = self._arm_index, self._baxter.measured
         measured.time_s, measured.position, measured.velocity = time_s, self._before[0][arm], self._before[1][arm]
-        queues = self.context.mail()
+        queues = self.context.pending()
         if queues:
             self._handling.handle(queues, time_s)
         self._collision.update(time_s, self._baxter.state.enabled)
@@ -214,14 +214,14 @@ class BaxterPlugin(ModelPlugin):
     def while_failed(self, time_s):
         self._before = self._model.read_joints()
         # What comes in now counts no more when the robot is back; but a reset is what it waits for.
-        keys = self._handling.drop(self.context.mail())
+        keys = self._handling.drop(self.context.pending())
         self._publishing.publish(time_s)
         return "set_super_reset" in keys
 
     def joints_set(self):
         # What has come in by now was said to the robot where it was.
         self._measure()
-        self._handling.handle(self.context.mail(), self.context.world.time_s)
+        self._handling.handle(self.context.pending(), self.context.world.time_s)
         self._gravity_ticks = 0
         self._baxter.arms.reset()
         self._head.reset()

@@ -19,15 +19,15 @@ class Handling:
     def handle(self, queues, time_s):
         """Handle all messages in those queues at time_s [s]; a refusal is logged."""
         for queue in sorted(queues, key=lambda queue: self._topics[queue][0]):
-            _, key, component, handler = self._topics[queue]
-            queue.handle(lambda message, key=key, component=component, handler=handler: self._call(
-                handler, key, component, message, time_s))
+            for message in queue.drain():
+                queue.guarded(self._call, queue, message, time_s)
 
     def drop(self, queues):
         """Forget all messages in those queues; returns the keys of the rows that had some."""
         return [self._topics[queue][1] for queue in queues if queue.drain()]
 
-    def _call(self, handler, key, component, message, time_s):
+    def _call(self, queue, message, time_s):
+        _, key, component, handler = self._topics[queue]
         try:
             handler(component, message, time_s)
         except CommandRefused as refusal:
