@@ -81,12 +81,12 @@ def measure_kind(table, interface, kind, gains, ticks):
     model = world.spawn(robot, "arms", Pose((0, 0, 1)), static=True)
     hardware = SimulatedHardware(model, robot, xml, log=FakeLog())
     manager = ControllerManager(hardware, FakeLog())
-    inboxes = []
+    subscriptions = []
     for number, names in enumerate(arms):
         name = "arm_%d" % number
         context, ros = fake_context(name, {"joints": names, **dict.fromkeys(names, gains)}, robot=robot)
         manager.load(name, kind, table.find(kind), context)
-        inboxes.append(ros.inboxes["/robot/%s/command" % name])
+        subscriptions.append(ros.subscriptions["/robot/%s/command" % name])
     context, ros = fake_context("states", {"publish_rate": 50}, robot=robot)
     ros.publisher("/robot/joint_states", None).has_listeners = False
     manager.load("states", "states", table.find("joint_state_controller/JointStateController"), context)
@@ -94,10 +94,10 @@ def measure_kind(table, interface, kind, gains, ticks):
     manager.switch([loaded.name for loaded in manager.loaded], [])
     parts = ([], [], [], [])
     for tick in range(ticks):
-        for names, inbox in zip(arms, inboxes, strict=True):
+        for names, subscribed in zip(arms, subscriptions, strict=True):
             message = command(names, tick)
             if message is not None:
-                inbox.put(message)
+                subscribed.put(message)
         marks = [time.perf_counter()]
         hardware.read()
         marks.append(time.perf_counter())

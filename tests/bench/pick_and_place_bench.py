@@ -116,8 +116,8 @@ def run(lab_class, robot, table, trial):
     """One trial. Returns (simulated seconds, distance from the target [m]); raises Failure, BlockLost, NoSolution."""
     lab = lab_class(robot, pose="untucked", parameters={"enable": True}, meshes=True)
     try:
-        for topic, outbox in lab.outboxes.items():
-            outbox.has_listeners = topic == STATE
+        for topic, publisher in lab.publishers.items():
+            publisher.has_listeners = topic == STATE
         index = lab.model.index(list(trial.start))
         lab.model.set_joint_positions(index, np.array(list(trial.start.values())))
         lab.plugin.joints_set()

@@ -33,9 +33,9 @@ def load_lab():
 
 def tick_costs(lab, before, listeners, ticks):
     """Mean (update, publish, physics step) in microseconds over ``ticks``; `before(tick)` is not counted."""
-    for outbox in lab.outboxes.values():
-        outbox.has_listeners = listeners
-        outbox.publish = lambda message: None
+    for publisher in lab.publishers.values():
+        publisher.has_listeners = listeners
+        publisher.publish = lambda message: None
     update = publish = step = 0.0
     for tick in range(ticks):
         before(tick)

@@ -17,8 +17,9 @@ from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
 from gazebo_ros.publications import Publications
 from gazebo_ros.simulation import HostedPlugin, Simulation
 from loop_ros.faults import Faults
-from loop_ros.mailbox import Queue, RequestBoard
 from loop_ros.publisher import LoopPublisher, PublisherHub
+from loop_ros.request_queue import RequestQueue
+from loop_ros.subscription import Subscription
 from model_files.resources import ResourceFinder
 from urdf_model import Box, Inertial, Link, Robot, Shape, parse_urdf
 from world_picture.snapshot import SnapshotWriter
@@ -36,13 +37,13 @@ class _Ros:
     """Topics that nobody has connected to."""
 
     def __init__(self):
-        self.hub, self.queues = PublisherHub(), {}
+        self.hub, self.subscriptions = PublisherHub(), {}
 
     def publisher(self, topic, msg_class, latch=False, greet=False):
         return LoopPublisher(self.hub, topic, msg_class, latch=latch, greet=greet)
 
-    def queue(self, topic, msg_class, depth, notice=lambda: None):
-        return self.queues.setdefault(topic, Queue(depth, notice))
+    def subscription(self, topic, msg_class, depth=1, notice=lambda: None):
+        return self.subscriptions.setdefault(topic, Subscription(depth, notice))
 
     def service(self, name, srv_class, handler):
         return SimpleNamespace(close=lambda: None)
@@ -82,8 +83,8 @@ class Loop(BareWorld):
         source, host = PluginSource(self.robot, namespace="/robot"), PluginHost(add_screen=lambda *_: None)
         parameters = {"baxter_sim_hardware": {"enable": True}}
         context = PluginContext(self.world, self.model, source, log, ros, parameters, host)
-        self._queues = ros.queues
-        self._simulation = Simulation(self.world, RequestBoard(), log, Faults(log), real_time_factor=0.0)
+        self._subscriptions = ros.subscriptions
+        self._simulation = Simulation(self.world, RequestQueue(), log, Faults(log), real_time_factor=0.0)
         publications = Publications(self._simulation, ros, writer, log, clock_rate=500.0)
         self._simulation.on_turn, self._simulation.on_tick = publications.on_turn, publications.on_tick
         self._simulation.host(HostedPlugin(BaxterPlugin(context), context, self.model.name, "Baxter"))
@@ -94,7 +95,7 @@ class Loop(BareWorld):
         """Let both arms follow a new command for TICKS ticks; return (CPU of a tick, of the step in it) [us]."""
         swing = 0.3 * np.sin(0.0004 * self._simulation.tick)
         for side, names in NAMES.items():
-            self._queues["/robot/limb/%s/joint_command" % side].put(
+            self._subscriptions["/robot/limb/%s/joint_command" % side].put(
                 JointCommand(JointCommand.POSITION_MODE, [angle + swing for angle in NEUTRAL], names))
         self._stepping_s, end = 0.0, self._simulation.tick + TICKS
         begin = time.thread_time()

@@ -67,12 +67,12 @@ class JointTrajectoryActionServer:
         self._names = self._limb.joint_names()
         self._watch = RobotWatch(limb)
         self._motion = ArmMotion(self._names, self._mode, 1.0 / rate, self._read_limits())
-        self._inbox = collections.deque()
+        self._requests = collections.deque()
         self._wake = threading.Condition()
         self._ending = False
         # A request is heard also while a simulation is paused.
         self._clock = RosClock(gives_up=lambda: (
-            self._ending or self._inbox or self._watch.was_interrupted() or self._watch.is_gone()))
+            self._ending or self._requests or self._watch.was_interrupted() or self._watch.is_gone()))
         self._ticker = Ticker(self._clock, rate)
         self._stopwatch = Stopwatch(self._clock.now())
         self._was_gone = False
@@ -127,7 +127,7 @@ class JointTrajectoryActionServer:
 
     def _post(self, request):
         with self._wake:
-            self._inbox.append(request)
+            self._requests.append(request)
             self._wake.notify()
 
     # -- the loop's thread ------------------------------------------------------------------------------------------
@@ -144,7 +144,7 @@ class JointTrajectoryActionServer:
     def _run(self):
         while not self._ending:
             with self._wake:
-                self._wake.wait_for(lambda: self._ending or self._inbox or self._motion.engaged, _IDLE_S)
+                self._wake.wait_for(lambda: self._ending or self._requests or self._motion.engaged, _IDLE_S)
             self._tick()
             if self._motion.engaged:
                 self._ticker.sleep()
@@ -174,8 +174,8 @@ class JointTrajectoryActionServer:
                 self._conclude(goal, verdict)
 
     def _drained(self):
-        while self._inbox:
-            yield self._inbox.popleft()
+        while self._requests:
+            yield self._requests.popleft()
 
     def _now_s(self):
         """The loop's own time [s], which never runs back."""

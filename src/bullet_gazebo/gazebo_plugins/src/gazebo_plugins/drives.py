@@ -41,7 +41,7 @@ class Drive(ModelPlugin):
         self._base_frame = context.element_text("robotBaseFrame", "base_footprint")
         self._wanted = (0.0, 0.0, 0.0)
         self.configure()
-        self._commands = context.mailbox(context.element_text("commandTopic", "cmd_vel"), Twist)
+        self._commands = context.subscription(context.element_text("commandTopic", "cmd_vel"), Twist)
         self._odometry = context.publisher(context.element_text("odometryTopic", "odom"), Odometry)
         self._tf = context.publisher("/tf", TFMessage) if self.flag(self.tf_tag, True) else None
 

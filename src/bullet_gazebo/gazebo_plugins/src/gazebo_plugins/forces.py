@@ -91,7 +91,7 @@ class Force(ModelPlugin):
             raise PluginError("%s names no topic; expected <topicName>" % what)
         self._what = what
         self._push = None
-        self._commands = context.mailbox(topic, Wrench)
+        self._commands = context.subscription(topic, Wrench)
 
     def update(self, time_s, dt):
         self._commands.handle(self._take)

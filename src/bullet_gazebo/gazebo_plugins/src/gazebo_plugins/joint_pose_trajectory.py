@@ -53,7 +53,8 @@ class JointPoseTrajectory(ModelPlugin):
         self._playback, self._index, self._columns, self._anchor = None, None, None, None
         self._now_s = 0.0
         # Last, since a trajectory may come at once.
-        self._commands = context.mailbox(context.element_text("topicName", "set_joint_trajectory"), JointTrajectory)
+        self._commands = context.subscription(context.element_text("topicName", "set_joint_trajectory"),
+                                              JointTrajectory)
         self._service = context.service(context.element_text("serviceName", "set_joint_trajectory"),
                                         SetJointTrajectory, self._serve)
 

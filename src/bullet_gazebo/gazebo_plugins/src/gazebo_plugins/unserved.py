@@ -22,10 +22,10 @@ class Projector(ModelPlugin):
         super().__init__(context)
         context.log.warn("plugin %s of model '%s': projected patterns are not drawn; its topics are there and have no "
                          "effect" % (context.element.get("filename"), context.model.name))
-        self._inboxes = [context.mailbox(topic, kind) for topic, kind in (
+        self._subscriptions = [context.subscription(topic, kind) for topic, kind in (
             (context.element_text("projectorTopicName"), Int32), (context.element_text("textureTopicName"), String))
             if topic is not None]
 
     def update(self, time_s, dt):
-        for inbox in self._inboxes:
-            inbox.take()
+        for subscription in self._subscriptions:
+            subscription.take()

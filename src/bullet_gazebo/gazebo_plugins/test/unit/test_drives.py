@@ -50,7 +50,7 @@ class Vehicle:
         self.plugin = plugin_class(context)
 
     def command(self, x=0.0, turn=0.0, y=0.0):
-        self.ros.inboxes["/ns/cmd_vel"].put(Twist(Vector3(x, y, 0), Vector3(0, 0, turn)))
+        self.ros.subscriptions["/ns/cmd_vel"].put(Twist(Vector3(x, y, 0), Vector3(0, 0, turn)))
 
     def run(self, seconds):
         for _ in range(round(seconds / DT)):

@@ -136,13 +136,13 @@ def test_a_box_on_the_floor_feels_the_floor(make):
 def test_a_force_acts_until_the_next_one(make):
     lab = make(BOX, Force, {"bodyName": "link", "topicName": "push"}, Pose((0, 0, 1.0)))
     lab.world.set_gravity((0, 0, 0))
-    lab.ros.inboxes["/ns/push"].put(Wrench(Vector3(4.0, 0, 0), Vector3()))
+    lab.ros.subscriptions["/ns/push"].put(Wrench(Vector3(4.0, 0, 0), Vector3()))
     lab.run(1.0)
     assert lab.model.base_twist()[0][0] == pytest.approx(2.0, rel=0.01)
-    lab.ros.inboxes["/ns/push"].put(Wrench(Vector3(math.nan, 0, 0), Vector3()))
+    lab.ros.subscriptions["/ns/push"].put(Wrench(Vector3(math.nan, 0, 0), Vector3()))
     lab.run(0.1)
     assert "ignored" in lab.log.of("warn")[0]
-    lab.ros.inboxes["/ns/push"].put(Wrench())
+    lab.ros.subscriptions["/ns/push"].put(Wrench())
     speed = lab.run(0.1).model.base_twist()[0][0]
     assert speed == pytest.approx(2.2, rel=0.01)
     assert lab.run(0.2).model.base_twist()[0][0] == speed

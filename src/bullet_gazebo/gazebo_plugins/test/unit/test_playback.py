@@ -47,7 +47,7 @@ def positions(lab):
 def test_points_are_taken_one_by_one_each_for_its_time(make):
     lab = arm(make)
     points = [((0.1, 0.2), 0.05), ((0.3, 0.4), 0.05), ((0.5, 0.6), 0)]
-    lab.ros.inboxes["/ns/set_joint_trajectory"].put(trajectory(points))
+    lab.ros.subscriptions["/ns/set_joint_trajectory"].put(trajectory(points))
     assert positions(lab.run(0.04)) == pytest.approx((0.1, 0.2), abs=1e-6)
     assert positions(lab.run(0.05)) == pytest.approx((0.3, 0.4), abs=1e-6)
     assert positions(lab.run(0.05)) == pytest.approx((0.5, 0.6), abs=1e-6)
@@ -73,7 +73,7 @@ def test_the_service_does_the_same_and_says_what_is_wrong(make):
 
 def test_joints_that_are_not_there_are_left_out(make):
     lab = arm(make)
-    lab.ros.inboxes["/ns/set_joint_trajectory"].put(trajectory([((7.0, 0.2), 0)], joints=("nose", "two")))
+    lab.ros.subscriptions["/ns/set_joint_trajectory"].put(trajectory([((7.0, 0.2), 0)], joints=("nose", "two")))
     assert positions(lab.run(0.01)) == pytest.approx((0.0, 0.2), abs=1e-6)
     assert "no joints nose" in lab.log.of("warn")[0]
 
@@ -81,7 +81,7 @@ def test_joints_that_are_not_there_are_left_out(make):
 def test_the_link_of_the_frame_stays_where_it_is(make):
     lab = arm(make)
     before = lab.model.link_pose("lower").matrix()
-    lab.ros.inboxes["/ns/set_joint_trajectory"].put(trajectory([((0.8, -0.3), 0)], frame="arm::lower"))
+    lab.ros.subscriptions["/ns/set_joint_trajectory"].put(trajectory([((0.8, -0.3), 0)], frame="arm::lower"))
     lab.run(0.002)
     np.testing.assert_allclose(lab.model.link_pose("lower").matrix(), before, atol=1e-6)
     assert lab.model.base_pose().position[1] != pytest.approx(0.0, abs=0.1)
@@ -117,5 +117,5 @@ def test_what_has_no_effect_is_there_and_says_so(make):
     make(BALL.replace("</robot>", "%s</robot>"), Nothing, {}).run(0.01)
     lab = make(BALL.replace("</robot>", "%s</robot>"), Projector, {"projectorTopicName": "projector"})
     assert "not drawn" in lab.log.of("warn")[0]
-    lab.ros.inboxes["/ns/projector"].put(Int32(1))
+    lab.ros.subscriptions["/ns/projector"].put(Int32(1))
     lab.run(0.01)

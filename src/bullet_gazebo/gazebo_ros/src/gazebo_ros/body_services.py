@@ -55,7 +55,7 @@ class BodyServices:
         self._faults = ros.faults
         self._wrenches = TimedJobs()  # of (model, link)
         self._efforts = TimedJobs()  # of (model, joint)
-        self._link_state_commands = ros.queue("/gazebo/set_link_state", LinkState, depth=10, notice=notice)
+        self._link_state_commands = ros.subscription("/gazebo/set_link_state", LinkState, depth=10, notice=notice)
         for name, srv_class, handler in (
                 ("apply_body_wrench", ApplyBodyWrench, self._apply_body_wrench),
                 ("apply_joint_effort", ApplyJointEffort, self._apply_joint_effort),

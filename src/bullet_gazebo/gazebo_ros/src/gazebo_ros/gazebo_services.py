@@ -40,8 +40,8 @@ from gazebo_ros.simulation import AdvanceRefused
 from gazebo_ros.spawning import SpawnRefused
 from gazebo_ros.urdf_extras import unscoped
 from loop_ros.faults import SURVIVED, described
-from loop_ros.mailbox import LoopEnded
 from loop_ros.reconfigure import Setting, SettingsServer
+from loop_ros.request_queue import LoopEnded
 from sim_time.stamps import stamp_ns
 from urdf_model import bounds
 
@@ -80,7 +80,7 @@ class GazeboServices:
         self.push = self._bodies.push
         self._settings = self._open_settings(ros)
         self._state_requests = {}
-        self._model_state_commands = ros.queue("/gazebo/set_model_state", ModelState, depth=10,
+        self._model_state_commands = ros.subscription("/gazebo/set_model_state", ModelState, depth=10,
                                                notice=self._note_command)
         for name, srv_class, handler in (
                 ("delete_model", DeleteModel, self._delete_model),
@@ -129,7 +129,7 @@ class GazeboServices:
             prepared = prepare(request.model_name, request.model_xml, request.robot_namespace,
                                _parameters)
             self._spawner.make_shapes(prepared)
-            self._simulation.board.call(self._spawn_prepared, prepared, request)
+            self._simulation.requests.call(self._spawn_prepared, prepared, request)
         except (SpawnRefused, BulletSimError, LoopEnded) as error:
             return SpawnModelResponse(False, "SpawnModel: Failure - %s" % error)
         except SURVIVED as error:  # a plugin's constructor is anybody's code
@@ -147,9 +147,9 @@ class GazeboServices:
         self._spawner.spawn(prepared, pose)
 
     def _advance(self, request):
-        board = self._simulation.board
+        requests = self._simulation.requests
         try:
-            done = board.call(self._simulation.start_advance, request.ticks, request.await_topics, request.timeout_s)
+            done = requests.call(self._simulation.start_advance, request.ticks, request.await_topics, request.timeout_s)
             tick, time_ns = done.result()
         except (AdvanceRefused, LoopEnded) as error:
             tick, time_ns = self._simulation.tick, self._simulation.time_ns

@@ -2,7 +2,7 @@
 """What a model plugin is: the piece of Python that a URDF's ``<plugin filename="...">`` brings into the world.
 
 A plugin lives in the loop thread. Everything it is given here may be called from there and from nowhere else; the only
-things other threads touch are the mailboxes and queues that the context hands out. Nothing it can call blocks: topics
+things other threads touch are the subscriptions that the context hands out. Nothing it can call blocks: topics
 and services are registered with the ROS master by a thread of their own, messages are sent without waiting.
 """
 import contextlib

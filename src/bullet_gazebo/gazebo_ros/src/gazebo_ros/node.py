@@ -28,10 +28,10 @@ from gazebo_ros.world_lights import WorldLights
 from lab_environment.single_instance import refusal, running_instance
 from loop_ros.faults import Faults
 from loop_ros.log import LoopLog
-from loop_ros.mailbox import RequestBoard
 from loop_ros.publisher import PublisherHub
+from loop_ros.request_queue import RequestQueue
 from loop_ros.ros_objects import RosObjects
-from loop_ros.subscriber import InletHub
+from loop_ros.subscriber import SubscriberHub
 from model_files.resources import ResourceFinder, model_folders, model_sizes, resource_folders
 from rospy_limits.node import limit_ports
 from sdf_model import ModelFolders
@@ -119,12 +119,12 @@ def _build(log, cleanup, line):
                   warn=log.warn, error=log.error)
     cleanup.callback(world.close)
 
-    hub, inlets, board = PublisherHub(), InletHub(), RequestBoard()
-    cleanup.callback(board.close)
-    cleanup.callback(inlets.close)
+    publisher_hub, subscriber_hub, requests = PublisherHub(), SubscriberHub(), RequestQueue()
+    cleanup.callback(requests.close)
+    cleanup.callback(subscriber_hub.close)
     faults = Faults(log)
-    ros = RosObjects(hub, inlets, board, log, faults)
-    simulation = Simulation(world, board, log, faults,
+    ros = RosObjects(publisher_hub, subscriber_hub, requests, log, faults)
+    simulation = Simulation(world, requests, log, faults,
                             real_time_factor=float(rospy.get_param("~real_time_factor", 1.0)),
                             paused=line.paused or bool(rospy.get_param("~paused", False)), deliveries=ros.deliveries)
     publications = Publications(simulation, ros, writer, log,
@@ -149,7 +149,7 @@ def _build(log, cleanup, line):
     ros.flush()
 
     diagnostics = Diagnostics(simulation, faults, ros)
-    parts = (("sending messages", hub.service), ("reading messages", inlets.service),
+    parts = (("sending messages", publisher_hub.service), ("reading messages", subscriber_hub.service),
              ("publishing", publications.on_turn), ("services under /gazebo", services.take_commands))
 
     def on_turn():
@@ -162,7 +162,7 @@ def _build(log, cleanup, line):
         diagnostics.on_tick()
 
     simulation.on_turn = on_turn
-    simulation.read_messages = inlets.service
+    simulation.read_messages = subscriber_hub.service
     simulation.before_step = services.push
     simulation.on_tick = on_tick
     def on_step_change():

@@ -52,10 +52,10 @@ class _Advance:
 class Simulation:
     """Runs a ``bullet_sim.World`` and its model plugins, tick by tick."""
 
-    def __init__(self, world, board, log, faults, real_time_factor=1.0, paused=False, deliveries=dict):
+    def __init__(self, world, requests, log, faults, real_time_factor=1.0, paused=False, deliveries=dict):
         """Ready to :meth:`run`.
 
-        ``board``: :class:`loop_ros.mailbox.RequestBoard`; ``faults``: :class:`loop_ros.faults.Faults`.
+        ``requests``: :class:`loop_ros.request_queue.RequestQueue`; ``faults``: :class:`loop_ros.faults.Faults`.
         ``deliveries()`` -> how many messages have come in on each topic that something in this world listens to.
         """
         #: Called once per turn of the loop, also while paused; before each physics step; after each tick; after time
@@ -64,7 +64,7 @@ class Simulation:
         #: Called after the length of a tick has changed.
         self.on_step_change = lambda: None
         self.world = world
-        self.board = board
+        self.requests = requests
         self.paused = paused
         self.plugins = []
         self.tick = 0
@@ -129,14 +129,14 @@ class Simulation:
     def run(self, stop):
         """Turn until ``stop()`` is true. The calling thread becomes the only one that may touch the world."""
         self._pacer.restart()
-        board = self.board
+        requests = self.requests
         while not stop():
-            board.run_pending()
+            requests.run_pending()
             self._faults.guarded("between two ticks", self.on_turn)
             if self._advance is not None:
                 self._advance_turn()
             elif self.paused:
-                board.wait(IDLE_S)
+                requests.wait(IDLE_S)
                 self._pacer.restart()
             else:
                 self.do_tick()
@@ -237,7 +237,7 @@ class Simulation:
                 self._end_advance(AdvanceRefused("no message within %g s on %s"
                                                  % (advance.timeout_s, ", ".join(advance.awaited))))
             elif advance.awaited:
-                self.board.wait(AWAIT_S)
+                self.requests.wait(AWAIT_S)
             return
         if advance.remaining:
             self.do_tick()

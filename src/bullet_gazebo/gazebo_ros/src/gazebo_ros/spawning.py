@@ -159,7 +159,7 @@ class Spawner:
         """
         static, cuts = prepared.options.get("static"), prepared.options.get("mesh_cuts")
         for link in _that_take_time(prepared.merged):
-            self._simulation.board.call(self._simulation.world.make_shape, prepared.merged, link, static, cuts)
+            self._simulation.requests.call(self._simulation.world.make_shape, prepared.merged, link, static, cuts)
 
     def spawn(self, prepared, pose):
         """Loop thread: make the model at ``pose`` and start its plugins. Raises :class:`SpawnRefused`."""

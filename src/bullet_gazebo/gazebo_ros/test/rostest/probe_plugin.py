@@ -26,15 +26,15 @@ class ProbePlugin(ModelPlugin):
         self._states = context.publisher("joint_states", JointState)
         self._first = context.publisher("first_state", JointState, latch=True)
         self._sent_first = False
-        self._target_box = context.mailbox("target", Float64)
-        self._break = context.queue("break", String, depth=1)
+        self._targets = context.subscription("target", Float64)
+        self._break = context.subscription("break", String, depth=1)
         context.service("fail", Trigger, _fail)
         context.service("where", Trigger, lambda _: TriggerResponse(True, repr(self._model.read_joints()[0].tolist())))
 
     def update(self, time_s, dt):
         if self._break.drain():
             raise RuntimeError("broken on purpose")
-        target = self._target_box.take()
+        target = self._targets.take()
         if target is not None:
             self._target = np.full(len(self._index), target.data)
         self._model.drive_position(self._index, self._target, np.full(len(self._index), 100.0))

@@ -80,7 +80,7 @@ def test_a_plugin_that_begins_anew_keeps_what_it_opened():
     class Plugin(ModelPlugin):
         def __init__(self, context, topic="gone"):
             super().__init__(context)
-            self.opened = (context.publisher("out", String), context.queue("in", String, depth=3),
+            self.opened = (context.publisher("out", String), context.subscription("in", String, depth=3),
                            context.screen("glass", [[1.0]], (1.0, 2.0), (3, 4)))
             self.own = context.publisher(topic, String)
 
@@ -93,4 +93,4 @@ def test_a_plugin_that_begins_anew_keeps_what_it_opened():
     assert plugin.own.is_closed and sorted(ros.publishers) == ["/robot/more", "/robot/out"]
     # The picture on a screen is closed with the model: this one could not be.
     context.close()
-    assert ros.publishers == ros.inboxes == {}
+    assert ros.publishers == ros.subscriptions == {}

@@ -9,7 +9,7 @@ from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros.simulation import AdvanceRefused, HostedPlugin, Simulation
 from lab_testing.waiting import wait_until
 from loop_ros.faults import Faults
-from loop_ros.mailbox import RequestBoard
+from loop_ros.request_queue import RequestQueue
 from loop_ros.testing import FakeLog
 
 
@@ -98,7 +98,7 @@ def counts():
 
 @pytest.fixture
 def simulation(log, counts):
-    return Simulation(FakeWorld(), RequestBoard(), log, Faults(log), paused=True, deliveries=lambda: dict(counts))
+    return Simulation(FakeWorld(), RequestQueue(), log, Faults(log), paused=True, deliveries=lambda: dict(counts))
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ def host(simulation, **options):
 
 
 def advance(simulation, ticks, topics=(), timeout_s=5.0):
-    return simulation.board.call(simulation.start_advance, ticks, topics, timeout_s)
+    return simulation.requests.call(simulation.start_advance, ticks, topics, timeout_s)
 
 
 def test_a_tick_is_update_step_publish_at_the_right_times(simulation):
@@ -251,7 +251,7 @@ def test_what_hangs_on_the_loop_may_raise(running, log, name):
     def fail():
         raise RuntimeError("broken on purpose")
 
-    running.board.call(setattr, running, name, fail)
+    running.requests.call(setattr, running, name, fail)
     running.paused = False
     wait_until(lambda: running.tick > 20 and log.of("error"), "the world to go on")
     assert "broken on purpose" in log.of("error")[0] and len(log.of("error")) == 1
@@ -289,8 +289,8 @@ def test_unhosting_a_model_closes_its_plugins_only(simulation):
 
 
 def test_a_paused_world_stands_still_and_answers(running):
-    assert running.board.call(lambda: running.tick) == 0
-    assert running.board.call(lambda: running.tick) == 0
+    assert running.requests.call(lambda: running.tick) == 0
+    assert running.requests.call(lambda: running.tick) == 0
 
 
 def test_a_world_runs_in_real_time(running):
@@ -311,8 +311,8 @@ def test_an_advance_makes_exactly_so_many_ticks(running):
 def test_an_advance_waits_for_its_topics_each_time(running, counts):
     future = advance(running, 2, ["/command"])
     # The loop has taken the request up and gone round since, and waits.
-    assert running.board.call(lambda: running.tick) == 0
-    assert running.board.call(lambda: running.tick) == 0
+    assert running.requests.call(lambda: running.tick) == 0
+    assert running.requests.call(lambda: running.tick) == 0
     assert not future.done()
     counts["/command"] += 1
     assert future.result(5.0)[0] == 2

@@ -107,8 +107,8 @@ class ActionServer:
         self._feedback_class = type(action.action_feedback)
         self._on_goal = on_goal
         self._on_cancel = on_cancel
-        self._goals = topics.queue(name + "/goal", _numbered(type(action.action_goal)), QUEUE_DEPTH)
-        self._cancels = topics.queue(name + "/cancel", _numbered(GoalID), QUEUE_DEPTH)
+        self._goals = topics.subscription(name + "/goal", _numbered(type(action.action_goal)), QUEUE_DEPTH)
+        self._cancels = topics.subscription(name + "/cancel", _numbered(GoalID), QUEUE_DEPTH)
         self._status = topics.publisher(name + "/status", GoalStatusArray, latch=True)
         self._feedback = topics.publisher(name + "/feedback", self._feedback_class)
         self._result = topics.publisher(name + "/result", self._result_class)

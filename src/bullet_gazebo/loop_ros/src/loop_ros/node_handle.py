@@ -15,7 +15,7 @@ class NodeHandle:
         self._ros = ros
         self._opened = []  # of (what it is: kind, name, type ..., the object, whether it is closed with the others)
         self._kept = []  # the same, of the owner before; see `begin_anew`
-        self._queues, self._noted = [], set()  # of the queues, the numbers of those that something came into
+        self._subscriptions, self._noted = [], set()  # the numbers of those that got messages
 
     def resolve(self, name):
         """Absolute ROS name: relative names live in the handle's namespace."""
@@ -29,37 +29,34 @@ class NodeHandle:
         return self._opening(("publisher", name, msg_class, latch),
                              lambda: self._ros.publisher(name, msg_class, latch=latch))
 
-    def mailbox(self, topic, msg_class):
-        """A subscription of which only the newest message counts: ``handle(function)`` calls ``function(message)`` if
-        one has come since, and drops and counts the message if that fails. ``take()`` -> message or None, unguarded."""
-        name = self.resolve(topic)
-        return self._opening(("mailbox", name, msg_class), lambda: self._ros.mailbox(name, msg_class))
+    def subscription(self, topic, msg_class, depth=1):
+        """A ``loop_ros.protocol.Subscription``, which keeps the newest ``depth`` unread messages.
 
-    def queue(self, topic, msg_class, depth):
-        """A subscription that loses nothing up to ``depth`` unread messages: ``handle(function)`` calls
-        ``function(message)`` for each, oldest first, and drops and counts a message on which that fails. ``drain()`` ->
-        list, unguarded."""
+        ``handle(function)`` calls ``function(message)`` for each of them, oldest first, and drops and counts a message
+        on which that fails. Unguarded: ``drain()`` -> list of them; ``take()`` -> the newest or None.
+        """
         name = self.resolve(topic)
 
         def make():
-            number = len(self._queues)
-            self._queues.append(self._ros.queue(name, msg_class, depth, lambda: self._noted.add(number)))
-            return self._queues[number]
+            number = len(self._subscriptions)
+            self._subscriptions.append(
+                self._ros.subscription(name, msg_class, depth, lambda: self._noted.add(number)))
+            return self._subscriptions[number]
 
-        return self._opening(("queue", name, msg_class, depth), make)
+        return self._opening(("subscription", name, msg_class, depth), make)
 
     def pending(self):
-        """Loop thread: those of this handle's :meth:`queue` objects that something came into since the last call, in
-        the order they were opened.
+        """Loop thread: the subscriptions of this handle that got messages since the last call, in the order they were
+        opened.
 
-        For an owner with so many queues that asking each of them at every tick takes time.
+        For an owner with so many subscriptions that asking each of them at every tick takes time.
         """
         if not self._noted:
             return ()
         numbers = sorted(self._noted)
-        # Before the queues are read: what comes in from here on is told again.
+        # Before they are read: what comes in from here on is told again.
         self._noted.difference_update(numbers)
-        return [self._queues[number] for number in numbers]
+        return [self._subscriptions[number] for number in numbers]
 
     def service(self, name, srv_class, handler):
         """Advertise a service; ``handler(request)`` runs in the loop thread between two ticks."""

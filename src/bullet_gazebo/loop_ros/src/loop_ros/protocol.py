@@ -21,33 +21,20 @@ class Publisher(Protocol):
         """Stop publishing."""
 
 
-class Mailbox(Protocol):
-    """A subscription of which only the newest message counts."""
+class Subscription(Protocol):
+    """One topic that is subscribed to. What is unread waits for the loop, as many messages as the depth says."""
 
     def take(self):
-        """The newest message since the last call, or None."""
-
-    def handle(self, take):
-        """Call ``take(message)`` for the newest message since the last call; one that it fails on is counted."""
-
-    def guarded(self, take, *arguments):
-        """Call ``take(*arguments)``; what it raises is counted as the fault of a message."""
-
-    def close(self):
-        """End the subscription and drop what is unread."""
-
-
-class Queue(Protocol):
-    """A subscription of which each message counts, up to a depth; beyond that the oldest are lost."""
+        """The newest unread message, or None; older ones are dropped."""
 
     def drain(self):
         """All unread messages, oldest first: a list."""
 
-    def handle(self, take):
-        """Call ``take(message)`` for each unread message, oldest first; one that it fails on is dropped and counted."""
+    def handle(self, handler):
+        """Call ``handler(message)`` for each unread message, oldest first; what it raises drops one and is counted."""
 
-    def guarded(self, take, *arguments):
-        """Call ``take(*arguments)``; what it raises is counted as the fault of a message."""
+    def guarded(self, handler, *arguments):
+        """Call ``handler(*arguments)``; what it raises is counted as the fault of a message."""
 
     def close(self):
         """End the subscription and drop what is unread."""
@@ -88,11 +75,8 @@ class Topics(Protocol):
     def publisher(self, topic, msg_class, latch=False) -> Publisher:
         """Publish ``topic``; ``latch``: a late subscriber gets the last message."""
 
-    def mailbox(self, topic, msg_class) -> Mailbox:
-        """Subscribe to ``topic`` for the newest message."""
-
-    def queue(self, topic, msg_class, depth) -> Queue:
-        """Subscribe to ``topic`` for every message; ``depth``: how many unread ones are kept, at least 1."""
+    def subscription(self, topic, msg_class, depth=1) -> Subscription:
+        """Subscribe to ``topic``; ``depth``: how many unread messages are kept, the newest ones, at least 1."""
 
     def service(self, name, srv_class, handler) -> Service:
         """Serve ``name``; ``handler(request)`` runs in the loop between two ticks and returns the response."""
@@ -116,11 +100,8 @@ class LoopRos(Protocol):
     def publisher(self, topic, msg_class, latch=False, greet=False) -> Publisher:
         """Publish ``topic``; ``latch``: a late subscriber gets the last message; ``greet``: the same, unannounced."""
 
-    def mailbox(self, topic, msg_class) -> Mailbox:
-        """As :meth:`Topics.mailbox`."""
-
-    def queue(self, topic, msg_class, depth, notice=lambda: None) -> Queue:
-        """As :meth:`Topics.queue`; ``notice()`` is called after each message, in any thread."""
+    def subscription(self, topic, msg_class, depth=1, notice=lambda: None) -> Subscription:
+        """As :meth:`Topics.subscription`; ``notice()`` is called after each message, in any thread."""
 
     def service(self, name, srv_class, handler) -> Service:
         """As :meth:`Topics.service`."""

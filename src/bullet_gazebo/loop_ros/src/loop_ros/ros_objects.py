@@ -11,26 +11,27 @@ import weakref
 import rospy
 
 from loop_ros.faults import SURVIVED, described
-from loop_ros.mailbox import LoopEnded, Mailbox, Queue
 from loop_ros.publisher import LoopPublisher
-from loop_ros.subscriber import Inlet
+from loop_ros.request_queue import LoopEnded
+from loop_ros.subscriber import Connection
+from loop_ros.subscription import Subscription
 from rospy_limits.messages import largest_message_bytes
 
 
 class RosObjects:
-    """Makes publishers, mailboxes, queues and services for the loop."""
+    """Makes publishers, subscriptions and services for the loop."""
 
-    def __init__(self, hub, inlets, board, log, faults):
-        """``hub``: :class:`PublisherHub`; ``inlets``: :class:`InletHub`; ``board``: :class:`RequestBoard`; ``log``:
-        :class:`LoopLog`; ``faults``: :class:`Faults`, which are counted here by topic and service."""
-        self._hub = hub
-        self._inlets = inlets
-        self._board = board
+    def __init__(self, publishers, subscribers, requests, log, faults):
+        """``publishers``: :class:`PublisherHub`; ``subscribers``: :class:`SubscriberHub`; ``requests``:
+        :class:`RequestQueue`; ``log``: :class:`LoopLog`; ``faults``: :class:`Faults`, counted by topic and service."""
+        self._publishers = publishers
+        self._subscribers = subscribers
+        self._requests = requests
         self._log = log
-        #: For who finds more of them.
+        #: Others may count theirs here too.
         self.faults = faults
         self._jobs = queue.SimpleQueue()
-        self._inboxes = {}
+        self._subscriptions = {}
         self._delivered_before = {}
         self._services = {}
         threading.Thread(target=self._work, name="ros_registrar", daemon=True).start()
@@ -46,25 +47,41 @@ class RosObjects:
             registered.append(registration)
             # rospy would put a queue and a thread between us and each connection.
             registration.impl.set_queue_size(None)
-            registration.impl.add_subscriber_listener(_Attention(self._hub, publisher))
+            registration.impl.add_subscriber_listener(_Attention(self._publishers, publisher))
             publisher.attach(registration.impl)
 
         def unregister():
             for registration in registered:
                 registration.unregister()
 
-        publisher = LoopPublisher(self._hub, topic, msg_class, latch=latch, greet=greet,
+        publisher = LoopPublisher(self._publishers, topic, msg_class, latch=latch, greet=greet,
                                   release=lambda: self._jobs.put(unregister))
         self._jobs.put(register)
         return publisher
 
-    def mailbox(self, topic, msg_class):
-        """A :class:`Mailbox` that messages on ``topic`` fall into."""
-        return self._subscribe(Mailbox(self._counting(topic)), topic, msg_class)
+    def subscription(self, topic, msg_class, depth=1, notice=lambda: None):
+        """A :class:`Subscription` to ``topic``; ``notice()`` is called after each message, in any thread."""
+        subscription = Subscription(depth, notice, self._counting(topic))
+        self._subscriptions[topic] = [*self._subscriptions.get(topic, ()), subscription]
+        registered = []
 
-    def queue(self, topic, msg_class, depth, notice=lambda: None):
-        """A :class:`Queue` that messages on ``topic`` fall into; ``notice()`` is called after each, in any thread."""
-        return self._subscribe(Queue(depth, notice, self._counting(topic)), topic, msg_class)
+        def register():
+            registration = rospy.Subscriber(topic, msg_class, subscription.put, tcp_nodelay=True)
+            registered.append(registration)
+            # A connection that rospy made before this line is read by rospy, in a thread of its own.
+            _read_in_loop(registration.impl, self._subscribers, self._log, self.faults)
+
+        def unregister():
+            for registration in registered:
+                registration.unregister()
+
+        def end():
+            self._forget(topic, subscription)
+            self._jobs.put(unregister)
+
+        subscription.on_close = end
+        self._jobs.put(register)
+        return subscription
 
     def service(self, name, srv_class, handler):
         """Advertise ``name``; ``handler(request)`` runs in the loop thread."""
@@ -83,8 +100,8 @@ class RosObjects:
 
         Returns the service's handler, which only the caller reaches from then on; None where there is no such service.
         """
-        for inbox in self._inboxes.get(name, ()):
-            inbox.close()
+        for subscription in self._subscriptions.get(name, ()):
+            subscription.close()
         service = self._services.get(name)
         if service is None:
             return None
@@ -97,15 +114,15 @@ class RosObjects:
         Raises ``rospy.ServiceException``, the right end for a service request, when the loop ends before.
         """
         try:
-            return self._board.call(function, *arguments)
+            return self._requests.call(function, *arguments)
         except LoopEnded as error:
             raise rospy.ServiceException(str(error)) from None
 
     def deliveries(self):
         """How many messages the loop's subscriptions have received: {topic: count}. Those that have been closed count
         on, so that it never becomes less."""
-        return {topic: self._delivered_before.get(topic, 0) + sum(inbox.delivered for inbox in inboxes)
-                for topic, inboxes in list(self._inboxes.items())}
+        return {topic: self._delivered_before.get(topic, 0) + sum(one.delivered for one in subscriptions)
+                for topic, subscriptions in list(self._subscriptions.items())}
 
     def flush(self, timeout_s=10.0):
         """Any thread but the loop's: wait until all registrations asked for so far are done."""
@@ -126,39 +143,16 @@ class RosObjects:
         self._jobs.put(register)
         return service
 
-    def _subscribe(self, box, topic, msg_class):
-        """Have rospy put what comes in on ``topic`` into a :class:`Mailbox` or :class:`Queue`, until that is closed."""
-        self._inboxes[topic] = [*self._inboxes.get(topic, ()), box]
-        registered = []
-
-        def register():
-            registration = rospy.Subscriber(topic, msg_class, box.put, tcp_nodelay=True)
-            registered.append(registration)
-            # A connection that rospy made before this line is read by rospy, in a thread of its own.
-            _read_in_loop(registration.impl, self._inlets, self._log, self.faults)
-
-        def unregister():
-            for registration in registered:
-                registration.unregister()
-
-        def end():
-            self._forget(topic, box)
-            self._jobs.put(unregister)
-
-        box.on_close = end
-        self._jobs.put(register)
-        return box
-
     def _counting(self, topic):
         return lambda error: self.faults.note(topic, error, "the message is dropped")
 
-    def _forget(self, topic, box):
-        self._delivered_before[topic] = self._delivered_before.get(topic, 0) + box.delivered
-        left = [other for other in self._inboxes.get(topic, ()) if other is not box]
+    def _forget(self, topic, subscription):
+        self._delivered_before[topic] = self._delivered_before.get(topic, 0) + subscription.delivered
+        left = [other for other in self._subscriptions.get(topic, ()) if other is not subscription]
         if left:
-            self._inboxes[topic] = left
+            self._subscriptions[topic] = left
         else:
-            self._inboxes.pop(topic, None)
+            self._subscriptions.pop(topic, None)
 
     def _work(self):
         while True:
@@ -185,7 +179,7 @@ def answering(name, handler, faults):
     return answer
 
 
-def _read_in_loop(impl, inlets, log, faults):
+def _read_in_loop(impl, subscribers, log, faults):
     """Have the loop read the connections of rospy's subscription ``impl``, as soon as they are made."""
     add = impl.add_connection
 
@@ -193,41 +187,41 @@ def _read_in_loop(impl, inlets, log, faults):
         # Held weakly: a connection that rospy drops while it is being made leaves its socket to be closed with the last
         # reference, and the publisher serves nobody else before that.
         held = weakref.ref(connection)
-        connection.receive_loop = lambda _: _receive(held(), impl, inlets, log, faults)
+        connection.receive_loop = lambda _: _receive(held(), impl, subscribers, log, faults)
         return add(connection)
 
     impl.add_connection = add_connection
 
 
-def _receive(connection, impl, inlets, log, faults):
-    """What rospy's thread for a connection does, once that stands: wait for its end."""
+def _receive(transport, impl, subscribers, log, faults):
+    """What rospy's thread for a connection, the ``transport``, does from then on: wait for its end."""
 
     def deliver(data):
-        connection.stat_bytes += len(data)
-        connection.stat_num_msg += 1
+        transport.stat_bytes += len(data)
+        transport.stat_num_msg += 1
         try:
             message = impl.data_class().deserialize(data)
-            message._connection_header = connection.header
-            if connection.is_latched:
-                connection.latch = message
-            impl.receive_callback([message], connection)
+            message._connection_header = transport.header
+            if transport.is_latched:
+                transport.latch = message
+            impl.receive_callback([message], transport)
         except Exception as error:  # noqa: BLE001  (anything may be sent; the world goes on)
             if not impl.closed:
                 faults.note(impl.resolved_name, error,
-                            "a message from %s cannot be read and is dropped" % connection.callerid_pub)
+                            "a message from %s cannot be read and is dropped" % transport.callerid_pub)
 
     try:
         # With the end of its header a publisher may have sent its first message, the one that it latches.
-        inlet = Inlet(connection.socket, deliver, largest_message_bytes(), held=connection.read_buff.getvalue())
+        connection = Connection(transport.socket, deliver, largest_message_bytes(), held=transport.read_buff.getvalue())
     except (AttributeError, OSError):  # it has been closed already
-        connection.close()
+        transport.close()
         return
-    inlets.add(inlet)
-    inlet.ended.wait()
-    if inlet.fault:
+    subscribers.add(connection)
+    connection.ended.wait()
+    if connection.fault:
         log.error("%s: the connection to %s is closed: %s"
-                  % (impl.resolved_name, connection.callerid_pub, inlet.fault))
-    connection.close()
+                  % (impl.resolved_name, transport.callerid_pub, connection.fault))
+    transport.close()
 
 
 class _Attention(rospy.SubscribeListener):

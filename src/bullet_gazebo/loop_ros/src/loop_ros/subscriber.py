@@ -46,15 +46,15 @@ _poll.restype = ctypes.c_int
 _EMPTY = (errno.EAGAIN, errno.EWOULDBLOCK, errno.EINTR)
 
 
-class Inlet:
+class Connection:
     """The receiving end of one publisher's connection. The loop reads; any thread may wait for ``ended``."""
 
-    def __init__(self, connection, deliver, largest_bytes, held=b""):
-        """``connection``: a connected stream socket, of which a duplicate is read: it may be closed elsewhere at any
+    def __init__(self, connected, deliver, largest_bytes, held=b""):
+        """``connected``: a connected stream socket, of which a duplicate is read: it may be closed elsewhere at any
         time. ``deliver(data)`` takes the bytes of each message, in the loop. A message that announces more than
         ``largest_bytes`` ends the connection. ``held``: bytes that have been read already, as far as they are not
         delivered."""
-        self._socket = connection.dup()
+        self._socket = connected.dup()
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         self._deliver = deliver
         self._largest_bytes = largest_bytes
@@ -112,7 +112,7 @@ class Inlet:
         return min(max(missing, PORTION_BYTES), LARGEST_PORTION_BYTES)
 
 
-class InletHub:
+class SubscriberHub:
     """What the loop does for all its subscriptions, once per turn."""
 
     def __init__(self, clock=time.perf_counter):
@@ -120,54 +120,55 @@ class InletHub:
         self._clock = clock
         self._new = collections.deque()
         self._closed = False
-        self._inlets = []
+        self._connections = []
         self._entries = None
         self._looked_at = -LOOK_PERIOD_S
         self._buffer = (ctypes.c_char * LARGEST_PORTION_BYTES)()
 
-    def add(self, inlet):
-        """Any thread: have an :class:`Inlet` read from the next turn on."""
-        self._new.append(inlet)
+    def add(self, connection):
+        """Any thread: have a :class:`Connection` read from the next turn on."""
+        self._new.append(connection)
         if self._closed:
-            inlet.end()
+            connection.end()
 
     def service(self):
         """Loop thread: deliver what has come in. Never waits."""
         if self._new:
             self._take_new()
         now = self._clock()
-        if not self._inlets or now - self._looked_at < LOOK_PERIOD_S:
+        if not self._connections or now - self._looked_at < LOOK_PERIOD_S:
             return
         self._looked_at = now
-        if _poll(self._entries, len(self._inlets), 0) <= 0:
+        if _poll(self._entries, len(self._connections), 0) <= 0:
             return
-        ready = [inlet for inlet, entry in zip(self._inlets, self._entries, strict=True) if entry.revents]
+        ready = [connection for connection, entry in zip(self._connections, self._entries, strict=True)
+                 if entry.revents]
         more = ready
         while more:
-            more = [inlet for inlet in more if inlet.read(self._buffer)]
+            more = [connection for connection in more if connection.read(self._buffer)]
             if self._clock() - now >= BUDGET_S:
                 break
-        if any(inlet.ended.is_set() for inlet in ready):
-            self._follow([inlet for inlet in self._inlets if not inlet.ended.is_set()])
+        if any(connection.ended.is_set() for connection in ready):
+            self._follow([connection for connection in self._connections if not connection.ended.is_set()])
 
     def close(self):
         """When the loop has ended: nothing more will be read."""
         self._closed = True
         self._take_new()
-        for inlet in self._inlets:
-            inlet.end()
+        for connection in self._connections:
+            connection.end()
         self._follow([])
 
     def _take_new(self):
-        inlets = self._inlets
+        connections = self._connections
         while self._new:
-            inlet = self._new.popleft()
-            inlet.deliver_complete()
-            if not inlet.ended.is_set():
-                inlets = [*inlets, inlet]
-        self._follow(inlets)
+            connection = self._new.popleft()
+            connection.deliver_complete()
+            if not connection.ended.is_set():
+                connections = [*connections, connection]
+        self._follow(connections)
 
-    def _follow(self, inlets):
-        self._inlets = inlets
-        self._entries = (_PollEntry * len(inlets))(
-            *(_PollEntry(inlet.fileno(), select.POLLIN, 0) for inlet in inlets))
+    def _follow(self, connections):
+        self._connections = connections
+        self._entries = (_PollEntry * len(connections))(
+            *(_PollEntry(connection.fileno(), select.POLLIN, 0) for connection in connections))

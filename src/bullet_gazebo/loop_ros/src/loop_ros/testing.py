@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """ROS for tests, without a master: what is published is kept, messages are put in by hand.
 
-``test_fake_ros.py`` asks the same of this and of the simulator's own. Mailboxes, queues, faults and the answers of
-services are the real code.
+``test_fake_ros.py`` asks the same of this and of the simulator's own. Subscriptions, faults and the answers of services
+are the real code.
 """
 import io
 
 from loop_ros.faults import Faults
-from loop_ros.mailbox import Mailbox, Queue
 from loop_ros.ros_objects import answering
+from loop_ros.subscription import Subscription
 
 
 class FakeLog:
@@ -59,14 +59,14 @@ class FakeFaults(Faults):
 class FakeRos:
     """A ``loop_ros.protocol.LoopRos`` that keeps what is open now, by absolute name; also a ``Topics``.
 
-    ``publishers``: {topic: the first open :class:`FakePublisher`}; ``inboxes``: {topic: :class:`FakeInbox`};
+    ``publishers``: {topic: the first open :class:`FakePublisher`}; ``subscriptions``: {topic: :class:`FakeTopic`};
     ``services``: {name: function of one request, which answers as a client is answered}; ``faults``:
     :class:`FakeFaults`.
     """
 
     def __init__(self, heard=lambda topic: True, clock=lambda: 0.0):
         """``heard(topic)``: whether somebody listens from the start; ``clock()``: see :attr:`FakePublisher.timed`."""
-        self.publishers, self.inboxes, self.services = {}, {}, {}
+        self.publishers, self.subscriptions, self.services = {}, {}, {}
         self.faults = FakeFaults()
         self._heard, self._clock = heard, clock
         self._handlers = {}  # name: (service, handler)
@@ -77,11 +77,20 @@ class FakeRos:
         sent = _Sent(self._heard(topic), self._clock) if first is None else first._sent
         return FakePublisher(sent, msg_class, latch or greet, self.publishers, topic)
 
-    def mailbox(self, topic, msg_class):
-        return self._subscribe(topic, Mailbox(self._counting(topic)), msg_class)
+    def subscription(self, topic, msg_class, depth=1, notice=lambda: None):
+        subscription = Subscription(depth, notice, self._counting(topic))
+        subscribed = self.subscriptions.setdefault(topic, FakeTopic(msg_class))
+        subscribed.all.append(subscription)
 
-    def queue(self, topic, msg_class, depth, notice=lambda: None):
-        return self._subscribe(topic, Queue(depth, notice, self._counting(topic)), msg_class)
+        def leave():
+            if subscription in subscribed.all:
+                self._delivered_before[topic] = self._delivered_before.get(topic, 0) + subscription.delivered
+                subscribed.all.remove(subscription)
+            if not subscribed.all:
+                self.subscriptions.pop(topic, None)
+
+        subscription.on_close = leave
+        return subscription
 
     def service(self, name, srv_class, handler):
         service = _FakeService(self, name)
@@ -96,8 +105,8 @@ class FakeRos:
         return list(self.services)
 
     def withdraw(self, name):
-        if name in self.inboxes:
-            self.inboxes[name].close()
+        if name in self.subscriptions:
+            self.subscriptions[name].close()
         service, handler = self._handlers.get(name, (None, None))
         if service is not None:
             service.close()
@@ -107,32 +116,17 @@ class FakeRos:
         return function(*arguments)
 
     def deliveries(self):
-        return {topic: self._delivered_before.get(topic, 0) + sum(box.delivered for box in inbox.boxes)
-                for topic, inbox in self.inboxes.items()}
+        return {topic: self._delivered_before.get(topic, 0) + sum(one.delivered for one in subscribed.all)
+                for topic, subscribed in self.subscriptions.items()}
 
     def flush(self, timeout_s=10.0):
         return True
 
     def close(self):
-        for opened in [*self.publishers.values(), *self.inboxes.values()]:
+        for opened in [*self.publishers.values(), *self.subscriptions.values()]:
             opened.close()
         for service, _ in list(self._handlers.values()):
             service.close()
-
-    def _subscribe(self, topic, box, msg_class):
-        """What comes in on a topic comes to all who subscribe to it."""
-        inbox = self.inboxes.setdefault(topic, FakeInbox(msg_class))
-        inbox.boxes.append(box)
-
-        def leave():
-            if box in inbox.boxes:
-                self._delivered_before[topic] = self._delivered_before.get(topic, 0) + box.delivered
-                inbox.boxes.remove(box)
-            if not inbox.boxes:
-                self.inboxes.pop(topic, None)
-
-        box.on_close = leave
-        return box
 
     def _counting(self, topic):
         return lambda error: self.faults.note(topic, error, "the message is dropped")
@@ -206,19 +200,19 @@ class FakePublisher:
             del self._publishers[self.topic]
 
 
-class FakeInbox:
-    """All subscriptions of one topic: ``put`` a message to them."""
+class FakeTopic:
+    """All subscriptions to one topic: ``put`` a message into each of them."""
 
     def __init__(self, msg_class):
-        self.msg_class, self.boxes = msg_class, []
+        self.msg_class, self.all = msg_class, []
 
     def put(self, message):
-        for box in list(self.boxes):
-            box.put(message)
+        for subscription in list(self.all):
+            subscription.put(message)
 
     def close(self):
-        for box in list(self.boxes):
-            box.close()
+        for subscription in list(self.all):
+            subscription.close()
 
 
 class _FakeService:

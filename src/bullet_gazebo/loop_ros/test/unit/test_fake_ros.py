@@ -24,11 +24,12 @@ from loop_ros import protocol, ros_objects
 from loop_ros.action_server import ActionServer
 from loop_ros.faults import Faults
 from loop_ros.log import LoopLog
-from loop_ros.mailbox import Mailbox, Queue, RequestBoard
 from loop_ros.node_handle import NodeHandle
 from loop_ros.publisher import LoopPublisher, PublisherHub
 from loop_ros.reconfigure import Setting, SettingsServer
-from loop_ros.subscriber import InletHub
+from loop_ros.request_queue import RequestQueue
+from loop_ros.subscriber import SubscriberHub
+from loop_ros.subscription import Subscription
 from loop_ros.testing import FakeFaults, FakeLog, FakePublisher, FakeRos
 
 TOPIC, SERVICE = "/topic", "/service"
@@ -49,7 +50,7 @@ class Fake:
         return lambda: list(publisher.messages)
 
     def send(self, topic, message):
-        self.ros.inboxes[topic].put(message)
+        self.ros.subscriptions[topic].put(message)
 
     def call(self, service, request):
         return self.ros.services[service](request)
@@ -94,8 +95,8 @@ class Real:
         monkeypatch.setattr("loop_ros.publisher.Peer.of", classmethod(lambda cls, peer: SimpleNamespace(
             transport=peer, send=peer.take, has_rest=False)))
         self.log = LoopLog(dict.fromkeys(("info", "warn", "error"), self._lines.append))
-        self._board, self._hub = RequestBoard(), PublisherHub()
-        self.ros = ros_objects.RosObjects(self._hub, InletHub(), self._board, self.log, Faults(self.log))
+        self._requests, self._hub = RequestQueue(), PublisherHub()
+        self.ros = ros_objects.RosObjects(self._hub, SubscriberHub(), self._requests, self.log, Faults(self.log))
         self.context = NodeHandle(self.ros)
 
     def _publisher(self, topic, msg_class, latch=False, queue_size=None):
@@ -140,7 +141,7 @@ class Real:
         client = threading.Thread(target=ask, daemon=True)
         client.start()
         while client.is_alive():
-            self._board.run_pending()
+            self._requests.run_pending()
             client.join(0.001)
         if isinstance(outcome[0], Exception):
             raise outcome[0]
@@ -172,8 +173,8 @@ def methods_of(owner):
 @pytest.mark.parametrize(("declared", "made"), [
     (protocol.LoopRos, ros_objects.RosObjects), (protocol.LoopRos, FakeRos), (protocol.Log, LoopLog),
     (protocol.Log, FakeLog), (protocol.Topics, NodeHandle), (protocol.Publisher, LoopPublisher),
-    (protocol.Publisher, FakePublisher), (protocol.Mailbox, Mailbox),
-    (protocol.Queue, Queue), (protocol.Faults, Faults), (protocol.Faults, FakeFaults),
+    (protocol.Publisher, FakePublisher), (protocol.Subscription, Subscription),
+    (protocol.Faults, Faults), (protocol.Faults, FakeFaults),
 ])
 def test_both_have_the_declared_methods(declared, made):
     assert methods_of(declared)
@@ -191,8 +192,8 @@ def side(request, monkeypatch):
     made.close()
 
 
-def test_of_a_mailbox_only_the_newest_counts(side):
-    box = side.context.mailbox(TOPIC, String)
+def test_without_a_depth_only_the_newest_counts(side):
+    box = side.context.subscription(TOPIC, String)
     assert box.take() is None
     for text in "abc":
         side.send(TOPIC, String(text))
@@ -202,21 +203,21 @@ def test_of_a_mailbox_only_the_newest_counts(side):
         side.send(TOPIC, String(text))
     box.handle(lambda message: got.append(message.data))
     box.handle(lambda message: got.append(message.data))
-    assert got == ["e"] and not hasattr(box, "drain")
+    assert got == ["e"]
 
 
-def test_a_queue_loses_the_oldest_beyond_its_depth(side):
-    queue = side.context.queue(TOPIC, String, 3)
+def test_a_subscription_loses_the_oldest_beyond_its_depth(side):
+    queue = side.context.subscription(TOPIC, String, 3)
     for text in "abcde":
         side.send(TOPIC, String(text))
     assert [message.data for message in queue.drain()] == ["c", "d", "e"]
-    assert queue.drain() == [] and not hasattr(queue, "take")
+    assert queue.drain() == []
 
 
 @pytest.mark.parametrize("error", [ValueError, RecursionError, SystemExit])
 @pytest.mark.parametrize("depth", [1, 5])
 def test_a_message_that_somebody_fails_on_is_dropped_alone(side, error, depth):
-    queue, got = side.context.queue(TOPIC, String, 5), []
+    queue, got = side.context.subscription(TOPIC, String, 5), []
 
     def take(message):
         if message.data == "bad":
@@ -231,7 +232,7 @@ def test_a_message_that_somebody_fails_on_is_dropped_alone(side, error, depth):
 
 
 def test_a_message_comes_to_all_who_subscribe(side):
-    one, two = side.context.queue(TOPIC, String, 3), side.context.mailbox(TOPIC, String)
+    one, two = side.context.subscription(TOPIC, String, 3), side.context.subscription(TOPIC, String)
     side.send(TOPIC, String("x"))
     assert [message.data for message in one.drain()] == ["x"] and two.take().data == "x"
 
@@ -295,8 +296,8 @@ def test_a_handler_that_raises_is_an_error_for_the_client_and_counted(side, kind
 
 
 def test_faults_of_messages_are_counted_by_topic(side):
-    side.context.queue(TOPIC, String, 3)
-    box = side.context.mailbox("/other", String)
+    side.context.subscription(TOPIC, String, 3)
+    box = side.context.subscription("/other", String)
     side.send("/other", String("x"))
     box.handle(lambda message: 1 / 0)
     side.context.survived("drawing", ValueError("y"))
@@ -304,11 +305,11 @@ def test_faults_of_messages_are_counted_by_topic(side):
 
 
 def test_what_came_in_is_told_once_and_counts_on_after_the_end(side):
-    first, second = side.context.queue(TOPIC, String, 3), side.context.queue("/other", String, 3)
+    first, second = side.context.subscription(TOPIC, String, 3), side.context.subscription("/other", String, 3)
     side.send("/other", String("x"))
     assert side.context.pending() == [second] and not side.context.pending()
     assert side.ros.deliveries() == {TOPIC: 0, "/other": 1}
-    again = side.context.queue("/other", String, 3)
+    again = side.context.subscription("/other", String, 3)
     second.close()
     side.send("/other", String("y"))
     assert [message.data for message in again.drain()] == ["y"] and second.drain() == first.drain() == []
@@ -317,7 +318,7 @@ def test_what_came_in_is_told_once_and_counts_on_after_the_end(side):
 
 def test_what_is_withdrawn_is_its_withdrawers_alone(side):
     side.context.service(SERVICE, SetBool, lambda request: SetBoolResponse(request.data, "served"))
-    queue = side.context.queue(TOPIC, String, 3)
+    queue = side.context.subscription(TOPIC, String, 3)
     side.send(TOPIC, String("unread"))
     assert side.context.served() == [SERVICE]
     handler = side.context.withdraw(SERVICE)
@@ -349,7 +350,7 @@ def test_settings_are_served(side):
 
 
 def test_after_its_end_a_context_has_nothing_open(side):
-    publisher, queue = side.context.publisher(TOPIC, String), side.context.queue("/in", String, 3)
+    publisher, queue = side.context.publisher(TOPIC, String), side.context.subscription("/in", String, 3)
     side.context.service(SERVICE, SetBool, SetBoolResponse)
     got = side.listen(TOPIC)
     side.send("/in", String("unread"))

@@ -35,10 +35,10 @@ class Served:
     def send(self, name, stamp_s=1.0):
         message = FollowJointTrajectoryActionGoal()
         message.goal_id = GoalID(genpy.Time.from_sec(stamp_s), name)
-        self.ros.inboxes["act/goal"].put(message)
+        self.ros.subscriptions["act/goal"].put(message)
 
     def cancel(self, name="", stamp_s=0.0):
-        self.ros.inboxes["act/cancel"].put(GoalID(genpy.Time.from_sec(stamp_s), name))
+        self.ros.subscriptions["act/cancel"].put(GoalID(genpy.Time.from_sec(stamp_s), name))
 
     @property
     def statuses(self):
@@ -245,7 +245,7 @@ def test_goals_and_cancels_of_one_tick_are_taken_in_the_order_of_arrival():
     def arrive(topic, numbered, message):
         buffer = io.BytesIO()
         message.serialize(buffer)
-        served.ros.inboxes[topic].put(numbered().deserialize(buffer.getvalue()))
+        served.ros.subscriptions[topic].put(numbered().deserialize(buffer.getvalue()))
 
     old, new = FollowJointTrajectoryActionGoal(), FollowJointTrajectoryActionGoal()
     old.goal_id.id, new.goal_id.id = "old", "new"
@@ -316,7 +316,7 @@ def test_an_id_that_cannot_be_sent_back_is_dropped_and_others_go_on(served, topi
     """As it is read from the wire: its stamp does not fit any more once the nanoseconds have been carried over."""
     goal_id = GoalID().deserialize(struct.pack("<III1s", 0xFFFFFFFF, 0xFFFFFFFF, 1, b"x"))
     message = goal_id if topic == "cancel" else FollowJointTrajectoryActionGoal(goal_id=goal_id)
-    served.ros.inboxes["act/" + topic].put(message)
+    served.ros.subscriptions["act/" + topic].put(message)
     served.send("a")
     served.server.spin(10.0)
     assert served.statuses == {"a": GoalStatus.ACTIVE}

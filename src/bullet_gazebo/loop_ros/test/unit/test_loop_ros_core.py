@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-CORE = ("faults", "log", "mailbox", "node_handle", "protocol", "publisher", "subscriber")
+CORE = ("faults", "log", "node_handle", "protocol", "publisher", "request_queue", "subscriber", "subscription")
 
 
 def test_the_core_loads_without_ros():

@@ -9,7 +9,7 @@ import pytest
 
 from lab_testing.waiting import wait_until
 from loop_ros import subscriber as subscribing
-from loop_ros.subscriber import Inlet, InletHub
+from loop_ros.subscriber import Connection, SubscriberHub
 
 LARGEST_BYTES = 10_000_000
 
@@ -32,8 +32,8 @@ class Line:
             self.far = socket.create_connection(server.getsockname())
             self.near, _ = server.accept()
         self.got = []
-        self.inlet = Inlet(self.near, self.got.append, LARGEST_BYTES)
-        hub.add(self.inlet)
+        self.connection = Connection(self.near, self.got.append, LARGEST_BYTES)
+        hub.add(self.connection)
 
     def close(self):
         self.far.close()
@@ -46,7 +46,7 @@ def framed(data):
 
 @pytest.fixture
 def hub():
-    hub = InletHub(Clock())
+    hub = SubscriberHub(Clock())
     yield hub
     hub.close()
 
@@ -124,8 +124,8 @@ def test_who_sends_more_than_a_turn_takes_neither_holds_up_the_loop_nor_others(h
 
 def test_sockets_are_not_looked_at_more_often_than_said(line):
     clock = Clock()
-    hub = InletHub(lambda: clock.now)
-    hub.add(line.inlet)
+    hub = SubscriberHub(lambda: clock.now)
+    hub.add(line.connection)
     line.far.sendall(framed(b"early"))
     wait_until(lambda: len(line.near.recv(100, socket.MSG_PEEK)) == 9, "the message to arrive", 10.0)
     hub.service()
@@ -144,9 +144,9 @@ def test_a_publisher_that_goes_ends_its_connection_and_no_other(hub, line):
     other = Line(hub)
     line.far.sendall(framed(b"last words"))
     line.far.close()
-    serve_until(hub, line.inlet.ended.is_set, "the end")
+    serve_until(hub, line.connection.ended.is_set, "the end")
     assert line.got == [b"last words"]
-    assert line.inlet.fault == ""
+    assert line.connection.fault == ""
     other.far.sendall(framed(b"still here"))
     serve_until(hub, lambda: other.got, "the other one")
     other.close()
@@ -158,7 +158,7 @@ def test_a_connection_closed_from_this_side_ends(hub, line):
     line.near.shutdown(socket.SHUT_RDWR)
     line.near.close()
     replacement = Line(hub)
-    serve_until(hub, line.inlet.ended.is_set, "the end")
+    serve_until(hub, line.connection.ended.is_set, "the end")
     replacement.far.sendall(framed(b"new"))
     serve_until(hub, lambda: replacement.got, "the new one's message")
     assert line.got == []
@@ -168,17 +168,17 @@ def test_a_connection_closed_from_this_side_ends(hub, line):
 @pytest.mark.parametrize("announced", [LARGEST_BYTES + 1, 10**9, 2**32 - 1])
 def test_a_message_that_announces_too_much_ends_the_connection_with_size_and_limit(hub, line, announced):
     line.far.sendall(framed(b"fine") + struct.pack("<I", announced))
-    serve_until(hub, line.inlet.ended.is_set, "the end")
+    serve_until(hub, line.connection.ended.is_set, "the end")
     assert line.got == [b"fine"]
-    assert str(announced) in line.inlet.fault and str(LARGEST_BYTES) in line.inlet.fault
+    assert str(announced) in line.connection.fault and str(LARGEST_BYTES) in line.connection.fault
 
 
 def test_the_end_of_the_loop_ends_all(hub, line):
     hub.service()
     late = Line(hub)
     hub.close()
-    assert line.inlet.ended.is_set() and late.inlet.ended.is_set()
+    assert line.connection.ended.is_set() and late.connection.ended.is_set()
     latest = Line(hub)
-    assert latest.inlet.ended.is_set()
+    assert latest.connection.ended.is_set()
     for each in (late, latest):
         each.close()

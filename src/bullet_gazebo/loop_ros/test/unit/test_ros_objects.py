@@ -16,11 +16,11 @@ from std_msgs.msg import String
 
 from lab_testing.waiting import wait_until
 from loop_ros.faults import Faults
-from loop_ros.mailbox import RequestBoard
 from loop_ros.node_handle import NodeHandle
 from loop_ros.publisher import PublisherHub
+from loop_ros.request_queue import RequestQueue
 from loop_ros.ros_objects import RosObjects, _read_in_loop
-from loop_ros.subscriber import InletHub
+from loop_ros.subscriber import SubscriberHub
 
 
 class Connection:
@@ -53,7 +53,7 @@ def framed(text):
 
 @pytest.fixture
 def scene(request):
-    got, errors, hub = [], [], InletHub()
+    got, errors, hub = [], [], SubscriberHub()
     impl = SimpleNamespace(data_class=String, resolved_name="/chatter", closed=False, connections=[],
                            receive_callback=lambda messages, _: got.extend(messages))
     impl.add_connection = lambda connection: impl.connections.append(connection) or True
@@ -132,7 +132,7 @@ def test_a_connection_that_rospy_gave_up_halfway_does_not_keep_the_publisher_wai
     listening.settimeout(10.0)
     transport = TCPROSTransport(TCPROSSub("/chatter", String), "/chatter")
     impl = SimpleNamespace(add_connection=lambda _: True)
-    _read_in_loop(impl, InletHub(), None, None)
+    _read_in_loop(impl, SubscriberHub(), None, None)
     impl.add_connection(transport)
     # What connect() asks for just before it has a socket.
     monkeypatch.setattr("rospy.impl.tcpros_base._is_use_tcp_keepalive", lambda close=transport.close: close())
@@ -150,7 +150,7 @@ def test_a_connection_that_rospy_gave_up_halfway_does_not_keep_the_publisher_wai
 
 
 def test_a_connection_that_is_gone_before_it_was_read_is_closed():
-    hub, connection = InletHub(), Connection()
+    hub, connection = SubscriberHub(), Connection()
     connection.socket.close()
     impl = SimpleNamespace(add_connection=lambda _: True)
     _read_in_loop(impl, hub, None, None)
@@ -188,7 +188,7 @@ def registrations(monkeypatch):
 def objects():
     errors = []
     log = SimpleNamespace(error=errors.append)
-    yield RosObjects(PublisherHub(), InletHub(), RequestBoard(), log, Faults(log))
+    yield RosObjects(PublisherHub(), SubscriberHub(), RequestQueue(), log, Faults(log))
     assert not errors
 
 
@@ -219,7 +219,7 @@ def test_a_publisher_that_is_closed_while_it_is_registered_does_not_stay(objects
 
 def test_deliveries_never_become_less(objects, registrations):
     """Who waits for the next message of a topic need not know of a model that went and one that came."""
-    first, second = (objects.queue("/commands", String, depth=10) for _ in range(2))
+    first, second = (objects.subscription("/commands", String, depth=10) for _ in range(2))
     for box in (first, first, second):
         box.put(String("go"))
     assert objects.deliveries() == {"/commands": 3}
@@ -227,7 +227,7 @@ def test_deliveries_never_become_less(objects, registrations):
     assert objects.deliveries() == {"/commands": 3}
     second.close()
     assert objects.deliveries() == {}, "nobody listens to it"
-    objects.mailbox("/commands", String).put(String("go"))
+    objects.subscription("/commands", String).put(String("go"))
     assert objects.deliveries() == {"/commands": 4}
     assert objects.flush() and registrations.open == ["/commands"]
 
@@ -236,10 +236,10 @@ def test_deliveries_never_become_less(objects, registrations):
 def scene_of_faults():
     errors = []
     log = SimpleNamespace(error=errors.append)
-    board = RequestBoard()
-    yield SimpleNamespace(ros=RosObjects(PublisherHub(), InletHub(), board, log, Faults(log)), board=board,
-                          errors=errors)
-    board.close()
+    requests = RequestQueue()
+    yield SimpleNamespace(ros=RosObjects(PublisherHub(), SubscriberHub(), requests, log, Faults(log)),
+                          requests=requests, errors=errors)
+    requests.close()
 
 
 @pytest.fixture
@@ -270,7 +270,7 @@ def test_a_handler_that_fails_is_an_error_to_the_one_who_asked_and_counted(scene
 
     client = threading.Thread(target=ask)
     client.start()
-    wait_until(lambda: (scene_of_faults.board.run_pending(), answers)[1], "the answer", 10.0)
+    wait_until(lambda: (scene_of_faults.requests.run_pending(), answers)[1], "the answer", 10.0)
     client.join()
     assert isinstance(answers[0], rospy.ServiceException) and "/break failed" in str(answers[0])
     assert ros.faults.places["/break"].count == 1 and "/break" in scene_of_faults.errors[0]
@@ -281,7 +281,7 @@ def test_a_message_that_a_handler_cannot_digest_is_counted_under_its_topic(scene
         raise ValueError(message.data)
 
     ros = scene_of_faults.ros
-    for box in (ros.mailbox("/one", String), ros.queue("/many", String, depth=3)):
+    for box in (ros.subscription("/one", String), ros.subscription("/many", String, depth=3)):
         for text in ("a", "b"):
             box.put(String(text))
         box.handle(fail)
@@ -295,8 +295,8 @@ def test_an_owner_that_begins_anew_keeps_its_topics_and_services(scene_of_faults
 
     def open_all(answer):
         return (handle.publisher("out", String), handle.publisher("other", String, latch=True),
-                handle.mailbox("in", String), handle.queue("many", String, depth=3),
-                handle.queue("many", String, depth=3), handle.service("ask", None, lambda request: answer))
+                handle.subscription("in", String), handle.subscription("many", String, depth=3),
+                handle.subscription("many", String, depth=3), handle.service("ask", None, lambda request: answer))
 
     first, gone = open_all("old"), handle.publisher("gone", String)
     handle.begin_anew()
@@ -311,7 +311,7 @@ def test_an_owner_that_begins_anew_keeps_its_topics_and_services(scene_of_faults
     answers = []
     client = threading.Thread(target=lambda: answers.append(services["/robot/ask"](None)))
     client.start()
-    wait_until(lambda: (scene_of_faults.board.run_pending(), answers)[1], "the answer", 10.0)
+    wait_until(lambda: (scene_of_faults.requests.run_pending(), answers)[1], "the answer", 10.0)
     client.join()
     assert answers == ["new"]
     # A beginning that got halfway loses nothing either.
@@ -339,8 +339,8 @@ def test_a_service_that_is_withdrawn_is_the_withdrawers_alone(objects, registrat
 
 
 def test_a_topic_that_is_withdrawn_is_no_longer_heard(objects, registrations):
-    queue = objects.queue("/states", String, depth=3)
-    objects.mailbox("/more", String)
+    queue = objects.subscription("/states", String, depth=3)
+    objects.subscription("/more", String)
     assert objects.flush()
     assert objects.withdraw("/states") is None
     assert objects.flush() and registrations.open == ["/more"]

@@ -149,16 +149,14 @@ class ControllerContext:
         """A publisher for the loop: ``has_listeners`` and ``publish(message)``; never waits."""
         return self._ros.publisher(self.resolve(topic), msg_class, latch=latch)
 
-    def mailbox(self, topic, msg_class):
-        """A subscription of which only the newest message counts: ``handle(function)`` calls ``function(message)`` if
-        one has come since, and drops and counts the message if that fails. ``take()`` -> message or None, unguarded."""
-        return self._ros.mailbox(self.resolve(topic), msg_class)
+    def subscription(self, topic, msg_class, depth=1):
+        """A subscription, which keeps the newest ``depth`` unread messages.
 
-    def queue(self, topic, msg_class, depth):
-        """A subscription that loses nothing up to ``depth`` unread messages: ``handle(function)`` calls
-        ``function(message)`` for each, oldest first, and drops and counts a message on which that fails. ``drain()`` ->
-        list, unguarded; ``guarded(function, ...)``: one such call."""
-        return self._ros.queue(self.resolve(topic), msg_class, depth)
+        ``handle(function)`` calls ``function(message)`` for each of them, oldest first, and drops and counts a message
+        on which that fails; ``guarded(function, ...)``: one such call. Unguarded: ``drain()`` -> list of them;
+        ``take()`` -> the newest or None.
+        """
+        return self._ros.subscription(self.resolve(topic), msg_class, depth)
 
     def service(self, name, srv_class, handler):
         """Advertise a service; ``handler(request)`` runs in the loop thread between two ticks."""

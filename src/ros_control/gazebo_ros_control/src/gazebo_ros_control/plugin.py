@@ -61,7 +61,7 @@ class GazeboRosControl(ModelPlugin):
         self._last_update_s = None
         self._restart = False
         topic = context.element_text("eStopTopic")
-        self._stop_messages = context.mailbox(topic, Bool) if topic else None
+        self._stop_messages = context.subscription(topic, Bool) if topic else None
         self._stopped = False
         self._types = _Types()
         self._services = ControllerManagerServices(self._manager, self._types.table, context, robot)

@@ -11,9 +11,9 @@ class Breaking(Controller):
     def __init__(self, name, hardware, context):
         super().__init__(name, hardware, context)
         self.index = self.claim(POSITION, ["elbow"])
-        self.inbox = context.mailbox("break", Empty)
+        self.subscription = context.subscription("break", Empty)
 
     def update(self, time_s, dt):
-        if self.inbox.take() is not None:
+        if self.subscription.take() is not None:
             raise ValueError("told to break")
         self.hardware.command[POSITION][self.index] = -0.3

@@ -50,7 +50,7 @@ class Vehicle:
     def drive(self, seconds, linear=0.0, angular=0.0):
         for _ in range(round(seconds / DT)):
             self.hardware.read()
-            self.ros.inboxes["/robot/base/cmd_vel"].put(Twist(Vector3(linear, 0, 0), Vector3(0, 0, angular)))
+            self.ros.subscriptions["/robot/base/cmd_vel"].put(Twist(Vector3(linear, 0, 0), Vector3(0, 0, angular)))
             self.controller.update(self.world.time_s, DT)
             self.hardware.write(DT)
             self.world.step()

@@ -13,7 +13,7 @@ from gazebo_ros.model_plugin import PluginContext, PluginSource
 from gazebo_ros.simulation import HostedPlugin, Simulation
 from gazebo_ros_control.plugin import GazeboRosControl, _flat
 from loop_ros.faults import Faults
-from loop_ros.mailbox import RequestBoard
+from loop_ros.request_queue import RequestQueue
 from loop_ros.testing import FakeLog, FakeRos
 from urdf_model import parse_urdf
 
@@ -168,13 +168,13 @@ def test_reset_and_both_ends_of_an_emergency_stop_restart_controllers(simulate):
     simulator.plugin.reset()
     simulator.run(2)
     assert len(controller.starts) == 2
-    simulator.ros.inboxes["/lab/arm/stop"].put(Bool(False))
+    simulator.ros.subscriptions["/lab/arm/stop"].put(Bool(False))
     simulator.run(2)
     assert len(controller.starts) == 2, "nothing was stopped"
-    simulator.ros.inboxes["/lab/arm/stop"].put(Bool(True))
+    simulator.ros.subscriptions["/lab/arm/stop"].put(Bool(True))
     simulator.run(2)
     assert len(controller.starts) == 3
-    simulator.ros.inboxes["/lab/arm/stop"].put(Bool(False))
+    simulator.ros.subscriptions["/lab/arm/stop"].put(Bool(False))
     simulator.run(2)
     assert len(controller.starts) == 4
 
@@ -231,7 +231,7 @@ class Loop:
 
     def __init__(self, simulator):
         self.simulator = simulator
-        self.simulation = Simulation(simulator.world, RequestBoard(), simulator.log, Faults(simulator.log), paused=True)
+        self.simulation = Simulation(simulator.world, RequestQueue(), simulator.log, Faults(simulator.log), paused=True)
         self.simulation.tick = simulator.world.tick
         self.hosted = HostedPlugin(simulator.plugin, simulator.context, "arm", "libgazebo_ros_control.so")
         self.simulation.host(self.hosted)

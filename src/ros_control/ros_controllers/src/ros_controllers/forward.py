@@ -20,17 +20,17 @@ class ForwardController(Controller):
         self.joints = self._read_joints()
         self.index = self.claim(self.interface, self.joints)
         self._command = np.zeros(len(self.joints))
-        self._inbox = context.mailbox("command", self.msg_class)
+        self._subscription = context.subscription("command", self.msg_class)
 
     def starting(self, time_s):
-        self._inbox.take()  # what came before the start was not meant for now
+        self._subscription.take()  # what came before the start was not meant for now
         if self.interface == POSITION:
             self._command = self.hardware.position[self.index]
         else:
             self._command = np.zeros(len(self.joints))
 
     def update(self, time_s, dt):
-        self._inbox.handle(self._accept)
+        self._subscription.handle(self._accept)
         self.hardware.command[self.interface][self.index] = self._command
 
     def _accept(self, message):

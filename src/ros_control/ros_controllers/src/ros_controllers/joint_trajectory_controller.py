@@ -77,7 +77,7 @@ class JointTrajectoryController(Controller):
         self._make_adapter()
         self._server = ActionServer(context, "follow_joint_trajectory", FollowJointTrajectoryAction, self._on_goal,
                                     self._on_cancel)
-        self._commands = context.mailbox("command", JointTrajectory)
+        self._commands = context.subscription("command", JointTrajectory)
         self._state = context.publisher("state", JointTrajectoryControllerState)
         context.service("query_state", QueryTrajectoryState, self._query_state)
 

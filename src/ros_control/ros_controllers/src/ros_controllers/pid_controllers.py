@@ -32,15 +32,15 @@ class PidController(Controller):
         self._tuning = TunablePids.of_controller(context, self.pid, gain_names)
         self._read_limits()
         self._command = np.zeros(len(self.joints))
-        self._inbox = context.mailbox("command", self.msg_class)
+        self._subscription = context.subscription("command", self.msg_class)
 
     def starting(self, time_s):
-        self._inbox.take()  # what came before the start was not meant for now
+        self._subscription.take()  # what came before the start was not meant for now
         self._command = self._limited(self._start_command())
         self.pid.reset()
 
     def update(self, time_s, dt):
-        self._inbox.handle(self._accept)
+        self._subscription.handle(self._accept)
         error = self._error()
         output = self.pid.update(error, dt)
         self.hardware.command[self.interface][self.index] = output

@@ -39,7 +39,7 @@ class VehicleController(Controller):
         self._pose_covariance = self._covariance("pose_covariance_diagonal")
         self._twist_covariance = self._covariance("twist_covariance_diagonal")
         self._configure()
-        self._commands = context.mailbox("cmd_vel", Twist)
+        self._commands = context.subscription("cmd_vel", Twist)
         self._odom_publisher = context.publisher("odom", Odometry)
         self._tf_publisher = context.publisher("/tf", TFMessage) if context.flag("enable_odom_tf", True) else None
         self._out_publisher = None

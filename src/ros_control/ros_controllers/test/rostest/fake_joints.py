@@ -23,10 +23,10 @@ from gazebo_ros.model_plugin import PluginContext, PluginSource
 from gazebo_ros.pacing import Pacer
 from loop_ros.faults import Faults
 from loop_ros.log import LoopLog
-from loop_ros.mailbox import RequestBoard
 from loop_ros.publisher import PublisherHub
+from loop_ros.request_queue import RequestQueue
 from loop_ros.ros_objects import RosObjects
-from loop_ros.subscriber import InletHub
+from loop_ros.subscriber import SubscriberHub
 from urdf_model import parse_urdf
 
 DT = 0.002
@@ -57,8 +57,8 @@ def main():
     text = rospy.get_param("/robot/robot_description")
     robot = parse_urdf(text, source="robot_description")
     log = LoopLog({"info": rospy.loginfo, "warn": rospy.logwarn, "error": rospy.logerr})
-    hub, inlets, board = PublisherHub(), InletHub(), RequestBoard()
-    ros = RosObjects(hub, inlets, board, log, Faults(log))
+    publisher_hub, subscriber_hub, requests = PublisherHub(), SubscriberHub(), RequestQueue()
+    ros = RosObjects(publisher_hub, subscriber_hub, requests, log, Faults(log))
     context = PluginContext(None, None, PluginSource(robot, None, "/robot", text), log, ros, {})
     pushed = rospy.get_param("/robot/effort_joints", [])
     hardware = FakeHardware({joint.name: (EFFORT if joint.name in pushed else POSITION,)
@@ -71,16 +71,16 @@ def main():
     pacer.restart()
     start, tick = time.time(), 0
     while not rospy.is_shutdown():
-        board.run_pending()
-        hub.service()
-        inlets.service()
+        requests.run_pending()
+        publisher_hub.service()
+        subscriber_hub.service()
         manager.update(start + tick * DT, DT)
         hardware.step(DT)
         tick += 1
         pacer.wait()
     services.close()
-    inlets.close()
-    board.close()
+    subscriber_hub.close()
+    requests.close()
 
 
 if __name__ == "__main__":

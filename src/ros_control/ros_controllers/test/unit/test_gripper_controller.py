@@ -30,7 +30,7 @@ class Gripper:
         self.ids += 1
         message = GripperCommandActionGoal(goal_id=GoalID(id="goal_%d" % self.ids))
         message.goal.command.position, message.goal.command.max_effort = position, max_effort
-        self.ros.inboxes["/robot/hand/gripper_cmd/goal"].put(message)
+        self.ros.subscriptions["/robot/hand/gripper_cmd/goal"].put(message)
 
     def run(self, seconds):
         for _ in range(round(seconds / DT)):
@@ -111,7 +111,7 @@ def test_a_cancelled_goal_holds_where_the_finger_is():
     gripper = Gripper(PositionGripperActionController)
     gripper.goal(-9.0)
     gripper.run(0.01)
-    gripper.ros.inboxes["/robot/hand/gripper_cmd/cancel"].put(GoalID(id="goal_1"))
+    gripper.ros.subscriptions["/robot/hand/gripper_cmd/cancel"].put(GoalID(id="goal_1"))
     gripper.run(DT)
     where = gripper.hardware.command[POSITION][0]
     gripper.run(0.5)

@@ -32,7 +32,7 @@ class Running:
             self.controller.starting(self.time_s)
 
     def send(self, message):
-        self.ros.inboxes["/robot/arm/command"].put(message)
+        self.ros.subscriptions["/robot/arm/command"].put(message)
 
     def run(self, ticks=1, step=True):
         for _ in range(ticks):

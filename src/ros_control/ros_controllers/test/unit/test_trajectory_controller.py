@@ -50,8 +50,8 @@ class Arm:
             self.time += DT
             self.controller.update(self.time, DT)
 
-    def inbox(self, name):
-        return self.ros.inboxes["%s/%s" % (NS, name)]
+    def topic(self, name):
+        return self.ros.subscriptions["%s/%s" % (NS, name)]
 
     def sent(self, name):
         return self.ros.publishers["%s/%s" % (NS, name)].messages
@@ -65,7 +65,7 @@ class Arm:
         message.goal.path_tolerance = [JointTolerance(*row) for row in path]
         message.goal.goal_tolerance = [JointTolerance(*row) for row in at_goal]
         message.goal.goal_time_tolerance = rospy.Duration.from_sec(goal_time_s)
-        self.inbox("follow_joint_trajectory/goal").put(message)
+        self.topic("follow_joint_trajectory/goal").put(message)
         return message.goal_id.id
 
     @property
@@ -235,7 +235,7 @@ def test_wrong_topic_commands_are_reported_and_change_nothing(message):
     arm = Arm()
     arm.goal(trajectory((0.1, [1.0, 1.0])))
     arm.tick()
-    arm.inbox("command").put(message)
+    arm.topic("command").put(message)
     arm.tick(0.2)
     assert len(arm.log.of("error")) == 1 and "/robot/arm/command: trajectory ignored" in arm.log.of("error")[0]
     assert arm.results == [("goal 1", GoalStatus.SUCCEEDED, R.SUCCESSFUL)]
@@ -279,7 +279,7 @@ def test_goal_is_rejected_while_the_controller_does_not_run():
 
 def test_commands_from_before_the_start_do_not_count():
     arm = Arm(start=False)
-    arm.inbox("command").put(trajectory((0.1, [1.0, 1.0])))
+    arm.topic("command").put(trajectory((0.1, [1.0, 1.0])))
     arm.controller.starting(arm.time)
     arm.tick(0.2)
     np.testing.assert_array_equal(arm.hardware.position, [0.0, 0.0])
@@ -287,7 +287,7 @@ def test_commands_from_before_the_start_do_not_count():
 
 def test_part_of_the_joints_where_that_is_allowed():
     arm = Arm(allow_partial_joints_goal=True)
-    arm.inbox("command").put(trajectory((1.0, [1.0, 1.0])))
+    arm.topic("command").put(trajectory((1.0, [1.0, 1.0])))
     arm.tick(0.5)
     arm.goal(trajectory((0.1, [0.0]), names=["elbow"]))
     arm.tick(0.2)
@@ -354,7 +354,7 @@ def test_topic_command_preempts_the_goal():
     arm = Arm()
     arm.goal(trajectory((1.0, [1.0, 1.0])))
     arm.tick(0.1)
-    arm.inbox("command").put(trajectory((0.1, [0.0, 0.0])))
+    arm.topic("command").put(trajectory((0.1, [0.0, 0.0])))
     arm.tick(0.2)
     assert arm.results == [("goal 1", GoalStatus.PREEMPTED, R.SUCCESSFUL)]
     np.testing.assert_allclose(arm.hardware.position, [0.0, 0.0], atol=1e-12)
@@ -364,7 +364,7 @@ def test_cancel_stops_the_joints_where_they_are():
     arm = Arm()
     goal_id = arm.goal(trajectory((1.0, [1.0, 1.0])))
     arm.tick(0.5)
-    arm.inbox("follow_joint_trajectory/cancel").put(GoalID(id=goal_id))
+    arm.topic("follow_joint_trajectory/cancel").put(GoalID(id=goal_id))
     arm.tick()
     here = arm.hardware.position.copy()
     arm.tick(0.5)
@@ -377,7 +377,7 @@ def test_cancel_with_a_stop_duration_runs_out_smoothly():
     arm = Arm(stop_trajectory_duration=0.4)
     goal_id = arm.goal(trajectory((1.0, [1.0, 1.0])))
     arm.tick(0.5)
-    arm.inbox("follow_joint_trajectory/cancel").put(GoalID(id=goal_id))
+    arm.topic("follow_joint_trajectory/cancel").put(GoalID(id=goal_id))
     velocities = []
     for _ in range(250):
         arm.tick()
@@ -392,7 +392,7 @@ def test_cancel_of_an_old_goal_does_not_matter():
     arm.tick(0.1)
     arm.goal(trajectory((0.1, [1.0, 1.0])))
     arm.tick()
-    arm.inbox("follow_joint_trajectory/cancel").put(GoalID(id=first))
+    arm.topic("follow_joint_trajectory/cancel").put(GoalID(id=first))
     arm.tick(0.2)
     assert arm.results[1:] == [("goal 2", GoalStatus.SUCCEEDED, R.SUCCESSFUL)]
 
@@ -402,7 +402,7 @@ def test_topic_command_without_points_stops_whatever_the_names(names):
     arm = Arm()
     arm.goal(trajectory((1.0, [1.0, 1.0])))
     arm.tick(0.5)
-    arm.inbox("command").put(trajectory(names=names))
+    arm.topic("command").put(trajectory(names=names))
     arm.tick(0.5)
     np.testing.assert_allclose(arm.hardware.position, [0.5, 0.5], atol=0.01)
     assert arm.results == [("goal 1", GoalStatus.PREEMPTED, R.SUCCESSFUL)]
@@ -434,7 +434,7 @@ def test_stopping_cancels_the_goal():
 
 def test_state_says_desired_actual_and_error_of_the_same_tick():
     arm = Arm(lag=0.9)
-    arm.inbox("command").put(trajectory((1.0, [1.0, 0.5])))
+    arm.topic("command").put(trajectory((1.0, [1.0, 0.5])))
     arm.tick(0.5)
     state = arm.sent("state")[-1]
     assert state.joint_names == JOINTS
@@ -468,7 +468,7 @@ def test_feedback_comes_while_a_goal_is_active():
 def test_query_tells_the_desired_state_at_a_time():
     arm = Arm()
     query = arm.ros.services[NS + "/query_state"]
-    arm.inbox("command").put(trajectory((1.0, [1.0, 2.0])))
+    arm.topic("command").put(trajectory((1.0, [1.0, 2.0])))
     arm.tick(0.1)
 
     def ask(time):

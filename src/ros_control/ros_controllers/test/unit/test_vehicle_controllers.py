@@ -44,7 +44,8 @@ class Vehicle:
         return self
 
     def send(self, linear, angular=0.0):
-        self.ros.inboxes["/robot/base/cmd_vel"].put(Twist(linear=Vector3(linear, 0, 0), angular=Vector3(0, 0, angular)))
+        self.ros.subscriptions["/robot/base/cmd_vel"].put(
+            Twist(linear=Vector3(linear, 0, 0), angular=Vector3(0, 0, angular)))
 
     def command(self, joint, interface=VELOCITY):
         return self.hardware.command[interface][self.hardware.joint_names.index(joint)]

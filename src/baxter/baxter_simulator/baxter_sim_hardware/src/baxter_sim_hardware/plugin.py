@@ -150,8 +150,8 @@ class BaxterPlugin(ModelPlugin):
                     hz = rate if row.rate == interface.JOINT_STATE_RATE else row.rate
                     self._publishing.add(row.rate, hz, function, component, context.publisher(name, message))
                 else:
-                    queue = context.queue(name, message, QUEUE_DEPTH)
-                    self._handling.add(queue, order.index(row.key), row.key, component, function)
+                    subscription = context.subscription(name, message, QUEUE_DEPTH)
+                    self._handling.add(subscription, order.index(row.key), row.key, component, function)
 
     def _set_joint_state_rate(self, hz):
         self._publishing.set_rate(interface.JOINT_STATE_RATE, hz)
@@ -162,9 +162,9 @@ class BaxterPlugin(ModelPlugin):
         self._before = self._model.read_joints()
         arm, measured = self._arm_index, self._baxter.measured
         measured.time_s, measured.position, measured.velocity = time_s, self._before[0][arm], self._before[1][arm]
-        queues = self.context.pending()
-        if queues:
-            self._handling.handle(queues, time_s)
+        pending = self.context.pending()
+        if pending:
+            self._handling.handle(pending, time_s)
         self._collision.update(time_s, self._baxter.state.enabled)
         self._gravity_ticks -= 1
         if self._gravity_ticks <= 0 or self._baxter.moves_by_gravity:

@@ -43,7 +43,7 @@ class Lab:
 
     Arrays over the 14 arm joints are in the order of NAMES.
     ``ros``: its ``loop_ros.testing.FakeRos``. Nobody listens to the screen, whose pictures would fill the memory.
-    ``inboxes``, ``outboxes``, ``services``: {name as the plugin says it: its inboxes, publishers, services}.
+    ``subscriptions``, ``publishers``, ``services``: by the name that the plugin gives them.
     """
 
     def __init__(self, robot, pose="neutral", parameters=None, angles=None, meshes=False):
@@ -72,11 +72,11 @@ class Lab:
     # -- what tests do with it
 
     @property
-    def inboxes(self):
-        return _own(self.ros.inboxes)
+    def subscriptions(self):
+        return _own(self.ros.subscriptions)
 
     @property
-    def outboxes(self):
+    def publishers(self):
         return _own(self.ros.publishers)
 
     @property
@@ -89,7 +89,7 @@ class Lab:
         return self.ros.faults.noted
 
     def send(self, topic, message):
-        self.ros.inboxes[self.context.resolve(topic)].put(message)
+        self.ros.subscriptions[self.context.resolve(topic)].put(message)
 
     def enable(self, on=True):
         self.send("set_super_enable", Bool(on))
@@ -137,7 +137,7 @@ class Lab:
         return self.model.read_joints()[1][self.arm]
 
     def last(self, topic):
-        return self.outboxes[topic].messages[-1]
+        return self.publishers[topic].messages[-1]
 
     def close(self):
         self.world.close()

@@ -48,9 +48,9 @@ def test_free_arms_touch_nothing_and_are_in_no_collision(lab):
     lab.command(POSITION, lab.position + np.tile([0.3, 0.2, -0.3, 0.3, 0.5, -0.5, 0.5], 2))
     lab.run(1.0, after=lambda lab: None)
     for side in SIDES:
-        states = lab.outboxes["limb/%s/collision_avoidance_state" % side].messages
+        states = lab.publishers["limb/%s/collision_avoidance_state" % side].messages
         assert not any(state.collision_object or state.other_arm for state in states)
-        states = lab.outboxes["limb/%s/collision_detection_state" % side].messages
+        states = lab.publishers["limb/%s/collision_detection_state" % side].messages
         assert not any(state.collision_state for state in states)
 
 

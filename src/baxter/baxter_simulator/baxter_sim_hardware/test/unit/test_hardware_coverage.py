@@ -50,10 +50,10 @@ def test_documentation_prints_the_counts(table):
 
 def test_every_published_row_comes_at_its_rate(make_lab):
     lab = make_lab()
-    times = {topic: [] for topic in lab.outboxes}
-    for topic, outbox in lab.outboxes.items():
-        outbox.has_listeners = True
-        outbox.publish = lambda message, topic=topic: times[topic].append(lab.world.time_s)
+    times = {topic: [] for topic in lab.publishers}
+    for topic, publisher in lab.publishers.items():
+        publisher.has_listeners = True
+        publisher.publish = lambda message, topic=topic: times[topic].append(lab.world.time_s)
     lab.run(2.2)
     for row in interface.TOPICS:
         if not row.is_published or row.rate == interface.LATCHED:
@@ -68,5 +68,5 @@ def test_every_published_row_comes_at_its_rate(make_lab):
 def test_latched_rows_are_published_once(make_lab):
     lab = make_lab()
     lab.run(0.5)
-    assert lab.outboxes["sim/started"].messages == [Empty()]
-    assert len(lab.outboxes["urdf"].messages) == 1
+    assert lab.publishers["sim/started"].messages == [Empty()]
+    assert len(lab.publishers["urdf"].messages) == 1

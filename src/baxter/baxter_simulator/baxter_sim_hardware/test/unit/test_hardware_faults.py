@@ -13,7 +13,7 @@ from baxter_sim_hardware.robot_state import State
 from baxter_sim_hardware.topics import interface
 from gazebo_ros.simulation import HostedPlugin, Simulation
 from loop_ros.faults import Faults
-from loop_ros.mailbox import RequestBoard
+from loop_ros.request_queue import RequestQueue
 
 TICK_S = 0.002
 INPUTS = [(row, name) for row in interface.TOPICS if not row.is_published for _, name in row.names()]
@@ -28,7 +28,7 @@ class Loop:
         self.lab, self.log = lab, lab.log
         world = SimpleNamespace(time_step_s=TICK_S, step=lab.world.step, reset_models=lab.world.reset_models,
                                 reset_time=lab.world.reset_time)
-        self.simulation = Simulation(world, RequestBoard(), lab.log, Faults(lab.log), paused=True)
+        self.simulation = Simulation(world, RequestQueue(), lab.log, Faults(lab.log), paused=True)
         self.hosted = HostedPlugin(lab.plugin, lab.context, "baxter", "libbaxter.so")
         self.simulation.host(self.hosted)
         self.simulation.tick = lab.world.tick
@@ -119,15 +119,15 @@ def test_a_message_that_cannot_be_made_leaves_the_others(loop):
             rate: (schedule, [(fail if publisher.topic == name else function, component, publisher)
                               for function, component, publisher in topics])
             for rate, (schedule, topics) in groups.items()}
-        for outbox in loop.lab.outboxes.values():
-            outbox.messages.clear()
-            outbox.has_listeners = True
+        for publisher in loop.lab.publishers.values():
+            publisher.messages.clear()
+            publisher.has_listeners = True
         loop.lab.faults.clear()
         for rate, (schedule, _) in groups.items():
             publishing.set_rate(rate, schedule.rate_hz)  # as if nothing had been published so far
         loop.run(TICK_S)
         assert [where for where, _ in loop.lab.faults] == ["publishing " + name]
-        assert [name for name in OUTPUTS if not loop.lab.outboxes[name].messages] == [topic]
+        assert [name for name in OUTPUTS if not loop.lab.publishers[name].messages] == [topic]
     assert loop.hosted.failures == 0
 
 
@@ -151,7 +151,7 @@ def test_a_tick_that_raises_brings_the_arms_to_rest_and_the_robot_goes_on(loop, 
     assert np.abs(path[-1] - path[len(path) // 2]).max() < 1e-3
     assert loop.state() == ENABLED
     assert loop.obeys(by=-0.05)
-    assert len(lab.outboxes["sim/started"].messages) == 1
+    assert len(lab.publishers["sim/started"].messages) == 1
 
 
 def test_a_resting_robot_does_not_move_when_it_begins_anew(loop, monkeypatch):

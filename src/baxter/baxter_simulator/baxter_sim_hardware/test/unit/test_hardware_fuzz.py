@@ -81,8 +81,8 @@ def test_any_message_is_taken_or_refused_and_the_robot_obeys_after(lab, seed):
         if rng.random() < 0.1:
             lab.send("set_super_reset", Empty())
             lab.send("set_super_enable", Bool(True))
-    for _, outbox in lab.outboxes.items():
-        for message in outbox.messages[-1:]:
+    for _, publisher in lab.publishers.items():
+        for message in publisher.messages[-1:]:
             buffer = io.BytesIO()
             message.serialize(buffer)
             assert len(buffer.getvalue()) < 2 * 10**6

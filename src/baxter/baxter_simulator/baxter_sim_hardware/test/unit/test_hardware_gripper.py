@@ -183,7 +183,7 @@ def test_holds_from_inside_what_stands_around_its_fingers(lab):
 
 def test_flags_stay_while_something_is_held(lab):
     hold_box(lab)
-    seen = lab.outboxes["end_effector/left_gripper/state"].messages
+    seen = lab.publishers["end_effector/left_gripper/state"].messages
     del seen[:]
     lab.run(2.0)
     assert {(message.gripping, message.moving, message.missed) for message in seen} == {(1, 0, 0)}

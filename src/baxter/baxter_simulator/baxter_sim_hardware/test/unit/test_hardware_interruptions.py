@@ -137,15 +137,15 @@ PAIRS = [(motion, interruption) for motion in MOTIONS for interruption in INTERR
 
 def as_new(lab):
     # Making messages for nobody takes most of a tick.
-    for topic, outbox in lab.outboxes.items():
-        outbox.has_listeners = topic == "state"
+    for topic, publisher in lab.publishers.items():
+        publisher.has_listeners = topic == "state"
     lab.plugin._robot.press_estop(False)
     lab.send("set_super_reset", Empty())
     lab.run(0.01)
     reset_world(lab)
-    for inbox in lab.inboxes.values():
-        for queue in inbox.boxes:
-            queue.drain()
+    for subscribed in lab.subscriptions.values():
+        for subscription in subscribed.all:
+            subscription.drain()
     lab.enable()
     lab.run(0.05)
     assert lab.last("state").enabled

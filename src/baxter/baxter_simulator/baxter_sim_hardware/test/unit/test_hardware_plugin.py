@@ -24,7 +24,7 @@ FINGERS = tuple("%s_gripper_%s_finger_joint" % (hand, finger) for hand in "lr" f
 
 def intervals(lab, topic):
     """Time between messages [s]; the first may be shorter, because the grid of a rate does not begin at the spawn."""
-    return np.diff([time_s for time_s, _ in lab.outboxes[topic].timed])
+    return np.diff([time_s for time_s, _ in lab.publishers[topic].timed])
 
 
 @pytest.mark.parametrize("mode, parameters, most_ticks", [
@@ -51,21 +51,21 @@ def test_rates_are_exact(make_lab):
     np.testing.assert_allclose(intervals(lab, "joint_states")[1:], 0.02, atol=1e-9)
     for topic in ("state", "limb/left/endpoint_state", "limb/right/gravity_compensation_torques"):
         np.testing.assert_allclose(intervals(lab, topic)[1:], 0.01, atol=1e-9)
-    assert len(lab.outboxes["sim/started"].messages) == 1
+    assert len(lab.publishers["sim/started"].messages) == 1
 
 
 def test_every_row_of_the_table_is_opened(make_lab):
     lab = make_lab()
     for row in interface.TOPICS:
         for _, name in row.names():
-            assert name in (lab.outboxes if row.is_published else lab.inboxes)
+            assert name in (lab.publishers if row.is_published else lab.subscriptions)
 
 
 @pytest.mark.parametrize("rate", [100, 500])
 def test_joint_state_rate_parameter_and_topic(make_lab, rate):
     lab = make_lab(parameters={"joint_state_rate": rate})
     lab.run(1.0)
-    assert len(lab.outboxes["joint_states"].messages) == pytest.approx(rate, abs=1)
+    assert len(lab.publishers["joint_states"].messages) == pytest.approx(rate, abs=1)
     lab.send("joint_state_publish_rate", UInt16(20))
     lab.run(1.0)
     np.testing.assert_allclose(intervals(lab, "joint_states")[-10:], 0.05, atol=1e-9)
@@ -104,7 +104,7 @@ def test_first_joint_state_is_the_start_pose(make_lab):
         "right": (-0.272659, 1.047, -0.00123203, 0.49262, -0.0806423, -0.0620532, 0.0265941)}
     lab = make_lab(pose="start")
     lab.run(0.002)
-    message = lab.outboxes["joint_states"].messages[0]
+    message = lab.publishers["joint_states"].messages[0]
     for side in SIDES:
         for joint, angle in zip(JOINTS, expected[side], strict=True):
             name = "%s_%s" % (side, joint)
@@ -114,7 +114,7 @@ def test_first_joint_state_is_the_start_pose(make_lab):
 def test_joint_states_names_and_lengths(make_lab):
     lab = make_lab()
     lab.run(0.5)
-    for message in lab.outboxes["joint_states"].messages:
+    for message in lab.publishers["joint_states"].messages:
         assert message.name == sorted(("head_pan", *FINGERS, *NAMES))
         assert len(message.name) == 19
         assert len(message.position) == len(message.velocity) == len(message.effort) == 19

@@ -138,7 +138,7 @@ def picture(width, height, encoding, value, step=None):
 
 
 def shown(lab):
-    lab.outboxes["sim/screen"].has_listeners = True
+    lab.publishers["sim/screen"].has_listeners = True
     lab.run(0.2)
     message = lab.last("sim/screen")
     assert (message.width, message.height, message.encoding) == (1024, 600, "rgb8")
@@ -296,13 +296,13 @@ FRAGMENT = '<robot name="tool"><link name="tool"/></robot>'
 
 def test_a_urdf_fragment_is_passed_on_once(make_lab):
     lab = make_lab()
-    sent = lab.outboxes["urdf"].messages
+    sent = lab.publishers["urdf"].messages
     assert len(sent) == 1 and sent[0].link == ""
     fragment = URDFConfiguration(Time(3), "left_hand", "left_gripper_base", FRAGMENT)
     for _ in range(5):
         lab.send("urdf", fragment)
         lab.run(0.01)
-    assert lab.outboxes["urdf"].messages[1:] == [fragment]
+    assert lab.publishers["urdf"].messages[1:] == [fragment]
 
 
 @pytest.mark.parametrize("link, joint, xml, reason", [
@@ -312,4 +312,4 @@ def test_a_senseless_urdf_fragment_is_refused(make_lab, link, joint, xml, reason
     lab = make_lab()
     lab.send("urdf", URDFConfiguration(Time(3), link, joint, xml))
     lab.run(0.01)
-    assert reason in lab.log.lines[-1] and len(lab.outboxes["urdf"].messages) == 1
+    assert reason in lab.log.lines[-1] and len(lab.publishers["urdf"].messages) == 1

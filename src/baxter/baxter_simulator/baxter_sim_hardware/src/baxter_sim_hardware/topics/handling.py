@@ -5,29 +5,29 @@ from baxter_sim_hardware.errors import CommandRefused
 
 
 class Handling:
-    """The queues of the topics that the robot subscribes to, and their handlers."""
+    """The robot's subscriptions and their handlers."""
 
     def __init__(self, warnings):
         """warnings: `warnings.Warnings`, for messages that are refused."""
         self._warnings = warnings
-        self._topics = {}  # queue -> (place in the order of handling, key of the row, component, handler)
+        self._topics = {}  # subscription -> (place in the order of handling, key of the row, component, handler)
 
-    def add(self, queue, place, key, component, handler):
+    def add(self, subscription, place, key, component, handler):
         """Have ``handler(component, message, time_s)`` called; within a tick those of a lower place come first."""
-        self._topics[queue] = place, key, component, handler
+        self._topics[subscription] = place, key, component, handler
 
-    def handle(self, queues, time_s):
-        """Handle all messages in those queues at time_s [s]; a refusal is logged."""
-        for queue in sorted(queues, key=lambda queue: self._topics[queue][0]):
-            for message in queue.drain():
-                queue.guarded(self._call, queue, message, time_s)
+    def handle(self, pending, time_s):
+        """Handle all messages of those subscriptions at time_s [s]; a refusal is logged."""
+        for subscription in sorted(pending, key=lambda subscription: self._topics[subscription][0]):
+            for message in subscription.drain():
+                subscription.guarded(self._call, subscription, message, time_s)
 
-    def drop(self, queues):
-        """Forget all messages in those queues; returns the keys of the rows that had some."""
-        return [self._topics[queue][1] for queue in queues if queue.drain()]
+    def drop(self, pending):
+        """Drop all messages of those subscriptions; returns the keys of the rows that had some."""
+        return [self._topics[subscription][1] for subscription in pending if subscription.drain()]
 
-    def _call(self, queue, message, time_s):
-        _, key, component, handler = self._topics[queue]
+    def _call(self, subscription, message, time_s):
+        _, key, component, handler = self._topics[subscription]
         try:
             handler(component, message, time_s)
         except CommandRefused as refusal:

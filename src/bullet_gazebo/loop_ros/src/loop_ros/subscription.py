@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What comes in on a topic waits here for the loop. ROS-free."""
+import collections
+
+from loop_ros.faults import SURVIVED
+
+
+def _raise(error):
+    raise error
+
+
+class Subscription:
+    """Unread messages of a topic: any thread puts them in, the loop takes them out.
+
+    It keeps the newest ``depth`` messages. With the depth of 1 only the newest message counts.
+    """
+
+    #: Called once, when the subscription is closed.
+    on_close = None
+
+    def __init__(self, depth=1, notice=lambda: None, on_fault=_raise):
+        """``notice()`` is called for each message that comes in, in the thread that brings it; ``on_fault(error)`` for
+        each that :meth:`guarded` drops. Raises ValueError for a depth below 1."""
+        if depth < 1:
+            raise ValueError("the depth of a subscription is %r, expected at least 1" % (depth,))
+        #: Messages since the start; read by the lock-step service.
+        self.delivered = 0
+        self._notice = notice
+        self._on_fault = on_fault
+        # Append and pop of a deque are atomic: no message is lost between the threads.
+        self._unread = collections.deque(maxlen=depth)
+
+    def put(self, message):
+        """Any thread: add a message; beyond the depth, the oldest is dropped."""
+        self._unread.append(message)
+        # Before it counts as delivered: a lock-step request that waited for it goes on from there.
+        self._notice()
+        self.delivered += 1
+
+    def take(self):
+        """Loop thread: the newest unread message, or None; older ones are dropped."""
+        messages = self.drain()
+        return messages[-1] if messages else None
+
+    def drain(self):
+        """Loop thread: all unread messages, oldest first."""
+        if not self._unread:
+            return []  # nearly always, and a robot has a hundred subscriptions
+        messages = []
+        while self._unread:
+            messages.append(self._unread.popleft())
+        return messages
+
+    def handle(self, handler):
+        """Loop thread: :meth:`guarded` for each unread message, oldest first."""
+        for message in self.drain():
+            self.guarded(handler, message)
+
+    def guarded(self, handler, *arguments):
+        """Loop thread: call ``handler(*arguments)`` for one message; what it raises is counted and not passed on."""
+        try:
+            handler(*arguments)
+        except SURVIVED as error:
+            self._on_fault(error)
+
+    def close(self):
+        """End the subscription and drop what is unread."""
+        ended, self.on_close = self.on_close, None
+        if ended is not None:
+            ended()
+        self._unread.clear()
