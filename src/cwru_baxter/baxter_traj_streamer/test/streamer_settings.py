@@ -4,7 +4,7 @@ import pathlib
 
 import yaml
 
-from baxter_traj_streamer.settings import Settings
+from baxter_traj_streamer.settings import StreamerSettings
 
 _PACKAGE = pathlib.Path(__file__).resolve().parents[1]
 
@@ -17,4 +17,4 @@ DEFAULTS, AS_IN_NOTES = (read(_PACKAGE / "config" / name) for name in ("streamer
 
 
 def make_settings(**overrides):
-    return Settings(DEFAULTS, overrides)
+    return StreamerSettings(DEFAULTS, overrides)

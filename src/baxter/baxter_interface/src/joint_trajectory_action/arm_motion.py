@@ -25,7 +25,7 @@ class Mode(enum.Enum):
     POSITION_WITH_DYNAMICS = "position_w_id"
 
 
-class Settings(NamedTuple):
+class GoalDefaults(NamedTuple):
     """What a goal is measured by unless it says so itself; n joints.
 
     ``path``, ``goal`` (n,): position errors allowed on the way and at the end [rad]; ``stopped_velocity`` [rad/s];
@@ -82,7 +82,7 @@ class ArmMotion:
         """Follow ``command`` (:class:`joint_trajectory.Command`) from ``now_s`` [s] on.
 
         ``position`` (n,): measured [rad]; ``goal``: any object. ``wanted``: the goal's own
-        :class:`joint_trajectory.GoalTolerances`, which override ``settings`` (:class:`Settings`). Joints that the
+        :class:`joint_trajectory.GoalTolerances`, which override ``settings`` (:class:`GoalDefaults`). Joints that the
         command does not name are left alone, or go on with what they were told before. The goal before is forgotten:
         say so to its owner.
 

@@ -34,7 +34,7 @@ from joint_trajectory import (
     tolerances_of,
 )
 
-from .arm_motion import LIMIT_SLACK_RAD, ArmMotion, Mode, Settings
+from .arm_motion import LIMIT_SLACK_RAD, ArmMotion, GoalDefaults, Mode
 from .robot_watch import RobotWatch
 
 # How often an idle server looks whether the robot is still there [s, wall].
@@ -201,7 +201,7 @@ class JointTrajectoryActionServer:
         before = self._motion.goal
         try:
             replacement = self._motion.begin(
-                command, now_s, self._measured()[0], handle, Settings.from_config(self._config.config, self._names),
+                command, now_s, self._measured()[0], handle, GoalDefaults.from_config(self._config.config, self._names),
                 tolerances_of(goal))
         except TrajectoryError as error:
             return self._refuse(handle, error)

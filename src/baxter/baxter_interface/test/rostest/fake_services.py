@@ -23,7 +23,7 @@ from std_msgs.msg import Empty, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 
-from baxter_sim_hardware.sensing.cameras import CameraRefused, Rack, Settings
+from baxter_sim_hardware.sensing.cameras import CameraRefused, CaptureSettings, Rack
 
 RATE_HZ = 20.0
 SIDES = ("left", "right")
@@ -141,7 +141,7 @@ class FakeServices:
             return errno.ENODEV
         asked = request.settings
         try:
-            self._rack.open_camera(request.name, Settings(
+            self._rack.open_camera(request.name, CaptureSettings(
                 asked.width, asked.height, asked.fps, {control.id: control.value for control in asked.controls}))
         except CameraRefused as refusal:
             return refusal.code

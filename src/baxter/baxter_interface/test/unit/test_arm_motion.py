@@ -5,7 +5,7 @@ import pytest
 
 from baxter_interface import parameter_tables
 from joint_trajectory import BeyondPosition, Command, GoalTolerances, Limits, Outcome
-from joint_trajectory_action.arm_motion import STOP_DURATION_S, ArmMotion, Mode, Settings
+from joint_trajectory_action.arm_motion import STOP_DURATION_S, ArmMotion, GoalDefaults, Mode
 
 NAMES = ["left_%s" % joint for joint in ("s0", "s1", "e0")]
 PERIOD = 0.01
@@ -20,7 +20,7 @@ class Arm:
     def __init__(self, mode=Mode.POSITION_WITH_DYNAMICS, **changes):
         self.mode = mode
         self.motion = ArmMotion(NAMES, mode, PERIOD, LIMITS)
-        self.settings = Settings.from_config(
+        self.settings = GoalDefaults.from_config(
             {**{p.name: p.default for p in TABLES[mode]}, **changes}, NAMES)
         self.position, self.velocity = np.zeros(3), np.zeros(3)
         self.stuck = np.zeros(3, dtype=bool)

@@ -9,7 +9,7 @@ from loop_ros.faults import Faults
 
 
 def test_diagnostics_tell_what_was_dropped_and_which_plugin_failed():
-    hosted = SimpleNamespace(label="libbrain.so", model_name="baxter", failures=0, last_error="", has_failed=False)
+    hosted = SimpleNamespace(label="libpanel.so", model_name="baxter", failures=0, last_error="", has_failed=False)
     simulation = SimpleNamespace(step_s=0.002, tick=0, time_ns=0, plugins=[hosted])
     sent, faults = [], Faults(SimpleNamespace(error=lambda text: None))
     publisher = SimpleNamespace(has_listeners=True, publish=sent.append)
@@ -28,6 +28,6 @@ def test_diagnostics_tell_what_was_dropped_and_which_plugin_failed():
     assert (pair.key, pair.value) == ("/robot/command", "1, the newest: ValueError: wrong")
     hosted.failures, hosted.has_failed = 3, True
     plugin = diagnostics.statuses()[1]
-    assert plugin.level == DiagnosticStatus.ERROR and "libbrain.so of baxter" in plugin.name
+    assert plugin.level == DiagnosticStatus.ERROR and "libpanel.so of baxter" in plugin.name
     assert {pair.key: pair.value for pair in plugin.values} == {"failures": "3",
                                                                 "newest": "update() raised ValueError: x"}

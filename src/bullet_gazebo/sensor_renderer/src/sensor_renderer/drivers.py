@@ -47,7 +47,7 @@ class Topic:
             publisher.unregister()
 
 
-class Settings:
+class ReconfigureServer:
     """Numbers that dynamic_reconfigure's clients read and change; closed like a topic."""
 
     #: Nothing of this asks for a picture.
@@ -92,7 +92,7 @@ class ColourTopics:
         self.compressed = Topic(image_topic + "/compressed", CompressedImage)
         self.infos = [Topic(name, CameraInfo) for name in info_topics]
         self._quality = convert.JPEG_QUALITY
-        settings = Settings(image_topic + "/compressed", [
+        settings = ReconfigureServer(image_topic + "/compressed", [
             Setting("jpeg_quality", self._quality, 1, 100, "of the pictures, in percent")], self._apply)
         self.all = [self.image, self.compressed, *self.infos, settings]
 
@@ -137,7 +137,7 @@ class Driver:
         def apply(values):
             self._pace.rate = values["imager_rate"]
 
-        return Settings(self.name(camera_name), [
+        return ReconfigureServer(self.name(camera_name), [
             Setting("imager_rate", self._pace.rate, 0.0, _FASTEST_HZ, "pictures a second [Hz]; 0: one of every state")],
             apply)
 

@@ -48,7 +48,7 @@ def judge(joint_names, points, limits, measured, settings):
     points: rows of (time from start [s], positions, velocities, accelerations), the latter two may be empty. With
     positions only and all times 0 the times are up to us: as short as the limits allow.
     limits: {joint: JointLimit}; measured: {joint: angle [rad]} or None: the robot may yet move, so leave the start
-    unjudged, from then on at the first point. settings: :class:`~.settings.Settings`.
+    unjudged, from then on at the first point. settings: :class:`~.settings.StreamerSettings`.
     """
     names = tuple(joint_names) or RIGHT_ARM
     if settings.joints == "right_arm":

@@ -9,7 +9,7 @@ import yaml
 import urdf_model
 
 from .judging import KNOWN_JOINTS, JointLimit
-from .settings import Settings, SettingsError
+from .settings import SettingsError, StreamerSettings
 
 # Parameters of this name override config/streamer.yaml.
 NAMESPACE = "/baxter_traj_streamer"
@@ -19,7 +19,7 @@ def read_settings(changes=None):
     """Settings from config/streamer.yaml; ``changes``, another file there, and the parameters below NAMESPACE override
     it. Raises SettingsError."""
     overrides = {**(_read(changes) if changes else {}), **rospy.get_param(NAMESPACE, {})}
-    return Settings(_read("streamer.yaml"), overrides)
+    return StreamerSettings(_read("streamer.yaml"), overrides)
 
 
 def _read(name):

@@ -26,7 +26,7 @@ def arm_joint_names(side):
     return list(baxter_model.joint_names(side))
 
 
-class Settings:
+class StreamerSettings:
     """The checked content of streamer.yaml as attributes of the same names.
 
     defaults: that content; overrides: dict with some of the same keys. Raises SettingsError.

@@ -144,9 +144,9 @@ def test_gripper_argument_wins_over_the_switch(expand):
 
 
 def test_brain_and_sensors_come_with_the_simulator_only(expand):
-    brains = [plugin for element in expand().gazebo for plugin in element.findall("plugin")]
-    assert [plugin.get("filename") for plugin in brains] == ["libbaxter_gazebo_ros_control.so"]
-    assert brains[0].findtext("robotNamespace") == "/robot"
+    plugins = [plugin for element in expand().gazebo for plugin in element.findall("plugin")]
+    assert [plugin.get("filename") for plugin in plugins] == ["libbaxter_gazebo_ros_control.so"]
+    assert plugins[0].findtext("robotNamespace") == "/robot"
     sensors = [sensor for element in expand(kinect="true").gazebo for sensor in element.findall("sensor")]
     assert {sensor.get("name"): sensor.find("plugin").get("filename") for sensor in sensors} == {
         "left_hand_camera": "libbaxter_camera.so", "right_hand_camera": "libbaxter_camera.so",

@@ -14,7 +14,7 @@ from baxter_model import BASE_FRAME, SIDES, poses, tip_of
 from baxter_sim_kinematics.chain import Chain
 from baxter_sim_kinematics.errors import KinematicsError, NoSolution
 from baxter_sim_kinematics.ik import solve_all
-from baxter_sim_kinematics.reach import Settings, compute, yoshikawa
+from baxter_sim_kinematics.reach import MapSettings, compute, yoshikawa
 from baxter_sim_kinematics.target import Target, pose_from_quaternion
 from urdf_model import UrdfError, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
@@ -206,7 +206,7 @@ def _reach(options):
     _, chain = _chain(options)
     volume = options.volume
     geometry = [*np.concatenate([part.ravel() for part in (*chain.arrays[:2], *chain.limit_arrays)]).round(6).tolist()]
-    settings = Settings(tuple(volume[0::2]), tuple(volume[1::2]), options.cell, options.orientations,
+    settings = MapSettings(tuple(volume[0::2]), tuple(volume[1::2]), options.cell, options.orientations,
                         None if options.tool is None else tuple(options.tool), options.starts,
                         "%s to %s, %s" % (chain.base, chain.tip, geometry))
     if options.jobs < 1:

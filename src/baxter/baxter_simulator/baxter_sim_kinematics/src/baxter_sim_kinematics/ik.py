@@ -8,9 +8,9 @@ import numpy as np
 from baxter_sim_kinematics import kernels
 from baxter_sim_kinematics.budget import USUAL
 from baxter_sim_kinematics.collision import first_free
+from baxter_sim_kinematics.diagnosis import beyond_reach, explain
 from baxter_sim_kinematics.search import APART, Collection, IkResult, Search
 from baxter_sim_kinematics.target import Target
-from baxter_sim_kinematics.verdict import beyond_reach, explain
 
 
 def solve(chain, target, seed, *, posture=None, budget=USUAL, checker=None):

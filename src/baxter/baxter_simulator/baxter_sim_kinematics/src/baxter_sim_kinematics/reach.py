@@ -27,7 +27,7 @@ class ReachError(KinematicsError):
 
 
 @dataclass(frozen=True)
-class Settings:
+class MapSettings:
     """What a map depends on. lower, upper: corners (3,) of the volume [m, base frame]; cell_m: edge of a cell;
     orientations: how many are tried in each; tool: (3,) the direction of the tip's z axis [base frame] if only turns
     about that count, else None; starts: of each search; chain: whatever tells one arm from another."""

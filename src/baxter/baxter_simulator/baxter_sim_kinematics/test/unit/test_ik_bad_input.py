@@ -23,7 +23,7 @@ from baxter_sim_kinematics import (
     solve_batch,
 )
 from baxter_sim_kinematics.commands import _robot
-from baxter_sim_kinematics.reach import ReachError, Settings, compute
+from baxter_sim_kinematics.reach import MapSettings, ReachError, compute
 from urdf_model import UrdfError, parse_urdf
 from urdf_model.transforms import rigid, rpy_matrix
 
@@ -144,7 +144,7 @@ def test_xacro_that_does_not_expand_is_named(tmp_path):
 def settings(**changes):
     values = {"lower": (0.5, 0.0, 0.0), "upper": (0.9, 0.2, 1.0), "cell_m": 0.1, "orientations": 1, "tool": None,
               "starts": 2, "chain": "left"}
-    return Settings(**{**values, **changes})
+    return MapSettings(**{**values, **changes})
 
 
 @pytest.mark.parametrize("change, text", [

@@ -137,7 +137,7 @@ def test_map_of_a_planar_arm_is_the_ring_that_it_should_be(tmp_path):
     chain = Chain("base", "tip", [("j%d" % i, "continuous", "l%d" % i, rigid(np.eye(3), origin), (0, 0, 1), None, None)
                                   for i, origin in enumerate(joints)]
                   + [("end", "fixed", "tip", rigid(np.eye(3), (0, 0, 0)), (0, 0, 1), None, None)])
-    settings = reach.Settings((-1.8, -1.8, -0.1), (1.8, 1.8, 0.1), 0.2, 5, (0.0, 0.0, 1.0), 30, "ring")
+    settings = reach.MapSettings((-1.8, -1.8, -0.1), (1.8, 1.8, 0.1), 0.2, 5, (0.0, 0.0, 1.0), 30, "ring")
     share, _ = reach.compute(chain, settings, tmp_path, 2)
     radius = np.linalg.norm(settings.centres()[:, :2], axis=1).reshape(settings.shape)
     inside = (radius > 0.45) & (radius < 1.55)
@@ -149,7 +149,7 @@ def test_map_of_a_planar_arm_is_the_ring_that_it_should_be(tmp_path):
 
 def test_orientations_are_rotations_and_tools_point_where_they_should():
     for tool in (None, (0.3, -0.4, 1.0), (0, 0, -1)):
-        settings = reach.Settings((0, 0, 0), (1, 1, 1), 0.5, 30, tool, 1, "")
+        settings = reach.MapSettings((0, 0, 0), (1, 1, 1), 0.5, 30, tool, 1, "")
         for rotation in settings.rotations():
             np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
             assert np.linalg.det(rotation) == pytest.approx(1.0)

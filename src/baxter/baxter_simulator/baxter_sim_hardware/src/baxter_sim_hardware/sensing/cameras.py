@@ -36,7 +36,7 @@ class CameraRefused(HardwareError):
         self.code = code
 
 
-class Settings(NamedTuple):
+class CaptureSettings(NamedTuple):
     """How a camera is open: size [pixels], rate [Hz], and ``controls``, {id: value}; those left out are automatic."""
 
     width: int
@@ -143,7 +143,7 @@ class Rack:
         return [name for name in self._names if name in self.open or not full]
 
     def open_camera(self, name, settings):
-        """Open or re-configure a camera; returns the :class:`Settings` as they hold. Raises :class:`CameraRefused`."""
+        """Open a camera anew; returns the :class:`CaptureSettings` in force. Raises :class:`CameraRefused`."""
         self._known(name)
         if name not in self.available():
             raise CameraRefused(errno.ENODEV, "%s has no power: %s are open, and only %d cameras can be; close one"

@@ -13,7 +13,7 @@ from baxter_core_msgs.srv import (
 )
 from std_srvs.srv import Empty, EmptyResponse
 
-from baxter_sim_hardware.sensing.cameras import FLIP, MIRROR, CameraRefused, Rack, Settings
+from baxter_sim_hardware.sensing.cameras import FLIP, MIRROR, CameraRefused, CaptureSettings, Rack
 from sensor_renderer import convert
 from sensor_renderer.drivers import ColourTopics, Driver
 from sim_time.pace import Pace
@@ -76,7 +76,7 @@ class CameraServices:
 
     def _open(self, request):
         asked = request.settings
-        settings = Settings(asked.width, asked.height, asked.fps,
+        settings = CaptureSettings(asked.width, asked.height, asked.fps,
                             {control.id: control.value for control in asked.controls})
 
         def do():
@@ -127,11 +127,11 @@ class BaxterCamera(Driver):
         controls = _UPRIGHT if self.camera_name == _HEAD else {}
         if self._services.as_robot:
             self._encoding = "bgra8"
-            self.first_settings = None if self.camera_name == _HEAD else Settings(*_ROBOT_MODE, controls)
+            self.first_settings = None if self.camera_name == _HEAD else CaptureSettings(*_ROBOT_MODE, controls)
         else:
             # As the vendor's simulator: the description's own size, until a client opens the camera in another mode.
             self._encoding = camera.encoding
-            self.first_settings = Settings(pinhole.width, pinhole.height, entry.rate, controls)
+            self.first_settings = CaptureSettings(pinhole.width, pinhole.height, entry.rate, controls)
         self._services.add(self)
 
     def use(self, settings):

@@ -15,17 +15,17 @@ from sim_time.stamps import stamp
 
 from .row import STATE_RATE_HZ, Part, Topic
 
-_MAKER = {"manufacturer": "Rethink Research Robot", "product": "SDK End Effector"}
+_MANUFACTURER = {"manufacturer": "Rethink Research Robot", "product": "SDK End Effector"}
 _PROPERTIES = {
     ElectricGripper: EndEffectorProperties(
         id=ELECTRIC.id, ui_type=ELECTRIC.ui_type, serial_number="3712199347", hardware_rev="2",
         firmware_rev="3.0.0 5.5", firmware_date="2014/7/24 18:30:00", has_calibration=True, controls_grip=True,
         senses_grip=True, controls_force=True, senses_force=True, controls_position=True, senses_position=True,
-        **_MAKER),
+        **_MANUFACTURER),
     SuctionGripper: EndEffectorProperties(
-        id=SUCTION.id, ui_type=SUCTION.ui_type, controls_grip=True, senses_grip=True, **_MAKER),
+        id=SUCTION.id, ui_type=SUCTION.ui_type, controls_grip=True, senses_grip=True, **_MANUFACTURER),
     # A bare arm: the robot takes whatever may hang there for a tool that is passive.
-    CustomGripper: EndEffectorProperties(id=CUSTOM.id, ui_type=CUSTOM.ui_type, **_MAKER),
+    CustomGripper: EndEffectorProperties(id=CUSTOM.id, ui_type=CUSTOM.ui_type, **_MANUFACTURER),
 }
 _FLAGS = ("enabled", "calibrated", "ready", "moving", "gripping", "missed", "error", "reverse")
 _UNKNOWN = dict.fromkeys(_FLAGS, EndEffectorState.STATE_UNKNOWN)
