@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arms that the kinematics benches run on, ours and as KDL has them, and who says what they touch."""
+"""The arms that the kinematics benches run on, ours and as KDL has them, and their collision checkers."""
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -50,7 +50,7 @@ class _Ros:
 
 
 class BareWorld:
-    """The robot on the floor with nobody who drives it, as a context. Attributes ``world``, ``model``, ``robot``."""
+    """The robot on the floor without commands, as a context. Attributes ``world``, ``model``, ``robot``."""
 
     def __enter__(self):
         with contextlib.ExitStack() as stack:

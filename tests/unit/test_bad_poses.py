@@ -87,7 +87,7 @@ def test_oracle_places_the_tip_where_kdl_does(modules, arms, name):
         np.testing.assert_allclose(ours[0], [[peer[i, k] for k in range(len(q))] for i in range(6)], atol=1e-9)
 
 
-def test_oracle_finds_what_there_is_and_keeps_the_limits(modules, arms):
+def test_oracle_finds_solutions_and_keeps_the_limits(modules, arms):
     arm = arms["left arm"]
     oracle = modules["ik_oracle"].Oracle(arm.robot, arm.chain.base, arm.chain.tip, METRES_PER_RADIAN, 100)
     rng = np.random.default_rng(13)

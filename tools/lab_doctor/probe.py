@@ -18,7 +18,7 @@ from lab_doctor.checks import SIMULATOR_TOPICS, is_loopback
 from lab_doctor.facts import Facts, Listener, Master, OtherMaster, PythonFacts, Topics
 
 DEADLINE_S = 15.0
-# What takes longer than this is named to the one who waits.
+# A check that takes longer than this is named on the terminal.
 PATIENCE_S = 4.0
 CALL_TIMEOUT_S = 1.0
 CALLER_ID = "/lab_doctor"

@@ -14,7 +14,7 @@ def pytest_addoption(parser):
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config, items):
     file = config.getoption("--leave-out-long")
-    # Who writes -m says by it which marks run.
+    # With -m the caller says which marks run.
     if file is None or config.option.markexpr:
         return
     left_out = [item for item in items if item.get_closest_marker("long")]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A share of one processor core for this process and everything it starts: a CPU quota by control group, v1 or v2.
 
-Busy loops beside a program slow it less than one expects: whoever sleeps most of the time goes first. A quota does not
-care who waits. See https://docs.kernel.org/admin-guide/cgroup-v2.html and .../cgroup-v1/cpusets.html (cpu.cfs_*).
+Busy loops beside a program slow it less than one expects: the scheduler prefers processes that sleep most of the time.
+A quota does not. See https://docs.kernel.org/admin-guide/cgroup-v2.html and .../cgroup-v1/cpusets.html (cpu.cfs_*).
 """
 
 import contextlib

@@ -51,7 +51,7 @@ def run(
     ending: threading.Event | None = None,
     stretch: float = 1.0,
 ):
-    """Run it and return a Tally. work_folder is emptied first; logs and results stay in it for who wants to look.
+    """Run it and return a Tally. work_folder is emptied first; logs and results stay in it.
 
     Where `ending` is given and becomes set, the test is stopped and Ended is raised. stretch: what all time limits,
     those in the file too, are multiplied with, because the processes get only a part of the machine.

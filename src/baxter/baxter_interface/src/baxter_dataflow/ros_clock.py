@@ -7,7 +7,7 @@ import rospy
 
 from .waiting import Stopwatch
 
-# A simulation that runs ticks hundreds of times a second; longer silence is worth a word to the one who waits.
+# A simulation that runs ticks hundreds of times a second; longer silence is worth a line in the log.
 STALL_NOTICE_S = 5.0
 # How often a sleeper looks up although the clock did not tick, to notice a shutdown [s, wall].
 LOOK_UP_S = 0.2

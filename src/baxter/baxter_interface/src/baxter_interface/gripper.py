@@ -41,7 +41,7 @@ class Gripper:
         self.set_parameters(defaults=True)
 
     def version_check(self):
-        """Tell whether the firmware of an electric gripper fits this SDK; log what there is to say."""
+        """Tell whether the firmware of an electric gripper fits this SDK; log the result."""
         if self.type() != ELECTRIC.name:
             self._link.warn("only an electric gripper has firmware with a version to check")
             return True

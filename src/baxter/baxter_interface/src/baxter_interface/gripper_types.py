@@ -130,7 +130,7 @@ TYPES = {SUCTION.ui_type: SuctionGripper, ELECTRIC.ui_type: ElectricGripper, CUS
 
 
 def judge_firmware(date, dates):
-    """Compare a gripper's firmware date with a row of VERSIONS_SDK2GRIPPER: return (fits, what there is to say)."""
+    """Compare a gripper's firmware date with a row of VERSIONS_SDK2GRIPPER: return (fits, message)."""
     try:
         found = datetime.strptime(date, DATE_FORMAT)
     except ValueError:

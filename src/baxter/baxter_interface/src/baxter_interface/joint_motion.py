@@ -23,8 +23,8 @@ PEAK_ACCELERATION_RAD_S2 = 2.0
 _PEAK_SLOPE = 15.0 / 8.0
 _PEAK_CURVATURE = 10.0 / math.sqrt(3.0)
 
-# An arm inside the tolerance may still be moving. It gets this long to come to rest [s], so that who reads the angles
-# next, or freezes them with exit_control_mode, gets those of the target ...
+# An arm inside the tolerance may still be moving. It gets this long to come to rest [s]: a program that next
+# reads the angles, or freezes them with exit_control_mode, gets those of the target ...
 SETTLE_TIME_S = 0.5
 # ... where this counts as rest [rad/s].
 SETTLED_SPEED_RAD_S = 0.005

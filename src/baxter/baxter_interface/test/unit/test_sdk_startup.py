@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waiting for those who shall hear a message."""
+"""Wait until a publisher has its expected subscribers."""
 import itertools
 import math
 

@@ -2,7 +2,7 @@
 """A mesh cut along planes into parts whose convex hulls, together, are a better stand-in for it than one hull.
 
 Bullet collides convex shapes quickly and robustly, but not moving or thin-walled triangle meshes. Where a shape is
-hollow is known to who knows the robot; so the planes are given, nothing is searched for.
+hollow is known in advance; so the planes are given, nothing is searched for.
 """
 
 AXES = "xyz"

@@ -147,7 +147,7 @@ def _answer(request, processor_s, memory_bytes):
         return json.dumps({"result": result}).encode()
     except MemoryError:
         return json.dumps({"error": "it took more than %d MB of memory" % (memory_bytes // 1_000_000)}).encode()
-    except Exception as error:  # noqa: BLE001  (whatever it is, it belongs to the one who asked)
+    except Exception as error:  # noqa: BLE001  (whatever it is, it belongs to the caller)
         return json.dumps({"error": str(error) or type(error).__name__}).encode()
 
 

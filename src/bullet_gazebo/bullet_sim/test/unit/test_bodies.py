@@ -75,7 +75,7 @@ def test_sleeping_bodies_wake_up_when_something_runs_into_them(world, sleeping_b
         robot.drive_velocity(robot.index(["slide"]), np.array([0.5]), np.array([50.0]))
     step(world, 400)
     assert sleeping_box.base_pose().position[0] > start.position[0] + 0.02
-    # Who is not hit sleeps on.
+    # A body that is not hit sleeps on.
     assert [box.base_pose() for box in others] == resting
 
 

@@ -159,9 +159,9 @@ class PluginContext(NodeHandle):
         return tuple(self._host.plugins())
 
     def screen(self, link, place, size_m, pixels):
-        """A rectangle of the model that shows pictures to who draws the world; for a plugin's constructor.
+        """A screen: a rectangle of the model that shows pictures; for a plugin's constructor.
 
-        It hangs on ``link`` at ``place`` (4, 4): in its middle, x to the right and y up for who looks at it.
+        It hangs on ``link`` at ``place`` (4, 4): in its middle, x to the right and y up for a viewer in front of it.
         ``size_m``: width and height; ``pixels``: columns and rows. Returns a
         :class:`world_picture.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """

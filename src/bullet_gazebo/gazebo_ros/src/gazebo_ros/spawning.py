@@ -83,7 +83,7 @@ class Spawner:
         self._mesh_files = simulation.world.mesh_files
         #: What viewers draw of the models that were spawned here: {model name: URDF text, or None for a floor}.
         self.drawings = {}
-        #: The sensors that need pictures, for who draws them: {model name: list of dictionaries}.
+        #: The sensors that need pictures, for the renderer: {model name: list of dictionaries}.
         self.sensors = {}
         # The screens that plugins have: {model name: list of (what the scene says, PictureWriter)}.
         self._screens = {}

@@ -232,7 +232,7 @@ def test_a_sensor_that_is_on_no_link_is_left_out_with_a_warning(reference, text)
     assert len(said) == 1 and text in said[0] and "left out" in said[0]
 
 
-def test_sensors_may_be_left_out_and_brains_not():
+def test_sensors_may_be_left_out_and_control_logic_not():
     assert not sensor_plugins.Laser.required and not sensor_plugins.PoseSensor.required
     assert not DrawnSensor.required and ModelPlugin.required
 

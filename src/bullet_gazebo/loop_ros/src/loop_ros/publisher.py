@@ -162,7 +162,7 @@ class LoopPublisher:
         impl = self._impl
         if impl is not None:
             connections = impl.connections
-            # Before the latch changes: who has joined since gets this message once, not the one before as well.
+            # Before the latch changes: a new subscriber gets this message once, not the one before as well.
             if connections is not self._known:
                 self._adopt(connections)
             dead = None

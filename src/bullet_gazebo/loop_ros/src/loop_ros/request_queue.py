@@ -50,7 +50,7 @@ class RequestQueue:
             except SystemExit as error:
                 # A thread that gets it ends without a word, and its client waits for ever.
                 future.set_exception(RuntimeError("it called sys.exit(%r)" % (error.code,)))
-            except Exception as error:  # noqa: BLE001  (whatever it is, it belongs to the one who asked)
+            except Exception as error:  # noqa: BLE001  (whatever it is, it belongs to the caller)
                 future.set_exception(error)
         return count
 

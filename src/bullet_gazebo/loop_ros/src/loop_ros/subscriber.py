@@ -21,8 +21,8 @@ _LENGTH = struct.Struct("<I")
 # How much is read at once [bytes]: a few commands; of a message that is larger, what is missing of it.
 PORTION_BYTES = 4096
 LARGEST_PORTION_BYTES = 256 * 1024
-# Receive buffer of a connection [bytes]: who sends more than the loop can take is held up, instead of being obeyed
-# seconds later.
+# Receive buffer of a connection [bytes]: a publisher that sends more than the loop can take is held up, instead of
+# being obeyed seconds later.
 RECEIVE_BUFFER_BYTES = 128 * 1024
 # How long the loop goes on reading in one turn [s], where there is more than a portion on some connection.
 BUDGET_S = 0.001

@@ -218,7 +218,7 @@ def test_a_publisher_that_is_closed_while_it_is_registered_does_not_stay(objects
 
 
 def test_deliveries_never_become_less(objects, registrations):
-    """Who waits for the next message of a topic need not know of a model that went and one that came."""
+    """A caller that waits for the next message of a topic need not know that one model went and another came."""
     first, second = (objects.subscription("/commands", String, depth=10) for _ in range(2))
     for box in (first, first, second):
         box.put(String("go"))
@@ -253,7 +253,7 @@ def services(monkeypatch):
 
 @pytest.mark.parametrize("kind", ["service", "service_in_thread"])
 @pytest.mark.parametrize("error", [KeyError("x"), RecursionError("too deep"), SystemExit(2)])
-def test_a_handler_that_fails_is_an_error_to_the_one_who_asked_and_counted(scene_of_faults, services, kind, error):
+def test_a_handler_that_fails_is_an_error_to_the_caller_and_counted(scene_of_faults, services, kind, error):
     def fail(request):
         raise error
 

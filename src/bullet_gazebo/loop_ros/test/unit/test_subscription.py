@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Unread messages, and who is told of them."""
+"""Unread messages of a topic, and the owner's notice of them."""
 from types import SimpleNamespace
 
 import pytest

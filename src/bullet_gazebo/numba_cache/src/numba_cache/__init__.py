@@ -18,7 +18,7 @@ def compiler(name, sources, **options):
     itself looks for a change of the file that a function is in, but not of the functions that it calls; here a change
     of any of them leads to another folder. Raises ImportError where numba is missing.
     """
-    import numba  # who only asks for a folder need not have it
+    import numba  # a caller that only asks for a folder need not have it
 
     place = folder(name, sources)
 

@@ -26,7 +26,7 @@ class Frames:
         return name in OWN or name in self._given
 
     def where(self, name, element):
-        """Return the 4x4 matrix of frame ``name`` in the scope; ``element`` is who asks, for the message."""
+        """Return the 4x4 matrix of frame ``name`` in the scope; ``element`` refers to it, for the message."""
         # Without recursion: a chain may be as long as the file.
         chain, asked = [], {}
         while name not in OWN and name not in self._found:

@@ -311,7 +311,7 @@ class GlRenderer:
             link.arrays[which].render()
 
     def _everything(self, mirror):
-        """What there is to draw: (:class:`_Link`, matrix, the same as OpenGL reads it), one for each link that has
+        """The links to draw: (:class:`_Link`, matrix, the same as OpenGL reads it), one for each link that has
         shapes."""
         found = []
         for body in mirror.bodies.values():

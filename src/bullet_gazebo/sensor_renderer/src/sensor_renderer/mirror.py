@@ -29,7 +29,7 @@ class Part(NamedTuple):
 
 class Screen(NamedTuple):
     """A rectangle that shows a picture. ``offset`` (4, 4) in the frame of ``link``: in its middle, x to the right and y
-    up for who looks at it; ``size``: width, height [m]; ``picture``:
+    up for a viewer in front of it; ``size``: width, height [m]; ``picture``:
     :class:`world_picture.shared_picture.PictureReader`."""
 
     link: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Write a merged robot as URDF text, for those who draw it: bodies, joints, shapes and colours, nothing else."""
+"""Write a merged robot as URDF text, for the renderer: bodies, joints, shapes and colours, nothing else."""
 
 from lxml import etree
 

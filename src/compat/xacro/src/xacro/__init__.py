@@ -49,7 +49,7 @@ def _find(package):
 
 
 def _without_inorder(main):
-    """The engine's command, which knows one order only, without its remark on everybody who asks for it by name."""
+    """The engine's command, which knows one order only, without its warning about calls by that name."""
     @functools.wraps(main)
     def command():
         sys.argv[1:] = [word for word in sys.argv[1:] if word not in ("--inorder", "-i")]

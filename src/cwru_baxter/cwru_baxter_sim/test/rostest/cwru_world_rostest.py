@@ -193,7 +193,7 @@ class CwruWorldTest(unittest.TestCase):
         for camera in cameras:
             self.assertEqual(wait_for_message("/cameras/%s/image" % camera, Image).width, 800)
 
-    def test_the_screen_shows_its_picture_to_who_looks_at_the_robot(self):
+    def test_the_screen_shows_its_picture_to_a_camera_that_looks_at_the_robot(self):
         # 0.5 m before the glass and looking straight at it; where that is says tf, base stands upright in the world.
         self.buffer.lookup_transform("base", "display", rospy.Time(), rospy.Duration(30.0))
         glass = np.linalg.inv(self.base_in("display"))

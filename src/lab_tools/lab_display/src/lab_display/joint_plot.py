@@ -6,7 +6,7 @@ from baxter_model import SIDES
 
 from .picture import Picture, new_figure
 
-# Colours that stay apart on white paper, also for most of those who see colours differently.
+# Colours that stay apart on white paper, also for most colour-blind readers.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#333333", "#8c564b")
 
 

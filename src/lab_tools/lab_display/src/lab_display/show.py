@@ -80,7 +80,7 @@ class JointLog:
         """Returns once the first message is in, so that nothing of what follows is missed."""
         self._subscriber = rospy.Subscriber(self._topic, JointState, self._take)
         try:
-            _wait(self._topic, self._arrived.is_set, "nobody publishes it; rostopic list shows what there is")
+            _wait(self._topic, self._arrived.is_set, "nobody publishes it; rostopic list shows the topics")
         except ShowError:
             self._subscriber.unregister()
             raise

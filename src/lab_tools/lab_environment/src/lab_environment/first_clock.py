@@ -24,7 +24,7 @@ STARTING_S = 300.0
 PARAMETER_S = 5.0
 # A start that is quicker than this passes without a word [s].
 FIRST_NOTICE_S = 1.0
-# How often the master is asked who is there [s].
+# Period of looking up the clock's publishers at the master [s].
 LOOK_EVERY_S = 0.5
 # ROS's own command-line tools show what is there, which may be that there is no /clock.
 _TOOLS = re.compile(r"(/usr)?/bin/[^/]+|/opt/ros/[^/]+/bin/[^/]+")

@@ -16,7 +16,7 @@ import rosgraph
 
 from lab_environment import master_calls
 
-# Until a connection is made, and from there to an answer [s]. Who is dead refuses at once; who is alive may be busy.
+# Until a connection is made, and from there to an answer [s]. A dead process refuses at once; a living one may be busy.
 _CONNECT_S = 2.0
 _ANSWER_S = 10.0
 # How often and how far apart [s] one tries to take what nobody seems to have.

@@ -72,7 +72,7 @@ def subscribe_all(subscriptions, paths, deadline):
 
 
 def save_picture(options):
-    """Record, draw, write, say what there was. Raises PlotError."""
+    """Record, draw, write, print a summary. Raises PlotError."""
     os.environ["QT_QPA_PLATFORM"] = "offscreen"  # before Qt is loaded
     import pyqtgraph
 

@@ -68,7 +68,7 @@ def split(path, topics):
         if topic in topics:
             return topic, tokens[count:]
     likely = difflib.get_close_matches(path, topics, n=3, cutoff=0.4)
-    hint = "topics of similar names: %s" % ", ".join(likely) if likely else "rostopic list shows what there is"
+    hint = "topics of similar names: %s" % ", ".join(likely) if likely else "rostopic list shows the topics"
     raise UnknownTopic("no topic begins '%s' so far; %s" % (path, hint))
 
 

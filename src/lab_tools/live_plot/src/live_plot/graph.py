@@ -2,7 +2,7 @@
 """Curves over time, drawn by PyQtGraph: the picture in the window and in the file."""
 import pyqtgraph
 
-# Easy to tell apart on white, for those who see few colours, too; the seventh curve begins again, dashed.
+# Easy to tell apart on white, for colour-blind readers, too; the seventh curve begins again, dashed.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#333333")
 
 

@@ -23,7 +23,7 @@ def _message_class(type_name):
 
 def topic_types():
     """Return {topic: type} of all topics that somebody publishes or listens to with a known type."""
-    # '*' is somebody who listens to anything, rostopic echo for example.
+    # '*' is a subscriber to any type, rostopic echo for example.
     return {name: kind for name, kind in rospy.get_master().getTopicTypes()[2] if kind != "*"}
 
 

@@ -54,7 +54,7 @@ class PlotTest(unittest.TestCase):
             self.assertGreater(samples, 10, line)
             self.assertGreater(seconds, 1.0)
 
-    def test_mistakes_are_told_what_there_is(self):
+    def test_mistakes_are_answered_with_the_right_names(self):
         for topic, parts in {
                 TOPIC + "/posit[0]": ("has no field 'posit'", "position (float64[])"),
                 TOPIC + "/position[3]": ("the array has 3 element(s)",),

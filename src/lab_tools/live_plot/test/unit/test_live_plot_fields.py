@@ -92,7 +92,7 @@ def test_times_are_seconds_and_have_parts():
     ("geometry_msgs/Point", ["x[0]"], r"/t/x\[0\]: this field is no array but one float64"),
     ("geometry_msgs/PoseWithCovariance", ["covariance[36]"], r"the array has 36 elements, counted from 0"),
     ("geometry_msgs/PoseWithCovariance", ["pose"], r"is no number; it has position \(geometry_msgs/Point\)")])
-def test_wrong_field_is_told_what_there_is(type_name, tokens, text):
+def test_wrong_field_is_answered_with_the_fields(type_name, tokens, text):
     with pytest.raises(PlotError, match=text):
         labels(type_name, *tokens)
 

@@ -116,7 +116,7 @@ class HandshakeServer:
     def turn(self, timeout_s=None):
         """Wait until something comes in, a deadline has passed, or ``timeout_s`` [s]; and do what is to be done."""
         ready = self._selector.select(self._timeout() if timeout_s is None else timeout_s)
-        # First those that have sent something: who is closed to make room for others has not.
+        # First those that have sent something: connections closed to make room for others have not.
         for key, _ in ready:
             if key.data is not None:
                 self._read(key.data)

@@ -61,7 +61,7 @@ def _parser():
 def _program_and_exercise(parser, options):
     words = options.words
     if not options.lab:
-        parser.error("say which lab and which program: ./baxter.sh check lab2 my_node.py (--list shows what there is)")
+        parser.error("say which lab and which program: ./baxter.sh check lab2 my_node.py (--list shows them all)")
     if options.lab.endswith(".py") or len(words) not in (1, 2):
         parser.error("expected LAB [EXERCISE] PROGRAM, as in ./baxter.sh check lab2 my_node.py, got: %s"
                      % " ".join([options.lab, *words]))

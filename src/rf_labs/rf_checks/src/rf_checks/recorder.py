@@ -24,7 +24,7 @@ from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from rf_checks.recorder_names import RECORDS, REQUESTS, SERVED, SILENCED, SOCKETS_VARIABLE
 
 RECORD_TICKS = 5  # 10 ms of simulation
-#: Commands written out in one record; who sends more floods, and the rest is only counted.
+#: Commands written out in one record; beyond that the rest is only counted.
 COMMANDS_TOLD = 3
 _DATAGRAM_BYTES = 1 << 18
 _RESET, _CONFIGURE = "/gazebo/reset_world", "/gazebo/set_model_configuration"

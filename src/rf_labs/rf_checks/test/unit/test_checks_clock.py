@@ -107,7 +107,7 @@ def test_nor_may_it_open_the_page_anew_to_write_or_to_cut(clock):
     clock.advance(STEP_S)
 
 
-def test_own_time_is_wall_time_of_who_rests_and_processor_time_of_who_computes():
+def test_own_time_is_wall_time_at_rest_and_processor_time_in_computing():
     with (subprocess.Popen(["sleep", "1000"]) as sleeper,
           subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy):
         resting, computing = (pacing.OwnTime(lambda pid=process.pid: [pid]) for process in (sleeper, busy))
@@ -122,7 +122,7 @@ def test_own_time_is_wall_time_of_who_rests_and_processor_time_of_who_computes()
         computing.close()
 
 
-def test_own_time_does_not_pass_for_who_waits_for_a_processor(monkeypatch):
+def test_own_time_does_not_pass_while_waiting_for_a_processor(monkeypatch):
     # As the kernel shows it: runnable, and nothing used.
     with subprocess.Popen(["sleep", "1000"]) as sleeper:
         monkeypatch.setattr(pacing.Tree, "runs", lambda self: True)

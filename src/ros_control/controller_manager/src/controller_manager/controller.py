@@ -48,7 +48,7 @@ class Controller:
         raise NotImplementedError
 
     def idle(self, time_s):
-        """One tick while the controller is loaded but does not run: answer those who ask, command nothing.
+        """One tick while the controller is loaded but does not run: answer requests, command nothing.
 
         Called at every tick instead of ``update``, e.g. to reject the goals of an action.
         """

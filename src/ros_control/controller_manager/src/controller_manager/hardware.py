@@ -58,7 +58,7 @@ class RobotHardware:
 
     def index(self, interface, joints, asked_by):
         """Indices (k,) of ``joints`` (names). Raises :class:`ControllerError` where one lacks ``interface``;
-        ``asked_by`` is who needs them, for the text."""
+        ``asked_by`` names the controller that needs them, for the text."""
         offered = self.interface_joints.get(interface)
         if offered is None:
             raise ControllerError(

@@ -6,7 +6,7 @@ POSITION = "hardware_interface::PositionJointInterface"
 VELOCITY = "hardware_interface::VelocityJointInterface"
 EFFORT = "hardware_interface::EffortJointInterface"
 
-#: Interfaces that command a joint: who uses a joint through one of these claims it.
+#: Interfaces that command a joint: a controller that uses a joint through one of these claims it.
 COMMAND = (POSITION, VELOCITY, EFFORT)
 
 #: Interfaces that only say something; of sensors, see ``RobotHardware.sensors``.

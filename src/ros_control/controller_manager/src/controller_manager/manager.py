@@ -60,7 +60,7 @@ class _Switch:
 class ControllerManager:
     """Loads, starts and stops controllers on one robot's hardware.
 
-    A change of who runs takes place inside :meth:`update`, so it takes as long as updates do not come.
+    A switch takes place inside :meth:`update`, so it takes as long as updates do not come.
     """
 
     def __init__(self, hardware, log):
@@ -176,7 +176,7 @@ class ControllerManager:
             try:
                 loaded.controller.update(time_s, dt)
             except _SURVIVED as error:  # a controller is anybody's code; the others go on
-                # Who waits for the end of a goal is told.
+                # A client that waits for the end of a goal is told.
                 with contextlib.suppress(*_SURVIVED):
                     loaded.controller.stopping(time_s)
                 self._fail(loaded, "update", error)
@@ -194,7 +194,7 @@ class ControllerManager:
                 self._give_up_switch(error)
 
     def close(self):
-        """Close all controllers; who waits for a switch is released (the future is cancelled)."""
+        """Close all controllers and wake all waiting callers of a switch (the future is cancelled)."""
         self._closed = True
         if self._switch is not None:
             self._switch.future.cancel()

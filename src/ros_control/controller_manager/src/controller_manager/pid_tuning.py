@@ -37,7 +37,7 @@ class TunablePids:
         return cls(context, pid, names, [name for name in names if context.flag(name + "/publish_state", False)])
 
     def publish(self, time_s, dt, output):
-        """After an update of the PID: tell who listens. ``output`` (k,): what it has returned."""
+        """After an update of the PID: publish its state. ``output`` (k,): what it has returned."""
         for k, publisher in self._states:
             if publisher.has_listeners:
                 publisher.publish(self._state(k, time_s, dt, output))

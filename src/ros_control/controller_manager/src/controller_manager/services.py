@@ -61,7 +61,7 @@ class ControllerManagerServices:
             host.service_in_thread("controller_manager/" + name, srv_class, self._guarded(handler, turn))
 
     def close(self):
-        """Loop thread: refuse what comes and release who waits."""
+        """Loop thread: refuse new requests and wake all waiting callers."""
         self._closed = True
         self._manager.close()
 

@@ -425,7 +425,7 @@ def test_a_failing_controller_is_reported_and_its_joints_are_held(robot, where, 
         assert robot.hardware.command[EFFORT][3] == 0.0, "no effort is left behind"
         assert robot.hardware.command[POSITION][1] == 0.25, "nor a position"
     if where == "update":
-        assert bad.calls[-1] == "stopping", "who waits for a goal is told"
+        assert bad.calls[-1] == "stopping", "a client that waits for a goal is told"
     robot.parameters["bad"]["fails_in"] = None
     robot.switch(["bad"])
     robot.update()

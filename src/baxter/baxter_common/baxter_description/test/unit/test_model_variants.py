@@ -143,7 +143,7 @@ def test_gripper_argument_wins_over_the_switch(expand):
     assert "l_gripper_l_finger" in expand(left_electric_gripper="false", left_gripper="electric").links
 
 
-def test_brain_and_sensors_come_with_the_simulator_only(expand):
+def test_control_logic_and_sensors_come_with_the_simulator_only(expand):
     plugins = [plugin for element in expand().gazebo for plugin in element.findall("plugin")]
     assert [plugin.get("filename") for plugin in plugins] == ["libbaxter_gazebo_ros_control.so"]
     assert plugins[0].findtext("robotNamespace") == "/robot"

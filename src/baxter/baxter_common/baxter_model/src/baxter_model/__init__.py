@@ -2,7 +2,7 @@
 """Facts of the Baxter robot, each in one place: names, mirror signs, poses, grippers. Free of ROS.
 
 `self_collision` says which links can touch, and `description` reads what a URDF says about the robot; both are imported
-by those who need them, so that `import baxter_model` stays cheap.
+by programs that need them, so that `import baxter_model` stays cheap.
 """
 from .errors import ModelError, ModelMismatch, PoseError
 from .grippers import CUSTOM, ELECTRIC, SUCTION, GripperKind

@@ -18,8 +18,8 @@ ENCODINGS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "8UC3": (3, (2, 1, 
 
 
 def on_glass(robot):
-    """Where pictures are on GLASS_LINK of a urdf_model.Robot: (place (4, 4), x to the right and y up for who looks at
-    them; width and height [m]), as wide as the glass. None for a robot without one."""
+    """Where pictures are on GLASS_LINK of a urdf_model.Robot: (place (4, 4), x to the right and y up for a viewer;
+    width and height [m]), as wide as the glass. None for a robot without one."""
     shapes = robot.links[GLASS_LINK].visuals if GLASS_LINK in robot.links else []
     if len(shapes) != 1 or not isinstance(shapes[0].geometry, Box):
         return None

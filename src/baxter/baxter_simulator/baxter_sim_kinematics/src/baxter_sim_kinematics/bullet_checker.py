@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A :class:`CollisionChecker` on the shapes of a bullet_sim world. Imported by who needs it: PyBullet takes its
+"""A :class:`CollisionChecker` on the shapes of a bullet_sim world. Imported only where it is used: PyBullet takes its
 time.
 """
 import itertools

@@ -95,7 +95,7 @@ def _failure(search, reason, detail, nearest, joints=(), excess=()):
 
 
 def _least_excess(search, start, lifted):
-    """Return (a solution inside the limits after all or None, {joint name: signed excess} of who has to give way).
+    """Return (a solution inside the limits after all or None, {joint name: signed excess} of those that must give way).
 
     One joint alone if that is enough, and of those the one that has to go least far; else several together. ``lifted``:
     a solution without limits.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fair turns: a lock that goes to who has waited longest."""
+"""Fair turns: a lock that goes to the thread that has waited longest."""
 import collections
 import threading
 

@@ -6,7 +6,7 @@ from baxter_sim_kinematics.turns import Turns
 from lab_testing.waiting import wait_until
 
 
-def test_the_order_of_asking_is_the_order_of_turns_also_for_who_comes_back_at_once():
+def test_the_order_of_asking_is_the_order_of_turns_also_for_a_thread_that_comes_back_at_once():
     turns, order, threads = Turns(), [], []
 
     def work(number):
