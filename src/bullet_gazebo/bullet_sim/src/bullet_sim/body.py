@@ -21,11 +21,15 @@ class Body:
     #: For how many looks of ``StateWatch`` the base has stood still.
     still_for = 0
 
-    def __init__(self, client, name, robot, merged, body, root_offset, static, world, self_collision=True):
-        self.name = name
-        self.robot = robot
-        self.merged = merged
-        self.static = static
+    def __init__(self, client, world, blueprint, body, root_offset):
+        """``client``: PyBullet's; ``blueprint``: :class:`bullet_sim.builder.Blueprint`; ``body``, ``root_offset``: what
+        ``builder.build`` has made of it."""
+        #: What the body is made from; which links can collide may change.
+        self.blueprint = blueprint
+        self.name = blueprint.name
+        self.robot = blueprint.robot
+        self.merged = merged = blueprint.merged
+        self.static = blueprint.static
         self.body = body
         self._client = client
         self._world = world
@@ -39,11 +43,9 @@ class Body:
         self._late_twist = None
         self._late_pushes = []
         self._pushes, self._pushed_at = [], -1  # of the step after `_pushed_at` steps
-        #: Whether the body was made so that some of its links can collide with each other.
-        self.self_collision = self_collision
         self._pairs = ()
         self._firm = set()  # indices of links that hold by friction without creeping
-        if self_collision:
+        if blueprint.self_collision:
             self.set_self_collision_pairs(())
         self._weightless = {}  # body's name -> its mass
         for link in merged.links.values():
@@ -262,9 +264,9 @@ class Body:
             if a != b:
                 wanted.add((min(a, b), max(a, b)))
         self._pairs = tuple(sorted(wanted))
-        if not self.self_collision:
+        if not self.blueprint.self_collision:
             if wanted:
-                self.self_collision = True
+                self.blueprint = self.blueprint._replace(self_collision=True)
                 self._world.make_anew([self])
             return
         links = sorted(self._link_names)
@@ -285,7 +287,7 @@ class Body:
     def _restore_collisions(self):
         """For Model: tell a body that has been made anew which links collide, and which hold firmly."""
         pairs = {frozenset((self._link_names[a], self._link_names[b])) for a, b in self._pairs}
-        if self.self_collision:
+        if self.blueprint.self_collision:
             self.set_self_collision_pairs([tuple(pair) for pair in pairs])
         for index in self._firm:
             pybullet.changeDynamics(self.body, index, frictionAnchor=1, physicsClientId=self._client)

@@ -5,9 +5,11 @@ The body is made with ``createMultiBody`` instead of ``loadURDF``: no temporary 
 copies, the inertia exactly as merged, and 10 ms where loading the same robot from a file takes 60.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from urdf_model import Surface, bounds
+from urdf_model import MergedRobot, Robot, Surface, bounds
 from urdf_model.transforms import quaternion_from_matrix, rigid
 
 from .pose import Pose
@@ -28,12 +30,27 @@ _DEFAULT_DAMPING = 1.0
 _RIGID_N_PER_M = 1e8
 
 
-def build(client, merged, pose, static, shapes, warn, mesh_cuts=None, self_collision=True):
-    """Create the multibody of ``merged`` (urdf_model.MergedRobot) with its root body at ``pose``.
+class Blueprint(NamedTuple):
+    """What a model is made from, and made anew from.
 
-    Returns (body id, inertial offset (4, 4) of the root link). ``static`` fixes the root in the world;
-    ``mesh_cuts``: as for ``World.spawn``. ``self_collision``: whether any two of its links shall ever collide.
+    ``merged``: the urdf_model.MergedRobot of ``robot``; ``static`` fixes its root in the world; ``mesh_cuts``: as for
+    ``World.spawn``; ``self_collision``: whether any two of its links can collide with each other.
     """
+
+    name: str
+    robot: Robot
+    merged: MergedRobot
+    static: bool
+    mesh_cuts: dict | None
+    self_collision: bool
+
+
+def build(client, blueprint, pose, shapes, warn):
+    """Create the multibody of a :class:`Blueprint` with its root body at ``pose``, its shapes from a ShapeStore.
+
+    Returns (body id, inertial offset (4, 4) of the root link). ``warn(text)`` is told of masses that are missing.
+    """
+    merged, static, mesh_cuts = blueprint.merged, blueprint.static, blueprint.mesh_cuts
     root = merged.links[merged.root]
     body_of = {joint.child: joint for joint in merged.joints.values()}
     order = {merged.root: 0, **{joint.child: i + 1 for i, joint in enumerate(merged.joints.values())}}
@@ -69,7 +86,7 @@ def build(client, merged, pose, static, shapes, warn, mesh_cuts=None, self_colli
         baseInertialFramePosition=root_offset[:3, 3].tolist(),
         baseInertialFrameOrientation=quaternion_from_matrix(root_offset).tolist(),
         # Self-collision has to be asked for at creation; Model then leaves only the pairs that were wanted.
-        flags=(pybullet.URDF_USE_SELF_COLLISION if self_collision else 0)
+        flags=(pybullet.URDF_USE_SELF_COLLISION if blueprint.self_collision else 0)
         | (0 if static else pybullet.URDF_ENABLE_SLEEPING),
         physicsClientId=client,
         **columns,

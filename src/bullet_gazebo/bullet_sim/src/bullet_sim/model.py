@@ -71,11 +71,11 @@ class Model(Body):
     A drive holds until another one replaces it, except efforts, which last one step.
     """
 
-    def __init__(self, client, name, robot, merged, body, root_offset, static, world, self_collision=True):
-        super().__init__(client, name, robot, merged, body, root_offset, static, world, self_collision)
+    def __init__(self, client, world, blueprint, body, root_offset):
+        super().__init__(client, world, blueprint, body, root_offset)
         self._gravity_key = None
         self._turned_gravity = None
-        joints = list(merged.joints.values())
+        joints = list(self.merged.joints.values())
         self.joint_names = tuple(joint.name for joint in joints)
         self._index = {joint.name: i for i, joint in enumerate(joints)}
         self.lower = _column(joints, "lower", -math.inf)
@@ -92,7 +92,7 @@ class Model(Body):
         self._bounds = None
         self._gears = {}  # of (joint, other), by index
         self._couplings = {}  # the same -> ratio
-        self._never_sleeps = static
+        self._never_sleeps = self.static
         self._set_damping(joints)
         if count:
             self.release(np.arange(count))

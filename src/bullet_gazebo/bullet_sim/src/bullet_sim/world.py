@@ -7,7 +7,7 @@ import numpy as np
 
 from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
-from .builder import build
+from .builder import Blueprint, build
 from .errors import BulletSimError, within
 from .model import Contact, Model
 from .pose import Pose
@@ -15,6 +15,9 @@ from .quiet_pybullet import pybullet
 from .shapes import MeshCache, MeshFiles, ShapeStore
 from .stand_ins import with_stand_ins
 from .state_watch import StateWatch
+
+# Of Bullet's constraint solver, at the start. `model.POSITION_GAIN` is chosen for it.
+SOLVER_ITERATIONS = 20
 
 
 def plain_path(uri):
@@ -41,7 +44,6 @@ class World:
 
     :param time_step_s: length of a tick [s]
     :param gravity: (3,) [m/s^2]
-    :param solver_iterations: of Bullet's constraint solver
     :param contact_ahead_m: how far apart bodies may be to count as a contact, which is solved before they touch [m].
         The default is what 2 m/s travel in a tick of 2 ms; Bullet's own 0.02 m has an arm that is folded beside its
         body pay for contacts that never come. For small bodies it is less in any case, a fiftieth of their size.
@@ -57,7 +59,6 @@ class World:
         self,
         time_step_s=0.002,
         gravity=(0.0, 0.0, -9.81),
-        solver_iterations=20,
         seed=0,
         contact_ahead_m=0.004,
         find_mesh=plain_path,
@@ -66,12 +67,11 @@ class World:
     ):
         self.time_step_s = within(bounds.TIME_STEP, time_step_s, "the time step")
         self._step_since = 0, 0.0  # the tick and the time [s] that the present length of a tick counts from
-        self.solver_iterations = solver_iterations
+        self.solver_iterations = SOLVER_ITERATIONS
         self.tick = 0
         #: How many steps there have been, which a reset of the time does not take back.
         self.steps = 0
         self.models = {}
-        self._mesh_cuts = {}
         self.random = np.random.default_rng(seed)
         self._warn = warn
         self._client = pybullet.connect(pybullet.DIRECT)
@@ -85,7 +85,7 @@ class World:
         self._touched = []  # models that something was done to since the last step, perhaps in their sleep
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step_s,
-            numSolverIterations=solver_iterations,
+            numSolverIterations=self.solver_iterations,
             numSubSteps=0,
             deterministicOverlappingPairs=1,
             physicsClientId=self._client,
@@ -169,21 +169,13 @@ class World:
             merged = merge_fixed(robot)
         rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
         pairs = [pair for pair in self_collision_pairs if all(merged.frames[link].link not in rough for link in pair)]
-        body, root_offset = build(
-            self._client,
-            merged,
-            pose,
-            static,
-            self._shapes,
-            lambda text: self._warn("model '%s': %s" % (name, text)),
-            mesh_cuts,
-            bool(pairs),
-        )
-        model = Model(self._client, name, robot, merged, body, root_offset, static, self, bool(pairs))
+        blueprint = Blueprint(name, robot, merged, static, mesh_cuts, bool(pairs))
+        body, root_offset = build(self._client, blueprint, pose, self._shapes,
+                                  lambda text: self._warn("model '%s': %s" % (name, text)))
+        model = Model(self._client, self, blueprint, body, root_offset)
         if pairs:
             model.set_self_collision_pairs(pairs)
         self.models[name] = model
-        self._mesh_cuts[name] = mesh_cuts
         self._watch.models_changed()
         return model
 
@@ -205,7 +197,7 @@ class World:
         """Remove a model. Raises BulletSimError when there is none of that name."""
         model = self._model(name)
         model.remove()
-        del self.models[name], self._mesh_cuts[name]
+        del self.models[name]
         self._watch.models_changed()
         self.note_weightless(model, False)
         self._touched = [other for other in self._touched if other is not model]
@@ -254,8 +246,7 @@ class World:
         for model in models:
             model.remove()
         for model, motion in motions.items():
-            body, _ = build(self._client, model.merged, model.frame_of(motion), model.static, self._shapes,
-                            lambda text: None, self._mesh_cuts.get(model.name), model.self_collision)
+            body, _ = build(self._client, model.blueprint, model.frame_of(motion), self._shapes, lambda text: None)
             model.take_body(body, motion)
         self.wake_all()
 
