@@ -10,6 +10,7 @@ import numpy as np
 from urdf_model import bounds
 
 from .body import BASE, Body
+from .damping import JointDamping
 from .errors import BulletSimError, within
 from .pose import Pose
 from .quiet_pybullet import pybullet
@@ -17,9 +18,6 @@ from .quiet_pybullet import pybullet
 # Bullet's joint motor reaches its target as velocity = gain * error / time step. With 20 solver iterations a gain of
 # 0.5 holds Baxter's arms within 5e-5 rad for 0.11 ms a step; the default of 0.1 sags by 2.4e-4 rad.
 POSITION_GAIN = 0.5
-
-# Bullet applies joint damping explicitly: beyond inertia / time step it pumps energy in. Half of that stays clear.
-_DAMPING_MARGIN = 0.5
 
 # Stands for "as strong as need be" [N m, N].
 _RIGID_EFFORT = 1e9
@@ -89,11 +87,12 @@ class Model(Body):
         self._effort_driven, self._any_effort_driven = np.zeros(count, dtype=bool), False
         self._commanded_effort = np.zeros(count)
         self._zeros = [0.0] * count
-        self._bounds = None
         self._gears = {}  # of (joint, other), by index
         self._couplings = {}  # the same -> ratio
         self._never_sleeps = self.static
-        self._set_damping(joints)
+        self._damping = JointDamping(self, client, world.time_step_s, {
+            index: within(bounds.DAMPING, joint.damping, "the damping of joint '%s'" % joint.name)
+            for index, joint in enumerate(joints) if joint.damping > 0.0})
         if count:
             self.release(np.arange(count))
         self.mark_start()
@@ -223,15 +222,16 @@ class Model(Body):
         Raises BulletSimError out of bounds.
         """
         within(bounds.DAMPING, damping, "the damping of joint '%s'" % self.joint_names[index])
-        self._wanted_damping[index] = damping
-        self.damping[index] = min(damping, self._damping_bounds()[index])
-        pybullet.changeDynamics(self.body, index, jointDamping=self.damping[index], physicsClientId=self._client)
+        self._damping.set(index, damping)
+
+    @property
+    def damping(self):
+        """(n,) The viscous damping of the joints as it acts [Nm s/rad or N s/m]."""
+        return self._damping.values
 
     def step_changed(self):
-        """For World: ticks have another length, which bounds the damping of the joints."""
-        self._bounds = None
-        for index, wanted in self._wanted_damping.items():
-            self.set_damping(index, wanted)
+        """For World: ticks have another length."""
+        self._damping.step_changed(self._world.time_step_s)
 
     def set_limits(self, index, lower, upper):
         """Set how far joint ``index`` goes [rad or m]. Raises BulletSimError where ``lower`` is not below ``upper``."""
@@ -436,8 +436,8 @@ class Model(Body):
         self._effort_driven[:] = self._any_effort_driven = False
         if twist is not None:
             pybullet.resetBaseVelocity(body, *twist, **client)
+        self._damping.restore()
         for index in range(len(self._all)):
-            pybullet.changeDynamics(body, index, jointDamping=self.damping[index], **client)
             if math.isfinite(self.lower[index]) or math.isfinite(self.upper[index]):
                 pybullet.changeDynamics(
                     body, index, jointLowerLimit=self.lower[index], jointUpperLimit=self.upper[index], **client
@@ -496,23 +496,6 @@ class Model(Body):
             self._effort_driven[index] = False
             self._any_effort_driven = bool(self._effort_driven.any())
             self._reading = None
-
-    def _set_damping(self, joints):
-        self._wanted_damping = {}  # index -> what was asked for
-        self.damping = np.zeros(len(joints))  # (n,) as it acts, [Nm s/rad] or [N s/m]
-        for index, joint in enumerate(joints):
-            if joint.damping > 0.0:
-                self.set_damping(index, joint.damping)
-
-    def _damping_bounds(self):
-        """Return the damping (n,) of each joint that is still sure to be stable, at the present position."""
-        if self._bounds is None:
-            felt = np.full(len(self.joint_names), math.inf)
-            if self.static:
-                # The inertia that a joint feels when the others are free to give way is 1 / (M^-1)_ii.
-                felt = 1.0 / np.diag(np.linalg.inv(self.mass_matrix(self.read_joints()[0])))
-            self._bounds = _DAMPING_MARGIN * felt / self._world.time_step_s
-        return self._bounds
 
 
 def _column(joints, field, absent):
