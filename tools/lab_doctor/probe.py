@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gather the facts, all at the same time, each with a deadline: a doctor that hangs on a dead network is no help."""
+"""Gather the facts in parallel, each with a deadline: the doctor must not hang on a dead network."""
 
 import http.client
 import json

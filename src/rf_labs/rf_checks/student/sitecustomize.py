@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""In a program under judgement the wall's clock is the simulation's: `time.sleep(1)` lasts one simulated second.
+"""Run a judged program on simulated time: `time.sleep(1)` lasts one simulated second.
 
 lab_environment's sitecustomize runs this module when Python starts, because the judge puts its folder into PYTHONPATH
 right behind. A simulation that runs faster or slower than real time thus changes nothing for a program that waits with

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Callbacks that do not keep their owners alive."""
+"""Signals, whose connections hold weak references to their slots."""
 import threading
 import weakref
 

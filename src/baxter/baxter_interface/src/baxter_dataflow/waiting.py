@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waiting in terms of a clock that is given: free of ROS.
+"""Waiting by a given clock. Free of ROS.
 
 A clock has `now()` [s], `sleep(duration_s)` and `is_shutdown()`.
 """

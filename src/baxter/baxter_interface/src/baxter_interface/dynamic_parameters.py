@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parameters that change at run time: dynamic_reconfigure's server, which lets in what a parameter can be, no more."""
+"""Parameters that change at run time: dynamic_reconfigure's server, with values checked against their ranges."""
 import math
 
 import rospy

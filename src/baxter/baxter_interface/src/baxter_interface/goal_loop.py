@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One goal after the other for an action server whose work is a step, 20 times a second."""
+"""The loop of an action server: one goal at a time, a step of its work 20 times a second."""
 import io
 import threading
 import time

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A smooth move of some joints to a target, and the verdict whether they arrived. Free of ROS.
+"""A smooth move of some joints to a target, and the check of their arrival. Free of ROS.
 
 Why not send the target and let the robot's own limits shape the move? Because programs expect a gentle one, and a
 step makes every joint leave at full speed and stop hard. Why not low-pass the command? Because a filter never quite

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waiting for things that come up one after the other, in wall time, aloud. Free of ROS."""
+"""Wait for several conditions in order, in wall time, with one line of progress. Free of ROS."""
 import errno
 import time
 from collections.abc import Callable

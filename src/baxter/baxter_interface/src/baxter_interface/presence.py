@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Is somebody there who publishes a topic, paused perhaps, or has he gone?"""
+"""Tell whether a topic still has a live publisher; a paused one counts."""
 import threading
 import time
 import xmlrpc.client

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Was the robot put elsewhere? Only a simulation does that: what was commanded before does not count after it."""
+"""Count resets of the simulation, which put the robot elsewhere: commands from before one no longer count."""
 import rospy
 from std_msgs.msg import UInt32
 

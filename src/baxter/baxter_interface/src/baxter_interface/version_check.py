@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Does this SDK fit the robot's software? Free of ROS."""
+"""Check that this SDK fits the robot's software. Free of ROS."""
 import errno
 import re
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Can this arm be commanded, and could it be all the time? What robot, cuff and clock say about that."""
+"""Watch robot, cuff and clock for whatever keeps an arm from being commanded, now or since a motion began."""
 import threading
 import time
 

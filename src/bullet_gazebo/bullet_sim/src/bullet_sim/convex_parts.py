@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A mesh cut along planes into parts whose convex hulls, together, are a better stand-in for it than one hull.
+"""Cut a mesh along planes: the convex hulls of its parts approximate it better than one hull.
 
 Bullet collides convex shapes quickly and robustly, but not moving or thin-walled triangle meshes. Where a shape is
 hollow is known in advance; so the planes are given, nothing is searched for.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Viscous damping of a model's joints, as much of it as Bullet can bear."""
+"""Viscous damping of a model's joints, bounded where Bullet's integration would become unstable."""
 
 import math
 

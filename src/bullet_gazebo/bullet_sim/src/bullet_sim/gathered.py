@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Links with more shapes than PyBullet takes for one: those that are too many are gathered in files.
+"""Links with more shapes than PyBullet accepts: the surplus is gathered in files.
 
 PyBullet has room for 16 shapes of a body and writes beyond it, which ends the process. A file holds any number: of
 convex bodies, one object each, or of triangles. Meshes lose nothing by that, boxes their sharp edges (by a millimetre),

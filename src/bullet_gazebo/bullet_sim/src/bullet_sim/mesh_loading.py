@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mesh files from anybody: formats that simulators share, nothing fetched, no entities, a bounded number of triangles.
+"""Load untrusted mesh files: common formats, nothing fetched, no entities, a bounded number of triangles.
 
 To be called in a process with limits (``limited``): libraries for formats do what a file tells them to.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Primitives in the place of meshes that are missing, so that a robot without its mesh files is still seen and felt."""
+"""Replace missing meshes by primitives, so that a robot without its mesh files can be seen and touched."""
 
 from __future__ import annotations
 

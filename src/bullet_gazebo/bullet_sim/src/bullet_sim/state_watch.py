@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""After each step: models whose state cannot be are put back to where they were, before anything reads it."""
+"""After each step, put models with an impossible state back to where they were, before anything reads it."""
 
 # Of one model at most one line in so many steps: what keeps failing would fill the log.
 _QUIET_STEPS = 5000

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gazebo's plugins of forces: at a joint, on a link, and one that pushes."""
+"""Gazebo's force plugins: on a joint, on a link, and a constant push."""
 import numpy as np
 from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plugins that are known and of which nothing is left to do here."""
+"""Plugins of Gazebo that are accepted and have no effect here."""
 from std_msgs.msg import Int32, String
 
 from gazebo_ros.model_plugin import ModelPlugin

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What services have changed about the physics, and how it was before: a reset takes it back. ROS-free."""
+"""Changes that services made to the physics, with the values from before, for a reset. ROS-free."""
 
 
 class Changes:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pushes that start at a time and last for a while. ROS-free; times are integer nanoseconds of simulation."""
+"""Forces with a start and a duration. ROS-free; times are integer nanoseconds of simulation."""
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What goes wrong in the loop without ending it: counted for /diagnostics, told in the log now and then. ROS-free."""
+"""Faults that the loop survives: counted for /diagnostics, logged now and then. ROS-free."""
 import contextlib
 import os
 import time

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading what others publish in the loop, between two ticks.
+"""Read the connections of subscriptions in the loop, between two ticks.
 
 rospy connects and shakes hands; from there on the loop reads the sockets itself. A thread for each connection, as rospy
 has it, must take the interpreter from the loop twice for each message (docs/decisions/0006). Nothing here imports

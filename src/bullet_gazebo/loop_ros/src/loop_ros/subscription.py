@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What comes in on a topic waits here for the loop. ROS-free."""
+"""Unread messages of a topic, which wait for the loop. ROS-free."""
 import collections
 
 from loop_ros.faults import SURVIVED

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What people write and Gazebo's reader took: attributes where elements belong, as before SDF 1.3."""
+"""Deviations that Gazebo's reader accepts: attributes in place of elements, as before SDF 1.3."""
 
 from lxml import etree
 

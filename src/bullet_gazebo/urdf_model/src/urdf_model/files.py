@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files that descriptions name: read without ever waiting for one, and no more of it than expected."""
+"""Read files that descriptions name, without blocking and up to a limit."""
 
 import errno
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""XML from anybody: no entities, no network, no more than a description may hold."""
+"""Parse untrusted XML: no entities, no network, a limited size."""
 
 from lxml import etree
 

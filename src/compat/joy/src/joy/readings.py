@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a joystick's sticks and buttons are, by the kernel's events (linux/joystick.h)."""
+"""Positions of a joystick's axes and buttons, from the kernel's events (linux/joystick.h)."""
 import struct
 
 _EVENT = struct.Struct("=IhBB")  # time [ms], value, type, number of the stick's axis or button

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One plan being carried out: where the joints shall be, and how they stop early. Free of ROS."""
+"""The execution of one plan: joint positions over time, and an early stop. Free of ROS."""
 import math
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the streamer hears from the robot."""
+"""The robot's joint angles and state, for the streamer."""
 import threading
 import time
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""rospy.init_node returns when simulated time runs, and not before.
+"""Have rospy.init_node return only when simulated time runs.
 
 Under /use_sim_time rospy's time stands at 0 until the first message on /clock and jumps then, by minutes perhaps.
 Programs that wait "2 s from now" at that moment, as the vendor's SDK does, have waited long enough before anything

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a program has published before its end goes out before its end.
+"""Have a program send all that it has published before it ends.
 
 rospy hands messages of a publisher with a queue to a thread for each connection, and a program that ends takes these
 threads with it: a command that was the last line of a program got lost, or not, as the machine pleased.

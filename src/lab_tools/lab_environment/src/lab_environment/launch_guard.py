@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the environment adds to roslaunch: a second simulator on a master is refused before anything is touched.
+"""Have roslaunch refuse a second simulator on a master, before it changes anything.
 
 roslaunch sets parameters first and starts nodes in any order, and each node that bears the name of another shuts that
 one down. By the time the second simulator itself could refuse, the first lab has lost its nodes. So the launch file is

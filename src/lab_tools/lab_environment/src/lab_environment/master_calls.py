@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""XML-RPC clients of ROS masters and nodes that wait for each answer so long and no longer.
+"""XML-RPC clients of ROS masters and nodes, with a deadline for each answer.
 
 ROS's own wait without end for a program that takes connections and was stopped.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A subscriber whose publisher refuses it says so, once.
+"""Log once when a publisher refuses a subscriber.
 
 rospy writes that to the node's log file alone, where nobody looks: a program that subscribes with another type than
 the publisher's, or with another version of it, hangs without a word.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Is a simulator on its way up? What the ROS master and the roslaunch that starts it know. Needs no rospy, and no node.
+"""Tell whether a simulator is starting, from the ROS master and the roslaunch that starts it. Needs no rospy, no node.
 
 A start is visible as any of these:
 

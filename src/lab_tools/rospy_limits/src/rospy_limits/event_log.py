@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Log lines for what others can cause as often as they like. ROS-free."""
+"""Log lines for events that others can cause at any rate. ROS-free."""
 import threading
 import time
 

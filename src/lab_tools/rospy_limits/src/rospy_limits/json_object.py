@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""JSON objects that come in by message, read within limits: no text of anybody's costs more than an error. ROS-free.
+"""Parse untrusted JSON objects from messages, within limits. ROS-free.
 
 Python's own reader fails in its own ways on what JSON allows: brackets a thousand deep, integers of any length.
 """

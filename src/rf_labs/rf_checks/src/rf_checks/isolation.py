@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The walls of a check, made with bubblewrap and the kernel's namespaces. Free of ROS; Linux only.
+"""The sandbox of a check, from bubblewrap and the kernel's namespaces. Free of ROS; Linux only.
 
 The whole check has a network namespace of its own, with a loopback and nothing else (`enter_network`). In it, the lab
 and the student's program each run in a sandbox (`command`): with own processes and own /dev/shm, with a home and a /tmp

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When simulated time may go on: as soon as the programs that are watched have nothing to do at this moment.
+"""Let simulated time go on as soon as the watched programs are idle.
 
 So a simulation that runs many times faster than real time does not run away from the program in it, however slow or
 busy the machine is: what is counted is the processor time that processes got, never the time on the wall in which they

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a check came to: for people, as JSON, as JUnit XML. Free of ROS."""
+"""The report of a check: as text, as JSON, as JUnit XML. Free of ROS."""
 import json
 from xml.etree import ElementTree
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What somebody asks for: checked points, in arrays."""
+"""A commanded trajectory: checked points, in arrays."""
 import collections
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where joints can go, and how fast."""
+"""Position and velocity limits of joints."""
 import numpy as np
 
 from .errors import BeyondPosition, BeyondVelocity

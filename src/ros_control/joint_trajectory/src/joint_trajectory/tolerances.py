@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far the joints may be from where they should be."""
+"""Tolerances on the joints' errors, on the path and at the goal."""
 from typing import NamedTuple
 
 import numpy as np

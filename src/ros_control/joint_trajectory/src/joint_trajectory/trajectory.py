@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the joints shall be at any time."""
+"""Joint positions, velocities and accelerations over time."""
 import bisect
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Take a block from one spot of a table and put it on another: the order of things, for any arm. Free of ROS.
+"""Take a block from one spot of a table and put it on another: the sequence of steps, for any arm. Free of ROS.
 
 An arm is an object with `name`, `ik(position, orientation, seed)` -> angles by joint name (raises what it likes),
 `move_to(angles)`, `open()`, `close()`, which return when it is done, and `holds()`. Positions [m] are those of the

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Why a pose has no solution: asked only when a search has found none, by searching again with something let go."""
+"""Diagnose why a pose has no solution: after a failed search, search again with one constraint removed."""
 import math
 from dataclasses import replace
 

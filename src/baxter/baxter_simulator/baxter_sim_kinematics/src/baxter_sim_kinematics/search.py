@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One target and one chain, searched for under varying limits and budgets."""
+"""Searches for one target of one chain, under varying limits and budgets."""
 import math
 from typing import NamedTuple
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the searches of one request begin, and when another beginning is worth a try."""
+"""Seeds for the searches of one request, and when the next seed is tried."""
 import enum
 from typing import NamedTuple
 

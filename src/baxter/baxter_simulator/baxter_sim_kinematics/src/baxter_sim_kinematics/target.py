@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is asked of the tip: a pose, or as much of one as matters."""
+"""The target of the tip: a pose, or the part of one that counts."""
 import math
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an arm runs into, what is said of it, and what a client may have switched off for the moment.
+"""Collisions of an arm: detection, the states to report, and what a client has suppressed for the moment.
 
 Avoidance is about the robot itself: an arm that touches the body, the other arm or its own shoulder yields, that is its
 drives push with a fraction of what they have, in the modes in which the physical robot keeps its arms apart (position

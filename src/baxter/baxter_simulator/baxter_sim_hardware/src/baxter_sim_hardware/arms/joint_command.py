@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a joint command may say: modes, limits, and the checks that stand between a message and a motor.
+"""Joint commands: modes, limits, and the checks of a message before it moves anything.
 
 A command is one decision: it is refused as a whole (`CommandRefused`) when it is malformed, and clamped, value by
 value, when it asks for more than the joints can do. That is how the physical robot treats both cases; its own tucked

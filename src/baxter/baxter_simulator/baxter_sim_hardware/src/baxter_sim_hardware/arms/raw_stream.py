@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""RAW_POSITION: set-points that come as a stream move on at the stream's own pace."""
+"""RAW_POSITION: a stream of set-points is followed at its own rate."""
 import numpy as np
 
 from .joint_modes import RAW_POSITION

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The electric gripper: commands in, set-point of its fingers out; what it feels follows from the fingers alone."""
+"""The electric gripper: commands in, set-point of its fingers out; its force is computed from the fingers alone."""
 import json
 from enum import Enum
 

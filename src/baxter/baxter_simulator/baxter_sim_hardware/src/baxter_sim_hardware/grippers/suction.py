@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The suction gripper: commands in, pressure in its cup out. What it holds, it holds by that pressure alone."""
+"""The suction gripper: commands in, pressure in its cup out. Only that pressure holds an object."""
 import json
 import math
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The grippers' ROS side: messages from and to the hands, and what a client says of a tool that only it knows."""
+"""The grippers' ROS side: messages from and to the hands, and a client's description of a custom tool."""
 import copy
 
 from baxter_core_msgs.msg import EndEffectorProperties, EndEffectorState

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When the robot publishes what: each topic at its rate, and nothing for a topic that nobody listens to."""
+"""Publish each of the robot's topics at its rate, and none without a subscriber."""
 import math
 
 from sim_time.pace import Schedule

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How the functions of this package are compiled, and where what was compiled is kept."""
+"""Compile the functions of this package, and keep the result in numba's cache."""
 from pathlib import Path
 
 from numba_cache import compiler

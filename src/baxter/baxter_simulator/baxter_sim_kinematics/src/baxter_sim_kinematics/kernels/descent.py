@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From one start downhill: onto the target, along it towards a posture, or as near to it as may be."""
+"""Descent from one start: onto the target, along it towards a posture, or as near to it as possible."""
 import math
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much of a pose error counts."""
+"""Rows of the pose error that count."""
 import enum
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Start after start until there are solutions enough."""
+"""Search from many starts until there are enough solutions."""
 import math
 
 import numpy as np

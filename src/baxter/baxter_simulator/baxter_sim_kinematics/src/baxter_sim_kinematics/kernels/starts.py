@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where searches begin: the seed, then random postures that depend on nothing but the request."""
+"""Starts of a search: the seed, then random postures that depend only on the request."""
 import math
 
 import numpy as np

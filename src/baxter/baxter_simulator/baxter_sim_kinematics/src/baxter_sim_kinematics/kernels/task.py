@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is asked of the tip, and how far it is from there."""
+"""The target of the tip, and the pose error."""
 import math
 
 import numpy as np
