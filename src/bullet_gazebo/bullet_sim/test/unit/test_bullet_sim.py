@@ -202,6 +202,13 @@ def test_damping_beyond_what_is_stable_is_bounded(world):
     assert np.isfinite(model.read_joints()[0]).all() and abs(model.read_joints()[1]).max() < 10
 
 
+def test_a_shorter_tick_lets_more_damping_act(world):
+    arm = world.spawn(parse_urdf(ARM.replace('damping="0.5"', 'damping="1e6"')), "arm", static=True)
+    before = arm.damping[0]
+    world.set_time_step(world.time_step_s / 2.0)
+    assert arm.damping[0] == pytest.approx(2.0 * before)
+
+
 def test_wrench_deflects_the_motor_torque_by_the_jacobian(world, arm):
     target = np.zeros(2)
     arm.drive_position(BOTH, target, arm.max_effort)
