@@ -108,7 +108,7 @@ fingerprint() {
     for folder in "${LAB_FOLDERS[@]}"; do
         if [[ -d $LAB_ROOT/src/$folder ]]; then folders+=("src/$folder"); fi
     done
-    # The order of the files must not depend on the language of whoever asks. -H: some folders of src are links.
+    # The order of the files must not depend on the user's language. -H: some folders of src are links.
     {
         echo "$LAB_ROOT"
         cd "$LAB_ROOT" && find -H requirements*.txt tools/*.txt tools/setup.bash ${folders[@]+"${folders[@]}"} $([[ -d src_overlay ]] && echo src_overlay) \

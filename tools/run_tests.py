@@ -128,7 +128,7 @@ def layers(selection, long: bool, stretch: float, ending: contextlib.ExitStack):
     for name in selection.linters:
         yield name, functools.partial(run_linter, name)
     if selection.unit_targets:
-        # Whoever names a single test means it, long or not; a -m of the user's own comes later and wins.
+        # A single test that is named runs, long or not; a -m of the user's own comes later and wins.
         is_single = any("::" in target for target in selection.unit_targets)
         marker = [] if long or is_single else ["-p", "lab_tests.long_tests"]
         runs = {"unit tests": UnitRun("unit", selection.unit_targets, marker + selection.pytest_arguments)}

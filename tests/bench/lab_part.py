@@ -43,7 +43,7 @@ OF_MESH = """<robot name="hostile"><link name="l"><inertial><mass value="1"/><in
 <collision><geometry><mesh filename="%s"/></geometry></collision></link></robot>"""
 TICK_S = 0.002
 COMMAND_TICKS = 5
-FIRST_TICK = 500  # by then whoever listens has connected, and the robot stands
+FIRST_TICK = 500  # by then all subscribers have connected, and the robot stands
 
 
 def up():

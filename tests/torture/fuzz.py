@@ -32,7 +32,7 @@ TOPIC_WEIGHT, SERVICE_WEIGHT = 4, 1
 REDRAWS = 8
 # Not fuzzed, and why.
 LEFT_OUT = {
-    "/clock": "is the time of all nodes: whoever publishes there is the simulator",
+    "/clock": "is the time of all nodes: only the simulator publishes there",
     "/gazebo/advance": "waits as long as it is asked to; the state machine drives it",
     "/gazebo/pause_physics": "the state machine pauses; here simulated time has to go on",
 }

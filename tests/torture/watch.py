@@ -59,7 +59,7 @@ class Watch(threading.Thread):
     """Follows the topics of CORE all the time and a changing sample of the others. Context manager.
 
     Attributes: ``found``, texts of what was wrong; ``counts``, messages read by topic; ``latest``, topic to its last
-    message; ``stamps``, ``still``: what is expected of the messages, set by whoever resets the time or moves the robot.
+    message; ``stamps``, ``still``: what is expected of the messages, set by the test.
     """
 
     def __init__(self, lab, limits, tolerance, seed=0):

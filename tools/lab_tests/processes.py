@@ -23,7 +23,7 @@ def marked(value: str, marker: str = MARKER) -> dict[int, str]:
                 if command:  # a zombie has none
                     found[int(entry.name)] = command
         except OSError:
-            continue  # it ended while we looked, or belongs to somebody else
+            continue  # it ended while we looked, or belongs to another user
     return found
 
 

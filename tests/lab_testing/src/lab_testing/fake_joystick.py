@@ -27,7 +27,7 @@ class FakeJoystick:
         self._write(_INITIAL)
 
     def unplug(self):
-        """Whoever reads it is told that it was closed."""
+        """Tell the reader that it was closed."""
         if self._file is not None:
             os.remove(self.path)  # first, so that the reader cannot open the old one again
             os.close(self._file)

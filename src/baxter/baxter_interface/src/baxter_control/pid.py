@@ -3,7 +3,7 @@
 
 
 def _ros_time():
-    import rospy  # Late, so that whoever brings a clock needs no ROS.
+    import rospy  # Late, so that a caller with a clock of its own needs no ROS.
 
     return rospy.get_time()
 

@@ -172,8 +172,8 @@ def follow_simulated_time():
 def wait_for_subscribers(publisher, timeout=1.0, enough=None):
     """Wait until all nodes that the master lists as subscribers of `publisher` have connected to it, if there are any.
 
-    The first message after a publisher was made is lost to whoever has not connected yet. Returns after `timeout` [s,
-    wall] in any case: a subscriber on the list may be dead. `enough`: so many will do; None for all.
+    The first message after a publisher was made is lost to subscribers that have not connected yet. Returns after
+    `timeout` [s, wall] in any case: a subscriber on the list may be dead. `enough`: so many will do; None for all.
     """
     try:
         expected = len(_nodes_of(publisher.resolved_name, subscribers=True))

@@ -94,7 +94,7 @@ class ArmMotion:
                               bounds(count, position=settings.goal, velocity=settings.stopped_velocity),
                               settings.goal_time_s)
         tolerances = merge_tolerances(defaults, self.joint_names, *wanted)
-        # The end is commanded in the tick before it; whoever keeps up is still moving then.
+        # The end is commanded in the tick before it; an arm that keeps up is still moving then.
         tolerances = tolerances._replace(goal_time_s=tolerances.goal_time_s + 2.0 * self._period_s)
         if not self.engaged:
             self._follower.start(now_s, position, np.zeros(count))

@@ -56,7 +56,7 @@ class JointTrajectoryActionServer:
         mode: "position_w_id" (raw positions, with velocities and accelerations beside them), "position", "velocity".
     Each goal ends once: succeeded, aborted with an error_code and an error_string, or preempted. One that cannot be
     carried out is aborted before anything moves, and disturbs no other. After a goal its end is held, until the next
-    one, or until the robot is disabled, the cuff is squeezed, somebody else commands the arm, or clean_shutdown().
+    one, or until the robot is disabled, the cuff is squeezed, another node commands the arm, or clean_shutdown().
     Waits up to 30 s of wall time for the robot, and raises, as Limb does.
     """
 

@@ -270,7 +270,7 @@ class TrajectoryServerTest(unittest.TestCase):
         self.assert_aborts(self.client.go([(0.5, AWAY)]), FollowJointTrajectoryResult.INVALID_GOAL, "cuff is squeezed")
         self.assert_quiet()
 
-    def test_whoever_commands_the_arm_afterwards_gets_it(self):
+    def test_another_node_that_commands_the_arm_afterwards_gets_it(self):
         self.assert_commanded()
         self.release()
         self.assert_quiet()

@@ -47,7 +47,7 @@ class World:
     :param contact_ahead_m: how far apart bodies may be to count as a contact, which is solved before they touch [m].
         The default is what 2 m/s travel in a tick of 2 ms; Bullet's own 0.02 m has an arm that is folded beside its
         body pay for contacts that never come. For small bodies it is less in any case, a fiftieth of their size.
-    :param seed: of ``World.random``, for whoever needs noise
+    :param seed: of ``World.random``, for noise
     :param find_mesh: function from a mesh URI to a file path, or None when there is no such file
     :param warn: function that is told what was mended, in one line
     :param error: function that is told, in one line, of which model Bullet gave no state that could be

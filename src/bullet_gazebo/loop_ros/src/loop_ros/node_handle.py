@@ -87,8 +87,8 @@ class NodeHandle:
         return self._ros.served()
 
     def withdraw(self, name):
-        """Loop thread: for good, no longer serve the service ``name`` nor listen to the topic of that name, whoever
-        opened it; for an owner that guards what others may do.
+        """Loop thread: for good, no longer serve the service ``name`` nor listen to the topic of that name, for all
+        owners; for an owner that guards what others may do.
 
         Returns the service's handler, for the caller's own requests; None where there is no such service.
         """

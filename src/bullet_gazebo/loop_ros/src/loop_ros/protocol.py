@@ -113,8 +113,8 @@ class LoopRos(Protocol):
         """Names of the services that are served now: a list."""
 
     def withdraw(self, name):
-        """Close the service and the subscriptions of this name, whoever opened them; returns the service's handler, or
-        None where there is no such service."""
+        """Close all owners' service and subscriptions of this name; returns the service's handler, or None where there
+        is no such service."""
 
     def call_in_loop(self, function, *arguments):
         """Any thread but the loop's: have ``function(*arguments)`` called between two ticks, return or raise what it

@@ -96,7 +96,7 @@ class RosObjects:
         return list(self._services)
 
     def withdraw(self, name):
-        """Loop thread: no longer serve the service ``name``, nor listen to the topic of that name, whoever opened it.
+        """Loop thread: no longer serve the service ``name``, nor listen to the topic of that name, for all owners.
 
         Returns the service's handler, which only the caller reaches from then on; None where there is no such service.
         """

@@ -35,7 +35,7 @@ class Pace:
         return time_s >= self._next_s - _TOLERANCE_S or time_s < self._last_s
 
     def took(self, time_s):
-        """It was done at ``time_s`` [s]. Who was late does not catch up."""
+        """It was done at ``time_s`` [s]. A late caller does not catch up."""
         following = self._next_s + self.period_s
         latest = time_s + self.period_s
         self._next_s = following if time_s < following <= latest + _TOLERANCE_S else latest

@@ -401,7 +401,7 @@ def _words(values):
 
 
 def _reduction(text):
-    # No fault of a transmission makes a body: whoever drives joints by it says what is wrong (controller_manager).
+    # No fault of a transmission makes a body: controller_manager, which uses it, says what is wrong.
     try:
         number = float(text)
     except (TypeError, ValueError):

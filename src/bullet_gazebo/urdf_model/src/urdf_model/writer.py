@@ -12,7 +12,7 @@ _SHEET_M = 0.002  # how thick a plane is drawn
 def drawing_urdf(merged):
     """Return URDF text whose bodies and movable joints are those of ``merged`` (a MergedRobot), in the same order.
 
-    Planes become thin boxes that face the same way. Joint limits are left out: whoever draws is told positions.
+    Planes become thin boxes that face the same way. Joint limits are left out: the renderer is given positions.
     """
     robot = etree.Element("robot", name=merged.name)
     for link in merged.links.values():

@@ -47,7 +47,7 @@ def _shared_memory_folder():
 def remove_stale(parent=None):
     """Delete this user's folders of simulators that are gone; returns their paths.
 
-    What bears such a name and is a link, or somebody else's, is neither followed nor touched: everybody may write where
+    What bears such a name and is a link, or another user's, is neither followed nor touched: everybody may write where
     the folders are.
     """
     parent = _shared_memory_folder() if parent is None else Path(parent)

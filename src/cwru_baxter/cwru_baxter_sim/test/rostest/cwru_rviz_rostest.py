@@ -55,7 +55,7 @@ class CwruRvizTest(unittest.TestCase):
                     robot=np.count_nonzero((red > 100) & (green < 40) & (blue < 40)))
 
     def keep(self, picture):
-        """Leave the picture beside the test's other results, for whoever wants to look."""
+        """Leave the picture beside the test's other results, for the reader."""
         folder = os.environ.get("ROS_TEST_RESULTS_DIR")
         if folder:
             height, width, _ = picture.shape

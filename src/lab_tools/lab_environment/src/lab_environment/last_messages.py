@@ -18,7 +18,7 @@ def amend(core):
 
 
 def _before_shutdown(reason):
-    # Who presses Ctrl-C wants an end; and a signal may have come where a lock is held that is needed here.
+    # The user who presses Ctrl-C wants an end; and a signal may have come where a lock is held that is needed here.
     if not reason.startswith("signal"):
         await_sent(queued_connections())
 

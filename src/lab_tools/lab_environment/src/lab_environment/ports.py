@@ -5,7 +5,7 @@ import errno
 import random
 import socket
 
-# Below those (32768 up) that the kernel gives to whoever connects: one of them could be taken before the master comes.
+# Below those (32768 up) that the kernel gives to clients: one of them could be taken before the master comes.
 PORTS = range(20000, 30000)
 
 

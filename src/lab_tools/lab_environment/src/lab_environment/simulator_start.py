@@ -18,7 +18,7 @@ from . import master_calls
 # Gazebo's own name, which launch files give its node.
 SIMULATOR = "/gazebo"
 CLOCK = "/clock"
-# A topic without messages; whoever is registered as its publisher is at work.
+# A topic without messages; its registered publisher is at work.
 SPAWNING = "/gazebo/spawning"
 # Longest wait for one answer [s].
 ANSWER_TIMEOUT_S = 2.0

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""A simulator's /clock, and joint states that reach whoever subscribes half a second later, as on a busy machine.
+"""A simulator's /clock, and joint states that reach a subscriber half a second later, as on a busy machine.
 
 Parameters: ~start_s, the first time on /clock; ~paused, it stays there.
 """

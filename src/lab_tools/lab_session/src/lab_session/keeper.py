@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`python3 keeper.py STATE_FILE COMMAND...`: runs a command for as long as its own standard input is open.
 
-Whoever started it holds the other end of that pipe, so that the command ends when its owner ends, however that happens.
+The starting process holds the other end of that pipe, so that the command ends when its owner ends, in any way.
 Free of ROS. The state file is locked while the keeper lives; its first line says `running` or `ending`, the others what
 runs. With LAB_SESSION_AFTER naming another keeper's state file, the command outlives that keeper.
 """

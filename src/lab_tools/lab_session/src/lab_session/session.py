@@ -20,7 +20,7 @@ from lab_environment.ports import free_port
 from . import keeper
 from .labs import LABS
 
-# A simulator that somebody else has started may still be coming up; after this its robot is another one [s].
+# A simulator that another program has started may still be coming up; after this its robot is another one [s].
 FOUND_TIMEOUT_S = 20.0
 # A simulator of ours has this long, on a machine that has much else to do [s].
 START_TIMEOUT_S = 120.0

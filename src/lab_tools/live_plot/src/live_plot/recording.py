@@ -28,7 +28,7 @@ class _Series:
         self._end += 1
 
     def kept(self):
-        """A view, for whoever holds the lock: (2, n), times and values."""
+        """A view, for the holder of the lock: (2, n), times and values."""
         return self._data[:, max(0, self._end - self._capacity):self._end]
 
 

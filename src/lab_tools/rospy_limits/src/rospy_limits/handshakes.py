@@ -157,7 +157,7 @@ class HandshakeServer:
         self._read(pending, is_new=True)
 
     def _is_full(self, host):
-        """Counts what is open; sockets are held weakly, whoever has taken them over closes them."""
+        """Counts what is open; sockets are held weakly, their new owner closes them."""
         held = self._open[host]
         if len(held) >= limits.CONNECTIONS_PER_ADDRESS:
             held[:] = [reference for reference in held if (still := reference()) is not None and still.fileno() >= 0]

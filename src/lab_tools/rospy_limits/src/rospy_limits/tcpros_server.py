@@ -43,7 +43,7 @@ def connection_handler(events):
                        % (*address[:2], error))
             return
         if "topic" in header:
-            # A latched message may have to wait for the client, or for somebody else whom the publisher waits for.
+            # A latched message may have to wait for the client, or for another client that the publisher waits for.
             threading.Thread(target=_answer, name="handshake", daemon=True,
                              args=(server.topic_connection_handler, connection, address, header, events)).start()
         elif "service" in header:

@@ -2,7 +2,7 @@
 """What the ROS master of the judge's lab knows, and what of it is no longer as the lab left it.
 
 The judge asks through rosgraph and is no node. Everybody who reaches a master may register, unregister and set
-parameters in anybody's name, so a node counts as gone when its process is, whoever bears its name by then.
+parameters in anybody's name, so a node counts as gone when its process is, whichever process has its name by then.
 """
 import contextlib
 import time

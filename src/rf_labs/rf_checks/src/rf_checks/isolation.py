@@ -216,7 +216,7 @@ def command(environment, binds=(), hidden=SOLVED, own_network=False):
 
 
 def environment_of(environment):
-    """Of an environment, what a program in a sandbox gets: no token or agent of whoever runs the check."""
+    """Of an environment, what a program in a sandbox gets: no token or agent of the user that runs the check."""
     kept = {name: value for name, value in environment.items()
             if name in _VARIABLES or name.startswith(("ROS_", "ROSCONSOLE_", "LC_"))}
     return {**kept, "HOME": HOME, "TMPDIR": "/tmp", "ROS_HOME": HOME + "/.ros", "ROS_LOG_DIR": HOME + "/log",

@@ -221,7 +221,7 @@ class Judge:
 
     @staticmethod
     def _look_at_graph(lab, run, with_parameters=False):
-        """Whether something of the lab's is gone, or somebody else publishes its topics; `run.changes` says what."""
+        """Whether something of the lab's is gone, or another node publishes its topics; `run.changes` says what."""
         try:
             run.changes = lab.graph.changes(with_parameters)
         except MasterSilent:

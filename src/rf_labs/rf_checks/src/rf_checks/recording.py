@@ -49,7 +49,7 @@ class Recording:
         return [tuple(command[:4]) for record in self.records for command in record["commands"]]
 
     def commanders(self):
-        """Who commanded the arms: sorted (node name, side, mode) of the commands that were written out and obeyed."""
+        """The nodes that commanded the arms: sorted (node name, side, mode) of recorded commands that were obeyed."""
         return sorted({(command[4], command[0], command[1]) for record in self.records
                        for command in record["commands"] if command[5]})
 

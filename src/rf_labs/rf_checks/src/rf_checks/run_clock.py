@@ -48,7 +48,7 @@ class RunClock:
         return {VARIABLE: str(self.descriptor)}
 
     def advance(self, step_s):
-        """Simulated time went on by `step_s`; whoever sleeps looks up."""
+        """Simulated time went on by `step_s`; wake all sleepers."""
         self._simulated_ns += round(step_s * 1e9)
         self._write()
         if platform.machine() in _FUTEX:

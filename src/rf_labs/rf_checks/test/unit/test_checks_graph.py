@@ -108,7 +108,7 @@ def test_a_node_that_is_gone_is_missing(graph, ik):
     assert graph.changes().withdrawn == []
 
 
-def test_a_node_whose_process_ended_is_missing_whoever_has_its_name(graph, living):
+def test_a_node_whose_process_ended_is_missing_though_another_has_its_name(graph, living):
     living.discard("/ik")
     assert graph.changes().missing_nodes == ["/ik"]
     assert not graph.is_as_it_was()

@@ -322,6 +322,6 @@ def _names(controllers):
 
 
 def _finish(future):
-    # Who waited may have given up and cancelled it.
+    # The waiting caller may have given up and cancelled it.
     with contextlib.suppress(InvalidStateError):
         future.set_result(None)

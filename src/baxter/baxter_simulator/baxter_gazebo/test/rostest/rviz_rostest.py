@@ -82,7 +82,7 @@ class RvizTest(unittest.TestCase):
         self.lab.wait(END_LIMIT_S)
 
     def keep(self, picture, name):
-        """Leave the picture beside the test's other results, for whoever wants to look."""
+        """Leave the picture beside the test's other results, for the reader."""
         folder = os.environ.get("ROS_TEST_RESULTS_DIR")
         if folder:
             height, width, _ = picture.shape

@@ -7,7 +7,7 @@ import threading
 class Turns:
     """A lock, as a context, whose waiters get it in the order in which they asked.
 
-    Python's own goes to whoever is fastest, and that is the thread that has just released it: a loop over ten thousand
+    Python's own goes to the fastest thread, which is the one that has just released it: a loop over ten thousand
     poses would keep everybody else waiting until its end.
     """
 
