@@ -344,8 +344,10 @@ def test_plan_is_melodics_trajectory_too(arm, planned):
     assert plan.joint_trajectory.joint_names == ["shoulder", "elbow"]
     assert len(plan.joint_trajectory.points) == 2
     plan.joint_trajectory.points[1].positions = [0.1, 0.2]
-    plan.joint_trajectory = plan.joint_trajectory
+    plan.joint_trajectory = copy.deepcopy(plan.joint_trajectory)
+    plan.joint_trajectory.points[1].velocities = [0.3, 0.4]
     assert plan[1].joint_trajectory.points[1].positions == [0.1, 0.2]
+    assert plan[1].joint_trajectory.points[1].velocities == [0.3, 0.4]
     display = DisplayTrajectory()
     display.trajectory.append(plan)
     sent = DisplayTrajectory()
