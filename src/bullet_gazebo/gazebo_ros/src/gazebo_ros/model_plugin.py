@@ -40,7 +40,7 @@ class ModelPlugin:
 
         Called before the model exists, with the ``urdf_model.Robot`` and the ``<plugin>`` element. A robot that is
         bolted to the floor answers ``{"static": True}``; one with its own self-collision table adds
-        ``self_collision_pairs``.
+        ``self_collision_pairs``, one with links that nothing bumps into ``solids``.
 
         Runs in a service thread (not in the loop), so slow work such as computing tables belongs here.
         """

@@ -15,6 +15,7 @@ from lxml import etree
 
 from bullet_sim import BulletSimError, Pose, with_stand_ins
 from bullet_sim.gathered import MOST_SHAPES
+from bullet_sim.solids import with_solids
 from bullet_sim.world import is_fixed
 from gazebo_ros import urdf_extras
 from gazebo_ros.drawn_sensor import DrawnSensor
@@ -141,10 +142,13 @@ class Spawner:
         if mended:
             self._log.warn("model '%s': %s (are the files there, and the packages in ROS_PACKAGE_PATH?)"
                            % (name, mended))
-        merged = merge_fixed(robot)
+        options = {"static": urdf_extras.is_static(robot), **options}
+        try:
+            merged = merge_fixed(with_solids(robot, options.pop("solids", None)))
+        except BulletSimError as error:
+            raise SpawnRefused(str(error)) from error
         if mended or drawing is None:
             drawing = None if is_floor(robot) else drawing_urdf(merged)
-        options = {"static": urdf_extras.is_static(robot), **options}
         stands_fast = is_fixed(merged.root, options["static"])
         for link in _that_take_time(merged):
             self._mesh_files.parts(merged.links[link].collisions, stands_fast and link == merged.root,
