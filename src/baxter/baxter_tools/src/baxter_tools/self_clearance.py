@@ -6,7 +6,7 @@ The shapes and the pairs of parts that can meet are those that the simulator col
 import numpy as np
 
 from baxter_model.description import finger_openings
-from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
+from baxter_model.self_collision import spawn_options
 from bullet_sim import World
 from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
@@ -28,8 +28,7 @@ class SelfClearance:
     def __init__(self, urdf_xml, names, warn=lambda text: None):
         robot = parse_urdf(urdf_xml, source="robot_description")
         self._world = World(find_mesh=ResourceFinder(), warn=warn, contact_ahead_m=self.SEEN_M)
-        self._model = self._world.spawn(robot, "baxter", static=True, mesh_cuts=MESH_CUTS,
-                                        self_collision_pairs=self_collision_pairs(robot.links))
+        self._model = self._world.spawn(robot, "baxter", static=True, **spawn_options(robot.links))
         self._index = self._model.index(names)
         self.lower, self.upper = self._model.lower[self._index], self._model.upper[self._index]
         openings = finger_openings(robot)

@@ -2,10 +2,13 @@
 """What the URDF says about Baxter: which joints make an arm, where its tip is, what it carries there."""
 from dataclasses import dataclass
 
-from urdf_model import Cylinder
+import numpy as np
+
+from urdf_model import Cylinder, Sphere, merge_fixed
 
 from .errors import ModelMismatch
-from .names import BASE_FRAME, SIDES, finger_prefix, joint_names, tip_of
+from .names import BASE_FRAME, SIDES, finger_prefix, is_part_of_arm, joint_names, tip_of
+from .self_collision import HEAD_GUARDS
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,22 @@ def openings_of(robot, side):
     """`finger_openings` of one arm; empty where it carries no electric gripper."""
     return {name: opening for name, opening in finger_openings(robot).items()
             if name.startswith(finger_prefix(side))}
+
+
+def head_guards(robot):
+    """[(link, centre (3,) in `base` [m], radius [m])] of the balls around the head that arms are kept out of."""
+    frames = merge_fixed(robot).frames
+    to_base = np.linalg.inv(frames[BASE_FRAME].offset)
+    return [(name, (to_base @ frames[name].offset @ shape.origin)[:3, 3], shape.geometry.radius)
+            for name in HEAD_GUARDS if name in robot.links and frames[name].link == frames[BASE_FRAME].link
+            for shape in robot.links[name].collisions if isinstance(shape.geometry, Sphere)]
+
+
+def arm_radius(robot):
+    """How thick the arms are [m]: the widest of the cylinders that stand for their links; 0 without any."""
+    return max((shape.geometry.radius for name, link in robot.links.items()
+                if any(is_part_of_arm(name, side) for side in SIDES)
+                for shape in link.collisions if isinstance(shape.geometry, Cylinder)), default=0.0)
 
 
 def cup_of(robot, side):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which parts of Baxter can hit which, and the convex pieces that stand in for its body.
+"""Which parts of Baxter can hit which, the convex pieces that stand in for its body, and what is solid of its head.
 
 Left out are pairs that a joint's limits keep apart and pairs whose shapes, thick cylinders with a wide bend between
 them, overlap although the robot's covers do not: neighbours and their neighbours along an arm, the upper arm and the
@@ -9,6 +9,12 @@ from .names import BASE_FRAME, SIDES, finger_prefix
 
 # The torso: the link of this name is merged with all that does not move.
 BODY = BASE_FRAME
+# The pan joint's link, to which the screen is fixed.
+HEAD = "head"
+# Two balls of the description around the head: the field that the robot's collision avoidance keeps its arms out of,
+# with nothing solid in it but the head, which the description gives no shape to collide with.
+HEAD_GUARDS = ("collision_head_link_1", "collision_head_link_2")
+_SOLIDS = {HEAD: "as drawn", "screen": "as drawn", **dict.fromkeys(HEAD_GUARDS, "hollow")}
 # An arm from torso to wrist; the links of the description, of which several are one body.
 SHOULDER, UPPER_ARM = "upper_shoulder", "lower_shoulder"
 BEYOND_UPPER_ARM = ("upper_elbow", "lower_elbow", "upper_forearm", "lower_forearm", "wrist")
@@ -34,9 +40,15 @@ def self_collision_pairs(links):
     pairs = [(a, b) for a in left.everything for b in right.everything
              if not (a in left.shoulder and b in right.shoulder)]
     for arm in arms.values():
-        pairs += [(BODY, link) for link in arm.beyond_upper_arm]
+        pairs += [(part, link) for part in (BODY, HEAD) for link in arm.beyond_upper_arm]
         pairs += [(link, other) for link in (*arm.shoulder, *arm.upper_arm) for other in arm.hand]
     return [pair for pair in pairs if all(link in links for link in pair)]
+
+
+def spawn_options(links):
+    """What `bullet_sim.World.spawn` shall know of a Baxter with these link names (any container), to be unpacked."""
+    return {"self_collision_pairs": self_collision_pairs(links), "mesh_cuts": MESH_CUTS,
+            "solids": {link: solid for link, solid in _SOLIDS.items() if link in links}}
 
 
 class _Arm:

@@ -10,7 +10,7 @@ from baxter_core_msgs.msg import EndEffectorProperties
 
 import baxter_model
 from baxter_model import JOINTS, MIRROR_SIGNS, SIDES, description
-from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
+from baxter_model.self_collision import BODY, HEAD, HEAD_GUARDS, MESH_CUTS, self_collision_pairs, spawn_options
 from urdf_model import parse_urdf
 
 
@@ -68,6 +68,21 @@ def test_every_pair_is_of_links_that_the_robot_has(robot):
     assert 0 < len(self_collision_pairs(bare)) < len(self_collision_pairs(robot.links))
     assert set(MESH_CUTS) <= set(robot.links)
     assert self_collision_pairs(["base_link", "arm"]) == []
+    assert spawn_options(["base_link", "arm"])["solids"] == {}
+    options = spawn_options(robot.links)
+    assert set(options["solids"]) <= set(robot.links) and robot.links[HEAD].visuals
+    assert {pair[1] for pair in options["self_collision_pairs"] if pair[0] == HEAD} == {
+        pair[1] for pair in options["self_collision_pairs"] if pair[0] == BODY}
+
+
+def test_guards_stand_around_the_head(robot):
+    guards = description.head_guards(robot)
+    assert [name for name, _, _ in guards] == list(HEAD_GUARDS)
+    for (_, centre, radius), y in zip(guards, (-0.04, 0.04), strict=True):
+        assert centre.tolist() == pytest.approx([0.04, y, 0.75]) and radius == 0.22
+    assert description.arm_radius(robot) == 0.06
+    other = parse_urdf('<robot name="desk"><link name="base"/></robot>')
+    assert description.head_guards(other) == [] and description.arm_radius(other) == 0.0
 
 
 def test_pairs_are_the_same_on_both_sides(robot):

@@ -8,7 +8,7 @@ import roslib.message
 
 from baxter_model import BASE_FRAME, SIDES, ModelError, tip_of
 from baxter_model.description import finger_openings, limbs_of
-from baxter_model.self_collision import MESH_CUTS, self_collision_pairs
+from baxter_model.self_collision import spawn_options
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
@@ -20,7 +20,7 @@ from .robot import Baxter
 from .robot_state import Event, State
 from .topics import interface
 from .topics.arms import ArmTopics
-from .topics.collision import CollisionTopics
+from .topics.collision import CollisionTopics, guards_of
 from .topics.grippers import GripperTopics
 from .topics.handling import Handling
 from .topics.head import HeadTopics
@@ -50,7 +50,7 @@ class BaxterPlugin(ModelPlugin):
     @classmethod
     def spawn_options(cls, robot, element):
         # The pedestal stands on the floor and stays there.
-        return {"static": True, "self_collision_pairs": self_collision_pairs(robot.links), "mesh_cuts": MESH_CUTS}
+        return {"static": True, **spawn_options(robot.links)}
 
     def __init__(self, context, before=None):
         """``before``: the robot_state.State of the plugin that this one takes over from, if there is one."""
@@ -102,7 +102,8 @@ class BaxterPlugin(ModelPlugin):
         senses = SensorTopics(world, model, robot, limb_index, self._dt)
         for part in (self._grippers, senses):
             part.attach_sensors(panel)
-        self._collision = CollisionTopics(world, model, baxter.arms, self._arms.feel, panel.cuff_squeezed)
+        self._collision = CollisionTopics(world, model, baxter, chains, guards_of(robot), self._arms.feel,
+                                          panel.cuff_squeezed)
         self._procedures = ProcedureTopics(baxter.state)
         self._parts = (
             self._robot, self._arms, panel, self._head, self._grippers, self._collision, self._procedures, senses,

@@ -97,11 +97,26 @@ def test_speed_ratio_scales_position_mode(make_lab, ratio, profile):
         for side in SIDES:
             lab.send("limb/%s/set_speed_ratio" % side, Float64(ratio))
     start = lab.position
-    lab.command(POSITION, start + np.tile([1, 1, 1, 1, 2, -2, 2], 2))
+    # As far for each joint as it comes in the same time: joints move in step.
+    limits = lab.model.max_velocity[lab.arm]
+    lab.command(POSITION, start + 0.7 * limits * np.tile([1, 1, 1, 1, 1, -1, 1], 2))
     _, velocity, _ = lab.record(0.5)
     expected = max(ratio, 0.0) * lab.model.max_velocity[lab.arm]
     # s0 has not the 50 Nm that the steepest part of the profile asks for, and catches up.
     np.testing.assert_allclose(np.abs(velocity).max(axis=0), expected, rtol=0.1, atol=5e-3)
+
+
+def test_joints_of_one_command_arrive_together_and_return_when_pushed(lab):
+    """Whatever way each has: but for the beginning they are on the straight line, nearly."""
+    start, way = lab.position, np.tile([0.2, -0.3, 1.5, 0.4, -0.5, 0.3, 2.0], 2)
+    lab.command(POSITION, start + way)
+    position, _, _ = lab.record(1.3)
+    share = (position - start) / way
+    assert np.ptp(share, axis=1).max() < 0.35 and np.ptp(share[350:], axis=1).max() < 0.15
+    assert np.abs(position[-1] - start - way).max() < 1e-3
+    lab.command(POSITION, (lab.position + 0.5)[:1], names=["left_s0"])
+    lab.run(1.0)
+    assert lab.position[0] == pytest.approx(position[-1][0] + 0.5, abs=1e-3)
 
 
 def test_speed_ratio_nan_is_refused(lab):
@@ -116,7 +131,13 @@ def test_velocity_is_reached_and_braked_before_the_joint_limit(lab):
     wanted = np.tile([0.5, -0.5, 0.5, 0.5, 1.0, 1.0, -1.0], 2)
     _, velocity, _ = lab.record(0.5, before=lambda lab: lab.command(VELOCITY, wanted))
     np.testing.assert_allclose(velocity[-1], wanted, atol=2e-3)
-    lab.run(8.0, before=lambda lab: lab.command(VELOCITY, wanted))
+
+    def stream(lab):
+        lab.command(VELOCITY, wanted)
+        for side in SIDES:
+            lab.send("limb/%s/suppress_collision_avoidance" % side, Empty())  # it would end at the head
+
+    lab.run(8.0, before=stream)
     ends = np.where(wanted > 0, lab.model.upper[lab.arm], lab.model.lower[lab.arm])
     np.testing.assert_allclose(lab.position, ends, atol=1e-3)
     assert np.abs(lab.velocity).max() < 1e-3

@@ -155,9 +155,14 @@ class Chain:
         """Return (:meth:`fk`, :meth:`jacobian`) for little more than the price of one. Raises InvalidPosture."""
         return kernels.tip_and_jacobian(*self.arrays, self.posture(q))
 
+    def joint_frames(self, q):
+        """Return the rotations (n + 1, 3, 3) and origins (n + 1, 3) of every joint's moved frame, whose z is its axis,
+        and of the tip, in the base frame. Raises InvalidPosture."""
+        return kernels.joint_frames(*self.arrays, self.posture(q))
+
     def link_frames(self, q):
         """Return {link name: pose (4, 4) in the base frame} for every link on the way. Raises InvalidPosture."""
-        rotations, origins = kernels.joint_frames(*self.arrays, self.posture(q))
+        rotations, origins = self.joint_frames(q)
         frames = {}
         for link, (joint, offset) in zip(self.link_names, self._hangs_on, strict=True):
             frame = np.eye(4)

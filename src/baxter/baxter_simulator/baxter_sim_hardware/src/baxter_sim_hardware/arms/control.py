@@ -4,6 +4,8 @@
 Each tick turns the commands that came in and the measured joint state into what the joint drives shall do:
 
 - POSITION moves the set-point at no more than speed ratio times the model's velocity limit, with bounded acceleration.
+  Joints that one command names move in step: all arrive when the one with the longest way does. The vendor's tuck_arms
+  ends as soon as the shoulder is folded, and leaves the elbow where it ought to be only if they do.
 - VELOCITY is the same profile towards the joint limit ahead, cruising at the commanded speed; so it brakes in time.
 - RAW_POSITION follows a stream of set-points as it is, without smoothing, braking at its end or a speed ratio: what
   arrives is passed on, bounded by the velocity limit and by the acceleration that the drives can follow.
@@ -42,6 +44,7 @@ ACCELERATION = {"s0": 10.0, "s1": 10.0, "e0": 15.0, "e1": 15.0, "w0": 40.0, "w1"
 STOP_ACCELERATION_FACTOR = 3.0
 BRAKES_ACCELERATION_FACTOR = 16.0
 
+LEAST_SHARE = 0.05  # of its speed that a joint keeps that moves in step with others; so it returns when pushed away
 SMOOTHING_S = 0.02  # see setpoint.MovingAverage
 AT_LIMIT = 0.999  # fraction of the velocity limit from which torque mode watches the limit
 SINK_DAMPING = 150.0  # [Nm s/rad] an unpowered arm with `disabled:=sink` gives way to gravity against this
@@ -80,6 +83,7 @@ class _Limb:
         self.floats = False
         self.yields = False
         self.balanced = True
+        self.slowing = 1.0  # share of the speed that its set-points may have
 
 
 class Arms:
@@ -100,6 +104,8 @@ class Arms:
         points = self._points = SetPoints(count)
         points.acceleration[:] = [ACCELERATION[name.rsplit("_", 1)[1]] for name in limits.names]
         points.stopping[:] = STOP_ACCELERATION_FACTOR * points.acceleration
+        self._share = np.ones(count)  # of its speed that a joint needs to move in step with others, in POSITION mode
+        self._nominal_speed = np.zeros(count)  # [rad/s] cruising speed, if nothing slows a limb
         self._smoothing = MovingAverage(max(1, round(SMOOTHING_S / dt)), measured.position)
         self._modes = JointModes(count)
         self._stream = RawStream(limits, dt)
@@ -193,6 +199,7 @@ class Arms:
             # As most commands are: nothing changes but where to.
             points.target[command.index] = command.values
             self._is_settled = False
+            self._move_in_step(command)
             return command
         named = np.zeros(len(self._all), dtype=bool)
         named[command.index] = True
@@ -206,6 +213,7 @@ class Arms:
         self._set_mode(named, command.mode)
         if command.mode is Mode.POSITION:
             points.target[command.index] = command.values
+            self._move_in_step(command)
         elif command.mode is Mode.VELOCITY:
             ahead = np.where(command.values > 0.0, self.limits.upper[command.index], self.limits.lower[command.index])
             points.target[command.index] = ahead
@@ -223,6 +231,24 @@ class Arms:
         if yields != limb.yields:
             limb.yields = yields
             self._efforts.set_yielding(limb.index, yields)
+
+    def wanted_rates(self, side):
+        """(k,) [rad/s] the speeds at which one limb's joints would move if nothing slowed them.
+
+        0 for those in modes that collision avoidance has no say in.
+        """
+        points, index = self._points, self._limbs[side].index
+        ahead = points.target[index] - points.position[index]
+        governed = (self._modes.mode[index] == POSITION) | (self._modes.mode[index] == VELOCITY)
+        speed = np.minimum(self._nominal_speed[index], np.sqrt(2.0 * points.acceleration[index] * np.abs(ahead)))
+        return np.where(governed, np.copysign(speed, ahead), 0.0)
+
+    def set_slowing(self, side, share):
+        """Which share of the speed, 0 to 1, a limb's set-points may have in position and velocity mode."""
+        limb = self._limbs[side]
+        if share != limb.slowing:
+            limb.slowing = share
+            self._refresh_speed()
 
     def set_gravity_compensation(self, side, on):
         """Whether a limb's torque mode adds the torque that balances gravity."""
@@ -393,8 +419,19 @@ class Arms:
             points.velocity[joints] = points.output_rate[joints] = measured.velocity[joints]
             self._smoothing.restart(joints, measured.position[joints])
 
+    def _move_in_step(self, command):
+        """Have the joints of a POSITION command arrive together."""
+        index = command.index
+        times = np.abs(command.values - self._points.position[index]) / self.limits.velocity[index]
+        longest = times.max()
+        shares = np.maximum(times / longest, LEAST_SHARE) if longest > 0.0 else np.ones(len(index))
+        if (shares != self._share[index]).any():
+            self._share[index] = shares
+            self._refresh_speed()
+
     def _set_mode(self, joints, mode):
         self._is_settled = False
+        self._share[joints] = 1.0
         self._modes.set(joints, mode)
         self._points.streams[:] = self._modes.mode == RAW_POSITION
         self._points.braking &= ~joints
@@ -404,12 +441,17 @@ class Arms:
 
     def _refresh_speed(self):
         """Cruising speed of each joint's set-point [rad/s], by mode."""
-        points, modes = self._points, self._modes
-        points.speed[:] = self.limits.velocity
+        points, modes, nominal = self._points, self._modes, self._nominal_speed
+        profiled = (modes.mode == POSITION) & ~points.braking
+        nominal[:] = np.where(profiled, self._share * self.limits.velocity, self.limits.velocity)
         for limb in self._limbs.values():
             if limb.speed_ratio != 1.0:
-                profiled = limb.index[(modes.mode[limb.index] == POSITION) & ~points.braking[limb.index]]
-                points.speed[profiled] *= limb.speed_ratio
+                nominal[profiled & limb.joints] *= limb.speed_ratio
         in_velocity = modes.mode == VELOCITY
         if in_velocity.any():
-            points.speed[in_velocity] = np.abs(modes.value[in_velocity])
+            nominal[in_velocity] = np.abs(modes.value[in_velocity])
+        points.speed[:] = nominal
+        for limb in self._limbs.values():
+            if limb.slowing != 1.0:
+                governed = limb.index[(modes.mode[limb.index] != RAW_POSITION) & ~points.braking[limb.index]]
+                points.speed[governed] *= limb.slowing

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The field around the head: nothing bumps into it; it slows and stops arms that come near, unless suppressed."""
+import numpy as np
+import pytest
+from std_msgs.msg import Empty
+
+from baxter_model import JOINTS, SIDES, poses, tip_of
+from baxter_model.description import arm_radius, head_guards
+from baxter_model.self_collision import HEAD, HEAD_GUARDS
+from baxter_sim_hardware.arms import avoidance, collision
+from baxter_sim_hardware.topics.collision import guards_of
+from baxter_sim_kinematics import Chain
+
+POSITION, VELOCITY = 1, 2
+NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
+FOLDED, UNFOLDED = ([poses().angles(pose, name.split("_")[0])[name] for name in NAMES]
+                    for pose in ("tucked", "untucked"))
+PERIOD_TICKS = 25  # tuck_arms commands and suppresses at 20 Hz
+FINGERS = ("l_gripper_l_finger_joint", "l_gripper_r_finger_joint", "r_gripper_l_finger_joint",
+           "r_gripper_r_finger_joint")
+
+
+def own_contacts(lab):
+    return {(contact.link_a, contact.link_b) for contact in lab.world.contacts(lab.model, lab.model)
+            if contact.distance <= 0.0 or contact.force > 0.0}
+
+
+def stream(goal, kinds=()):
+    """Function for `before`: command a posture and suppress `kinds`, as tuck_arms does."""
+    def send(lab):
+        if lab.world.tick % PERIOD_TICKS == 0:
+            lab.command(POSITION, goal)
+            for kind in kinds:
+                for side in SIDES:
+                    lab.send("limb/%s/%s" % (side, kind), Empty())
+
+    return send
+
+
+def listed(lab):
+    return {name for side in SIDES for name in lab.last("limb/%s/collision_avoidance_state" % side).collision_object}
+
+
+def gap(lab, side):
+    """[m] from one arm, as thick as it is, to the nearest guard: by points along its capsules."""
+    robot = lab.context.robot
+    _, origins = Chain.from_robot(robot, tip=tip_of(side)).joint_frames(lab.position[slice(0, 7) if side == "left"
+                                                                                     else slice(7, 14)])
+    share = np.linspace(0.0, 1.0, 400)[:, None]
+    points = np.vstack([a + share * (b - a) for a, b in zip(origins[2:], origins[3:], strict=False)])
+    return min(np.linalg.norm(points - centre, axis=1).min() - radius - arm_radius(robot)
+               for _, centre, radius in head_guards(robot))
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_distance_and_closing_speed_are_those_of_the_geometry(robot, side):
+    """Against differences: a step along the rates changes the gap as the field says that it does."""
+    guards, chain = guards_of(robot), Chain.from_robot(robot, tip=tip_of(side))
+    rng, step, checked = np.random.default_rng(5), 1e-6, 0
+    for q in rng.uniform(chain.lower, chain.upper, (300, 7)):
+        rates = rng.uniform(-1.0, 1.0, 7)
+        for k, name in enumerate(guards.names):
+            one = avoidance.Guards((name,), guards.centres[k:k + 1], guards.radii[k:k + 1])
+
+            def look(posture, one=one, rates=rates):
+                distances, slowing = avoidance._distances(
+                    one.centres, one.radii, *chain.joint_frames(posture), rates)
+                return distances[0], slowing
+
+            distance, slowing = look(q)
+            closing = (distance - look(q + step * rates)[0]) / step
+            allowed = max(distance, 0.0) / avoidance.CLOSING_S
+            if closing > 1.05 * allowed:
+                # Another capsule, farther away and faster, may have more to say.
+                assert slowing <= 1.001 * allowed / closing
+                checked += 1
+            near = avoidance.field(one, *chain.joint_frames(q), rates).near
+            assert near == ((name,) if distance < avoidance.FIELD_M else ())
+    assert checked > 10
+
+
+@pytest.mark.parametrize("kinds", [(), (collision.AVOIDANCE,), (collision.BODY_AVOIDANCE,)])
+def test_arms_stop_at_the_field_unless_it_is_suppressed(make_lab, kinds):
+    lab = make_lab(pose="untucked", meshes=True, parameters={"enable": True})
+    lab.run(0.1)
+    assert listed(lab) == set()
+    gaps, names, touches = [], set(), set()
+
+    def watch(lab):
+        gaps.append(min(gap(lab, side) for side in SIDES))
+        names.update(listed(lab))
+        touches.update(own_contacts(lab))
+
+    lab.run(4.0, before=stream(FOLDED, kinds), after=lambda lab: lab.world.tick % 10 or watch(lab))
+    assert touches == set()
+    if kinds:
+        assert names == set() and np.abs(lab.position - FOLDED).max() < 0.01
+        assert min(gaps) < -3e-3  # through what holds nobody up
+        return
+    assert names and names <= set(HEAD_GUARDS)
+    assert min(gaps) > -2e-3 and np.abs(lab.position - FOLDED).max() > 0.3
+    assert np.abs(lab.velocity).max() < 0.02
+    # What leads away is free.
+    lab.command(POSITION, UNFOLDED)
+    lab.run(3.5)
+    assert np.abs(lab.position - UNFOLDED).max() < 1e-3 and listed(lab) == set()
+
+
+def test_velocity_mode_is_slowed_too(make_lab):
+    lab = make_lab(pose="untucked", parameters={"enable": True})
+    rates = 0.4 * np.sign(np.array(FOLDED) - UNFOLDED) * np.minimum(np.abs(np.array(FOLDED) - UNFOLDED), 1.0)
+    gaps = []
+    lab.run(3.0, before=lambda lab: lab.command(VELOCITY, rates),
+            after=lambda lab: lab.world.tick % 10 or gaps.append(min(gap(lab, side) for side in SIDES)))
+    assert -2e-3 < min(gaps) < avoidance.FIELD_M
+
+
+@pytest.mark.parametrize("start", ["neutral", "tucked"])
+def test_arms_fold_and_unfold_as_the_vendors_program_has_them(make_lab, start):
+    """By way of the unfolded posture, in position mode, with avoidance suppressed where the arms are flipped.
+
+    A posture is passed when all joints, of the folded one the shoulders', are within 0.2 rad. Nothing touches, and the
+    grippers stay open.
+    """
+    lab = make_lab(pose=start, meshes=True, parameters={"enable": True})
+    lab.run(0.2)
+    fingers = lab.model.index(FINGERS)
+    spread, touches, moved = lab.model.read_joints()[0][fingers], set(), []
+    goals = [(UNFOLDED, start == "tucked"), (FOLDED, True), (UNFOLDED, True)]
+
+    def watch(lab):
+        touches.update(own_contacts(lab))
+        moved.append(np.abs(lab.model.read_joints()[0][fingers] - spread).max())
+
+    for goal, suppressed in goals:
+        joints = [i for i in range(14) if goal is UNFOLDED or i % 7 < 2]
+        for _ in range(round(8.0 / 0.05)):
+            lab.run(0.05, before=stream(goal, (collision.AVOIDANCE,) if suppressed else ()), after=watch)
+            if np.abs(lab.position - goal)[joints].max() < 0.2:
+                break
+        else:
+            pytest.fail("the arms did not come to %s within 8 s: %s" % (goal, lab.position))
+        assert listed(lab) == set()
+    assert touches == set()
+    assert max(moved) < 1e-4
+
+
+def test_the_head_itself_is_solid(make_lab):
+    """Random postures: where an arm stands in the head it touches it, and the guards touch nothing."""
+    lab = make_lab(meshes=True)
+    rng, touched = np.random.default_rng(3), set()
+    for q in rng.uniform(lab.model.lower[lab.arm], lab.model.upper[lab.arm], (1500, 14)):
+        lab.model.set_joint_positions(lab.arm, q)
+        touched.update(link for contact in lab.world.touching(lab.model) for link in (contact.link_a, contact.link_b)
+                       if contact.distance < 0.0 and HEAD in (contact.link_a, contact.link_b))
+    assert {"left_lower_elbow", "right_lower_elbow"} <= touched
+    shapes = {shape.link for link in lab.model.merged.links.values() for shape in link.collisions}
+    assert not shapes & set(HEAD_GUARDS)
