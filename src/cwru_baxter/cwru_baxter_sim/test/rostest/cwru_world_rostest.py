@@ -235,6 +235,8 @@ class CwruWorldTest(unittest.TestCase):
         self.assertLess(max(map(abs, states.position)), 0.02)
         place = matrix_of(self.buffer.lookup_transform("head", "kinect_link", rospy.Time(), rospy.Duration(30.0)))
         self.assertLess(np.abs(place[:3, 3] - [0.14, 0.0, 0.264]).max(), 1e-6)
+        same = matrix_of(self.buffer.lookup_transform("kinect_link", "camera_link", rospy.Time(), rospy.Duration(30.0)))
+        self.assertLess(np.abs(same - np.eye(4)).max(), 1e-9)
 
 
 if __name__ == "__main__":
