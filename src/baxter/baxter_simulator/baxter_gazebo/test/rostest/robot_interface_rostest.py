@@ -122,6 +122,27 @@ class RobotInterfaceTest(unittest.TestCase):
             self.table.publish("joint_command", JointCommand(POSITION, [0.9], [side + "_w1"]), side)
         wait_until(lambda: self.robot.error({side + "_w1": 0.9 for side in SIDES}) < 2e-3, "both w1 at 0.9", 30.0)
 
+    def effect_joint_position_controller(self):
+        self.neutral()
+        for side in SIDES:
+            self.table.publish("joint_position_controller", (0.9,), (side, "w1"))
+        wait_until(lambda: self.robot.error({side + "_w1": 0.9 for side in SIDES}) < 2e-3, "both w1 at 0.9", 30.0)
+
+    def effect_joint_velocity_controller(self):
+        self.neutral()
+        self.table.until(lambda: max(self.robot.positions[side + "_w1"] for side in SIDES) < 1.0, "both w1 turn",
+                         *(("joint_velocity_controller", (-0.4,), (side, "w1")) for side in SIDES))
+
+    def effect_joint_effort_controller(self):
+        self.neutral()
+        self.table.until(lambda: min(self.robot.positions[side + "_w2"] for side in SIDES) > 0.2, "both w2 turn",
+                         *(("joint_effort_controller", (1.0,), (side, "w2")) for side in SIDES))
+
+    def effect_head_position_controller(self):
+        self.robot.restart()
+        self.table.publish("head_position_controller", (0.4,))
+        self.see("head_state", None, lambda state: abs(state.pan - 0.4) < 0.01, "head at 0.4")
+
     def effect_joint_command_timeout(self):
         """One velocity command goes on for as long as it may."""
         self.neutral()

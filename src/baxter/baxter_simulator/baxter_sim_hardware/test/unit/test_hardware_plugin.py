@@ -163,7 +163,8 @@ def test_messages_of_one_tick_are_handled_in_the_order_of_the_table(make_lab):
     assert lab.last("state").stopped
     assert sum("joint command ignored: the robot is not enabled" in line for line in lab.log.lines) == 2  # one a limb
     assert list(interface.HANDLED_LAST) == [
-        "set_super_reset", "set_super_enable", "set_super_stop", "joint_command"]
+        "set_super_reset", "set_super_enable", "set_super_stop", "joint_command", "joint_position_controller",
+        "joint_velocity_controller", "joint_effort_controller"]
 
 
 def test_every_function_of_a_row_is_a_method_for_its_kind_of_topic():

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The arms in ROS messages: their commands and settings, where their end points and set-points are, what they feel."""
 import numpy as np
+from baxter_core_msgs.msg import JointCommand
 
 from baxter_model import BASE_FRAME, tip_of
 from baxter_sim_hardware.arms import endpoint
@@ -9,6 +10,22 @@ from baxter_sim_hardware.errors import CommandRefused
 
 from . import convert
 from .row import JOINT_STATE_RATE, STATE_RATE_HZ, Part, Topic
+
+# The vendor's simulator had a controller for each joint and mode, which programs made for it command one by one.
+# {name of a group of controllers: (mode, what a number means)}
+CONTROLLERS = {
+    "joint_position_controller": (Mode.POSITION, "position [rad]"),
+    "joint_velocity_controller": (Mode.VELOCITY, "velocity [rad/s]"),
+    "joint_effort_controller": (Mode.TORQUE, "torque beside gravity's [Nm]"),
+}
+
+
+def _single(mode):
+    def handle(part, limb_joint, msg, time_s):
+        side, joint = limb_joint
+        part.joint_command(side, JointCommand(mode=mode, names=["%s_%s" % (side, joint)], command=[msg.data]), time_s)
+
+    return handle
 
 
 class ArmTopics(Part):
@@ -98,7 +115,8 @@ class ArmTopics(Part):
         if msg.data:
             self._baxter.arms.stop_limb(side)
 
-    def _joint_command(self, side, msg, time_s):
+    def joint_command(self, side, msg, time_s):
+        """Take one JointCommand message."""
         try:
             command = self._baxter.command(side, msg.mode, msg.names, msg.command)
         except CommandRefused as refusal:
@@ -123,7 +141,7 @@ class ArmTopics(Part):
               "set-points of the arms' joints, in alphabetical order; effort is what torque mode adds to gravity"),
         Topic("commanded_endpoint_state", "limb/{limb}/commanded_endpoint_state", "baxter_core_msgs/EndpointState",
               STATE_RATE_HZ, _commanded_endpoint, "the end point where the set-points are; no wrench is commanded"),
-        Topic("joint_command", "limb/{limb}/joint_command", "baxter_core_msgs/JointCommand", None, _joint_command,
+        Topic("joint_command", "limb/{limb}/joint_command", "baxter_core_msgs/JointCommand", None, joint_command,
               "any subset of the limb's joints in any order; mode 1 position, 2 velocity, 3 torque, 4 raw position"),
         Topic("set_speed_ratio", "limb/{limb}/set_speed_ratio", "std_msgs/Float64", None, _speed_ratio,
               "0 to 1: position mode's share of the joints' velocity limits"),
@@ -137,4 +155,8 @@ class ArmTopics(Part):
               "command"),
         Topic("command_velocity_tozero", "limb/{limb}/command_velocity_tozero", "std_msgs/Bool", None, _stop,
               "true stops the limb, which then holds"),
+        *(Topic(key, "{limb}_%s/joints/{limb}_{joint}_controller/command" % key, "std_msgs/Float64", None,
+                _single(mode),
+                "%s, as a joint command with this joint alone: for programs made for the vendor's simulator" % meaning)
+          for key, (mode, meaning) in CONTROLLERS.items()),
     )

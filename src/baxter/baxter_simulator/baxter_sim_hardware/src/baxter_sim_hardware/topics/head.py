@@ -43,6 +43,10 @@ class HeadTopics(Part):
         request = msg.enable_pan_request if msg.speed_ratio else HeadPanCommand.REQUEST_PAN_VOID
         self._head.command_pan(msg.target, msg.speed_ratio, _REQUESTS.get(request))
 
+    def _command_position(self, component, msg, time_s):
+        self._state.require_enabled()
+        self._head.command_pan(msg.data, 0.0, None)
+
     def _command_nod(self, component, msg, time_s):
         if msg.data:
             self._state.require_enabled()
@@ -60,4 +64,6 @@ class HeadTopics(Part):
               "target [rad]; speed ratio of 8.4 rad/s, where 0 means full speed; enable request"),
         Topic("command_head_nod", "head/command_head_nod", "std_msgs/Bool", None, _command_nod,
               "true begins a nod of 1 s"),
+        Topic("head_position_controller", "head_position_controller/joints/head_controller/command", "std_msgs/Float64",
+              None, _command_position, "pan [rad] at full speed: for programs made for the vendor's simulator"),
     )

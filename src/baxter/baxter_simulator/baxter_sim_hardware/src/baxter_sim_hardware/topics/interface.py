@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot's ROS interface as one table: what the plugin opens, what the documentation lists, what tests expect."""
-from .arms import ArmTopics
+from .arms import CONTROLLERS, ArmTopics
 from .collision import CollisionTopics
 from .grippers import GripperTopics
 from .head import HeadTopics
@@ -19,7 +19,7 @@ PARTS = (RobotTopics, ArmTopics, PanelTopics, HeadTopics, GripperTopics, Collisi
 TOPICS = tuple(row for part in PARTS for row in part.TOPICS)
 #: Messages of one tick on these topics are handled after all others, in this order: a stop overrides an enable, and a
 #: joint command meets the robot as they leave it.
-HANDLED_LAST = ("set_super_reset", "set_super_enable", "set_super_stop", "joint_command")
+HANDLED_LAST = ("set_super_reset", "set_super_enable", "set_super_stop", "joint_command", *CONTROLLERS)
 
 
 def markdown_table(namespace="/robot"):

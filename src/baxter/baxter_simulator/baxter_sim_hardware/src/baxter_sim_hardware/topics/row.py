@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A row of the interface table, and what has such rows."""
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import MethodType
 
-from baxter_model import SIDES
+from baxter_model import JOINTS, SIDES
 from baxter_sim_hardware.sensing.panel import ANALOG, DIGITAL, NAVIGATORS
 
 STATE_RATE_HZ = 100.0  # the physical robot's state topics
@@ -12,7 +13,7 @@ LATCHED = "latched"  # in place of a rate: published once, and again to each lat
 JOINT_STATE_RATE = "joint_state_rate"  # in place of a rate: the parameter of that name
 ASSEMBLIES = (*SIDES, "head", "torso")
 COMPONENTS = {"limb": SIDES, "digital": tuple(DIGITAL), "analog": tuple(ANALOG), "navigator": NAVIGATORS,
-              "assembly": ASSEMBLIES}
+              "assembly": ASSEMBLIES, "joint": JOINTS}
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,8 @@ class Topic:
     - (publisher) for a latched topic; it is called once and publishes on its own;
     - (component, message, time_s) for a topic that the robot subscribes to; it raises CommandRefused.
 
-    component: one of COMPONENTS, None where there is one topic; snapshot: `snapshot.Snapshot`.
+    component: one of COMPONENTS, None where there is one topic, (limb, joint) where there is one for each joint of each
+    limb; snapshot: `snapshot.Snapshot`.
     """
 
     key: str
@@ -43,10 +45,12 @@ class Topic:
 
     def names(self):
         """[(component or None, topic name)], one for each limb, navigator ... where the topic exists for each."""
-        for kind, components in COMPONENTS.items():
-            if "{%s}" % kind in self.name:
-                return [(component, self.name.format(**{kind: component})) for component in components]
-        return [(None, self.name)]
+        kinds = [kind for kind in COMPONENTS if "{%s}" % kind in self.name]
+        names = []
+        for components in itertools.product(*(COMPONENTS[kind] for kind in kinds)):
+            component = components if len(kinds) > 1 else components[0] if kinds else None
+            names.append((component, self.name.format(**dict(zip(kinds, components, strict=True)))))
+        return names
 
 
 class Part:
