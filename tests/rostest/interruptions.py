@@ -21,7 +21,7 @@ from lab_testing.waiting import wait_until
 UNDER_WAY = {"gripper": 0.004}
 UNDER_WAY_RAD = 0.15
 # What brakes comes to rest within this distance; what the world puts elsewhere stays within it [rad, m].
-BRAKING_RAD = 0.06
+BRAKING_RAD = 0.15
 # What holds moves by no more than this in HOLD_S [rad, m].
 STILL_RAD, HOLD_S = 0.005, 1.0
 STILL = {"gripper": 0.0005}

@@ -12,7 +12,6 @@ from baxter_model.self_collision import spawn_options
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
-from .arms.effort_bounds import BRAKES_EFFORT_FACTOR
 from .arms.joint_command import JointLimits
 from .errors import HardwareError
 from .grippers.hands import hand_of
@@ -36,9 +35,6 @@ from .topics.warnings import Warnings
 
 PARAMETERS = "/baxter_sim_hardware/"
 QUEUE_DEPTH = 200  # messages between two ticks: 2 ms of a client that writes at 100 kHz
-# How often the torque that balances gravity is computed anew where it only raises what a drive may exert [ticks]: from
-# one time to the next an arm at full speed turns by 0.04 rad, and the torque changes by 2 Nm.
-GRAVITY_TICKS = 5
 
 
 class BaxterPlugin(ModelPlugin):
@@ -72,7 +68,7 @@ class BaxterPlugin(ModelPlugin):
         self._dt = context.world.time_step_s
         limits = JointLimits(names, model.lower[arm], model.upper[arm], model.max_velocity[arm], model.max_effort[arm])
         self._baxter = Baxter(
-            limbs, limits, model.read_joints()[0][arm], dt=self._dt,
+            limbs, limits, model.read_joints()[0][arm], self._dynamics, dt=self._dt,
             profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"), state=before)
         self._warnings = Warnings(context.log)
         self._build_parts(context, {limb.side: model.index(limb.joint_names) for limb in limbs})
@@ -82,7 +78,6 @@ class BaxterPlugin(ModelPlugin):
         elif self._switch("enable", False):
             self._robot.apply(Event.ENABLE)
         self._before = model.read_joints()
-        self._gravity_ticks = 0  # for so many ticks measured.gravity still holds
         # The joints that were driven to a position last, as the arms and as the model number them.
         self._driven = self._driven_index = None
         self._has_started = before is not None
@@ -167,10 +162,8 @@ class BaxterPlugin(ModelPlugin):
         if pending:
             self._handling.handle(pending, time_s)
         self._collision.update(time_s, self._baxter.state.enabled)
-        self._gravity_ticks -= 1
-        if self._gravity_ticks <= 0 or self._baxter.moves_by_gravity:
+        if self._baxter.moves_by_gravity:
             measured.gravity = self._model.gravity_efforts(self._before[0])[arm]
-            self._gravity_ticks = GRAVITY_TICKS
         drives = self._baxter.update()
         if len(drives.position_driven):
             if drives.position_driven is not self._driven:
@@ -190,6 +183,13 @@ class BaxterPlugin(ModelPlugin):
     def _feel_torques(self, side):
         return self._arms.feel(side, self._snapshot())[0]
 
+    def _dynamics(self, velocity):
+        """As for `Measured`."""
+        model, arm = self._model, self._arm_index
+        position, velocities = model.read_joints()[0], np.zeros(len(model.joint_names))
+        velocities[arm] = velocity
+        return model.mass_matrix(position)[np.ix_(arm, arm)], model.inverse_dynamics(position, velocities)[arm]
+
     def _snapshot(self):
         return Snapshot(self._model, self._before, self._dt)
 
@@ -205,8 +205,7 @@ class BaxterPlugin(ModelPlugin):
     def hold(self):
         self._baxter.state.fail()
         arm = self._arm_index
-        self._model.drive_position(arm, self._model.read_joints()[0][arm],
-                                   BRAKES_EFFORT_FACTOR * self._model.max_effort[arm])
+        self._model.drive_position(arm, self._model.read_joints()[0][arm], self._model.max_effort[arm])
 
     def restarted(self):
         before = self._baxter.state.state
@@ -223,7 +222,6 @@ class BaxterPlugin(ModelPlugin):
         # What has come in by now was said to the robot where it was.
         self._measure()
         self._handling.handle(self.context.pending(), self.context.world.time_s)
-        self._gravity_ticks = 0
         self._baxter.arms.reset()
         self._head.reset()
         self._grippers.reset()

@@ -11,29 +11,31 @@ DISABLED_BEHAVIOURS = ("hold", "sink")
 class Baxter:
     """The robot's state and its arms, one tick at a time.
 
-    limbs, limits, dt: as for `Arms`; position: (n,) [rad] where the arms are; profile: 'sim' or 'robot' (speed ratio at
-    start); disabled: what arms do without power, 'hold' or 'sink'; state: a robot_state.State to begin in.
+    limbs, limits, dt: as for `Arms`; position: (n,) [rad] where the arms are; dynamics: as for `Measured`;
+    profile: 'sim' or 'robot' (speed ratio at start); disabled: what arms do without power, 'hold' or 'sink';
+    state: a robot_state.State to begin in.
 
-    Attribute `measured`: the `Measured` that the caller renews before each tick, and before each event that comes
-    between two ticks.
+    Attributes: `profile`; `state`, a `RobotState`; `arms`, an `Arms`; `measured`, the `Measured` that the caller renews
+    before each tick, and before each event that comes between two ticks.
     """
 
-    def __init__(self, limbs, limits, position, dt=0.002, profile="sim", disabled="hold", state=None):
+    def __init__(self, limbs, limits, position, dynamics, dt=0.002, profile="sim", disabled="hold", state=None):
         if profile not in SPEED_RATIO:
             raise HardwareError("profile is '%s'; choices are %s" % (profile, ", ".join(SPEED_RATIO)))
         if disabled not in DISABLED_BEHAVIOURS:
             raise HardwareError("disabled is '%s'; choices are %s" % (disabled, ", ".join(DISABLED_BEHAVIOURS)))
+        self.profile = profile
         self.state = RobotState() if state is None else RobotState(state)
-        self.measured = Measured(position)
+        self.measured = Measured(position, dynamics)
         self.arms = Arms(limbs, limits, self.measured, speed_ratio=SPEED_RATIO[profile], dt=dt)
-        self.arms.stop(brakes=True)
+        self.arms.stop()
         self._sinks = disabled == "sink"
         self._speed_ratio = SPEED_RATIO[profile]
 
     def take_over(self):
         """Begin with arms that are moving: forget every command, bring them to rest, and hold them."""
         self.arms.take_over()
-        self.arms.stop(brakes=not self.state.enabled)
+        self.arms.stop()
 
     def apply(self, event):
         """Take an enable, disable, stop, reset ... event. Raises CommandRefused where the state does not allow it."""
@@ -41,7 +43,7 @@ class Baxter:
         self.state.apply(event)
         if self.state.enabled != was_enabled:
             # Nothing that was commanded before counts any more.
-            self.arms.stop(brakes=not self.state.enabled)
+            self.arms.stop()
 
     def restore_settings(self):
         """Speed ratios and command time-outs of all limbs as they were at the start."""
@@ -57,10 +59,10 @@ class Baxter:
     @property
     def moves_by_gravity(self):
         """Whether drives follow from the torque that balances gravity, so that `update` needs it as it is now."""
-        return self.arms.in_torque or (self._sinks and not self.state.enabled)
+        return self.arms.needs_gravity or (self._sinks and not self.state.enabled)
 
     def update(self):
-        """Drives of the arms for this tick; measured.gravity may be ticks old unless `moves_by_gravity`."""
+        """Drives of the arms for this tick; measured.gravity counts only where `moves_by_gravity`."""
         if self._sinks and not self.state.enabled:
             return self.arms.sink()
         return self.arms.update()

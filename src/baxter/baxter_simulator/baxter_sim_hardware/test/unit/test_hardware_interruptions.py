@@ -15,7 +15,7 @@ PUSH = np.tile([3.0, -3.0, 2.0, 3.0, -0.3, 0.3, 0.2], 2)  # [Nm]
 # So long a motion goes on before it is interrupted [s].
 UNDER_WAY_S = 0.3
 # What brakes rests after so long, and within so far; a command that is still in force is followed to its end.
-BRAKING_S, BRAKING_RAD, END_S = 0.5, 0.06, 2.5
+BRAKING_S, BRAKING_RAD, END_S = 0.5, 0.1, 2.5
 # What holds moves by no more than this [rad; m] in so long.
 STILL, HOLD_S = 1e-3, 0.3
 

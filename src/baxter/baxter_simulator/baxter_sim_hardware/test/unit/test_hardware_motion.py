@@ -2,14 +2,20 @@
 """How the arms move: every command mode on the real physics, both limbs at once."""
 import numpy as np
 import pytest
-from std_msgs.msg import Empty, Float64
+from std_msgs.msg import Bool, Empty, Float64
 
 from baxter_model import JOINTS
+from baxter_sim_hardware.arms import stopping
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
 SIDES = ("left", "right")
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 SMALL_MOVE = np.tile([0.2, 0.2, -0.2, 0.2, 0.3, -0.3, 0.3], 2)
+
+
+def way_of_a_stop(lab):
+    """How far each joint would get (14,) [rad] if it were to stop now: what the joints' torques need."""
+    return stopping.travel(lab.velocity, lab.plugin._baxter.arms.stopping())
 
 
 def random_poses(lab, count):
@@ -175,6 +181,46 @@ def test_arm_too_heavy_to_brake_in_time_does_not_swing_back(lab):
     assert np.all(travelled.max(axis=0) - travelled[-1] < 0.01)
 
 
+@pytest.mark.parametrize("joint", [0, 1, 2, 3, 4, 5, 6])
+def test_a_stop_uses_the_torque_that_there_is_and_no_more(lab, joint):
+    """One joint at full speed, all others at rest: v^2 / 2 a, with what the torques leave for a."""
+    lab.model.set_self_collision_pairs(())
+    wanted = np.zeros(14)
+    wanted[[joint, joint + 7]] = lab.model.max_velocity[lab.arm][joint]
+    lab.run(0.25, before=lambda lab: lab.command(VELOCITY, wanted))
+    speed, where = lab.velocity[joint], lab.position
+    inertia, bias = lab.plugin._dynamics(lab.velocity)
+    limits, arm = lab.effort_limit[:7], np.ix_(range(7), range(7))
+    column = inertia[arm][:, joint]
+    # The joint that has least left decides: its own, or one that has to hold against it.
+    hardest = ((stopping.SHARE * limits + np.sign(column) * bias[:7]) / np.abs(column)).min()
+    hardest = min(hardest, 16.0 * lab.plugin._baxter.arms._points.acceleration[joint])
+    lab.stop()
+    position, _, effort = lab.record(0.6)
+    travelled = np.abs(position - where).max(axis=0)[joint]
+    print("%s: %.4f rad, computed %.4f rad" % (NAMES[joint], travelled, speed * speed / (2.0 * hardest)))
+    assert travelled == pytest.approx(speed * speed / (2.0 * hardest), abs=0.003, rel=0.05)
+    assert np.all(np.abs(effort) <= lab.effort_limit + 1e-6)
+
+
+@pytest.mark.parametrize("mode", [POSITION, VELOCITY, TORQUE, RAW])
+def test_no_drive_exerts_more_than_its_limit(make_lab, mode):
+    """Wild commands, arms that meet, enabling and disabling in motion: what is applied is what is reported."""
+    lab = make_lab(parameters={"enable": True})
+    rng, lower, upper = np.random.default_rng(11), lab.model.lower[lab.arm], lab.model.upper[lab.arm]
+    wild = {POSITION: lambda: rng.uniform(lower, upper), RAW: lambda: rng.uniform(lower, upper),
+            VELOCITY: lambda: rng.choice([-1.0, 1.0], 14) * lab.model.max_velocity[lab.arm],
+            TORQUE: lambda: rng.choice([-1.0, 1.0], 14) * lab.effort_limit}[mode]
+    for turn in range(12):
+        values = wild()
+        _, _, effort = lab.record(0.4, before=lambda lab, values=values: lab.command(mode, values))
+        assert np.all(np.abs(effort) <= lab.effort_limit + 1e-6), turn
+        for enabled in (False, True):
+            lab.send("set_super_enable", Bool(enabled))
+            _, _, effort = lab.record(0.1)
+            assert np.all(np.abs(effort) <= lab.effort_limit + 1e-6), turn
+
+
 @pytest.mark.parametrize("seconds", [float("nan"), -1.0, 0.0])
 def test_senseless_timeouts_are_refused(lab, seconds):
     lab.set_timeout(seconds)
@@ -298,14 +344,17 @@ def test_stop_and_disable_halt_any_motion(lab, mode, values, end):
 
     lab.run(0.3, before=stream)
     assert np.abs(lab.velocity).max() > 0.5
-    where = lab.position
+    where, computed = lab.position, way_of_a_stop(lab)
     if end == "stop":
         lab.stop()
     else:
         lab.enable(False)
-    position, velocity, _ = lab.record(0.6, before=stream)
-    assert np.abs(position - where).max() < 0.02
-    assert np.abs(velocity[100:]).max() < 0.01  # 0.2 s later
+    position, velocity, effort = lab.record(0.6, before=stream)
+    travelled = np.abs(position - where).max(axis=0)
+    print("stopped after %s rad, computed %s rad" % (travelled.round(4), computed.round(4)))
+    np.testing.assert_allclose(travelled, computed, atol=0.004 + 0.05 * computed.max())
+    assert np.all(np.abs(effort) <= lab.effort_limit + 1e-6)
+    assert np.abs(velocity[150:]).max() < 0.01  # 0.3 s later
     # and re-enabling moves nothing
     rest = lab.position
     lab.send("set_super_reset", Empty())

@@ -11,9 +11,8 @@ Each tick turns the commands that came in and the measured joint state into what
   arrives is passed on, bounded by the velocity limit and by the acceleration that the drives can follow.
 - TORQUE adds the command to the torque that balances gravity.
 
-In every mode the model's effort limit bounds what a drive adds to gravity compensation, which stands outside the clamp:
-a shoulder needs up to 57 Nm for the arm's weight alone, more than the 50 Nm that the physical robot's URDF allows it,
-and would sink in one posture out of twelve.
+In every mode, a stop included, a drive exerts no more than the model's effort limit, what carries the arm's weight
+among it.
 
 Whatever is streamed (all but POSITION) expires joint by joint when its command is older than the limb's time-out;
 the joint then stops and holds. A command moves only the joints it names. In the mode that the limb is in already, the
@@ -28,21 +27,23 @@ import numpy as np
 
 from baxter_sim_hardware.errors import CommandRefused
 
-from .effort_bounds import EffortBounds
+from .effort_bounds import REACH_RAD, EffortBounds
 from .joint_command import CommandParser, Mode
 from .joint_modes import POSITION, RAW_POSITION, VELOCITY, JointModes
 from .raw_stream import RawStream
 from .setpoint import MovingAverage, SetPoints, any_beyond, follow, stopping_point
+from .stopping import hardest_stop
 
 COMMAND_TIMEOUT_S = 0.2  # the robot's own
 SPEED_RATIO = {"sim": 1.0, "robot": 0.3}  # at start, by profile; 0.3 is what the physical robot starts with
 
 # Set-points accelerate by what the arm can follow nearly anywhere in its workspace within the effort limits [rad/s^2].
-# A stop decelerates harder, and harder still with the brakes on (disabled or stopped): from full speed, 1.5 rad/s at
-# the shoulder and 4 rad/s at the wrist, within 0.015 rad. What the drives cannot follow, the reach bound catches.
+# Joints that hold because a command expired or names them no more decelerate harder, and what the drives cannot follow
+# the reach bound catches. Where the whole robot stops (disabled, enabled, stopped), an arm slows down as hard as its
+# torques allow, within these factors: see `stopping`.
 ACCELERATION = {"s0": 10.0, "s1": 10.0, "e0": 15.0, "e1": 15.0, "w0": 40.0, "w1": 40.0, "w2": 40.0}
 STOP_ACCELERATION_FACTOR = 3.0
-BRAKES_ACCELERATION_FACTOR = 16.0
+LEAST_STOP_FACTOR, MOST_STOP_FACTOR = 0.1, 16.0
 
 LEAST_SHARE = 0.05  # of its speed that a joint keeps that moves in step with others; so it returns when pushed away
 SMOOTHING_S = 0.02  # see setpoint.MovingAverage
@@ -103,13 +104,13 @@ class Arms:
         self._all = np.arange(count)
         points = self._points = SetPoints(count)
         points.acceleration[:] = [ACCELERATION[name.rsplit("_", 1)[1]] for name in limits.names]
-        points.stopping[:] = STOP_ACCELERATION_FACTOR * points.acceleration
+        points.stopping[:] = points.acceleration
         self._share = np.ones(count)  # of its speed that a joint needs to move in step with others, in POSITION mode
         self._nominal_speed = np.zeros(count)  # [rad/s] cruising speed, if nothing slows a limb
         self._smoothing = MovingAverage(max(1, round(SMOOTHING_S / dt)), measured.position)
         self._modes = JointModes(count)
         self._stream = RawStream(limits, dt)
-        self._efforts = EffortBounds(limits.effort, dt)
+        self._efforts = EffortBounds(limits.effort)
         self._is_settled = False  # every set-point rests on its target, until the next command or push
         self.reset()
 
@@ -149,6 +150,11 @@ class Arms:
     def in_torque(self):
         """Whether any joint is in torque mode."""
         return self._modes.any_in_torque
+
+    @property
+    def needs_gravity(self):
+        """Whether drives follow from the torque that balances gravity."""
+        return self._modes.any_in_torque or self._efforts.any_yields
 
     @property
     def commanded_position(self):
@@ -288,26 +294,34 @@ class Arms:
         limb.mode = Mode.POSITION
         self._hold(limb.joints)
 
-    def stop(self, brakes):
-        """Stop every joint and hold it where it comes to rest.
-
-        brakes: whether the brakes are on from now, which stop harder than the drives alone; until the next stop.
-        """
-        factor = BRAKES_ACCELERATION_FACTOR if brakes else STOP_ACCELERATION_FACTOR
-        self._points.stopping[:] = factor * self._points.acceleration
-        self._efforts.brake(brakes)
+    def stop(self):
+        """Stop every joint as hard as its torques allow, and hold it where it comes to rest."""
+        self._follow_joint(self._modes.in_torque)
+        stopping = self.stopping()
         for limb in self._limbs.values():
             limb.mode = Mode.POSITION
             limb.floats = False
-        self._hold(np.ones(len(self._all), dtype=bool))
+        self._hold(np.ones(len(self._all), dtype=bool), stopping)
+
+    def stopping(self):
+        """(n,) [rad/s^2] with which the set-points, as fast as they are now, slow down in a stop: see `stopping`."""
+        points = self._points
+        found = np.zeros(len(self._all))
+        if points.output_rate.any():
+            inertia, bias = self._measured.dynamics(points.output_rate)
+            for limb in self._limbs.values():
+                own = limb.index
+                found[own] = hardest_stop(points.output_rate[own], inertia[np.ix_(own, own)], bias[own],
+                                          self.limits.effort[own])
+        return np.clip(found, LEAST_STOP_FACTOR * points.acceleration, MOST_STOP_FACTOR * points.acceleration)
 
     # -- one tick
 
     def update(self):
         """Drives for the tick in which the joints are as measured."""
-        measured, points, efforts = self._measured, self._points, self._efforts
+        measured, points = self._measured, self._points
         if self._is_settled:
-            leads = any_beyond(efforts.reach, points.output, points.output_rate, measured.position, self._dt)
+            leads = any_beyond(REACH_RAD, points.output, points.output_rate, measured.position, self._dt)
         else:
             expired = self._modes.expired(measured.time_s)
             if expired is not None:
@@ -316,8 +330,7 @@ class Arms:
         if leads:
             self._keep_within_reach()
 
-        bound = efforts.bound(measured.gravity, self._modes.mode)
-        efforts.end_tick()
+        bound = self._efforts.bound(measured.gravity, self._modes.mode)
         if self._is_settled or not self._modes.any_in_torque:
             return Drives(self._all, points.output, points.output_rate, bound, _NONE, _NONE, _NONE)
         in_torque = self._modes.in_torque
@@ -337,7 +350,8 @@ class Arms:
         fall = np.clip(-gravity / SINK_DAMPING, -limits.velocity, limits.velocity)
         at_end = ((position <= limits.lower) & (fall < 0.0)) | ((position >= limits.upper) & (fall > 0.0))
         return Drives(_NONE, _NONE, _NONE, _NONE,
-                      self._all, np.where(at_end, 0.0, fall), np.abs(gravity) + SINK_FRICTION)
+                      self._all, np.where(at_end, 0.0, fall),
+                      np.minimum(np.abs(gravity) + SINK_FRICTION, limits.effort))
 
     # -- inside
 
@@ -355,14 +369,14 @@ class Arms:
         total = command + gravity
         at_limit = (np.abs(velocity) > AT_LIMIT * limit) & (command * velocity >= 0.0)
         direction = np.where(at_limit, velocity, total)
-        effort = np.where(at_limit, self.limits.effort[joints] + np.abs(gravity), np.abs(total))
-        return np.copysign(limit, direction), effort
+        effort = np.where(at_limit, np.inf, np.abs(total))
+        return np.copysign(limit, direction), np.minimum(effort, self.limits.effort[joints])
 
     def _move_set_points(self):
         """One tick of the set-points; returns whether any leads its joint by more than it may."""
         points, smoothing = self._points, self._smoothing
         rests, braked, leads = follow(points.numbers, points.flags, smoothing.window, smoothing.oldest,
-                                      self._measured.position, self._efforts.reach, self._dt)
+                                      self._measured.position, REACH_RAD, self._dt)
         smoothing.turn()
         if braked:
             # At the target and at rest: with the weaker acceleration of other motions it would overshoot.
@@ -378,10 +392,9 @@ class Arms:
     def _keep_within_reach(self):
         points, measured = self._points, self._measured
         # The joints have not made this tick's step yet.
-        reach = self._efforts.reach
         lead = points.output - points.output_rate * self._dt - measured.position
-        far = np.abs(lead) > reach
-        offset = np.clip(lead[far], -reach, reach) - lead[far]
+        far = np.abs(lead) > REACH_RAD
+        offset = np.clip(lead[far], -REACH_RAD, REACH_RAD) - lead[far]
         points.position[far] += offset
         points.output[far] += offset
         self._smoothing.shift(far, offset)
@@ -397,11 +410,13 @@ class Arms:
         points = self._points
         return self._clamped(stopping_point(points.position, points.velocity, points.stopping))
 
-    def _hold(self, joints):
-        """Stop the joints in the mask and keep them where they come to rest."""
+    def _hold(self, joints, stopping=None):
+        """Stop the joints in the mask and keep them where they come to rest; stopping: (n,) [rad/s^2]."""
         if not joints.any():
             return
         points = self._points
+        points.stopping[joints] = (STOP_ACCELERATION_FACTOR * points.acceleration if stopping is None
+                                   else stopping)[joints]
         self._follow_joint(joints & self._modes.in_torque)
         # Brake from where the drives are now, not from where smoothing would still take them.
         points.position[joints] = points.output[joints]

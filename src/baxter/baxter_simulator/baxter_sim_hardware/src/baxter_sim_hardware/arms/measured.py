@@ -7,12 +7,15 @@ class Measured:
     """State of the arms' n joints. One object; each tick renews its values.
 
     time_s: [s]; position: (n,) [rad]; velocity: (n,) [rad/s]; gravity: (n,) [Nm] the torque that balances gravity.
+    dynamics: function (velocity (n,) [rad/s]) -> (inertia (n, n) [kg m^2], torque (n,) [Nm] that keeps the joints at
+    that velocity), where the joints are.
     """
 
-    __slots__ = ("time_s", "position", "velocity", "gravity")
+    __slots__ = ("time_s", "position", "velocity", "gravity", "dynamics")
 
-    def __init__(self, position):
+    def __init__(self, position, dynamics):
         """At rest in ``position`` at time 0."""
+        self.dynamics = dynamics
         self.time_s = 0.0
         self.position = np.array(position, dtype=float)
         self.velocity = np.zeros_like(self.position)
