@@ -99,7 +99,9 @@ class BaxterPlugin(ModelPlugin):
             part.attach_sensors(panel)
         self._collision = CollisionTopics(world, model, baxter, chains, guards_of(robot), self._arms.feel,
                                           panel.cuff_squeezed)
-        self._procedures = ProcedureTopics(baxter.state)
+        if baxter.profile == "robot":
+            self._robot.what_keeps_disabled = self._collision.too_near
+        self._procedures = ProcedureTopics(baxter, self._warnings)
         self._parts = (
             self._robot, self._arms, panel, self._head, self._grippers, self._collision, self._procedures, senses,
             ScreenTopics(context), StatusTopics(baxter, limb_index, robot.links, context.urdf_xml, context.log))

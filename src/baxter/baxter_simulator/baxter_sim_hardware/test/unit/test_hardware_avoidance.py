@@ -156,3 +156,32 @@ def test_the_head_itself_is_solid(make_lab):
     assert {"left_lower_elbow", "right_lower_elbow"} <= touched
     shapes = {shape.link for link in lab.model.merged.links.values() for shape in link.collisions}
     assert not shapes & set(HEAD_GUARDS)
+
+
+@pytest.mark.parametrize("profile", ["sim", "robot"])
+@pytest.mark.parametrize("at_start", [True, False])
+def test_folded_arms_keep_the_robots_profile_disabled(make_lab, profile, at_start):
+    """Unless the field is suppressed, as tuck_arms does it."""
+    lab = make_lab(pose="tucked", parameters={"enable": at_start, "profile": profile})
+    lab.run(0.1)
+    assert listed(lab) == set(HEAD_GUARDS)
+    if not at_start:
+        lab.enable()
+    lab.run(0.1)
+    assert lab.last("state").enabled == (profile == "sim")
+    if profile == "sim":
+        return
+    assert any("enable ignored: in the field of collision avoidance: the left arm (collision_head_link_" in line
+               and "tuck_arms.py -u" in line for line in lab.log.lines)
+    for side in SIDES:
+        lab.send("limb/%s/%s" % (side, collision.AVOIDANCE), Empty())
+    lab.run(0.1)
+    lab.enable()
+    lab.run(1.0)
+    assert lab.last("state").enabled
+    # And it is enabled as often as one likes elsewhere.
+    lab.run(9.0, before=stream(UNFOLDED, (collision.AVOIDANCE,)))
+    lab.enable(False)
+    lab.enable()
+    lab.run(0.1)
+    assert lab.last("state").enabled and listed(lab) == set()

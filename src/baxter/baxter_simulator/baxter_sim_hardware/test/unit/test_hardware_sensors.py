@@ -6,8 +6,9 @@ from baxter_core_msgs.msg import URDFConfiguration
 from baxter_maintenance_msgs.msg import CalibrateArmEnable, TareEnable
 from genpy import Time
 from sensor_msgs.msg import Image
-from std_msgs.msg import Empty, Float32, String, UInt16
+from std_msgs.msg import Empty, Float32, Float64, String, UInt16
 
+from baxter_sim_hardware.arms import procedures
 from baxter_sim_hardware.sensing import sensors
 from bullet_sim import Pose
 from urdf_model import parse_urdf
@@ -208,8 +209,20 @@ def test_a_procedure_runs_its_dialogue(lab, name, side):
     lab.run(1.0, before=keep_asking(name, side))
     assert status(lab, name, side).isEnabled and status(lab, name, side).complete == 0
     assert status(lab, name, side).controlUid == "sdk"
-    lab.run(5.0, before=keep_asking(name, side))
-    assert status(lab, name, side).isEnabled and status(lab, name, side).complete == 2
+    # The arm goes through its postures, rests in each, and takes its time; the other one stays where it is.
+    joints = slice(0, 7) if side == "left" else slice(7, 14)
+    start, path, begin = lab.position, [], lab.world.time_s
+    while status(lab, name, side).complete == 0 and lab.world.time_s < begin + 100.0:
+        lab.run(0.1, before=keep_asking(name, side))
+        path.append(lab.position)
+    assert status(lab, name, side).isEnabled and status(lab, name, side).complete == 2, status(lab, name, side)
+    way = procedures.postures(name, side)
+    assert lab.world.time_s - begin > procedures.REST_S * len(way) - 1.0
+    path = np.array(path)
+    for posture in way:
+        assert (np.abs(path[:, joints] - posture).max(axis=1) < procedures.NEAR_RAD).sum() > 20
+    other = np.delete(np.arange(14), np.arange(14)[joints])
+    assert np.abs(path[:, other] - start[other]).max() < 1e-3
     ask(lab, name, side, False)
     lab.run(0.2)
     assert not status(lab, name, side).isEnabled
@@ -240,9 +253,32 @@ def test_a_tare_fails_when_something_leans_on_the_arm(lab):
         lab.model.apply_wrench("left_gripper", (0.0, 0.0, -10.0),
                                position=lab.model.link_pose("left_gripper").position)
 
-    lab.run(6.0, before=lean)
+    lab.run(25.0, before=lean)
     assert status(lab, "Tare", "left").complete == 1
     assert "feels" in status(lab, "Tare", "left").errorCodes[0]
+
+
+def test_a_tare_that_is_ended_stops_the_arm(lab):
+    lab.run(1.0, before=keep_asking("Tare", "left"))
+    go_on = keep_asking("Tare", "left")
+    for _ in range(100):
+        lab.run(0.1, before=go_on)
+        if np.abs(lab.velocity[:7]).max() > 0.3:
+            break
+    ask(lab, "Tare", "left", False)
+    lab.run(0.4)
+    where = lab.position
+    lab.run(1.0)
+    assert np.abs(lab.position - where).max() < 1e-3
+    assert np.abs(lab.position[:7] - procedures.postures("Tare", "left")[1]).max() > 0.02
+    assert status(lab, "Tare", "left").complete == 0 and not status(lab, "Tare", "left").isEnabled
+
+
+def test_a_tare_whose_arm_is_held_fails(lab):
+    lab.send("limb/left/set_speed_ratio", Float64(0.0))
+    lab.run(40.0, before=keep_asking("Tare", "left"))
+    assert status(lab, "Tare", "left").complete == 1
+    assert "s1 is 0.30 rad off its posture" in status(lab, "Tare", "left").errorCodes[0]
 
 
 def test_updater_has_nothing_to_update_from(make_lab):

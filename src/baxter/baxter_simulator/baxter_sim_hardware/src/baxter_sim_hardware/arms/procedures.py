@@ -1,35 +1,80 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Maintenance: the procedures that tare an arm and calibrate it, and the updater, as far as a simulated robot has them.
 
-A procedure runs while its client keeps asking for it and the robot is enabled. Here it watches the arm's joints at
-rest: it succeeds when what they exert is, on average, what their model says, and fails when something leans on the arm.
+A procedure runs while its client keeps asking for it and the robot is enabled. It takes the arm through a row of
+postures around the neutral one and watches its joints at rest in each: it succeeds when what they exert is, on average,
+what their model says, and fails when something leans on the arm or keeps it from a posture. Which postures the physical
+robot takes is not public.
 """
+from enum import Enum
+from typing import NamedTuple
+
 import numpy as np
+
+from baxter_model import JOINTS, MIRROR_SIGNS, SIDES, poses
 
 from .collision import SQUISH_NM
 
 STATUS_RATE_HZ = 10.0
 KEEP_ALIVE_S = 1.5  # [simulated s] the physical robot wants a message faster than 1 Hz; clients send two a second
-DURATION_S = 5.0  # [simulated s] of a procedure
+REST_S = 2.0  # [simulated s] in each posture, of which the second half counts: what was set in motion has died down
+ARRIVAL_S = 30.0  # [simulated s] in which a posture must be reached: the longest way takes 2 s, 20 s at a ratio of 0.1
+NEAR_RAD = 0.01
 # A joint of an arm on which nothing leans differs from its model by less than this part of what counts as a squeeze.
 TOLERANCE = 0.1
 NOT_COMPLETE, FAILURE, SUCCESS = 0, 1, 2  # RobustControllerStatus.complete
 
-PROCEDURES = {"Tare": "tares", "CalibrateArm": "calibrates"}  # by the name of its topics
+# By the name of its topics: what it does, and its postures, each by what differs from the neutral one on the left arm
+# [rad]. Taring is about the shoulder's spring, calibrating about every joint: it turns each one to either side.
+PROCEDURES = {
+    "Tare": ("tares", ({}, {"s1": -0.3}, {"s1": 0.2, "e1": 0.3}, {"s1": -0.2, "e1": 0.5}, {})),
+    "CalibrateArm": ("calibrates", ({}, *({joint: turn} for joint, size in zip(
+        JOINTS, (0.3, 0.2, 0.5, 0.3, 0.8, 0.5, 0.8), strict=True) for turn in (size, -size)), {})),
+}
 
 UPDATER_IDLE, UPDATER_INVALID = 0, 1  # UpdateStatus.status
 
 
-class Procedure:
-    """One procedure on one arm. `complete`, `uid`, `timed_out`, `errors`, `is_enabled` are the fields of its status."""
+def postures(name, side):
+    """The postures (7,) [rad], shoulder to wrist, that a procedure of PROCEDURES takes one arm through."""
+    neutral = np.array(list(poses().angles("neutral", side).values()))
+    signs = np.array([1 if side == SIDES[0] else MIRROR_SIGNS[joint] for joint in JOINTS])
+    return [neutral + signs * [turns.get(joint, 0.0) for joint in JOINTS] for turns in PROCEDURES[name][1]]
 
-    def __init__(self):
+
+class Arm(NamedTuple):
+    """What a procedure knows of its arm, (7,) each: position [rad], velocity [rad/s], torques from outside [Nm]."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    torques: np.ndarray
+
+
+class Order(Enum):
+    """What a procedure wants of the arm, where it is no posture."""
+
+    NOTHING = "nothing"
+    STOP = "stop"
+
+
+class Procedure:
+    """One procedure on one arm. `complete`, `uid`, `timed_out`, `errors`, `is_enabled` are the fields of its status.
+
+    way: sequence of postures (7,) [rad].
+    """
+
+    def __init__(self, way):
+        self._way = way
         self.reset()
 
     def reset(self):
         self.is_enabled = self.timed_out = False
         self.complete, self.uid, self.errors = NOT_COMPLETE, "", []
-        self._begin = self._last = 0.0
+        self._last = 0.0  # when the client asked for it
+        self._moves = False  # whether the arm may be on its way by this procedure
+        self._left = list(self._way)
+        self._since = None  # when the arm was sent to the first posture that is left, or came there
+        self._is_there = False
         self._sum, self._count = np.zeros(len(SQUISH_NM)), 0
 
     def take(self, wanted, uid, time_s):
@@ -38,35 +83,64 @@ class Procedure:
             self.is_enabled = False
         elif not self.is_enabled:
             self.reset()
-            self.is_enabled, self.uid, self._begin = True, uid, time_s
+            self.is_enabled, self.uid = True, uid
         self._last = time_s
 
     @property
-    def is_running(self):
-        return self.is_enabled and self.complete == NOT_COMPLETE
+    def is_active(self):
+        """Whether `update` has something to do."""
+        return self.is_enabled or self._moves
 
-    def update(self, time_s, robot_enabled, torques):
-        """Go on, at time_s [s]; torques: (7,) from outside [Nm] that the arm's joints feel now."""
+    def update(self, time_s, robot_enabled, arm):
+        """Go on, at time_s [s]; arm: `Arm`. Returns an `Order`, or the posture (7,) [rad] that the arm shall go to."""
         if self.is_enabled and time_s - self._last > KEEP_ALIVE_S:
             self.is_enabled, self.timed_out = False, True
-        if not self.is_running:
-            return
-        self._sum += torques
-        self._count += 1
+        if self.is_enabled and self.complete == NOT_COMPLETE:
+            order = self._go_on(time_s, robot_enabled, arm)
+            if self.complete == NOT_COMPLETE:
+                return order
+        order = Order.STOP if self._moves and self.complete != SUCCESS else Order.NOTHING
+        self._moves = False
+        return order
+
+    def _go_on(self, time_s, robot_enabled, arm):
         if not robot_enabled:
-            self._fail("the robot is disabled")
-        elif time_s - self._begin >= DURATION_S:
-            mean = np.abs(self._sum / self._count)
-            bound = TOLERANCE * np.array(list(SQUISH_NM.values()))
-            wrong = ["%s feels %.1f Nm too much, at most %.1f are allowed" % (name, found, allowed)
-                     for name, found, allowed in zip(SQUISH_NM, mean, bound, strict=True) if found > allowed]
-            if wrong:
-                self._fail(*wrong)
-            else:
-                self.complete = SUCCESS
+            return self._fail("the robot is disabled")
+        if self._since is None:
+            self._since, self._is_there, self._moves = time_s, False, True
+            return self._left[0]
+        passed = time_s - self._since
+        if not self._is_there:
+            if np.abs(arm.position - self._left[0]).max() < NEAR_RAD and np.abs(arm.velocity).max() < NEAR_RAD:
+                self._since, self._is_there = time_s, True
+            elif passed > ARRIVAL_S:
+                far = np.abs(arm.position - self._left[0])
+                return self._fail("%s is %.2f rad off its posture after %.0f s: something is in the arm's way" % (
+                    JOINTS[int(far.argmax())], far.max(), ARRIVAL_S))
+            return Order.NOTHING
+        if passed > 0.5 * REST_S:
+            self._sum += arm.torques
+            self._count += 1
+        if passed >= REST_S:
+            self._left.pop(0)
+            self._since = None
+            if not self._left:
+                self._judge()
+        return Order.NOTHING
+
+    def _judge(self):
+        mean = np.abs(self._sum / self._count)
+        bound = TOLERANCE * np.array(list(SQUISH_NM.values()))
+        wrong = ["%s feels %.1f Nm too much, at most %.1f are allowed" % (name, found, allowed)
+                 for name, found, allowed in zip(SQUISH_NM, mean, bound, strict=True) if found > allowed]
+        if wrong:
+            self._fail(*wrong)
+        else:
+            self.complete = SUCCESS
 
     def _fail(self, *reasons):
         self.complete, self.errors = FAILURE, list(reasons)
+        return Order.STOP
 
 
 class Updater:

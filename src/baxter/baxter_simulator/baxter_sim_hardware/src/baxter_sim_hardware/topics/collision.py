@@ -69,6 +69,15 @@ class CollisionTopics(Part):
         position = self._baxter.measured.position[self._arms.joints_of(side)]
         return avoidance.field(self._guards, *self._chains[side].joint_frames(position), self._arms.wanted_rates(side))
 
+    def too_near(self):
+        """Which arms are in the field around the head, so that a physical robot could not be enabled; "" for none."""
+        near = ["the %s arm (%s)" % (side, ", ".join(field.near)) for side in SIDES
+                if (field := self._field(side, self._world.time_s)).near]
+        if not near:
+            return ""
+        return ("in the field of collision avoidance: %s; unfold the arms by rosrun baxter_tools tuck_arms.py -u, "
+                "which suppresses it" % " and ".join(near))
+
     def _contacts(self):
         """[(link, link)] of the robot's own contacts that overlap or press."""
         return [(contact.link_a, contact.link_b) for contact in self._world.contacts(self._model, self._model)

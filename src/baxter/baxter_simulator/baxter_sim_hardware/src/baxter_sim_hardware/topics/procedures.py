@@ -4,8 +4,17 @@ from baxter_core_msgs.msg import RobustControllerStatus
 from baxter_maintenance_msgs.msg import UpdateSources, UpdateStatus
 from std_msgs.msg import Bool, Int32
 
-from baxter_model import SIDES
-from baxter_sim_hardware.arms.procedures import PROCEDURES, STATUS_RATE_HZ, Procedure, Updater
+from baxter_model import SIDES, joint_names
+from baxter_sim_hardware.arms.joint_command import Mode
+from baxter_sim_hardware.arms.procedures import (
+    PROCEDURES,
+    STATUS_RATE_HZ,
+    Arm,
+    Order,
+    Procedure,
+    Updater,
+    postures,
+)
 from baxter_sim_hardware.errors import CommandRefused
 from sim_time.pace import Schedule
 
@@ -32,11 +41,11 @@ def _take(name):
 
 
 class ProcedureTopics(Part):
-    """state: the robot's RobotState."""
+    """baxter: `robot.Baxter`; warnings: `warnings.Warnings`."""
 
-    def __init__(self, state):
-        self._state = state
-        self.procedures = {(name, side): Procedure() for name in PROCEDURES for side in SIDES}
+    def __init__(self, baxter, warnings):
+        self._baxter, self._warnings = baxter, warnings
+        self.procedures = {(name, side): Procedure(postures(name, side)) for name in PROCEDURES for side in SIDES}
         self._updater = Updater()
         self._schedule = Schedule(STATUS_RATE_HZ)
 
@@ -49,9 +58,22 @@ class ProcedureTopics(Part):
         """After a step: let procedures go on. feel: function(side) -> (7,) torques from outside [Nm], which costs."""
         if not self._schedule.due(time_s):
             return
-        for (_, side), procedure in self.procedures.items():
-            if procedure.is_enabled:
-                procedure.update(time_s, self._state.enabled, feel(side))
+        for (name, side), procedure in self.procedures.items():
+            if procedure.is_active:
+                self._update(name, side, procedure, time_s, feel)
+
+    def _update(self, name, side, procedure, time_s, feel):
+        baxter = self._baxter
+        own = baxter.arms.joints_of(side)
+        arm = Arm(baxter.measured.position[own], baxter.measured.velocity[own], feel(side))
+        order = procedure.update(time_s, baxter.state.enabled, arm)
+        try:
+            if order is Order.STOP:
+                baxter.arms.stop_limb(side)
+            elif order is not Order.NOTHING:
+                baxter.command(side, Mode.POSITION, joint_names(side), order.tolist())
+        except CommandRefused as refusal:
+            self._warnings.warn(time_s, (name, side), "%s of the %s arm: %s" % (name, side, refusal))
 
     def _start_update(self, component, msg, time_s):
         self._updater.start(msg.data)
@@ -81,7 +103,7 @@ class ProcedureTopics(Part):
     TOPICS = (
         *(Topic("procedure_status_" + name, "/robustcontroller/{limb}/%s/status" % name,
                 "baxter_core_msgs/RobustControllerStatus", STATUS_RATE_HZ, _status_of(name),
-                "how the procedure that %s the arm is getting on" % verb) for name, verb in PROCEDURES.items()),
+                "how the procedure that %s the arm is getting on" % verb) for name, (verb, _) in PROCEDURES.items()),
         Topic("plugins_loaded", "/robustcontroller/{limb}/rc_plugins_loaded", "std_msgs/Bool", UPDATER_RATE_HZ,
               _plugins_loaded, "true"),
         Topic("update_sources", "/usb/update_sources", "baxter_maintenance_msgs/UpdateSources", UPDATER_RATE_HZ,
@@ -97,7 +119,7 @@ class ProcedureTopics(Part):
         *(Topic("procedure_enable_" + name, "/robustcontroller/{limb}/%s/enable" % name,
                 "baxter_maintenance_msgs/" + TYPES[name], None, _take(name),
                 "starts and keeps alive (at least once in 1.5 s) or ends the procedure that %s the arm" % verb)
-          for name, verb in PROCEDURES.items()),
+          for name, (verb, _) in PROCEDURES.items()),
         Topic("updater_start", "/updater/start", "std_msgs/String", None,
               _start_update, "starts an update by its id; none is known"),
         Topic("updater_stop", "/updater/stop", "std_msgs/Empty", None, _stop_update, "back to idle"),

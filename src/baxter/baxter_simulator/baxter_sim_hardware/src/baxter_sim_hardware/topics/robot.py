@@ -19,7 +19,8 @@ class RobotTopics(Part):
     """baxter: `robot.Baxter`; joint_names: of the whole model; measure: function that renews baxter.measured;
     set_joint_state_rate: function(Hz).
 
-    Attribute `on_disabled`: functions that are called when the robot was disabled.
+    Attributes. `on_disabled`: functions that are called when the robot was disabled. `what_keeps_disabled`: function
+    that returns why it may not be enabled where its arms are, or "".
     """
 
     def __init__(self, baxter, joint_names, measure, set_joint_state_rate, context, warnings):
@@ -28,12 +29,15 @@ class RobotTopics(Part):
         self._order = np.argsort(joint_names)
         self._joint_states_message = convert.JointStates([joint_names[i] for i in self._order])
         self.on_disabled = []
+        self.what_keeps_disabled = str
 
     def apply(self, event):
         """Take an `Event`; a request that the robot's state refuses is logged."""
         self._measure()
         before = self._baxter.state.state
         try:
+            if event is Event.ENABLE and not self._baxter.state.enabled and self.what_keeps_disabled():
+                raise CommandRefused(self.what_keeps_disabled())
             self._baxter.apply(event)
         except CommandRefused as refusal:
             self._warnings.warn(self._world.time_s, event, "%s ignored: %s" % (event.value, refusal))
