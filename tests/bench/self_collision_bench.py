@@ -13,6 +13,7 @@ import xacro
 from baxter_model import SIDES, joint_names, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
+from bullet_sim.solids import with_solids
 from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 
@@ -30,6 +31,7 @@ class Lab:
 
     def __init__(self, robot, with_pairs):
         options = BaxterPlugin.spawn_options(robot, None)
+        robot = with_solids(robot, options.pop("solids"))
         if not with_pairs:
             options["self_collision_pairs"] = ()
         self.world = World(find_mesh=ResourceFinder())

@@ -13,6 +13,7 @@ from baxter_core_msgs.msg import JointCommand
 from baxter_model import SIDES, joint_names, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
+from bullet_sim.solids import with_solids
 from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
 from gazebo_ros.publications import Publications
 from gazebo_ros.simulation import HostedPlugin, Simulation
@@ -66,8 +67,9 @@ class BareWorld:
         stack.callback(self.world.close)
         self.world.add_ground_plane()
         self.robot = parse_urdf(expanded("baxter_description", "baxter.urdf.xacro"), source="baxter")
-        self.model = self.world.spawn(self.robot, "baxter", Pose((0, 0, 0.93)),
-                                      **BaxterPlugin.spawn_options(self.robot, None))
+        options = BaxterPlugin.spawn_options(self.robot, None)
+        self.model = self.world.spawn(with_solids(self.robot, options.pop("solids")), "baxter", Pose((0, 0, 0.93)),
+                                      **options)
         for names in NAMES.values():
             self.model.set_joint_positions(self.model.index(names), np.array(NEUTRAL))
 

@@ -8,6 +8,7 @@ import numpy as np
 from baxter_model.description import finger_openings
 from baxter_model.self_collision import spawn_options
 from bullet_sim import World
+from bullet_sim.solids import with_solids
 from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 
@@ -28,7 +29,9 @@ class SelfClearance:
     def __init__(self, urdf_xml, names, warn=lambda text: None):
         robot = parse_urdf(urdf_xml, source="robot_description")
         self._world = World(find_mesh=ResourceFinder(), warn=warn, contact_ahead_m=self.SEEN_M)
-        self._model = self._world.spawn(robot, "baxter", static=True, **spawn_options(robot.links))
+        options = spawn_options(robot.links)
+        solid = with_solids(robot, options.pop("solids"))
+        self._model = self._world.spawn(solid, "baxter", static=True, **options)
         self._index = self._model.index(names)
         self.lower, self.upper = self._model.lower[self._index], self._model.upper[self._index]
         openings = finger_openings(robot)

@@ -13,7 +13,6 @@ from .model import Contact, Model
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import MeshCache, MeshFiles, ShapeStore
-from .solids import with_solids
 from .stand_ins import with_stand_ins
 from .state_watch import StateWatch
 
@@ -139,8 +138,7 @@ class World:
         for model in self.models.values():
             model.wake()
 
-    def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=(), mesh_cuts=None, solids=None,
-              merged=None):
+    def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=(), mesh_cuts=None, merged=None):
         """Put ``robot`` (urdf_model.Robot) into the world as ``name``, its frame at ``pose``; return its Model.
 
         The frame of a robot from a URDF is that of its root link. What stands in for meshes that are missing is told
@@ -150,10 +148,9 @@ class World:
         ``mesh_cuts``: {link: planes}, as for ``convex_parts.cut``, in the mesh's axes [m], has the collision meshes of
         those links cut and stood in for by the convex hulls of the parts. Where such a mesh is missing, the pairs of
         its body are left out: what stands in for it is too rough to fold an arm around.
-        ``solids``: as for ``solids.with_solids``, says of links that they collide otherwise than described.
-        ``merged``: the MergedRobot of ``robot``, which then has been checked, has no mesh that is missing, and has its
-        ``solids``: what takes its time has been done, in another thread perhaps.
-        Raises BulletSimError when the name is taken or empty, for numbers out of bounds, and for unknown ``solids``.
+        ``merged``: the MergedRobot of ``robot``, which then has been checked and has no mesh that is missing: what
+        takes its time has been done, in another thread perhaps.
+        Raises BulletSimError when the name is taken or empty, and for numbers out of bounds.
         """
         if not name:
             raise BulletSimError("a model needs a name")
@@ -169,7 +166,7 @@ class World:
             robot, mended = with_stand_ins(robot, self.mesh_files)
             if mended:
                 self._warn("model '%s': %s" % (name, mended))
-            merged = merge_fixed(with_solids(robot, solids))
+            merged = merge_fixed(robot)
         rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
         pairs = [pair for pair in self_collision_pairs if all(merged.frames[link].link not in rough for link in pair)]
         blueprint = Blueprint(name, robot, merged, static, mesh_cuts, bool(pairs))

@@ -3,7 +3,7 @@
 import pytest
 
 from bullet_sim import BulletSimError, Pose, World
-from bullet_sim.solids import AS_DRAWN, HOLLOW
+from bullet_sim.solids import AS_DRAWN, HOLLOW, with_solids
 from urdf_model import parse_urdf
 
 POST = """<robot name="post">
@@ -20,7 +20,7 @@ iyy="0.004" iyz="0" izz="0.004"/></inertial><collision><geometry><sphere radius=
 def test_a_ball_rests_on_what_is_solid(kind, rests_at_m):
     world = World()
     try:
-        world.spawn(parse_urdf(POST), "post", static=True, solids=kind and {"top": kind})
+        world.spawn(with_solids(parse_urdf(POST), kind and {"top": kind}), "post", static=True)
         ball = world.spawn(parse_urdf(BALL), "ball", Pose((0.0, 0.0, 1.2)))
         for _ in range(700):
             world.step()
@@ -32,10 +32,5 @@ def test_a_ball_rests_on_what_is_solid(kind, rests_at_m):
 @pytest.mark.parametrize("solids, text", [({"tip": HOLLOW}, "robot 'post' has no link 'tip' that could be hollow"),
                                           ({"top": "soft"}, "link 'top' is to be 'soft'; choices are 'as drawn'")])
 def test_what_cannot_be_is_refused(solids, text):
-    world = World()
-    try:
-        with pytest.raises(BulletSimError, match=text):
-            world.spawn(parse_urdf(POST), "post", static=True, solids=solids)
-        assert not world.models
-    finally:
-        world.close()
+    with pytest.raises(BulletSimError, match=text):
+        with_solids(parse_urdf(POST), solids)

@@ -40,7 +40,8 @@ class ModelPlugin:
 
         Called before the model exists, with the ``urdf_model.Robot`` and the ``<plugin>`` element. A robot that is
         bolted to the floor answers ``{"static": True}``; one with its own self-collision table adds
-        ``self_collision_pairs``, one with links that nothing bumps into ``solids``.
+        ``self_collision_pairs``, one with links that nothing bumps into ``solids``, as for
+        ``bullet_sim.solids.with_solids``, which the robot gets before it is spawned.
 
         Runs in a service thread (not in the loop), so slow work such as computing tables belongs here.
         """

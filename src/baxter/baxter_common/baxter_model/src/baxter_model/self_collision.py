@@ -46,7 +46,11 @@ def self_collision_pairs(links):
 
 
 def spawn_options(links):
-    """What `bullet_sim.World.spawn` shall know of a Baxter with these link names (any container), to be unpacked."""
+    """What a model plugin says to have a Baxter with these link names (any container) spawned.
+
+    {"self_collision_pairs", "mesh_cuts": as for `bullet_sim.World.spawn`, "solids": as for
+    `bullet_sim.solids.with_solids`}.
+    """
     return {"self_collision_pairs": self_collision_pairs(links), "mesh_cuts": MESH_CUTS,
             "solids": {link: solid for link, solid in _SOLIDS.items() if link in links}}
 

@@ -13,6 +13,7 @@ from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
 from .arms.joint_command import JointLimits
+from .arms.measured import Measured
 from .errors import HardwareError
 from .grippers.hands import hand_of
 from .robot import Baxter
@@ -68,7 +69,7 @@ class BaxterPlugin(ModelPlugin):
         self._dt = context.world.time_step_s
         limits = JointLimits(names, model.lower[arm], model.upper[arm], model.max_velocity[arm], model.max_effort[arm])
         self._baxter = Baxter(
-            limbs, limits, model.read_joints()[0][arm], self._dynamics, dt=self._dt,
+            limbs, limits, Measured(model.read_joints()[0][arm], self._dynamics), dt=self._dt,
             profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"), state=before)
         self._warnings = Warnings(context.log)
         self._build_parts(context, {limb.side: model.index(limb.joint_names) for limb in limbs})

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter's control logic: arbitrates arm commands and defines the behaviour while disabled."""
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
-from .arms.measured import Measured
 from .errors import HardwareError
 from .robot_state import RobotState
 
@@ -11,22 +10,21 @@ DISABLED_BEHAVIOURS = ("hold", "sink")
 class Baxter:
     """The robot's state and its arms, one tick at a time.
 
-    limbs, limits, dt: as for `Arms`; position: (n,) [rad] where the arms are; dynamics: as for `Measured`;
-    profile: 'sim' or 'robot' (speed ratio at start); disabled: what arms do without power, 'hold' or 'sink';
-    state: a robot_state.State to begin in.
+    limbs, limits, measured, dt: as for `Arms`; profile: 'sim' or 'robot' (speed ratio at start); disabled: what arms do
+    without power, 'hold' or 'sink'; state: a robot_state.State to begin in.
 
     Attributes: `profile`; `state`, a `RobotState`; `arms`, an `Arms`; `measured`, the `Measured` that the caller renews
     before each tick, and before each event that comes between two ticks.
     """
 
-    def __init__(self, limbs, limits, position, dynamics, dt=0.002, profile="sim", disabled="hold", state=None):
+    def __init__(self, limbs, limits, measured, dt=0.002, profile="sim", disabled="hold", state=None):
         if profile not in SPEED_RATIO:
             raise HardwareError("profile is '%s'; choices are %s" % (profile, ", ".join(SPEED_RATIO)))
         if disabled not in DISABLED_BEHAVIOURS:
             raise HardwareError("disabled is '%s'; choices are %s" % (disabled, ", ".join(DISABLED_BEHAVIOURS)))
         self.profile = profile
         self.state = RobotState() if state is None else RobotState(state)
-        self.measured = Measured(position, dynamics)
+        self.measured = measured
         self.arms = Arms(limbs, limits, self.measured, speed_ratio=SPEED_RATIO[profile], dt=dt)
         self.arms.stop()
         self._sinks = disabled == "sink"

@@ -13,6 +13,7 @@ import xacro
 from baxter_model import JOINTS, SIDES, poses
 from baxter_sim_hardware.plugin import BaxterPlugin
 from bullet_sim import Pose, World
+from bullet_sim.solids import with_solids
 from gazebo_ros.model_plugin import PluginContext, PluginHost, PluginSource
 from loop_ros.testing import FakeLog, FakeRos
 from model_files.resources import ResourceFinder
@@ -50,8 +51,9 @@ class Lab:
         """meshes: whether the body collides as it looks; without, it is passed through, which loads faster."""
         self.world = World(time_step_s=TICK_S, **({"find_mesh": ResourceFinder()} if meshes else {}))
         element = ElementTree.fromstring("<plugin/>")
-        self.model = self.world.spawn(robot, "baxter", Pose((0.0, 0.0, 0.93), (0.0, 0.0, 0.0, 1.0)),
-                                      **BaxterPlugin.spawn_options(robot, element))
+        options = BaxterPlugin.spawn_options(robot, element)
+        self.model = self.world.spawn(with_solids(robot, options.pop("solids")), "baxter",
+                                      Pose((0.0, 0.0, 0.93), (0.0, 0.0, 0.0, 1.0)), **options)
         self.arm = self.model.index(NAMES)
         if angles is None:
             angles = [poses().angles(pose, name.split("_")[0])[name] for name in NAMES]
