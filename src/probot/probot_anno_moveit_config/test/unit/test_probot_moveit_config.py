@@ -170,6 +170,15 @@ def test_planning_server_gets_its_parameters(arguments, controller):
     assert node.args.split() == ["moveit_ros_move_group", "move_group"]
 
 
+@pytest.mark.parametrize("arguments", [["fake_execution:=true"], ["moveit_controller_manager:=fake"]])
+def test_fake_arms_move_as_asked_for(arguments):
+    values = {name: param.value for name, param in load("move_group.launch", *arguments).params.items()}
+    assert values["/move_group/moveit_controller_manager"].startswith("moveit_fake_controller_manager/")
+    assert values["/move_group/controller_list"][0]["type"] == "interpolate"
+    config = load("demo.launch", "fake_execution_type:=last point")
+    assert config.params["/move_group/controller_list"].value[0]["type"] == "last point"
+
+
 def run(executable, *arguments, **environment):
     environment = {**os.environ, **environment}
     return subprocess.run([str(PACKAGE / "nodes" / executable), *arguments], env=environment, text=True,
