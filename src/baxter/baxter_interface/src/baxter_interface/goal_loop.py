@@ -14,6 +14,7 @@ from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
 from baxter_model.readiness import lost, why_not_ready
 
+from .goal_queue import GoalQueue
 from .presence import Presence
 from .resets import PUT_ELSEWHERE, Resets
 
@@ -52,51 +53,28 @@ class GoalLoop:
         self._robot = robot
         self._label = label
         self._begin = begin
-        self._lock = threading.Condition()
-        self._next = self._current = None
-        self._cancelled = self._ending = False
+        self._goals = GoalQueue(lambda handle, text: handle.set_canceled(text=text))
+        self._ending = False
         self._presence = Presence(rospy.resolve_name("robot/state"), robot.silence_s)
         self._resets, self._resets_before = Resets(), 0
         self._clock = RosClock(gives_up=lambda: self._is_unwanted() or bool(self._trouble()))
         self._thread = threading.Thread(target=self._run, name=label, daemon=True)
-        self._server = actionlib.ActionServer(name, action, self._on_goal, self._on_cancel, auto_start=False)
+        self._server = actionlib.ActionServer(name, action, self._goals.put, self._goals.cancel, auto_start=False)
         start(self._server)
         self._thread.start()
 
     def clean_shutdown(self, timeout_s=2.0):
         """End the goal, if there is one, and wait for that, `timeout_s` [s, wall] at most."""
-        with self._lock:
-            self._ending = True
-            self._lock.notify()
+        self._ending = True
+        self._goals.close()
         self._thread.join(timeout_s)
-
-    # -- rospy's threads --------------------------------------------------------------------------------------------
-
-    def _on_goal(self, handle):
-        with self._lock:
-            if self._next is not None:
-                self._next.set_canceled(text="another goal came before this one was begun")
-            self._next = handle
-            self._lock.notify()
-
-    def _on_cancel(self, handle):
-        with self._lock:
-            if self._next is not None and self._next == handle:
-                self._next = None
-                handle.set_canceled(text="cancelled before it was begun")
-            elif self._current is not None and self._current == handle:
-                self._cancelled = True
-
-    # -- the loop's thread ------------------------------------------------------------------------------------------
 
     def _run(self):
         while not self._ending and not rospy.is_shutdown():
-            with self._lock:
-                self._lock.wait_for(lambda: self._next is not None or self._ending, _LOOK_UP_S)
-                if self._next is None:
-                    continue
-                self._current, self._next, self._cancelled = self._next, None, False
-            handle, begin_s = self._current, time.monotonic()
+            handle = self._goals.take(_LOOK_UP_S)
+            if handle is None:
+                continue
+            begin_s = time.monotonic()
             handle.set_accepted()
             try:
                 end, result, text = self._carry_out(handle)
@@ -105,8 +83,7 @@ class GoalLoop:
                 rospy.logerr("%s: %s", self._label, traceback.format_exc())
                 end, result, text = handle.set_aborted, None, "the action server failed: %s" % error
             time.sleep(max(0.0, begin_s + SHORTEST_GOAL_S - time.monotonic()))
-            with self._lock:
-                self._current = None
+            self._goals.done()
             end(result, text)
 
     def _carry_out(self, handle):
@@ -148,7 +125,7 @@ class GoalLoop:
             work.stop()
 
     def _is_unwanted(self):
-        return self._cancelled or self._next is not None
+        return self._goals.is_cancelled or self._goals.has_next
 
     def _trouble(self, since_reset=False):
         """Why nothing can be moved now, "" if it can. since_reset: although the robot was put elsewhere meanwhile."""

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The action server ``trajActionServer``: glue between goals, judging and the robot's joint commands."""
-import threading
-
 import numpy as np
 import rospy
 from baxter_core_msgs.msg import JointCommand
@@ -9,6 +7,7 @@ from baxter_core_msgs.msg import JointCommand
 from baxter_dataflow.ros_clock import RosClock
 from baxter_dataflow.waiting import Ticker
 from baxter_interface import goal_loop
+from baxter_interface.goal_queue import GoalQueue
 from baxter_interface.resets import PUT_ELSEWHERE
 from joint_trajectory import rows_of_points
 
@@ -34,57 +33,34 @@ class Interpolator:
         self._limits = limits
         self._settings = settings
         self._version = version
-        self._lock = threading.Condition()
-        self._next = None
-        self._current = None
-        self._cancelled = False
+        self._goals = GoalQueue(lambda handle, text: handle.set_canceled(self._result(handle), text))
         self._count = 0
         self._publishers = {side: rospy.Publisher("/robot/limb/%s/joint_command" % side, JointCommand, queue_size=1,
                                                   tcp_nodelay=True) for side in SIDES}
-        self._server = TrajServer(ACTION_NAME, version, self._on_goal, self._on_cancel)
+        self._server = TrajServer(ACTION_NAME, version, self._on_goal, self._goals.cancel)
 
     def run(self):
         """Serve until the node is shut down."""
         goal_loop.start(self._server)
         while not rospy.is_shutdown():
-            with self._lock:
-                # Woken by a goal; the time-out is for the shutdown.
-                self._lock.wait_for(lambda: self._next is not None, timeout=0.5)
-                if self._next is None:
-                    continue
-                self._current, self._next = self._next, None
-                self._cancelled = False
-                handle = self._current
+            # Woken by a goal; the time-out is for the shutdown.
+            handle = self._goals.take(0.5)
+            if handle is None:
+                continue
             try:
                 self._follow(handle)
             finally:
-                with self._lock:
-                    self._current = None
+                self._goals.done()
 
     # -- rospy's threads ------------------------------------------------------------------------------------------
 
     def _on_goal(self, handle):
-        with self._lock:
-            busy = self._current is not None
-            try:
-                # While an arm moves nobody knows where this goal would begin; that is judged when it does.
-                self._judge(handle, None if busy else self._robot.angles())
-            except GoalRefused as refusal:
-                rospy.logwarn("goal refused: %s", refusal)
-                handle.set_rejected(self._result(handle), str(refusal))
-                return
-            if self._next is not None:
-                self._next.set_canceled(self._result(self._next), "a newer goal came before this one had begun")
-            self._next = handle
-            self._lock.notify()
-
-    def _on_cancel(self, handle):
-        with self._lock:
-            if self._next is not None and handle == self._next:
-                self._next = None
-                handle.set_canceled(self._result(handle), "cancelled before it had begun")
-            elif self._settings.preemption and self._current is not None and handle == self._current:
-                self._cancelled = True
+        try:
+            # While an arm moves nobody knows where this goal would begin; that is judged when it does.
+            self._goals.put(handle, lambda is_busy: self._judge(handle, None if is_busy else self._robot.angles()))
+        except GoalRefused as refusal:
+            rospy.logwarn("goal refused: %s", refusal)
+            handle.set_rejected(self._result(handle), str(refusal))
 
     # -- the loop -------------------------------------------------------------------------------------------------
 
@@ -157,8 +133,7 @@ class Interpolator:
 
     def _is_unwanted(self):
         """Whether the goal at hand was cancelled, or a newer one waits that may take over."""
-        with self._lock:
-            return self._cancelled or (self._settings.preemption and self._next is not None)
+        return self._settings.preemption and (self._goals.is_cancelled or self._goals.has_next)
 
     def _farthest(self, names, target):
         """What is wrong with the joint that is farthest from its target; None if all are near."""
