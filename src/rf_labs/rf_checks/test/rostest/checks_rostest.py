@@ -23,13 +23,13 @@ from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose  # noqa
 from rf_checks.judge import Judge  # noqa: E402
 from rf_checks.lab import Lab, robot_description  # noqa: E402
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
-from cpu_quota import QuotaUnavailable, cpu_quota  # noqa: E402
+PACKAGE = Path(__file__).resolve().parents[2]
+WORKSPACE = PACKAGE.parents[2]
+sys.path.insert(0, str(WORKSPACE / "tools"))
+from lab_tests.quota import Quota, QuotaError  # noqa: E402
 
 # Keys of a report that hold times.
 TIMES = ("wall_s", "cpu_s", "simulated_s", "real_time_factor")
-PACKAGE = Path(__file__).resolve().parents[2]
-WORKSPACE = PACKAGE.parents[2]
 # Program -> the key of its fault, and words of which its sentence must have one.
 WRONG = {
     "syntax_error": ("syntax", "line 7"),
@@ -128,7 +128,7 @@ class Loaded(unittest.TestCase):
                 try:
                     with load():
                         found = self.judge_all(programs)
-                except QuotaUnavailable as reason:
+                except QuotaError as reason:
                     skip(self, "%s: %s" % (name, reason))
                 for program, result in found.items():
                     if not result["graded"]:
@@ -151,7 +151,7 @@ class Slow(Loaded):
 
     def test_a_slow_machine_changes_no_points(self):
         self.compare([("exercises/solutions", "joint_command"), ("test/wrong", "exits_early")],
-                     {"20 %": lambda: cpu_quota(20)})
+                     {"20 %": lambda: Quota(20)})
 
 
 class Busy(Loaded):
@@ -164,10 +164,10 @@ class Busy(Loaded):
         self.compare(self.PROGRAMS, {"full speed": contextlib.nullcontext})
 
     def test_40_percent(self):
-        self.compare(self.PROGRAMS, {"40 %": lambda: cpu_quota(40)}, times=2)
+        self.compare(self.PROGRAMS, {"40 %": lambda: Quota(40)}, times=2)
 
     def test_20_percent(self):
-        self.compare(self.PROGRAMS, {"20 %": lambda: cpu_quota(20)}, times=2)
+        self.compare(self.PROGRAMS, {"20 %": lambda: Quota(20)}, times=2)
 
     def test_eight_other_labs(self):
         self.compare(self.PROGRAMS, {"eight labs": lambda: other_labs(8)}, times=2)
