@@ -5,7 +5,9 @@ from catkin_pkg.python_setup import generate_distutils_setup
 
 PACKAGES = [
     "motion_planning",
+    "motion_planning.constraints",
     "motion_planning.exact",
+    "motion_planning.kinematics",
     "motion_planning.model",
     "motion_planning.scene",
     "motion_planning.srdf",

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Constraints that hold together."""
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+from motion_planning.constraints.targets import (
+    Context,
+    JointTarget,
+    OrientationTarget,
+    PositionTarget,
+    VisibilityTarget,
+)
+
+
+@dataclass(frozen=True)
+class ConstraintSet:
+    """Constraints all of which are to be kept. Empty: everything keeps to it."""
+
+    name: str = ""
+    joints: tuple[JointTarget, ...] = ()
+    positions: tuple[PositionTarget, ...] = ()
+    orientations: tuple[OrientationTarget, ...] = ()
+    visibilities: tuple[VisibilityTarget, ...] = ()
+
+    def __post_init__(self):
+        for entry in fields(self)[1:]:
+            object.__setattr__(self, entry.name, tuple(getattr(self, entry.name)))
+
+    def __len__(self):
+        return len(self.all)
+
+    @property
+    def all(self):
+        """The constraints in the order of :meth:`evaluate`'s answer: joints, positions, orientations, visibilities."""
+        return self.joints + self.positions + self.orientations + self.visibilities
+
+    def evaluate(self, model, state, scene, exact=None):
+        """Return [Evaluation, ...], one for each of :attr:`all`, of a State.
+
+        ``exact``: ExactChecker that tells whether a link stands in a line of sight; not looked at where None. Raises
+        ConstraintError for names that neither the robot nor the scene has.
+        """
+        context = Context(model, state, scene, exact)
+        return [one.evaluate(context) for one in self.all]
+
+    def broken(self, model, state, scene, exact=None):
+        """Return the sentence of the first constraint that is not kept, None where all are. Raises ConstraintError."""
+        context = Context(model, state, scene, exact)
+        return next((result.sentence for result in (one.evaluate(context) for one in self.all)
+                     if not result.satisfied), None)
+
+    def resolved(self, scene):
+        """Return the set with its frames looked up in ``scene`` as it is now, and constraints on something that is held
+        put on the link that holds it. What a goal means by a frame that moves is where that is when it is asked for.
+
+        Raises ConstraintError for names that neither the robot nor the scene has.
+        """
+        return replace(self, **{entry.name: tuple(one.resolved(scene) for one in getattr(self, entry.name))
+                                for entry in fields(self)[1:]})
+
+    def merged(self, other):
+        """Return the constraints of both sets."""
+        return ConstraintSet(self.name or other.name, *(getattr(self, entry.name) + getattr(other, entry.name)
+                                                        for entry in fields(self)[1:]))

@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Single constraints. ``frame`` is the name of a frame of the scene, "" the planning frame."""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from motion_planning.constraints import regions
+from motion_planning.errors import PlanningError
+from motion_planning.scene import Scene, TriangleMesh, WorldObject
+from motion_planning.shapes import read_only
+from urdf_model.transforms import inverse, matrix_from_quaternion
+
+#: Rounding errors that a comparison with a tolerance forgives [rad, m].
+_ROUNDING = 1e-9
+_AXES = ("z", "y", "x")  # of a sensor that looks along it, by number
+
+
+class ConstraintError(PlanningError):
+    """A constraint that cannot be understood: unknown names, tolerances or numbers that are none."""
+
+
+class Evaluation(NamedTuple):
+    """Whether a constraint is kept, how far from its middle (weighted, in its unit), and why not, "" where it is."""
+
+    satisfied: bool
+    distance: float
+    sentence: str
+
+
+@dataclass(frozen=True)
+class JointTarget:
+    """A joint between position - below and position + above [rad or m]."""
+
+    joint: str
+    position: float
+    above: float = 1e-4
+    below: float = 1e-4
+    weight: float = 1.0
+
+    def __post_init__(self):
+        _finite("joint '%s'" % self.joint, self.position, self.above, self.below, self.weight)
+        if self.above < 0.0 or self.below < 0.0:
+            raise ConstraintError("tolerances of joint '%s' are +%g and -%g; expected 0 or more"
+                                  % (self.joint, self.above, self.below))
+
+    def evaluate(self, context):
+        index = context.variable(self.joint)
+        value = float(context.state.q[index])
+        off = value - self.position
+        if context.model.continuous[index]:
+            off = math.remainder(off, 2.0 * math.pi)
+        kept = -self.below - _ROUNDING <= off <= self.above + _ROUNDING
+        return Evaluation(kept, self.weight * abs(off), "" if kept else
+                          "joint '%s' is at %.4f; expected %.4f to %.4f"
+                          % (self.joint, value, self.position - self.below, self.position + self.above))
+
+    def resolved(self, scene):
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class PositionTarget:
+    """A point of a link inside one of some regions. offset (3,): the point in the link's frame [m].
+
+    regions: ((shape, pose (4, 4) in ``frame``), ...); shapes that have an inside: Box, Sphere, Cylinder, Cone, and
+    TriangleMesh, of which the convex hull counts.
+    """
+
+    link: str
+    regions: tuple
+    offset: np.ndarray = (0.0, 0.0, 0.0)
+    frame: str = ""
+    weight: float = 1.0
+
+    def __post_init__(self):
+        object.__setattr__(self, "offset", read_only(self.offset))
+        object.__setattr__(self, "regions", tuple((shape, read_only(pose)) for shape, pose in self.regions))
+        _finite("the position of link '%s'" % self.link, self.offset, self.weight, *(pose for _, pose in self.regions))
+        if not self.regions:
+            raise ConstraintError("the position of link '%s' has no region to be in" % self.link)
+        for shape, _ in self.regions:
+            if not regions.has_inside(shape):
+                raise ConstraintError("the position of link '%s' shall be in a %s, which has no inside"
+                                      % (self.link, type(shape).__name__))
+
+    def evaluate(self, context):
+        link, frame = context.link_pose(self.link), context.frame(self.frame)
+        point = link[:3, :3] @ self.offset + link[:3, 3]
+        distances, inside = [], False
+        for shape, pose in self.regions:
+            middle = frame @ pose
+            distances.append(float(np.linalg.norm(point - middle[:3, 3])))
+            inside |= regions.holds(shape, inverse(middle) @ np.append(point, 1.0))
+        return Evaluation(inside, self.weight * min(distances), "" if inside else
+                          "link '%s' is at %.4f %.4f %.4f, %.4f m from the middle of its region and outside of it"
+                          % (self.link, *point, min(distances)))
+
+    def resolved(self, scene):
+        frame = _frame(scene, self.frame)
+        link, inside = _holder(scene, self.link)
+        placed = tuple((shape, frame @ pose) for shape, pose in self.regions)
+        return replace(self, link=link, offset=inside[:3, :3] @ self.offset + inside[:3, 3], regions=placed, frame="")
+
+
+@dataclass(frozen=True, eq=False)
+class OrientationTarget:
+    """A link turned as ``rotation`` (3, 3), or quaternion (x, y, z, w), in ``frame``, within ``tolerances`` (3,) [rad].
+
+    They are of angles about x, y and z, or of the rotation vector's parts (``rotation_vector``), of the turn from what
+    is wanted to what is. pi or more lets an axis free.
+    """
+
+    link: str
+    rotation: np.ndarray
+    tolerances: tuple[float, float, float] = (1e-3, 1e-3, 1e-3)
+    frame: str = ""
+    rotation_vector: bool = False
+    weight: float = 1.0
+
+    def __post_init__(self):
+        try:
+            rotation = np.asarray(self.rotation, dtype=np.float64)
+            rotation = matrix_from_quaternion(rotation) if rotation.shape == (4,) else rotation
+            _finite("the orientation of link '%s'" % self.link, rotation, self.weight, *self.tolerances)
+        except ValueError as error:
+            raise ConstraintError("the orientation of link '%s' is none: %s" % (self.link, error)) from None
+        if rotation.shape != (3, 3) or abs(np.linalg.det(rotation) - 1.0) > 1e-3:
+            raise ConstraintError("the orientation of link '%s' is no rotation" % self.link)
+        if len(self.tolerances) != 3 or min(self.tolerances) < 0.0:
+            raise ConstraintError("tolerances of the orientation of link '%s' are %s; expected three of 0 or more"
+                                  % (self.link, list(self.tolerances)))
+        object.__setattr__(self, "rotation", read_only(rotation))
+
+    def evaluate(self, context):
+        wanted = context.frame(self.frame)[:3, :3] @ self.rotation
+        turn = wanted.T @ context.link_pose(self.link)[:3, :3]
+        angles = self.angles(turn)
+        kept = all(abs(angle) <= allowed + _ROUNDING for angle, allowed in zip(angles, self.tolerances, strict=True))
+        return Evaluation(kept, self.weight * float(np.abs(angles).sum()), "" if kept else
+                          "link '%s' is turned by %.4f %.4f %.4f rad (x, y, z) from what is wanted; allowed %g %g %g"
+                          % (self.link, *angles, *self.tolerances))
+
+    def angles(self, turn):
+        """Return the angles (3,) of a turn (3, 3) that the tolerances are of; of equal ones the best that fit."""
+        if self.rotation_vector:
+            return regions.rotation_vector(turn)
+        y = math.asin(min(1.0, max(-1.0, turn[0, 2])))
+        x, z = math.atan2(-turn[1, 2], turn[2, 2]), math.atan2(-turn[0, 1], turn[0, 0])
+        flipped = (math.remainder(x + math.pi, 2.0 * math.pi), math.remainder(math.pi - y, 2.0 * math.pi),
+                   math.remainder(z + math.pi, 2.0 * math.pi))
+        return min((np.array((x, y, z)), np.array(flipped)), key=lambda angles: max(
+            abs(angle) - allowed for angle, allowed in zip(angles, self.tolerances, strict=True)))
+
+    def resolved(self, scene):
+        link, inside = _holder(scene, self.link)
+        rotation = _frame(scene, self.frame)[:3, :3] @ self.rotation @ inside[:3, :3].T
+        return replace(self, link=link, rotation=rotation, frame="")
+
+
+@dataclass(frozen=True, eq=False)
+class VisibilityTarget:
+    """A disc that a sensor sees, with no link of the robot in between.
+
+    target_pose (4, 4) in ``target_frame``: the disc lies in its x-y plane; target_radius [m]. sensor_pose (4, 4) in
+    ``sensor_frame``; view_axis: 0, 1, 2 for a sensor that looks along its z, y, x. max_view_angle [rad]: between the
+    sensor's axis and the disc's axis (its z turned round); max_range_angle: between the sensor's axis and the line to
+    the disc; 0: not looked at. cone_sides: corners that the disc is drawn with.
+    """
+
+    target_radius: float
+    target_pose: np.ndarray
+    sensor_pose: np.ndarray
+    target_frame: str = ""
+    sensor_frame: str = ""
+    cone_sides: int = 8
+    view_axis: int = 0
+    max_view_angle: float = 0.0
+    max_range_angle: float = 0.0
+    weight: float = 1.0
+    # Links that may stand in the way: what sees and what is seen.
+    may_touch: tuple[str, ...] = field(default=())
+
+    def __post_init__(self):
+        for name in ("target_pose", "sensor_pose"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        _finite("a visibility", self.target_radius, self.target_pose, self.sensor_pose, self.max_view_angle,
+                self.max_range_angle, self.weight)
+        if self.view_axis not in (0, 1, 2) or self.cone_sides < 3 or self.target_radius < 0.0:
+            raise ConstraintError("a visibility needs a view axis of 0, 1 or 2, three or more sides and a radius of 0 "
+                                  "or more, got %s, %s and %s" % (self.view_axis, self.cone_sides, self.target_radius))
+        object.__setattr__(self, "may_touch", (*self.may_touch, self.target_frame, self.sensor_frame))
+
+    def evaluate(self, context):
+        target = context.frame(self.target_frame) @ self.target_pose
+        sensor = context.frame(self.sensor_frame) @ self.sensor_pose
+        axis, line = sensor[:3, 2 - self.view_axis], target[:3, 3] - sensor[:3, 3]
+        reach = float(np.linalg.norm(line))
+        if reach < 1e-9:
+            return Evaluation(False, 0.0, "the sensor sits on what it shall see")
+        for limit, other, what in ((self.max_view_angle, -target[:3, 2], "the target is turned away from the sensor"),
+                                   (self.max_range_angle, line / reach, "the target lies beside the sensor's axis")):
+            angle = math.acos(min(1.0, max(-1.0, float(axis @ other))))
+            if limit > 0.0 and angle > limit + _ROUNDING:
+                return Evaluation(False, self.weight * (angle - limit), "%s by %.4f rad; at most %.4f are allowed"
+                                  % (what, angle, limit))
+        if self.target_radius > 0.0 and context.exact is not None:
+            for contact in self._in_the_way(context, sensor, target):
+                if contact.a not in self.may_touch:
+                    return Evaluation(False, self.weight * contact.depth, "'%s' stands between the sensor and the "
+                                      "target" % contact.a)
+        return Evaluation(True, 0.0, "")
+
+    def _in_the_way(self, context, sensor, target):
+        turns = np.linspace(0.0, 2.0 * math.pi, self.cone_sides, endpoint=False)
+        rim = np.stack([np.cos(turns), np.sin(turns), np.zeros_like(turns)], axis=1) * self.target_radius
+        rim = rim @ target[:3, :3].T + target[:3, 3]
+        count = self.cone_sides
+        sides = [(0, 1 + k, 1 + (k + 1) % count) for k in range(count)]
+        disc = [(count + 1, 1 + (k + 1) % count, 1 + k) for k in range(count)]
+        cone = TriangleMesh(np.vstack([sensor[:3, 3], rim, target[:3, 3]]), sides + disc)
+        alone = Scene(context.model, context.state).with_object(
+            WorldObject("line of sight", np.eye(4), ((cone, np.eye(4)),)))
+        return [one for one in context.exact.contacts(alone) if one.b == "line of sight"]
+
+    def resolved(self, scene):
+        return self  # one of the two moves with the robot, else there would be nothing to choose
+
+
+class Context:
+    """A state of a robot in a scene, with the frames of both looked up once."""
+
+    def __init__(self, model, state, scene, exact=None):
+        self.model, self.state, self.exact = model, state, exact
+        self._scene = scene.with_state(state)
+        self._frames = None
+
+    def variable(self, joint):
+        if joint not in self.model.index:
+            raise ConstraintError("a constraint names joint '%s', which the robot has not or which cannot be moved"
+                                  % joint)
+        return self.model.index[joint]
+
+    def link_pose(self, link):
+        if link in self.model.link_index:
+            if self._frames is None:
+                self._frames = self.model.frames(self.state.q, self.state.base)
+            return self._frames[self.model.link_index[link]]
+        return _frame(self._scene, link)
+
+    def frame(self, name):
+        return _frame(self._scene, name)
+
+
+def _frame(scene, name):
+    if not name:
+        return np.eye(4)
+    try:
+        return scene.frame(name)
+    except PlanningError as error:
+        raise ConstraintError("a constraint names a frame: %s" % error) from None
+
+
+def _holder(scene, name):
+    """(link, pose (4, 4) in it) of a link, or of something that a link holds, or a subframe of that."""
+    if name in scene.model.link_index:
+        return name, np.eye(4)
+    owner = name if name in scene.state.attached else name.rpartition("/")[0]
+    if owner not in scene.state.attached:
+        raise ConstraintError("a constraint is on link '%s', which the robot has not, nor holds" % name)
+    link = scene.state.attached[owner].link
+    return link, inverse(scene.frame(link)) @ _frame(scene, name)
+
+
+def _finite(what, *numbers):
+    if not all(np.isfinite(number).all() for number in numbers):
+        raise ConstraintError("%s has a number that is not finite" % what)

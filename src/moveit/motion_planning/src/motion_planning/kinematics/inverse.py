@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Inverse kinematics of groups."""
+import time
+from itertools import product
+
+import numpy as np
+
+from motion_planning.kinematics.limb import KinematicsFailure, NoIkSolution, limbs_of
+from motion_planning.model import Group, ModelError, State
+
+#: Solutions of each limb that are tried together before the search begins anew elsewhere.
+_SEVERAL = 12
+
+
+def fk(model, q, links, base=None):
+    """Return {link: pose (4, 4) in the planning frame} of ``links`` at ``q`` (n,).
+
+    ``base`` (4, 4): the root in the planning frame, identity where None. Raises ModelError for an unknown link.
+    """
+    unknown = [link for link in links if link not in model.link_index]
+    if unknown:
+        raise ModelError("robot '%s' has no link '%s'" % (model.name, unknown[0]))
+    frames = model.frames(q, base)
+    return {link: frames[model.link_index[link]] for link in links}
+
+
+def ik(model, group, poses, seed, timeout_s=0.05, accept=None, clock=time.monotonic):
+    """Return ``q`` (n,), the seed's but for the joints of ``group``, that puts links where they shall be.
+
+    group: a Group or its name. poses: {link: pose (4, 4), or position (3,) where any orientation will do}, in the
+    planning frame; several links where each has joints of its own, as the hands of both arms. seed: a State, or q (n,)
+    with the root in the origin; the solution found nearest to it is taken. timeout_s: how long solutions that
+    ``accept`` refuses are followed by others; one is looked for in any case. accept: function of q (n,) that returns
+    None, or a sentence that says why it will not do.
+    Raises NoIkSolution, which says why; KinematicsFailure for links that the group cannot move so; ModelError.
+    """
+    deadline = clock() + timeout_s
+    group = group if isinstance(group, Group) else model.group(group)
+    state = seed if isinstance(seed, State) else model.state(np.asarray(seed, dtype=np.float64))
+    if not poses:
+        raise KinematicsFailure("no link of group '%s' is to be put anywhere" % group.name)
+    limbs = limbs_of(model, group, list(poses))
+    frames = model.frames(state.q, state.base)
+    targets = [limb.target(poses[limb.link], frames[model.link_index[limb.base]]) for limb in limbs]
+    q = _put(model, state.q, limbs, [limb.nearest(target, _seed_of(limb, state.q))
+                                     for limb, target in zip(limbs, targets, strict=True)])
+    if accept is None:
+        return q
+    refusal = accept(q)
+    if refusal is None:
+        return q
+    return _search(model, state.q, (limbs, targets), accept, (refusal, deadline, clock))
+
+
+def _search(model, start, problem, accept, progress):
+    """The first other solution that ``accept`` takes, near ones first, then from random postures until the deadline."""
+    limbs, targets = problem
+    refusal, deadline, clock = progress
+    generator, tried, around = np.random.default_rng(0), 1, start
+    while True:
+        found = [limb.several(target, _seed_of(limb, around), _SEVERAL)
+                 for limb, target in zip(limbs, targets, strict=True)]
+        together = sorted(product(*found), key=lambda parts: sum(
+            float(np.sum((part - start[limb.indices]) ** 2)) for limb, part in zip(limbs, parts, strict=True)))
+        for parts in together:
+            q = _put(model, start, limbs, parts)
+            refused = accept(q)
+            if refused is None:
+                return q
+            tried += 1
+            if clock() >= deadline:
+                break
+        if clock() >= deadline:
+            raise NoIkSolution("%d solutions were found and refused, the nearest because %s" % (tried, refusal), True)
+        around = generator.uniform(model.bounds[:, 0], model.bounds[:, 1])
+
+
+def _seed_of(limb, q):
+    return np.clip(q[limb.indices], limb.chain.lower, limb.chain.upper)
+
+
+def _put(model, q, limbs, parts):
+    """``q`` (n,) with each limb's part (k,) in its place; joints that turn without end between -pi and pi."""
+    whole = np.array(q)
+    for limb, part in zip(limbs, parts, strict=True):
+        whole[limb.indices] = part
+    return model.wrapped(whole)
