@@ -36,4 +36,4 @@ def main() -> int:
 if __name__ == "__main__":
     status = main()
     sys.stdout.flush()
-    os._exit(status)  # a probe that still hangs, in a thread, must not keep us
+    os._exit(status)  # a thread whose probe still hangs must not delay the exit

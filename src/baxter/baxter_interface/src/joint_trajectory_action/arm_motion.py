@@ -26,7 +26,7 @@ class Mode(enum.Enum):
 
 
 class GoalDefaults(NamedTuple):
-    """What a goal is measured by unless it says so itself; n joints.
+    """Tolerances and gains for a goal that gives none of its own; n joints.
 
     ``path``, ``goal`` (n,): position errors allowed on the way and at the end [rad]; ``stopped_velocity`` [rad/s];
     0 or less: any. ``goal_time_s``: how much later the end may be reached. ``gains`` (3, n): kp, ki, kd of velocity

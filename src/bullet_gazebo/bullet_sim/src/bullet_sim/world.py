@@ -308,7 +308,7 @@ class World:
         return [None if model is None else (model.name, model.link_name(link)) for model, link in found]
 
     def close(self):
-        """Give the physics client back. The world is of no use afterwards."""
+        """Give the physics client back. The world cannot be used afterwards."""
         if self._client is not None:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = None

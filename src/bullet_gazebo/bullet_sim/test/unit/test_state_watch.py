@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Bullet cannot compute with is refused, and where it comes about all the same, nobody sees it."""
+"""Numbers that Bullet cannot compute with are refused; a state that becomes impossible is put back unread."""
 
 import math
 

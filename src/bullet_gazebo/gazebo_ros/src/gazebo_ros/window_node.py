@@ -29,7 +29,7 @@ def main():
         print("gazebo_gui: no display (DISPLAY is not set), the lab goes on without a window; rviz or gui:=false")
         return 0
     _keep_the_output_for_python()
-    from gazebo_ros import window  # loads PyBullet, which is of no use without a display
+    from gazebo_ros import window  # loads PyBullet, which is not needed without a display
 
     if not window.can_open():
         print("gazebo_gui: no OpenGL on display %s, the lab goes on without a window" % os.environ["DISPLAY"])

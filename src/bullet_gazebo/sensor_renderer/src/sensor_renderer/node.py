@@ -138,7 +138,7 @@ class SensorRenderer:
                 wanted[body["name"], str(sorted(listed.items()))] = body["name"], listed
         for key in [key for key in self._sensors if key not in wanted]:
             self._sensors.pop(key).close()
-        # What is of no use is said once, not at every change of the world.
+        # A sensor that cannot be served is logged once, not at every change of the world.
         self._refused &= wanted.keys()
         for key, (model, listed) in wanted.items():
             if key not in self._sensors and key not in self._refused:

@@ -158,7 +158,7 @@ def connect(name, *arguments):
     follows). Calling it again is safe: it finds what the first call has started, or starts it again, with the arguments
     that it is called with then.
 
-    Raises :class:`LabError` when there is no lab to be had.
+    Raises :class:`LabError` when no lab can be found or started.
     """
     if name not in LABS:
         raise LabError("there is no lab '%s'; there are: %s" % (name, ", ".join(LABS)))

@@ -69,7 +69,7 @@ class ControllerManager:
         self._log = log
         self._loaded = {}
         self._running = []
-        self._idle = []  # loaded, not running, with something to do all the same
+        self._idle = []  # loaded, not running, but with work in each tick
         self._switch = None
         self._closed = False
 

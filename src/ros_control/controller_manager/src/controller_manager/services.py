@@ -134,7 +134,7 @@ class ControllerManagerServices:
                           "position_controllers/JointTrajectoryController (has its YAML file been loaded, in this "
                           "namespace?)" % (name, context.resolve("type"), found))
         try:
-            # Importing takes its time; not the loop's.
+            # Importing is slow, so it happens outside of the loop.
             controller_class = self._find_table().find(kind)
         except ControlError as error:
             raise Refused("cannot load controller '%s': %s" % (name, error)) from error

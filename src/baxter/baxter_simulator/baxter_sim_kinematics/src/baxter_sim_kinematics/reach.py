@@ -18,7 +18,7 @@ from urdf_model.transforms import matrix_from_quaternion
 
 # Cells that are computed, saved and counted together: about a second's work.
 _CHUNK = 32
-# A million cells take a day; far more than that are a slip of the pen and do not fit into memory.
+# A million cells take a day. A request for far more is a typing error, and would not fit into memory.
 _MOST_CELLS = 10_000_000
 
 
