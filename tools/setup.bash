@@ -24,7 +24,7 @@ DESCRIPTION=$LAB_ROOT/src/baxter/baxter_common/baxter_description
 GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
 STEPS=(apt venv pip meshes overlay build urdf kernels)
 # Python packages with compiled inner loops: `python3 -m NAME` fills their cache.
-COMPILED=(baxter_sim_kinematics baxter_sim_hardware)
+COMPILED=(baxter_sim_kinematics baxter_sim_hardware motion_planning)
 declare -A TITLES=(
     [apt]="Debian packages"
     [venv]="virtual environment"

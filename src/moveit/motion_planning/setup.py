@@ -9,7 +9,9 @@ PACKAGES = [
     "motion_planning.exact",
     "motion_planning.kinematics",
     "motion_planning.model",
+    "motion_planning.planners",
     "motion_planning.scene",
+    "motion_planning.spheres",
     "motion_planning.srdf",
     "motion_planning.timing",
 ]

@@ -68,7 +68,7 @@ class ExactChecker:
 
     def __init__(self, model, meshes):
         """``meshes``: function from the file name of a mesh to its shapes.TriangleMesh, or raises PlanningError."""
-        self.model = model
+        self.model, self.meshes = model, meshes
         self.warnings = []
         self._geometries = Geometries()
         self._lock = threading.Lock()

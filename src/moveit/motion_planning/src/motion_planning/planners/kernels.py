@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The inner loops of planning, compiled: two trees that grow towards each other, and shortcuts.
+
+Trees are kept variable by variable, so that distances to 16 nodes are computed at once: ``nodes`` (2, k, room)
+float32, room a multiple of 16; ``parents`` (2, room) int32, -1 for a root. ``numbers`` (7) int64 holds what is to last
+between calls: 0, 1 the trees' sizes; 2 the tree that grows; 3 the random state; 4, 5 the two nodes at which they met;
+6 how many samples were drawn.
+"""
+import numpy as np
+
+from motion_planning.spheres.compiled import compiled
+from motion_planning.spheres.kernel import free_edge, work_arrays
+from motion_planning.spheres.lanes import below, fill, load, store
+
+GOING_ON, MET, FULL = range(3)
+
+
+@compiled
+def random_bits(numbers):
+    """The next of a sequence of 64 random bits: xorshift* (Vigna 2016)."""
+    x = np.uint64(numbers[3])
+    x ^= x >> np.uint64(12)
+    x ^= x << np.uint64(25)
+    x ^= x >> np.uint64(27)
+    numbers[3] = np.int64(x)
+    return x * np.uint64(2685821657736338717)
+
+
+@compiled
+def random_unit(numbers):
+    """A random number from 0 up to 1."""
+    return np.float32(random_bits(numbers) >> np.uint64(40)) * np.float32(2.0 ** -24)
+
+
+@compiled
+def nearest(nodes, tree, count, target, distances):
+    """Return (index, squared distance) of the node of a tree that is nearest to ``target`` (k,)."""
+    k, room = nodes.shape[1], nodes.shape[2]
+    flat = nodes.ravel()
+    best, least = 0, np.float32(np.inf)
+    for begin in range(0, count, 16):
+        total = fill(np.float32(0.0))
+        for j in range(k):
+            apart = load(flat, (tree * k + j) * room + begin) - fill(target[j])
+            total = total + apart * apart
+        if below(total, fill(least)) == 0:
+            continue
+        store(distances, 0, total)
+        for lane in range(min(16, count - begin)):
+            if distances[lane] < least:
+                best, least = begin + lane, distances[lane]
+    return best, least
+
+
+@compiled
+def _add(trees, tree, q, parent):
+    nodes, parents, numbers = trees
+    count = numbers[tree]
+    for j in range(len(q)):
+        nodes[tree, j, count] = q[j]
+    parents[tree, count] = parent
+    numbers[tree] = count + 1
+    return count
+
+
+@compiled
+def grow(tables, trees, bounds, reach, step, samples):
+    """Draw up to ``samples`` samples. Return MET, FULL (no room for more nodes) or GOING_ON.
+
+    tables: of the checker. trees: (nodes, parents, numbers). bounds: (low, high), (k,) float32 each. ``reach``: the
+    longest edge; ``step``: how far apart states on an edge are looked at.
+    """
+    nodes, parents, numbers = trees
+    low, high = bounds
+    k = nodes.shape[1]
+    room = nodes.shape[2]
+    work = work_arrays(tables[0])
+    distances = np.empty(16, np.float32)
+    sample, new, at = np.empty(k, np.float32), np.empty(k, np.float32), np.empty(k, np.float32)
+    for _ in range(samples):
+        if numbers[0] + 1 >= room or numbers[1] + 1 >= room:
+            return FULL
+        # The smaller tree grows.
+        tree = 0 if numbers[0] <= numbers[1] else 1
+        if numbers[0] == numbers[1]:
+            tree = numbers[2]
+            numbers[2] = 1 - tree
+        numbers[6] += 1
+        for j in range(k):
+            sample[j] = low[j] + (high[j] - low[j]) * random_unit(numbers)
+        parent, square = nearest(nodes, tree, numbers[tree], sample, distances)
+        length = np.sqrt(square)
+        share = min(np.float32(1.0), reach / length) if length > 0 else np.float32(0.0)
+        for j in range(k):
+            at[j] = nodes[tree, j, parent]
+            new[j] = at[j] + share * (sample[j] - at[j])
+        if not free_edge(tables, work, at, new, step):
+            continue
+        added = _add(trees, tree, new, parent)
+        # The other tree comes towards what is new as far as it can.
+        other = 1 - tree
+        parent, square = nearest(nodes, other, numbers[other], new, distances)
+        length = np.sqrt(square)
+        parts = max(1, int(np.ceil(length / reach)))
+        for part in range(parts):
+            if numbers[other] + 1 >= room:
+                return FULL
+            for j in range(k):
+                at[j] = nodes[other, j, parent]
+                sample[j] = at[j] + (new[j] - at[j]) / np.float32(parts - part)
+            if not free_edge(tables, work, at, sample, step):
+                break
+            if part == parts - 1:
+                numbers[4 + tree], numbers[4 + other] = added, parent
+                return MET
+            parent = _add(trees, other, sample, parent)
+    return GOING_ON
+
+
+@compiled
+def _point(path, lengths, along, out):
+    """Write the point ``along`` the path into ``out`` (k,) and return the index of the corner before it."""
+    i = 0
+    while i < len(lengths) - 2 and lengths[i + 1] <= along:
+        i += 1
+    piece = lengths[i + 1] - lengths[i]
+    share = (along - lengths[i]) / piece if piece > 0 else np.float32(0.0)
+    for j in range(path.shape[1]):
+        out[j] = path[i, j] + share * (path[i + 1, j] - path[i, j])
+    return i
+
+
+@compiled
+def shortcut(tables, path, count, numbers, step, tries, misses):
+    """Shorten a path in place: straight lines between two random points of it, where they are free and worth it.
+
+    path (room, k), of which the first ``count`` rows count; each success adds at most 2 rows. Ends after ``tries`` or
+    after ``misses`` in a row. Returns the new count.
+    """
+    room, k = path.shape
+    work = work_arrays(tables[0])
+    a, b = np.empty(k, np.float32), np.empty(k, np.float32)
+    lengths = np.empty(room, np.float32)
+    missed = 0
+    lengths[0] = np.float32(0.0)
+    known = 1  # so many of lengths hold
+    for _ in range(tries):
+        for i in range(known, count):
+            total = np.float32(0.0)
+            for j in range(k):
+                total += (path[i, j] - path[i - 1, j]) ** 2
+            lengths[i] = lengths[i - 1] + np.sqrt(total)
+        known = count
+        whole = lengths[count - 1]
+        first, second = random_unit(numbers) * whole, random_unit(numbers) * whole
+        if first > second:
+            first, second = second, first
+        i = _point(path, lengths[:count], first, a)
+        o = _point(path, lengths[:count], second, b)
+        if i == o:
+            continue
+        direct = np.float32(0.0)
+        for j in range(k):
+            direct += (b[j] - a[j]) ** 2
+        if second - first - np.sqrt(direct) < np.float32(1e-3) * whole or count + 2 > room \
+                or not free_edge(tables, work, a, b, step):
+            missed += 1
+            if missed >= misses:
+                break
+            continue
+        missed = 0
+        # Corners i + 1 ... o give way to two.
+        change = 2 - (o - i)
+        if change > 0:
+            for row in range(count - 1, o, -1):
+                path[row + change] = path[row]
+        elif change < 0:
+            for row in range(o + 1, count):
+                path[row + change] = path[row]
+        path[i + 1], path[i + 2] = a, b
+        count += change
+        known = i + 1
+    return count

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A path from a start to one of some goals: by spheres, and nothing goes out that exact geometry has not seen."""
+import math
+import threading
+import weakref
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from motion_planning.planners.errors import NoPath
+from motion_planning.planners.trees import REACH, Path, Run, rrt_connect, shorten
+from motion_planning.spheres import SphereChecker, SphereModel
+
+# The share of the time that spheres get before a search by exact geometry alone begins.
+_SHARE_OF_SPHERES = 0.7
+# A path that exact geometry refuses is looked for again, with states on its edges closer by this factor each time.
+_FINER = 0.5
+_FINEST = 1.0 / 512.0
+# How far a step leads out of where spheres say that the robot touches [rad], and how many are looked at together.
+_STEPS_OUT = (0.03, 0.4)
+_CANDIDATES = 48
+# Edges that are checked by exact geometry alone are shorter: most of them fail.
+_EXACT_REACH = 0.25
+
+_sphere_models = weakref.WeakKeyDictionary()
+_sphere_models_lock = threading.Lock()
+
+
+class Search(NamedTuple):
+    """How to look for a path. exact: ExactChecker. seed: the same one gives the same path where time suffices.
+    allowed_time [s] on ``clock``, a function that returns seconds. planner_id: kept for the caller; there is one
+    planner. stop: asked every few ms whether to end."""
+
+    exact: Any
+    seed: int
+    allowed_time: float
+    clock: Callable[[], float]
+    planner_id: str = ""
+    stop: Callable[[], bool] = lambda: False
+
+
+def sphere_model_of(exact):
+    """Return the SphereModel of an ExactChecker's robot, made once."""
+    with _sphere_models_lock:
+        if exact not in _sphere_models:
+            _sphere_models[exact] = SphereModel.of(exact.model, exact.meshes)
+        return _sphere_models[exact]
+
+
+def plan_path(scene, group, start, goals, search):
+    """Return a Path from ``start`` (k,) to one of ``goals`` (g, k) of the group named ``group``.
+
+    It is looked for and shortened by spheres that contain the robot, then every state on it, as close as those that the
+    spheres were asked about and between them, is checked by ``search.exact``. Where exact geometry is free and the
+    spheres are not, it leads out of there by exact geometry. Raises NoPath.
+    """
+    return _Planning(scene, group, search).path(start, goals)
+
+
+class _Planning:
+    def __init__(self, scene, group, search):
+        self.scene, self.search, self.model = scene, search, scene.model
+        self.group = self.model.group(group)
+        self.begin = search.clock()
+        self.random = np.random.default_rng(search.seed & (1 << 63) - 1)
+        self.checker = SphereChecker(sphere_model_of(search.exact), self.group, scene)
+        self.bounds = np.array(self.model.bounds[self.group.indices])
+
+    def path(self, start, goals):
+        start, goals = self._postures(start, goals)
+        self._free_or_raise("the start", [start])
+        goals = self._free_or_raise("every goal" if len(goals) > 1 else "the goal", goals)
+        try:
+            return self._by_spheres(start, goals)
+        except NoPath as error:
+            if error.stopped or not self._left(1.0):
+                raise
+        return self._by_exact(start, goals)
+
+    # -- ends ---------------------------------------------------------------------------------------------------
+
+    def _postures(self, start, goals):
+        """The arrays, joints that turn without end brought to the turn that is nearest to the start."""
+        start, goals = np.array(start, dtype=float), np.atleast_2d(np.array(goals, dtype=float))
+        count = len(self.group)
+        if start.shape != (count,) or goals.shape[1:] != (count,) or not len(goals):
+            raise NoPath("start and goals of group '%s' need %d values each, got arrays of shape %s and %s"
+                         % (self.group.name, count, start.shape, goals.shape))
+        if not (np.isfinite(start).all() and np.isfinite(goals).all()):
+            raise NoPath("start or goal of group '%s' has values that are not finite" % self.group.name)
+        turns = self.model.continuous[self.group.indices]
+        goals[:, turns] -= 2.0 * math.pi * np.round((goals[:, turns] - start[turns]) / (2.0 * math.pi))
+        ends = np.concatenate([start[None], goals])
+        # Whoever stands a little beyond a limit may come back.
+        self.bounds[:, 0] = np.minimum(self.bounds[:, 0], ends.min(axis=0))
+        self.bounds[:, 1] = np.maximum(self.bounds[:, 1], ends.max(axis=0))
+        self.bounds[turns] = np.column_stack([ends.min(axis=0) - math.pi, ends.max(axis=0) + math.pi])[turns]
+        return start, goals
+
+    def _free_or_raise(self, what, postures):
+        free = [q for q in postures if self._exact_free(q)]
+        if not free:
+            state = self.scene.state.with_q(postures[0], self.group.indices)
+            contacts = self.search.exact.contacts(self.scene, state, self.group.name, most=1)
+            raise NoPath("%s is in collision%s" % (what, ": %s" % contacts[0] if contacts else ""))
+        return np.array(free)
+
+    # -- ways of looking ----------------------------------------------------------------------------------------
+
+    def _by_spheres(self, start, goals):
+        run = self._run(_SHARE_OF_SPHERES)
+        outwards = self._way_out(start, run)
+        inwards = []
+        for goal in goals:
+            try:
+                inwards.append(self._way_out(goal, run)[::-1])
+            except NoPath as error:
+                if error.stopped or goal is goals[-1] and not inwards:
+                    raise
+        entries = np.array([way[0] for way in inwards])
+        checker, seed = self.checker, self.search.seed
+        while True:
+            found = rrt_connect(checker, self.bounds, outwards[-1], entries, run._replace(seed=seed), REACH)
+            short = shorten(found, checker, run._replace(seed=seed))
+            inward = inwards[int(np.abs(entries - short.points[-1]).max(axis=1).argmin())]
+            path = short._replace(points=np.concatenate([outwards[:-1], short.points, inward[1:]]))
+            path.points[0], path.points[-1] = start, inward[-1]
+            if self._path_is_free(path.points, run):
+                return path
+            run.check("a path was looked for that exact geometry agrees with")
+            checker, seed = checker.at(max(_FINEST, _FINER * checker.resolution)), seed + 1
+
+    def _way_out(self, q, run):
+        """Points (m, k) from ``q``, free by exact geometry, to the first that is free by spheres."""
+        if self.checker.valid(q)[0]:
+            return np.array([q])
+        nodes, parents = [q], [-1]
+        while True:
+            run.check("a way was looked for out of where the robot nearly touches something")
+            parent = int(self.random.integers(len(nodes)))
+            away = self.random.normal(size=(_CANDIDATES, len(q)))
+            away *= self.random.uniform(*_STEPS_OUT, (_CANDIDATES, 1)) / np.linalg.norm(away, axis=1, keepdims=True)
+            some = np.clip(nodes[parent] + away, self.bounds[:, 0], self.bounds[:, 1])
+            free = self.checker.valid(some)
+            # The shortest of those that lead out, then one that only leads on.
+            order = np.argsort(np.linalg.norm(some - nodes[parent], axis=1))
+            for number in [*[k for k in order if free[k]][:8], *[k for k in order if not free[k]][:1]]:
+                if self._edge_is_free(nodes[parent], some[number]):
+                    nodes.append(some[number])
+                    parents.append(parent)
+                    if free[number]:
+                        return self._traced(nodes, parents, len(nodes) - 1)[::-1]
+
+    def _by_exact(self, start, goals):
+        """RRT-Connect with nothing but exact geometry: slow, for what spheres cannot get through."""
+        run = self._run(1.0)
+        trees = [([start], [-1]), (list(goals), [-1] * len(goals))]
+        grown = 0
+        while True:
+            run.check("a path was looked for by exact geometry: spheres around the robot found none")
+            grown = 0 if len(trees[0][0]) <= len(trees[1][0]) else 1
+            sample = self.random.uniform(self.bounds[:, 0], self.bounds[:, 1])
+            new = self._extend(*trees[grown], sample)
+            if new is None:
+                continue
+            target = trees[grown][0][new]
+            while (other := self._extend(*trees[1 - grown], target)) is not None:
+                if np.array_equal(trees[1 - grown][0][other], target):
+                    ends = (new, other) if grown == 0 else (other, new)
+                    ways = [self._traced(*tree, end) for tree, end in zip(trees, ends, strict=True)]
+                    points = np.concatenate([ways[0][::-1], ways[1][1:]])
+                    return Path(self._shortened(points, run))
+                run.check("a path was looked for by exact geometry")
+
+    def _extend(self, nodes, parents, target):
+        apart = np.linalg.norm(np.array(nodes) - target, axis=1)
+        parent = int(apart.argmin())
+        near = nodes[parent]
+        new = target if apart[parent] <= _EXACT_REACH else near + (target - near) * (_EXACT_REACH / apart[parent])
+        if apart[parent] == 0.0 or not self._edge_is_free(near, new):
+            return None
+        nodes.append(new)
+        parents.append(parent)
+        return len(nodes) - 1
+
+    def _shortened(self, points, run):
+        """The path with corners left out while exact geometry and time allow."""
+        k = 0
+        while k + 2 < len(points):
+            try:
+                run.check("a path was shortened")
+            except NoPath:
+                break
+            if self._edge_is_free(points[k], points[k + 2]):
+                points = np.delete(points, k + 1, axis=0)
+            else:
+                k += 1
+        return points
+
+    @staticmethod
+    def _traced(nodes, parents, node):
+        way = []
+        while node >= 0:
+            way.append(nodes[node])
+            node = parents[node]
+        return np.array(way)
+
+    # -- exact geometry -----------------------------------------------------------------------------------------
+
+    def _exact_free(self, q):
+        return self.search.exact.free(self.scene, self.scene.state.with_q(q, self.group.indices), self.group.name)
+
+    def _edge_is_free(self, a, b):
+        count = max(1, math.ceil(np.linalg.norm(b - a) / (0.5 * self.checker.resolution)))
+        # Far end first: it is new.
+        return all(self._exact_free(a + (b - a) * (k / count)) for k in range(count, 0, -1))
+
+    def _path_is_free(self, points, run):
+        """Whether exact geometry agrees, at states between those that spheres were asked about."""
+        for a, b in zip(points[:-1], points[1:], strict=True):
+            count = max(1, math.ceil(np.linalg.norm(b - a) / self.checker.resolution))
+            for k in range(count):
+                if k % 64 == 0:
+                    run.check("a path was checked by exact geometry")
+                if not self._exact_free(a + (b - a) * ((k + 0.5) / count)):
+                    return False
+            if not self._exact_free(b):
+                return False
+        return True
+
+    # -- time ---------------------------------------------------------------------------------------------------
+
+    def _run(self, share):
+        return Run(self.search.seed, self.begin + share * self.search.allowed_time, self.search.clock, self.search.stop)
+
+    def _left(self, share):
+        return self.search.clock() < self.begin + share * self.search.allowed_time

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""RRT-Connect (Kuffner and LaValle 2000) and shortcuts, on a SphereChecker."""
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from motion_planning.planners import kernels
+from motion_planning.planners.errors import NoPath
+
+#: The longest edge of a tree [rad, Euclidean distance of joint values]. Longer ones find fewer narrow ways.
+REACH = 0.5
+# So many samples are drawn between two looks at the clock: about 2 ms.
+_SAMPLES = 1000
+_LEAST_ROOM, _MOST_ROOM = 4096, 1 << 20
+# Shortcuts: so many tries in all, so many in vain one after the other; nodes that a path may have meanwhile.
+_TRIES, _MISSES = 200, 30
+_ROOM_MORE = 2 * _TRIES + 2
+
+
+class Path(NamedTuple):
+    """points (m, k): corners of a path of straight lines, the first is the start. samples: how many were drawn."""
+
+    points: np.ndarray
+    samples: int = 0
+
+    @property
+    def length(self):
+        """The sum of Euclidean distances [rad]."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+class Run(NamedTuple):
+    """seed: the same one gives the same path. deadline: when to give up, on ``clock``, a function that returns seconds.
+    stop: a function asked every few ms whether to end."""
+
+    seed: int
+    deadline: float
+    clock: Callable[[], float]
+    stop: Callable[[], bool] = lambda: False
+
+    def check(self, what):
+        """Raise NoPath when time is over or the caller wants no more."""
+        if self.stop():
+            raise NoPath("stopped while %s" % what, stopped=True)
+        if self.clock() >= self.deadline:
+            raise NoPath("time was over while %s" % what, late=True)
+
+
+def rrt_connect(checker, bounds, start, goals, run, reach=REACH):
+    """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), free by ``checker`` (SphereChecker).
+
+    Two trees grow towards each other, the smaller one first. bounds (k, 2): where samples are drawn; start and goals
+    have to be free themselves. Raises NoPath when time is over or ``run.stop`` says so.
+    """
+    start, goals = np.asarray(start, dtype=np.float32), np.atleast_2d(np.asarray(goals, dtype=np.float32))
+    for goal in goals[np.argsort(np.linalg.norm(goals - start, axis=1), kind="stable")]:
+        if checker.edge(start, goal):
+            return Path(np.array([start, goal], dtype=float))
+    bounds = np.ascontiguousarray(np.asarray(bounds).T, dtype=np.float32)
+    trees = _seeds(start, goals, run.seed)
+    while True:
+        result = kernels.grow(checker.tables, trees, (bounds[0], bounds[1]), np.float32(reach),
+                              np.float32(checker.resolution), _SAMPLES)
+        if result == kernels.MET:
+            return Path(_traced(trees), int(trees[2][6]))
+        run.check("a path was looked for: %d samples were drawn, the trees from start and goal have %d and %d postures"
+                  % (trees[2][6], trees[2][0], trees[2][1]))
+        if result == kernels.FULL:
+            trees = _roomier(trees)
+
+
+def shorten(path, checker, run):
+    """Return the Path without detours that ``checker`` knows a straight way past; never longer than it was."""
+    count = len(path.points)
+    points = np.empty((count + _ROOM_MORE, path.points.shape[1]), np.float32)
+    points[:count] = path.points
+    count = kernels.shortcut(checker.tables, points, count, _numbers(run.seed), np.float32(checker.resolution), _TRIES,
+                             _MISSES)
+    return path._replace(points=points[:count].astype(float))
+
+
+def _numbers(seed):
+    numbers = np.zeros(7, np.int64)
+    # Seeds that are near each other shall not give sequences that are; 0 would give nothing but zeros.
+    bits = np.random.SeedSequence(seed & (1 << 63) - 1).generate_state(1, np.uint64)[0]
+    numbers[3] = bits >> np.uint64(1) | np.uint64(1)
+    return numbers
+
+
+def _seeds(start, goals, seed):
+    """Trees of nothing but their roots."""
+    room = max(_LEAST_ROOM, 2 * len(goals) + 16)
+    room += -room % 16
+    nodes, parents = np.empty((2, len(start), room), np.float32), np.full((2, room), -1, np.int32)
+    numbers = _numbers(seed)
+    nodes[0, :, 0], nodes[1, :, : len(goals)] = start, goals.T
+    numbers[:2] = 1, len(goals)
+    return nodes, parents, numbers
+
+
+def _roomier(trees):
+    nodes, parents, numbers = trees
+    room = 4 * nodes.shape[2]
+    if room > _MOST_ROOM:
+        raise NoPath("a path was looked for until memory was full: %d samples were drawn" % numbers[6])
+    more = np.empty((2, nodes.shape[1], room), np.float32)
+    more[:, :, : nodes.shape[2]] = nodes
+    more_parents = np.full((2, room), -1, np.int32)
+    more_parents[:, : parents.shape[1]] = parents
+    return more, more_parents, numbers
+
+
+def _traced(trees):
+    """The points from the first tree's root over where the trees met to a root of the second; the place counts once."""
+    nodes, parents, numbers = trees
+    ways = []
+    for tree in (0, 1):
+        way, node = [], numbers[4 + tree]
+        while node >= 0:
+            way.append(nodes[tree, :, node])
+            node = parents[tree, node]
+        ways.append(way)
+    return np.array(ways[0][::-1] + ways[1], dtype=float)

@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Robots as spheres, checked many configurations at once by compiled code."""
+from motion_planning.spheres.checker import RESOLUTION, SphereChecker
+from motion_planning.spheres.cover import CoverError
+from motion_planning.spheres.sphere_model import SphereModel
+
+__all__ = ["RESOLUTION", "CoverError", "SphereChecker", "SphereModel"]

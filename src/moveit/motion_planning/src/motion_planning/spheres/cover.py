@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Few spheres that together contain a solid, and reach little beyond it; boxes that contain a mesh.
+
+A sphere whose centre lies d deep in the solid and whose radius is d + tolerance reaches at most ``tolerance`` beyond
+it. Of such spheres those are taken, most first, that contain what no other has contained yet. Contained have to be
+samples of surface and inside; each by so much more than itself that what lies between the samples is contained too.
+"""
+import numpy as np
+
+from urdf_model import Box, Cylinder, Sphere
+
+# Samples are this far apart [tolerances]; what lies between is at most half a diagonal of their squares away.
+_SPACING = 0.5
+_BETWEEN = 0.75 * _SPACING
+# No more samples times centres than this, which is about as many bytes: larger solids get a larger tolerance.
+_MOST = 40_000_000
+# Half of the largest side [m].
+_LARGEST = 1e4
+#: Added to each radius [m]: what single floats lose.
+ROUNDING = 2e-5
+
+
+class CoverError(ValueError):
+    """Geometry that cannot be covered; the text says which."""
+
+
+def cover(parts, tolerance):
+    """Return spheres (n, 4), centre and radius, that contain all ``parts`` and reach ``tolerance`` [m] beyond them.
+
+    parts: [(geometry, pose (4, 4))]; geometry: Box, Cylinder or Sphere of urdf_model, or what has ``vertices`` (n, 3)
+    and ``triangles`` (m, 3). A mesh counts as solid where its surface is closed up to gaps of ``tolerance``. What is
+    large is contained with a larger tolerance. Raises CoverError.
+    """
+    alone = [(geometry, pose) for geometry, pose in parts if isinstance(geometry, Sphere)]
+    found = [np.append(pose[:3, 3], geometry.radius + ROUNDING) for geometry, pose in alone]
+    solids = [_solid(geometry, pose, tolerance) for geometry, pose in parts if not isinstance(geometry, Sphere)]
+    if not solids:
+        return np.array(found).reshape(-1, 4)
+    wanted = np.concatenate([solid.samples for solid in solids])
+    between = max(solid.between for solid in solids)
+    for sphere in found:
+        wanted = wanted[np.linalg.norm(wanted - sphere[:3], axis=1) > sphere[3] - between]
+    centres = np.concatenate([solid.inside for solid in solids])
+    depth = np.max([solid.depth(centres) for solid in solids], axis=0)
+    radii = np.maximum(depth, 0.0) + max(solid.tolerance for solid in solids)
+    chosen = _greedy(wanted, centres, radii - between)
+    spheres = np.column_stack([centres[chosen], radii[chosen] + ROUNDING])
+    return np.concatenate([np.array(found).reshape(-1, 4), _shrunk(spheres, wanted, between)])
+
+
+def ball(spheres):
+    """Return (4,): a ball around all ``spheres`` (n, 4); Ritter's, made smaller by steps towards what is furthest."""
+    centre = 0.5 * ((spheres[:, :3] - spheres[:, 3:]).min(0) + (spheres[:, :3] + spheres[:, 3:]).max(0))
+    best = np.append(centre, np.inf)
+    for turn in range(200):
+        reach = np.linalg.norm(spheres[:, :3] - centre, axis=1) + spheres[:, 3]
+        far = reach.argmax()
+        if reach[far] < best[3]:
+            best = np.append(centre, reach[far])
+        centre = centre + (spheres[far, :3] - centre) / (turn + 2.0)
+    return best + [0.0, 0.0, 0.0, ROUNDING]
+
+
+def _greedy(wanted, centres, reach):
+    """Indices of centres whose balls with radius ``reach`` contain all points ``wanted``, most points first."""
+    contained = np.empty((len(centres), len(wanted)), dtype=bool)
+    points = np.sum(wanted * wanted, axis=1)
+    for begin in range(0, len(centres), 256):
+        some = centres[begin : begin + 256]
+        square = points + np.sum(some * some, axis=1)[:, None] - 2.0 * some @ wanted.T
+        contained[begin : begin + 256] = square <= np.square(np.maximum(reach[begin : begin + 256], 0.0))[:, None]
+    left = np.ones(len(wanted), dtype=bool)
+    gain = contained.sum(axis=1)
+    chosen = []
+    while left.any():
+        best = int(gain.argmax())
+        if gain[best] <= 0:
+            raise CoverError("%d of %d samples of a solid are in no sphere; its parts may be too different in size"
+                             % (left.sum(), len(left)))
+        chosen.append(best)
+        new = np.flatnonzero(left & contained[best])
+        left[new] = False
+        gain -= contained[:, new].sum(axis=1)
+    # What later spheres contain as well is not needed.
+    times = contained[chosen].sum(axis=0)
+    kept = []
+    for k in chosen:
+        if (times[contained[k]] > 1).all():
+            times = times - contained[k]
+        else:
+            kept.append(k)
+    return np.array(kept, dtype=int)
+
+
+def _shrunk(spheres, wanted, between):
+    """Make each sphere as small as what it alone contains allows."""
+    spheres = spheres.copy()
+    distance = np.linalg.norm(wanted[None, :, :] - spheres[:, None, :3], axis=2) + between + ROUNDING
+    for k in np.argsort(-spheres[:, 3]):
+        inside = distance <= spheres[:, 3:] + 1e-9
+        alone = inside[k] & (inside.sum(axis=0) == 1)
+        spheres[k, 3] = min(spheres[k, 3], max(distance[k, alone].max(initial=0.0), 1e-4))
+    return spheres
+
+
+class _solid_box:
+    """A box or a cylinder: samples of it, points inside, and how deep points are in it."""
+
+    def __init__(self, geometry, pose, tolerance):
+        self._geometry, self._pose = geometry, pose
+        box = isinstance(geometry, Box)
+        half = 0.5 * np.array(geometry.size if box else [2 * geometry.radius, 2 * geometry.radius, geometry.length])
+        if not ((half >= 0.0) & (half <= _LARGEST)).all():
+            raise CoverError("a solid has sizes %s m; expected from 0 to %g" % (2.0 * half, 2.0 * _LARGEST))
+        # About as many samples and centres as there will be; a large solid is seen with coarser eyes.
+        area, volume = 8.0 * (half * np.roll(half, 1)).sum(), 8.0 * half.prod()
+        while (area / (tolerance * _SPACING) ** 2) * (volume / tolerance**3 + area / tolerance**2) > _MOST:
+            tolerance *= 1.25
+        spacing, self.tolerance = tolerance * _SPACING, tolerance
+        self.between = spacing * _BETWEEN / _SPACING
+        # Along an edge the spheres are small: centres are to be no further apart than the tolerance.
+        if box:
+            samples, inside = _box_surface(half, spacing), _grid(half, tolerance)
+        else:
+            samples, inside = _cylinder_surface(geometry, spacing), _cylinder_grid(geometry, tolerance)
+        self.samples = _moved(pose, np.concatenate([samples, inside]))
+        self.inside = _moved(pose, inside)
+
+    def depth(self, points):
+        geometry = self._geometry
+        local = (points - self._pose[:3, 3]) @ self._pose[:3, :3]
+        if isinstance(geometry, Box):
+            return (0.5 * np.array(geometry.size) - np.abs(local)).min(axis=1)
+        return np.minimum(geometry.radius - np.hypot(local[:, 0], local[:, 1]),
+                          0.5 * geometry.length - np.abs(local[:, 2]))
+
+
+class _solid_mesh:
+    """A mesh, seen as the voxels that its surface runs through and those that it encloses."""
+
+    def __init__(self, mesh, pose, tolerance):
+        vertices = np.asarray(mesh.vertices, dtype=float).reshape(-1, 3)
+        triangles = np.asarray(mesh.triangles).reshape(-1, 3)
+        if not len(triangles) or not np.isfinite(vertices).all():
+            raise CoverError("a mesh has %d triangles and %s corners; expected at least one, and finite corners"
+                             % (len(triangles), "finite" if np.isfinite(vertices).all() else "infinite"))
+        # Surface voxels are not deep at all: the tolerance alone has to take a sphere to their corners.
+        while True:
+            cell, spacing = 0.6 * tolerance, 0.3 * tolerance
+            samples = mesh_samples(vertices, triangles, spacing)
+            full, lowest = voxels(samples, cell)
+            cells = np.argwhere(full)
+            if len(samples) * len(cells) <= _MOST:
+                break
+            tolerance *= 1.25
+        self.tolerance, self.between = tolerance, 0.6 * spacing
+        self._surface = _moved(pose, samples)
+        self.samples = self._surface
+        self.inside = _moved(pose, lowest + (cells + 0.5) * cell)
+        self._inside_depth = self._distance(self.inside) - self.between
+        surface, _ = voxels(samples, cell, fill=False)
+        self._inside_depth[surface[tuple(cells.T)]] = 0.0
+
+    def depth(self, points):
+        """Of points of ``inside``; 0 elsewhere, which is never too deep."""
+        depth = np.zeros(len(points))
+        own = {tuple(p): d for p, d in zip(self.inside.tolist(), self._inside_depth, strict=True)}
+        for i, point in enumerate(points.tolist()):
+            depth[i] = own.get(tuple(point), 0.0)
+        return depth
+
+    def _distance(self, points):
+        nearest = np.empty(len(points))
+        square = np.sum(self._surface**2, axis=1)
+        for begin in range(0, len(points), 256):
+            some = points[begin : begin + 256]
+            nearest[begin : begin + 256] = (square - 2.0 * some @ self._surface.T).min(axis=1) + np.sum(some**2, axis=1)
+        return np.sqrt(np.maximum(nearest, 0.0))
+
+
+def _solid(geometry, pose, tolerance):
+    if isinstance(geometry, (Box, Cylinder)):
+        return _solid_box(geometry, pose, tolerance)
+    if hasattr(geometry, "triangles"):
+        return _solid_mesh(geometry, pose, tolerance)
+    raise CoverError("a %s cannot be covered; expected a box, a cylinder, a sphere or a mesh" % type(geometry).__name__)
+
+
+def _moved(pose, points):
+    return points @ pose[:3, :3].T + pose[:3, 3]
+
+
+def _line(half, spacing):
+    """Points from -half to half, an odd number, so that the middle is one of them."""
+    count = 2 * int(np.ceil(half / spacing)) + 1
+    return np.linspace(-half, half, count)
+
+
+def _grid(half, spacing):
+    return np.stack(np.meshgrid(*(_line(h, spacing) for h in half), indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _box_surface(half, spacing):
+    sides = []
+    for axis in range(3):
+        others = [k for k in range(3) if k != axis]
+        u, v = np.meshgrid(*(_line(half[k], spacing) for k in others), indexing="ij")
+        for sign in (-1.0, 1.0):
+            side = np.empty((u.size, 3))
+            side[:, axis], side[:, others[0]], side[:, others[1]] = sign * half[axis], u.ravel(), v.ravel()
+            sides.append(side)
+    return np.concatenate(sides)
+
+
+def _disc(radius, spacing):
+    """Points (n, 2) on rings from the middle to the rim, at most ``spacing`` apart along rings and between them."""
+    steps = max(1, int(np.ceil(radius / spacing)))
+    points = [np.zeros((1, 2))]
+    for k in range(1, steps + 1):
+        angle = _around(radius * k / steps, spacing)
+        points.append(radius * k / steps * np.column_stack([np.cos(angle), np.sin(angle)]))
+    return np.concatenate(points)
+
+
+def _around(radius, spacing):
+    count = max(8, int(np.ceil(2.0 * np.pi * radius / spacing)))
+    return 2.0 * np.pi * np.arange(count) / count
+
+
+def _cylinder_surface(cylinder, spacing):
+    # A round reaches beyond the line between two samples: hence a little closer.
+    angle, z = _around(cylinder.radius, 0.9 * spacing), _line(0.5 * cylinder.length, spacing)
+    angle, z = (grid.ravel() for grid in np.meshgrid(angle, z))
+    return np.concatenate([np.column_stack([cylinder.radius * np.cos(angle), cylinder.radius * np.sin(angle), z]),
+                           _stacked(_disc(cylinder.radius, 0.9 * spacing),
+                                    0.5 * cylinder.length * np.array([-1.0, 1.0]))])
+
+
+def _cylinder_grid(cylinder, spacing):
+    return _stacked(_disc(cylinder.radius, spacing), _line(0.5 * cylinder.length, spacing))
+
+
+def _stacked(disc, heights):
+    """The points (n, 2) at each of the heights."""
+    return np.column_stack([np.tile(disc, (len(heights), 1)), np.repeat(heights, len(disc))])
+
+
+def mesh_samples(vertices, triangles, spacing):
+    """Return points (n, 3) on the triangles, none of whose points is further than 0.6 ``spacing`` from one of them."""
+    corners = vertices[triangles]
+    longest = np.max([np.linalg.norm(corners[:, i] - corners[:, i - 1], axis=1) for i in range(3)], axis=0)
+    parts = np.maximum(1, np.ceil(longest / spacing)).astype(int)
+    points = [vertices]
+    for count in np.unique(parts):
+        some = corners[parts == count]
+        i, j = np.array([(i, j) for i in range(count + 1) for j in range(count + 1 - i)]).T / count
+        points.append((some[:, None, 0] * (1.0 - i - j)[:, None] + some[:, None, 1] * i[:, None]
+                       + some[:, None, 2] * j[:, None]).reshape(-1, 3))
+    points = np.concatenate(points)
+    # Corners that triangles share, and crowds in small ones, count once.
+    _, first = np.unique(np.round(points / (0.15 * spacing)).astype(np.int64), axis=0, return_index=True)
+    return points[first]
+
+
+def voxels(samples, pitch, fill=True):
+    """Return (cells (a, b, c) bool, corner (3,)): those of size ``pitch`` that hold samples, or that these enclose."""
+    lowest = samples.min(axis=0) - 1.5 * pitch
+    index = np.floor((samples - lowest) / pitch).astype(int)
+    full = np.zeros(index.max(axis=0) + 2, dtype=bool)
+    full[tuple(index.T)] = True
+    if not fill:
+        return full, lowest
+    outside = np.zeros_like(full)
+    outside[0], outside[-1], outside[:, 0], outside[:, -1], outside[:, :, 0], outside[:, :, -1] = (True,) * 6
+    outside &= ~full
+    count = -1
+    while count != outside.sum():
+        count = outside.sum()
+        # Sweeps carry the outside as far as it goes along each axis, both ways.
+        for axis in range(3):
+            for way in (slice(None), slice(None, None, -1)):
+                sweep, wall = np.moveaxis(outside, axis, 0)[way], np.moveaxis(full, axis, 0)[way]
+                for k in range(1, len(sweep)):
+                    sweep[k] |= sweep[k - 1] & ~wall[k]
+    return ~outside, lowest
+
+
+def boxes_of_cells(full, lowest, pitch, beyond=0.0):
+    """Return boxes (n, 2, 3), least and greatest corner, that together are the cells, each larger by ``beyond``."""
+    left, found = full.copy(), []
+    for start in np.argwhere(full):
+        a, b, c = start
+        if not left[a, b, c]:
+            continue
+        end = [a + 1, b + 1, c + 1]
+        for axis in (2, 1, 0):
+            while end[axis] < full.shape[axis]:
+                slab = [slice(s, e) for s, e in zip(start, end, strict=True)]
+                slab[axis] = slice(end[axis], end[axis] + 1)
+                if not left[tuple(slab)].all():
+                    break
+                end[axis] += 1
+        left[a : end[0], b : end[1], c : end[2]] = False
+        found.append((lowest + pitch * start - beyond, lowest + pitch * np.array(end) + beyond))
+    return np.array(found).reshape(-1, 2, 3)

@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sixteen configurations at once: where the robot's spheres are, and whether they meet the world or each other.
+
+A checker is two tuples of flat arrays, made by ``tables``:
+
+    robot = (joints, joint_numbers, clusters, cluster_numbers, spheres, pairs, tests, branches, skips)
+    world = (node_links, nodes, kinds, objects)
+
+``joints`` (3 int32 each): parent joint or -1, 1 if prismatic, variable; parents come first.
+``joint_numbers`` (14 float32 each): rotation (3, 3) and offset of the joint's frame in its parent's, the axis being z;
+multiplier and offset of the variable.
+``clusters`` (3 int32): joint, first and last + 1 sphere. ``cluster_numbers`` (4 float32): a ball around all spheres of
+the cluster, centre in the joint's frame and radius. ``spheres``: the same, a tree: ``skips`` (1 int32) is 0 for a
+sphere, and for a ball around those that follow the number of the first that it does not contain. ``pairs`` (2 int32):
+clusters that must not meet.
+``tests`` (3 int32): cluster, first and last + 1 node that it must not meet; what hits most should come first.
+``branches`` (6 int32): first and last + 1 joint, cluster and test of what hangs on one joint of those without a parent.
+``nodes`` (6 float32): least and greatest corner. ``node_links`` (2 int32): the node to go on with where this one is not
+met, the object or -1. ``kinds`` and ``objects`` (16 float32): SPHERE ... below; centre (3), rotation from the planning
+frame's axes into the object's (3, 3), sizes (3).
+"""
+import numpy as np
+
+from motion_planning.spheres.compiled import compiled
+from motion_planning.spheres.lanes import below, fill, greatest, load, magnitude, ramp, root, store, whole
+
+SPHERE, AXIS_BOX, BOX, UPRIGHT_CYLINDER, CYLINDER, PLANE = range(6)
+JOINT, JOINT_NUMBERS, CLUSTER, OBJECT, BRANCH = 3, 14, 3, 16, 6
+ALL = 0xFFFF
+
+_PI_HIGH, _PI_LOW = np.float32(3.140625), np.float32(np.pi - 3.140625)
+_ONE_OVER_PI, _HALF, _TWO, _ONE = np.float32(1.0 / np.pi), np.float32(0.5), np.float32(2.0), np.float32(1.0)
+_ZERO = np.float32(0.0)
+# Taylor's series of the sine as far as single floats on [-pi/2, pi/2] tell the difference.
+_S3, _S5, _S7 = np.float32(-1.0 / 6.0), np.float32(1.0 / 120.0), np.float32(-1.0 / 5040.0)
+_S9, _S11 = np.float32(1.0 / 362880.0), np.float32(-1.0 / 39916800.0)
+
+
+@compiled
+def _sine_near(x, turns):
+    """The sine of x + turns pi, |x| <= pi / 2."""
+    square = x * x
+    series = fill(_S9) + square * fill(_S11)
+    series = fill(_S7) + square * series
+    series = fill(_S5) + square * series
+    series = fill(_S3) + square * series
+    value = x + x * square * series
+    # -1 for odd turns
+    halves = turns * fill(_HALF)
+    odd = magnitude(halves - whole(halves)) * fill(_TWO)
+    return value * (fill(_ONE) - fill(_TWO) * odd)
+
+
+@compiled
+def sine(x):
+    turns = whole(x * fill(_ONE_OVER_PI))
+    return _sine_near((x - turns * fill(_PI_HIGH)) - turns * fill(_PI_LOW), turns)
+
+
+@compiled
+def cosine(x):
+    """cos x = sin(x + pi / 2), with the half turn taken off before it costs digits."""
+    turns = whole(x * fill(_ONE_OVER_PI) + fill(_HALF))
+    before = turns - fill(_HALF)
+    return _sine_near((x - before * fill(_PI_HIGH)) - before * fill(_PI_LOW), turns)
+
+
+@compiled
+def place_joints(robot, q, begin, end, frames):
+    """Write the frames of the joints begin ... end - 1, 12 lanes each: columns x, y, z and the origin.
+
+    q: 16 values of each variable.
+    """
+    joints, numbers = robot[0], robot[1]
+    for j in range(begin, end):
+        parent, prismatic, variable = joints[JOINT * j], joints[JOINT * j + 1], joints[JOINT * j + 2]
+        n = JOINT_NUMBERS * j
+        value = load(q, 16 * variable) * fill(numbers[n + 12]) + fill(numbers[n + 13])
+        at = 192 * j
+        for axis in range(3):  # of the frame outside
+            if parent < 0:
+                x, y, z = fill(numbers[n + 3 * axis]), fill(numbers[n + 3 * axis + 1]), fill(numbers[n + 3 * axis + 2])
+                p = fill(numbers[n + 9 + axis])
+            else:
+                up = 192 * parent + 16 * axis
+                a, b, c = load(frames, up), load(frames, up + 48), load(frames, up + 96)
+                x = a * fill(numbers[n]) + b * fill(numbers[n + 3]) + c * fill(numbers[n + 6])
+                y = a * fill(numbers[n + 1]) + b * fill(numbers[n + 4]) + c * fill(numbers[n + 7])
+                z = a * fill(numbers[n + 2]) + b * fill(numbers[n + 5]) + c * fill(numbers[n + 8])
+                p = load(frames, up + 144) + a * fill(numbers[n + 9]) + b * fill(numbers[n + 10]) \
+                    + c * fill(numbers[n + 11])
+            place = at + 16 * axis
+            store(frames, place, x)
+            store(frames, place + 48, y)
+            store(frames, place + 96, z)
+            store(frames, place + 144, p)
+        if prismatic:
+            for axis in range(3):
+                place = at + 16 * axis
+                store(frames, place + 144, load(frames, place + 144) + value * load(frames, place + 96))
+        else:
+            s, c = sine(value), cosine(value)
+            for axis in range(3):
+                place = at + 16 * axis
+                x, y = load(frames, place), load(frames, place + 48)
+                store(frames, place, x * c + y * s)
+                store(frames, place + 48, y * c - x * s)
+
+
+@compiled
+def _place(frames, joint, numbers, i):
+    """Where the centre of ball i is."""
+    at = 192 * joint
+    x, y, z = fill(numbers[4 * i]), fill(numbers[4 * i + 1]), fill(numbers[4 * i + 2])
+    return (load(frames, at) * x + load(frames, at + 48) * y + load(frames, at + 96) * z + load(frames, at + 144),
+            load(frames, at + 16) * x + load(frames, at + 64) * y + load(frames, at + 112) * z + load(frames, at + 160),
+            load(frames, at + 32) * x + load(frames, at + 80) * y + load(frames, at + 128) * z + load(frames, at + 176))
+
+
+@compiled
+def _beyond(x, half):
+    """How far |x| is beyond half, or 0."""
+    return greatest(magnitude(x) - half, fill(_ZERO))
+
+
+@compiled
+def _meets_node(nodes, node, x, y, z, square):
+    """Mask of the lanes whose ball with that squared radius meets the node's box."""
+    n = 6 * node
+    nothing = fill(_ZERO)
+    dx = greatest(greatest(fill(nodes[n]) - x, x - fill(nodes[n + 3])), nothing)
+    dy = greatest(greatest(fill(nodes[n + 1]) - y, y - fill(nodes[n + 4])), nothing)
+    dz = greatest(greatest(fill(nodes[n + 2]) - z, z - fill(nodes[n + 5])), nothing)
+    return below(dx * dx + dy * dy + dz * dz, square)
+
+
+@compiled
+def _meets_object(kind, objects, n, x, y, z, radius):
+    """Mask of the lanes whose ball at x, y, z meets an object."""
+    x, y, z = x - fill(objects[n]), y - fill(objects[n + 1]), z - fill(objects[n + 2])
+    if kind == BOX or kind == CYLINDER or kind == PLANE:
+        a = x * fill(objects[n + 3]) + y * fill(objects[n + 4]) + z * fill(objects[n + 5])
+        b = x * fill(objects[n + 6]) + y * fill(objects[n + 7]) + z * fill(objects[n + 8])
+        z = x * fill(objects[n + 9]) + y * fill(objects[n + 10]) + z * fill(objects[n + 11])
+        x, y = a, b
+    r = fill(radius)
+    if kind == PLANE:
+        return below(magnitude(z) - fill(objects[n + 14]), r)
+    if kind == SPHERE:
+        reach = r + fill(objects[n + 12])
+        return below(x * x + y * y + z * z, reach * reach)
+    dz = _beyond(z, fill(objects[n + 14]))
+    if kind == AXIS_BOX or kind == BOX:
+        dx, dy = _beyond(x, fill(objects[n + 12])), _beyond(y, fill(objects[n + 13]))
+        return below(dx * dx + dy * dy + dz * dz, r * r)
+    out = greatest(root(x * x + y * y) - fill(objects[n + 12]), fill(_ZERO))
+    return below(out * out + dz * dz, r * r)
+
+
+@compiled
+def _cluster_meets_object(tables, c, k, frames, found, every):
+    """``found`` with the lanes in which a sphere of cluster c meets object k."""
+    robot, (_, _, kinds, objects) = tables
+    kind, n = kinds[k], OBJECT * k
+    clusters, spheres, skips = robot[2], robot[4], robot[8]
+    joint, s, last = clusters[CLUSTER * c], clusters[CLUSTER * c + 1], clusters[CLUSTER * c + 2]
+    while s < last:
+        x, y, z = _place(frames, joint, spheres, s)
+        near = _meets_object(kind, objects, n, x, y, z, spheres[4 * s + 3])
+        if skips[s]:
+            s = s + 1 if near | found != found else skips[s]
+            continue
+        s += 1
+        found |= near
+        if found != 0 and (not every or found == ALL):
+            break
+    return found
+
+
+@compiled
+def _clusters_meet(robot, a, b, frames, centres, found, every):
+    """``found`` with the lanes in which a sphere of cluster a meets one of cluster b."""
+    clusters, balls, spheres, skips = robot[2], robot[3], robot[4], robot[8]
+    joint, s, last = clusters[CLUSTER * a], clusters[CLUSTER * a + 1], clusters[CLUSTER * a + 2]
+    other, first, end = clusters[CLUSTER * b], clusters[CLUSTER * b + 1], clusters[CLUSTER * b + 2]
+    bx, by, bz = load(centres, 48 * b), load(centres, 48 * b + 16), load(centres, 48 * b + 32)
+    while s < last:
+        x, y, z = _place(frames, joint, spheres, s)
+        radius = spheres[4 * s + 3]
+        if _balls_meet(x - bx, y - by, z - bz, radius + balls[4 * b + 3]) | found == found:
+            s = skips[s] if skips[s] else s + 1
+            continue
+        s += 1
+        if skips[s - 1]:
+            continue
+        o = first
+        while o < end:
+            u, v, w = _place(frames, other, spheres, o)
+            near = _balls_meet(x - u, y - v, z - w, radius + spheres[4 * o + 3])
+            if skips[o]:
+                o = o + 1 if near | found != found else skips[o]
+                continue
+            o += 1
+            found |= near
+            if found != 0 and (not every or found == ALL):
+                return found
+    return found
+
+
+@compiled
+def _balls_meet(x, y, z, reach):
+    """Mask of the lanes in which two balls x, y, z apart meet; reach: their radii together."""
+    return below(x * x + y * y + z * z, fill(reach * reach))
+
+
+@compiled
+def hits(tables, work, every):
+    """Return the mask of those of 16 configurations that are in collision.
+
+    tables: (robot, world). work: ``work_arrays``, the configurations in the first of them, 16 values of each variable.
+    ``every`` false: it is enough to know that one is; the mask may lack others.
+    """
+    robot, world = tables
+    q, frames, centres, last_hit = work
+    clusters, balls, pairs, tests, branches = robot[2], robot[3], robot[5], robot[6], robot[7]
+    links, nodes, kinds, objects = world
+    found = 0
+    count = len(branches) // BRANCH
+    for turn in range(count):
+        # The arm that was hit last is likely to be hit again, and then the others need not be placed at all.
+        b = (turn + last_hit[0]) % count
+        row = BRANCH * b
+        place_joints(robot, q, branches[row], branches[row + 1], frames)
+        for c in range(branches[row + 2], branches[row + 3]):
+            x, y, z = _place(frames, clusters[CLUSTER * c], balls, c)
+            store(centres, 48 * c, x)
+            store(centres, 48 * c + 16, y)
+            store(centres, 48 * c + 32, z)
+        for t in range(branches[row + 4], branches[row + 5]):
+            c, node, end = tests[3 * t], tests[3 * t + 1], tests[3 * t + 2]
+            x, y, z = load(centres, 48 * c), load(centres, 48 * c + 16), load(centres, 48 * c + 32)
+            radius = balls[4 * c + 3]
+            square = fill(radius * radius)
+            while node < end:
+                if _meets_node(nodes, node, x, y, z, square) | found == found:
+                    node = links[2 * node]
+                    continue
+                k = links[2 * node + 1]
+                node += 1
+                if k < 0 or _meets_object(kinds[k], objects, OBJECT * k, x, y, z, radius) | found == found:
+                    continue
+                found = _cluster_meets_object(tables, c, k, frames, found, every)
+                if found != 0 and (not every or found == ALL):
+                    last_hit[0] = b
+                    return found
+    for i in range(len(pairs) // 2):
+        a, b = pairs[2 * i], pairs[2 * i + 1]
+        x, y, z = load(centres, 48 * a), load(centres, 48 * a + 16), load(centres, 48 * a + 32)
+        if _balls_meet(x - load(centres, 48 * b), y - load(centres, 48 * b + 16), z - load(centres, 48 * b + 32),
+                       balls[4 * a + 3] + balls[4 * b + 3]) | found == found:
+            continue
+        found = _clusters_meet(robot, a, b, frames, centres, found, every)
+        if found != 0 and (not every or found == ALL):
+            return found
+    return found
+
+
+@compiled
+def work_arrays(robot):
+    """Return the arrays that ``hits`` works in: values, frames, centres of clusters, the branch to begin with."""
+    variables = 1
+    for j in range(len(robot[0]) // JOINT):
+        variables = max(variables, robot[0][JOINT * j + 2] + 1)
+    return (np.empty(16 * variables, np.float32), np.empty(192 * (len(robot[0]) // JOINT), np.float32),
+            np.empty(12 * len(robot[3]), np.float32), np.zeros(1, np.int64))
+
+
+@compiled
+def free_states(tables, states, free):
+    """Write for each row of ``states`` (m, k) float32 whether it is free of collisions."""
+    work = work_arrays(tables[0])
+    q = work[0]
+    m, k = states.shape
+    for begin in range(0, m, 16):
+        for lane in range(16):
+            row = min(begin + lane, m - 1)
+            for j in range(k):
+                q[16 * j + lane] = states[row, j]
+        found = hits(tables, work, True)
+        for lane in range(min(16, m - begin)):
+            free[begin + lane] = found >> lane & 1 == 0
+
+
+@compiled
+def free_edge(tables, work, a, b, step):
+    """Whether the straight line from ``a`` to ``b`` (k,) float32 is free, looked at in steps of at most ``step``.
+
+    ``a`` itself is left out. The steps are fewer than sixteen nowhere: lanes that would lie idle make them finer. They
+    are looked at from coarse to fine, the end first.
+    """
+    q = work[0]
+    length = np.float32(0.0)
+    for j in range(len(a)):
+        length += (b[j] - a[j]) * (b[j] - a[j])
+    rows = max(1, int(np.ceil(np.sqrt(length) / (np.float32(16.0) * step))))
+    count = np.float32(16 * rows)
+    bits = 1
+    while bits < rows:
+        bits *= 2
+    for turn in range(bits):
+        # The bits of the turn in reverse: 0, 1/2, 1/4, 3/4 ... of the way between two lanes.
+        back, one, rest = 0, bits >> 1, turn
+        while rest:
+            if rest & 1:
+                back += one
+            one >>= 1
+            rest >>= 1
+        if back >= rows:
+            continue
+        along = (ramp() * fill(np.float32(rows)) + fill(np.float32(rows - back))) / fill(count)
+        for j in range(len(a)):
+            store(q, 16 * j, fill(a[j]) + along * fill(b[j] - a[j]))
+        if hits(tables, work, False):
+            return False
+    return True
+
+
+@compiled
+def edge_is_free(tables, a, b, step):
+    """``free_edge`` for a caller without work arrays."""
+    return free_edge(tables, work_arrays(tables[0]), a, b, step)

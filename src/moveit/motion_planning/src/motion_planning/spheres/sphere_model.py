@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The spheres of all links of a robot, made once from its collision geometry and kept between runs."""
+import hashlib
+import os
+import tempfile
+import threading
+from collections import OrderedDict
+from pathlib import Path
+
+import numpy as np
+
+from motion_planning.shapes import TriangleMesh
+from motion_planning.spheres import cover as covers
+from motion_planning.spheres.cover import boxes_of_cells, cover, mesh_samples, voxels
+from numba_cache import folder
+from urdf_model import Box, Cylinder, Mesh
+
+#: How far a sphere may reach beyond the geometry [m]; for what is thin, this share of its thinnest half side, ...
+TOLERANCE_M = 0.01
+_THIN_SHARE = 0.35
+# ... but not less than this share of the tolerance.
+_LEAST_SHARE = 0.4
+#: Boxes that stand for a mesh have sides of this size and its multiples [m]...
+MESH_CELL_M = 0.006
+# ... or larger ones, so that the longest side of the mesh has at most so many.
+_MOST_CELLS = 150
+# Tables of robots and of links that stand still.
+_MOST_KEPT = 200
+
+
+class SphereModel:
+    """Spheres and boxes that contain the collision geometry of each link, made when they are first asked for.
+
+    May be used from any number of threads. What is made is kept on disk beside compiled code, for the same geometry and
+    tolerance [m].
+    """
+
+    def __init__(self, model, parts, tolerance):
+        self.model, self.tolerance = model, tolerance
+        self._parts, self._spheres, self._fixed = parts, {}, {}
+        self._kept, self._lock = OrderedDict(), threading.Lock()
+
+    @classmethod
+    def of(cls, model, meshes, tolerance=TOLERANCE_M):
+        """Return the SphereModel of a PlanningModel.
+
+        ``meshes``: function from a mesh's filename to its TriangleMesh in the file's own scale. Raises what it raises.
+        """
+        parts = {}
+        for name in model.links:
+            shapes = model.robot.links[name].collisions
+            parts[name] = [(_scaled(shape.geometry, meshes), shape.origin) for shape in shapes]
+        return cls(model, parts, tolerance)
+
+    def spheres(self, link):
+        """Return (n, 4), centre in the link's frame and radius [m], what the link is while it moves; n may be 0.
+
+        Raises CoverError.
+        """
+        if link not in self._spheres:
+            parts = self._parts[link]
+            self._spheres[link] = cached(cover, parts, fitting(parts, self.tolerance)) if parts else np.empty((0, 4))
+        return self._spheres[link]
+
+    def fixed(self, link):
+        """Return [(geometry, pose (4, 4) in the link's frame)], what the link is while it does not move: meshes as
+        Boxes."""
+        if link not in self._fixed:
+            self._fixed[link] = [(boxes_of(geometry), pose) for geometry, pose in self._parts[link]]
+        return self._fixed[link]
+
+    def kept(self, key, make):
+        """Return what ``make()`` returned for this key, made again only when many others have been asked for since."""
+        with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                return self._kept[key]
+        made = make()
+        with self._lock:
+            self._kept[key] = made
+            while len(self._kept) > _MOST_KEPT:
+                self._kept.popitem(last=False)
+        return made
+
+
+def fitting(parts, tolerance):
+    """Return the tolerance [m] for parts of these sizes: what is thin gets a closer fit."""
+    half = [0.5 * min(geometry.size) for geometry, _ in parts if isinstance(geometry, Box)]
+    half += [min(geometry.radius, 0.5 * geometry.length) for geometry, _ in parts if isinstance(geometry, Cylinder)]
+    return tolerance * float(np.clip(_THIN_SHARE * min(half, default=np.inf) / tolerance, _LEAST_SHARE, 1.0))
+
+
+class Boxes:
+    """Boxes that stand for a mesh or an octree. corners (n, 2, 3): least and greatest, in the frame of the shape."""
+
+    def __init__(self, corners):
+        self.corners = corners
+
+
+def boxes_of(geometry):
+    """Return ``geometry`` as it is, or the Boxes that contain it where it is a mesh; made once for the same mesh."""
+    return Boxes(cached(mesh_boxes, [(geometry, np.eye(4))], MESH_CELL_M)) if _is_mesh(geometry) else geometry
+
+
+def mesh_boxes(parts, cell):
+    """Return boxes (n, 2, 3) that contain a mesh and what it encloses, and reach at most two cells beyond it."""
+    (mesh, _), = parts
+    size = np.ptp(mesh.vertices, axis=0).max()
+    cell = max(cell, size / _MOST_CELLS)
+    spacing = 0.5 * cell
+    samples = mesh_samples(mesh.vertices, mesh.triangles, spacing)
+    full, lowest = voxels(samples, cell)
+    return boxes_of_cells(full, lowest, cell, beyond=0.6 * spacing)
+
+
+def cached(function, parts, size):
+    """Return ``function(parts, size)``, an array, from disk where it has been made before."""
+    digest = hashlib.sha256(repr((function.__name__, size)).encode())
+    for geometry, pose in parts:
+        digest.update(np.ascontiguousarray(pose).tobytes())
+        if _is_mesh(geometry):
+            digest.update(geometry.vertices.tobytes() + geometry.triangles.tobytes())
+        else:
+            digest.update(repr(geometry).encode())
+    path = Path(folder("motion_planning_spheres", [covers.__file__])) / (digest.hexdigest()[:32] + ".npy")
+    try:
+        return np.load(path)
+    except (OSError, ValueError, EOFError):
+        pass
+    made = function(parts, size)
+    try:
+        # Two processes may make it at once: the file is whole or not there.
+        handle, unfinished = tempfile.mkstemp(dir=path.parent)
+        with os.fdopen(handle, "wb") as file:
+            np.save(file, made)
+        os.replace(unfinished, path)
+    except OSError:
+        pass  # a cache that cannot be written is as good as none
+    return made
+
+
+def _is_mesh(geometry):
+    return isinstance(geometry, TriangleMesh)
+
+
+def _scaled(geometry, meshes):
+    if not isinstance(geometry, Mesh):
+        return geometry
+    mesh = meshes(geometry.filename)
+    return TriangleMesh(mesh.vertices * np.array(geometry.scale), mesh.triangles)

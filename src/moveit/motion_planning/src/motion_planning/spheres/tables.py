@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A scene, seen by one group, as the flat arrays that ``kernel`` works on.
+
+What moves with the group becomes spheres on joints; all else, other links of the robot included, becomes the world.
+What is the same from scene to scene, the robot, is kept in the SphereModel.
+"""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from motion_planning.shapes import Cone, Octree
+from motion_planning.spheres.cover import ball
+from motion_planning.spheres.sphere_model import cached, cover, fitting
+from motion_planning.spheres.world_tables import Tree, forest, joined, pyramid, solids_of, tree_of
+from urdf_model import Plane
+
+# Clusters on the same joint become one if the ball around both is at most this much larger than the larger one's.
+_MERGED = 1.25
+# So many spheres are looked at one by one.
+_FEW_SPHERES = 4
+
+
+class _Mover(NamedTuple):
+    """A link, or what one holds: spheres (n, 4) in the frame of the joint that it moves with."""
+
+    name: str
+    touch: frozenset
+    joint: int
+    spheres: np.ndarray
+
+
+class _Cluster(NamedTuple):
+    """Movers on one joint that may touch the same things."""
+
+    joint: int
+    movers: tuple
+    spheres: np.ndarray
+    ball: np.ndarray
+
+
+class _Still(NamedTuple):
+    """A link, or what one holds, that the group does not move; may: for each cluster, whether they may touch."""
+
+    tree: Tree
+    may: tuple
+
+
+class _Robot(NamedTuple):
+    """What a robot is for a group, whatever objects there are."""
+
+    clusters: tuple
+    branch: tuple  # of each cluster
+    depth: tuple
+    arrays: tuple  # of the kernel's robot table, tests and what follows left out
+    pairs: np.ndarray
+    still: tuple
+
+
+def bake(sphere_model, group, scene, state):
+    """Return (robot, world), see ``kernel``: what of ``scene`` the joints of ``group`` can run into, elsewhere as in
+    ``state``."""
+    things = [*scene.objects.values(), *([scene.octomap] if scene.octomap is not None else [])]
+    movers = _mover_names(sphere_model.model, group, state)
+    # For each object those that may touch it, mostly nobody.
+    special = [(thing.id, frozenset(name for name, touch in movers
+                                    if thing.id in touch or scene.allowed.allowed(name, thing.id))) for thing in things]
+    special = {name: may for name, may in special if may}
+    others = np.delete(state.q, group.indices)
+    key = (group.name, id(scene.allowed), others.tobytes(), state.base.tobytes(), tuple(scene.link_padding.items()),
+           tuple(scene.link_scale.items()), tuple(map(id, state.attached.values())), tuple(special.values()))
+    # What the key names by identity is kept with what is found: no other object gets the same.
+    robot, _ = sphere_model.kept(key, lambda: (_robot(sphere_model, group, scene, state, special),
+                                               (scene.allowed, *state.attached.values())))
+    groups = {}
+    for thing in things:
+        may = special.get(thing.id, frozenset())
+        allowed = tuple(bool(may) and all(mover.name in may for mover in cluster.movers) for cluster in robot.clusters)
+        groups.setdefault(allowed, []).append(solids_of([(shape, thing.pose @ pose) for shape, pose in thing.shapes]))
+    stills = [_Still(tree_of(joined(solids)), may) for may, solids in groups.items()] + list(robot.still)
+    world, places = forest([still.tree for still in stills])
+    return _with_tests(robot, stills, places), world
+
+
+def _with_tests(robot, stills, places):
+    """The robot's table, complete: what each cluster has to be tested against, objects before the robot itself."""
+    tests = [(robot.branch[c], rank, -robot.depth[c], c, *place)
+             for rank, (still, place) in enumerate(zip(stills, places, strict=True)) if place[1] > place[0]
+             for c in range(len(robot.clusters)) if not still.may[c]]
+    tests.sort()
+    joints, *rest, skips, joint_branch = robot.arrays
+    branches = []
+    for number in range(max(joint_branch, default=-1) + 1):
+        for keys in (joint_branch, robot.branch, [test[0] for test in tests]):
+            branches += [sum(key < number for key in keys), sum(key <= number for key in keys)]
+    return (joints, *rest, robot.pairs, np.array([test[3:] for test in tests], np.int32).ravel(),
+            np.array(branches, np.int32), skips)
+
+
+# -- the robot ----------------------------------------------------------------------------------------------------
+
+def _mover_names(model, group, state):
+    """[(name, names of what it may touch whatever is allowed)] of the links that the group moves and what they hold."""
+    moving = frozenset(group.moving_links)
+    return ([(name, frozenset()) for name in model.links if name in moving]
+            + [(name, body.touch_links) for name, body in state.attached.items() if body.link in moving])
+
+
+def _robot(sphere_model, group, scene, state, special):
+    model = sphere_model.model
+    joints, seats = _joints(model, group, state)
+    movers, still = [], []
+    frames = model.frames(state.q, state.base)
+    for link, name in enumerate(model.links):
+        joint, pose = seats[link]
+        if joint >= 0:
+            spheres = sphere_model.spheres(name)
+            if len(spheres):
+                movers.append(_Mover(name, frozenset(), joint, _moved(spheres, pose, _padding(scene, name, spheres))))
+        elif sphere_model.fixed(name):
+            pad = scene.link_padding.get(name, 0.0)
+            still.append((name, frozenset(), sphere_model.kept(
+                ("still", name, frames[link].tobytes(), pad),
+                lambda name=name, link=link, pad=pad: tree_of(solids_of(_placed(sphere_model.fixed(name), frames[link]),
+                                                                       pad)))))
+    for body in state.attached.values():
+        joint, pose = seats[model.link_index[body.link]]
+        if joint >= 0:
+            spheres = _spheres_of(body.object, sphere_model.tolerance)
+            if len(spheres):
+                movers.append(_Mover(body.id, body.touch_links, joint, _moved(spheres, pose @ body.object.pose, 0.0)))
+        else:
+            place = frames[model.link_index[body.link]] @ body.object.pose
+            still.append((body.id, body.touch_links, tree_of(solids_of(_placed(body.object.shapes, place)))))
+
+    def may(a, b):
+        return a[0] in b[1] or b[0] in a[1] or scene.allowed.allowed(a[0], b[0])
+
+    rows = [tuple([may(mover, other) for other in [*movers, *still]]
+                  + [mover.name in names for names in special.values()]) for mover in movers]
+    depth, branch = _branches(joints)
+    clusters = sorted(_clusters(movers, rows), key=lambda cluster: (branch[cluster.joint], -depth[cluster.joint]))
+    first = [movers.index(cluster.movers[0]) for cluster in clusters]
+    pairs = [(a, b) for a in range(len(clusters)) for b in range(a + 1, len(clusters))
+             if clusters[a].joint != clusters[b].joint and not rows[first[a]][first[b]]]
+    table, spheres, skips = [], [], []
+    for cluster in clusters:
+        begin = len(spheres)
+        _sphere_tree(cluster.spheres, spheres, skips)
+        table += [cluster.joint, begin, len(spheres)]
+    arrays = (np.array([joint[:3] for joint in joints], np.int32).ravel(),
+              np.array([joint[3] for joint in joints], np.float32).ravel(), np.array(table, np.int32),
+              np.array([cluster.ball for cluster in clusters], np.float32).ravel(),
+              np.array(spheres, np.float32).ravel(), np.array(skips, np.int32), tuple(branch))
+    return _Robot(tuple(clusters), tuple(branch[cluster.joint] for cluster in clusters),
+                  tuple(depth[cluster.joint] for cluster in clusters), arrays, np.array(pairs, np.int32).ravel(),
+                  tuple(_Still(tree, tuple(rows[k][len(movers) + n] for k in first))
+                        for n, (_, _, tree) in enumerate(still)))
+
+
+def _joints(model, group, state):
+    """Return the joints that the group moves [(parent, prismatic, variable, numbers)], and for each link of the model
+    (the joint that it moves with or -1, its pose in that joint's frame)."""
+    parents, origins, axes, kinds, variables, factors = model.kinematics
+    own = {int(index): number for number, index in enumerate(group.indices)}
+    joints, seats = [], []
+    for link, parent in enumerate(parents):
+        joint, pose = (-1, state.base) if parent < 0 else seats[parent]
+        pose = pose @ origins[link]
+        multiplier, offset = factors[link]
+        variable = int(variables[link])
+        if kinds[link] and variable in own:
+            turn = np.eye(4)
+            turn[:3, :3] = _rotation_taking_z_to(axes[link])
+            entry = pose @ turn
+            joints.append((joint, int(kinds[link] == 2), own[variable],
+                           [*entry[:3, :3].ravel(), *entry[:3, 3], multiplier, offset]))
+            joint, pose = len(joints) - 1, turn.T
+        elif kinds[link]:
+            value = offset + (multiplier * state.q[variable] if variable >= 0 else 0.0)
+            pose = pose @ _motion(kinds[link], axes[link], value)
+        seats.append((joint, pose))
+    return joints, seats
+
+
+def _branches(joints):
+    """Return for each joint how many are above it, and which of those without a parent it hangs on."""
+    depth, branch = [], []
+    for parent, *_ in joints:
+        depth.append(0 if parent < 0 else depth[parent] + 1)
+        branch.append(max(branch, default=-1) + 1 if parent < 0 else branch[parent])
+    return depth, branch
+
+
+def _rotation_taking_z_to(axis):
+    z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    x = np.cross((0.0, 1.0, 0.0) if abs(z[1]) < 0.9 else (1.0, 0.0, 0.0), z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _motion(kind, axis, value):
+    pose = np.eye(4)
+    if kind == 2:
+        pose[:3, 3] = value * np.asarray(axis)
+        return pose
+    turn, (s, c) = _rotation_taking_z_to(axis), (math.sin(value), math.cos(value))
+    pose[:3, :3] = turn @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ turn.T
+    return pose
+
+
+def _moved(spheres, pose, larger):
+    return np.column_stack([spheres[:, :3] @ pose[:3, :3].T + pose[:3, 3], spheres[:, 3] + larger])
+
+
+def _padding(scene, link, spheres):
+    """How much larger [m] a link is to be: its padding, and its scale as what that adds at the furthest point."""
+    larger, scale = scene.link_padding.get(link, 0.0), scene.link_scale.get(link, 1.0)
+    if scale != 1.0:
+        larger += (scale - 1.0) * float((np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]).max(initial=0.0))
+    return larger
+
+
+def _clusters(movers, rows):
+    """Return the _Clusters of ``movers``, whose ``rows`` say what each may touch."""
+    found = []
+    for number, mover in enumerate(movers):
+        alone = _Cluster(mover.joint, (mover,), mover.spheres, ball(mover.spheres))
+        for place, cluster in enumerate(found):
+            # Two on one joint never meet; all the rest has to be the same for them.
+            other = rows[movers.index(cluster.movers[0])]
+            if cluster.joint != mover.joint or any(
+                    a != b for k, (a, b) in enumerate(zip(rows[number], other, strict=True))
+                    if k >= len(movers) or movers[k].joint != mover.joint):
+                continue
+            spheres = np.concatenate([cluster.spheres, mover.spheres])
+            together = cluster._replace(movers=(*cluster.movers, mover), spheres=spheres, ball=ball(spheres))
+            if together.ball[3] <= _MERGED * max(cluster.ball[3], alone.ball[3]):
+                found[place] = together
+                break
+        else:
+            found.append(alone)
+    return found
+
+
+def _sphere_tree(some, spheres, skips):
+    """Append ``some`` (n, 4) to ``spheres`` and ``skips`` as a tree of balls, see ``kernel``; what is larger first."""
+    if len(some) <= _FEW_SPHERES:
+        spheres += some[np.argsort(-some[:, 3], kind="stable")].tolist()
+        skips += [0] * len(some)
+        return
+    order = some[np.argsort(some[:, np.ptp(some[:, :3], axis=0).argmax()], kind="stable")]
+    halves = order[: len(some) // 2], order[len(some) // 2 :]
+    for half in sorted(halves, key=lambda half: -half[:, 3].max()):
+        number = len(spheres)
+        spheres.append(ball(half).tolist())
+        skips.append(0)
+        _sphere_tree(half, spheres, skips)
+        skips[number] = len(spheres)
+
+
+def _spheres_of(item, tolerance):
+    """The spheres (n, 4) of an object that is held, in its own frame."""
+    found = []
+    for geometry, pose in item.shapes:
+        if isinstance(geometry, Plane):
+            continue  # nobody holds a plane without end
+        if isinstance(geometry, Octree):
+            found += [np.array([[*(pose[:3, :3] @ box[:3] + pose[:3, 3]), 0.5 * math.sqrt(3.0) * box[3]]])
+                      for box in geometry.boxes]
+        else:
+            parts = [(pyramid(geometry) if isinstance(geometry, Cone) else geometry, pose)]
+            found.append(cached(cover, parts, fitting(parts, tolerance)))
+    return np.concatenate(found) if found else np.empty((0, 4))
+
+
+def _placed(parts, pose):
+    return [(geometry, pose @ inner) for geometry, inner in parts]

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What stands still as the flat arrays that ``kernel`` works on: objects, and trees of boxes around them."""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from motion_planning.shapes import Cone, Octree, TriangleMesh
+from motion_planning.spheres import kernel
+from motion_planning.spheres.sphere_model import Boxes, boxes_of
+from urdf_model import Box, Cylinder, Plane, Sphere
+
+# What is infinite has corners this far away [m].
+_FAR = 1e6
+# A cone is the pyramid around it with so many sides.
+_CONE_SIDES = 24
+# By how much a tree's boxes are larger than what is in them [m], for single floats.
+_ROUNDING = 1e-5
+
+
+class Solids(NamedTuple):
+    """n objects. kinds (n,), numbers (n, 16): see ``kernel``; low, high (n, 3): corners of boxes around them."""
+
+    kinds: np.ndarray
+    numbers: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+class Tree(NamedTuple):
+    """Objects and the boxes around them, counted from 0."""
+
+    links: np.ndarray
+    nodes: np.ndarray
+    kinds: np.ndarray
+    objects: np.ndarray
+
+
+def solids_of(parts, pad=0.0):
+    """Return the Solids of ``parts``, [(geometry, pose (4, 4) in the planning frame)], ``pad`` [m] larger all round."""
+    found = [_solids(geometry, pose, pad) for geometry, pose in parts]
+    return joined(found)
+
+
+def joined(found):
+    """Return one Solids of many."""
+    if not found:
+        return Solids(np.empty(0, np.int32), np.empty((0, kernel.OBJECT), np.float32), *np.empty((2, 0, 3)))
+    return Solids(*(np.concatenate(arrays) for arrays in zip(*found, strict=True)))
+
+
+def _solids(geometry, pose, pad):
+    rotation, centre = pose[:3, :3].T, pose[:3, 3]
+    if isinstance(geometry, Plane):
+        return _one(kernel.PLANE, centre, rotation, (0.0, 0.0, pad), np.full(3, _FAR))
+    if isinstance(geometry, Sphere):
+        radius = geometry.radius + pad
+        return _one(kernel.SPHERE, centre, rotation, (radius, 0.0, 0.0), np.full(3, radius))
+    if isinstance(geometry, Cylinder):
+        radius, half = geometry.radius + pad, 0.5 * geometry.length + pad
+        reach = half * np.abs(rotation[2]) + radius * np.sqrt(np.maximum(0.0, 1.0 - rotation[2] ** 2))
+        upright = abs(abs(rotation[2, 2]) - 1.0) < 1e-9
+        kind = kernel.UPRIGHT_CYLINDER if upright else kernel.CYLINDER
+        return _one(kind, centre, rotation, (radius, 0.0, half), reach)
+    corners = _corners(geometry)
+    middle, half = 0.5 * (corners[:, 0] + corners[:, 1]), 0.5 * (corners[:, 1] - corners[:, 0]) + pad
+    centres, reach = middle @ rotation + centre, half @ np.abs(rotation)
+    straight = (np.abs(np.abs(rotation) - 1.0) < 1e-9).sum() == 3
+    numbers = np.zeros((len(corners), kernel.OBJECT), np.float32)
+    numbers[:, :3], numbers[:, 3:12], numbers[:, 12:15] = centres, rotation.ravel(), reach if straight else half
+    return Solids(np.full(len(corners), kernel.AXIS_BOX if straight else kernel.BOX, np.int32), numbers,
+                  centres - reach, centres + reach)
+
+
+def _one(kind, centre, rotation, sizes, reach):
+    return Solids(np.array([kind], np.int32), np.array([[*centre, *rotation.ravel(), *sizes, 0.0]], np.float32),
+                  (centre - reach)[None], (centre + reach)[None])
+
+
+def _corners(geometry):
+    """(n, 2, 3) of what is made of boxes."""
+    if isinstance(geometry, Boxes):
+        return geometry.corners
+    if isinstance(geometry, Box):
+        half = 0.5 * np.array(geometry.size)
+        return np.array([[-half, half]])
+    if isinstance(geometry, Octree):
+        half = 0.5 * geometry.boxes[:, 3:]
+        return np.stack([geometry.boxes[:, :3] - half, geometry.boxes[:, :3] + half], axis=1)
+    return boxes_of(pyramid(geometry) if isinstance(geometry, Cone) else geometry).corners
+
+
+def pyramid(cone):
+    """Return the TriangleMesh of a pyramid around a Cone."""
+    k = np.arange(_CONE_SIDES)
+    angle, around = 2.0 * np.pi * k / _CONE_SIDES, cone.radius / math.cos(math.pi / _CONE_SIDES)
+    half = 0.5 * cone.length
+    rim = np.column_stack([around * np.cos(angle), around * np.sin(angle), np.full(_CONE_SIDES, -half)])
+    after = (k + 1) % _CONE_SIDES
+    tip, base = np.full_like(k, _CONE_SIDES), np.full_like(k, _CONE_SIDES + 1)
+    return TriangleMesh(np.concatenate([rim, [[0.0, 0.0, half], [0.0, 0.0, -half]]]),
+                        np.concatenate([np.column_stack([k, after, tip]), np.column_stack([after, k, base])]))
+
+
+def tree_of(solids):
+    """Return the Tree over Solids: halves of the order in which a space-filling curve meets them, one object a leaf."""
+    count = len(solids.kinds)
+    order = _along_curve(0.5 * (solids.low + solids.high))
+    low, high = solids.low[order], solids.high[order]
+    # A branch is (first, last + 1 object, number of its node); what is below it has the numbers that follow.
+    first, last, number = np.array([0]), np.array([count]), np.array([0])
+    links = np.empty((max(0, 2 * count - 1), 2), np.int32)
+    nodes = np.empty((len(links), 6), np.float32)
+    levels = []
+    while len(first) and count:
+        size = last - first
+        links[number, 0] = number + 2 * size - 1
+        leaf = size == 1
+        links[number, 1] = np.where(leaf, first, -1)
+        levels.append((number[~leaf], size[~leaf]))
+        nodes[number[leaf]] = np.concatenate([low[first[leaf]] - _ROUNDING, high[first[leaf]] + _ROUNDING], axis=1)
+        first, last, number, size = first[~leaf], last[~leaf], number[~leaf], size[~leaf]
+        middle = first + size // 2
+        first, last, number = (np.concatenate([first, middle]), np.concatenate([middle, last]),
+                               np.concatenate([number + 1, number + 2 * (size // 2)]))
+    for number, size in reversed(levels):
+        one, other = nodes[number + 1], nodes[number + 2 * (size // 2)]
+        nodes[number, :3] = np.minimum(one[:, :3], other[:, :3])
+        nodes[number, 3:] = np.maximum(one[:, 3:], other[:, 3:])
+    return Tree(links, nodes, solids.kinds[order], solids.numbers[order])
+
+
+def _along_curve(points):
+    """The order in which Morton's curve meets ``points`` (n, 3)."""
+    low, high = points.min(axis=0, initial=_FAR), points.max(axis=0, initial=-_FAR)
+    cell = ((points - low) / np.maximum(high - low, 1e-9) * 1023.0).astype(np.int64)
+    code = np.zeros(len(points), dtype=np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
+
+
+def forest(trees):
+    """Return (world, [(first node, last + 1)]): many Trees as one table, see ``kernel``."""
+    places, links, objects_before, nodes_before = [], [], 0, 0
+    for tree in trees:
+        shifted = tree.links.copy()
+        shifted[:, 0] += nodes_before
+        shifted[shifted[:, 1] >= 0, 1] += objects_before
+        links.append(shifted)
+        places.append((nodes_before, nodes_before + len(shifted)))
+        nodes_before, objects_before = nodes_before + len(shifted), objects_before + len(tree.kinds)
+    empty = tree_of(joined([]))
+    trees = [empty, *trees]
+    world = (np.concatenate([empty.links, *links]).ravel(), np.concatenate([tree.nodes for tree in trees]).ravel(),
+             np.concatenate([tree.kinds for tree in trees]), np.concatenate([tree.objects for tree in trees]).ravel())
+    return world, places

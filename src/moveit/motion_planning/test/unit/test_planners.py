@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Paths: free by geometry that shares nothing with the planner, from start to goal, the same for the same seed."""
+import itertools
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pybullet
+import pytest
+
+from motion_planning.exact import ExactChecker
+from motion_planning.model import PlanningModel
+from motion_planning.planners import NoPath, Run, Search, plan_path, rrt_connect, shorten
+from motion_planning.scene import Scene, WorldObject
+from motion_planning.spheres import SphereChecker, SphereModel
+from urdf_model import Box, Cylinder
+from urdf_model.transforms import pose_matrix as pose
+
+# As long as a slow machine may need: what is tested is the answer.
+PATIENCE_S = 60.0
+
+LINKS = "".join("""<link name="l%d"><collision><origin xyz="0.2 0 0"/><geometry><box size="0.4 0.06 0.06"/></geometry>
+</collision></link>""" % k for k in range(4))
+JOINTS = "".join("""<joint name="j%d" type="revolute"><origin xyz="%s 0 0"/><parent link="%s"/><child link="l%d"/>
+<axis xyz="0 %d %d"/><limit lower="-2.8" upper="2.8" effort="1" velocity="1"/></joint>"""
+                 % (k, 0.4 if k else 0.0, "l%d" % (k - 1) if k else "base", k, k % 2, 1 - k % 2) for k in range(4))
+SNAKE = "<robot name='snake'><link name='base'/>%s%s</robot>" % (LINKS, JOINTS)
+SNAKE_SRDF = "<robot name='snake'><group name='arm'>%s</group>%s</robot>" % (
+    "".join("<joint name='j%d'/>" % k for k in range(4)),
+    "".join("<disable_collisions link1='l%d' link2='l%d' reason='Adjacent'/>" % (k, k + 1) for k in range(3)))
+
+
+@pytest.fixture(scope="module")
+def snake():
+    return PlanningModel.from_xml(SNAKE, SNAKE_SRDF)
+
+
+@pytest.fixture(scope="module")
+def exact(snake):
+    return ExactChecker(snake, None)
+
+
+def search(exact, seed=1, allowed_time=PATIENCE_S, **more):
+    return Search(exact, seed, allowed_time, time.monotonic, **more)
+
+
+def patient(exact, seed, looks=60):
+    """A Search whose time is the number of looks at the clock: as patient on any machine."""
+    return Search(exact, seed, looks, itertools.count().__next__)
+
+
+def clutter(model, seed, count=5):
+    rng = np.random.default_rng(seed)
+    return Scene(model).with_objects([
+        WorldObject("thing%d" % k, pose(rng.uniform(-1.2, 1.2, 3), rng.uniform(-3.0, 3.0, 3)),
+                    ((box if k % 2 else rod, np.eye(4)),))
+        for k in range(count) for box in [Box(tuple(rng.uniform(0.1, 0.4, 3)))]
+        for rod in [Cylinder(*rng.uniform(0.05, 0.4, 2))]])
+
+
+def free_postures(exact, scene, group, rng, count):
+    found = []
+    while len(found) < count:
+        q = rng.uniform(*scene.model.bounds[group.indices].T)
+        if exact.free(scene, scene.state.with_q(q, group.indices), group.name):
+            found.append(q)
+    return np.array(found)
+
+
+class Bullet:
+    """The snake and a scene in PyBullet, which knows nothing of spheres, FCL or this package's kinematics."""
+
+    def __init__(self, scene, folder):
+        self.client = pybullet.connect(pybullet.DIRECT)
+        file = folder / "snake.urdf"
+        file.write_text(SNAKE)
+        self.robot = pybullet.loadURDF(str(file), useFixedBase=True, physicsClientId=self.client)
+        self.joints = list(range(pybullet.getNumJoints(self.robot, physicsClientId=self.client)))
+        self.things = [self._thing(item) for item in scene.objects.values()]
+
+    def _thing(self, item):
+        (shape, inner), = item.shapes
+        where = item.pose @ inner
+        if isinstance(shape, Box):
+            made = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.5 * s for s in shape.size],
+                                                 physicsClientId=self.client)
+        else:
+            made = pybullet.createCollisionShape(pybullet.GEOM_CYLINDER, radius=shape.radius, height=shape.length,
+                                                 physicsClientId=self.client)
+        turn = pybullet.getQuaternionFromEuler(rpy(where[:3, :3]))
+        return pybullet.createMultiBody(0.0, made, -1, where[:3, 3].tolist(), turn, physicsClientId=self.client)
+
+    def deepest(self, q):
+        """The deepest contact [m] at the posture ``q``; below 0: how far it is from one, 0.05 at most."""
+        for joint, value in zip(self.joints, q, strict=True):
+            pybullet.resetJointState(self.robot, joint, value, physicsClientId=self.client)
+        found = [point for thing in self.things
+                 for point in pybullet.getClosestPoints(self.robot, thing, 0.05, physicsClientId=self.client)]
+        for a, b in itertools.combinations(self.joints, 2):
+            if b - a > 1:
+                found += pybullet.getClosestPoints(self.robot, self.robot, 0.05, a, b, physicsClientId=self.client)
+        return max((-point[8] for point in found), default=-0.05)
+
+    def close(self):
+        pybullet.disconnect(self.client)
+
+
+def rpy(rotation):
+    """Roll, pitch, yaw of a rotation matrix (3, 3)."""
+    return (np.arctan2(rotation[2, 1], rotation[2, 2]), np.arcsin(np.clip(-rotation[2, 0], -1.0, 1.0)),
+            np.arctan2(rotation[1, 0], rotation[0, 0]))
+
+
+def states_on(points, step):
+    pieces = [a + (b - a) * np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(b - a) / step))[:, None]
+              for a, b in itertools.pairwise(points)]
+    return np.concatenate(pieces)
+
+
+def test_300_paths_are_free_by_pybullet(snake, exact, tmp_path):
+    group = snake.groups["arm"]
+    worst, detours = [], 0
+    for seed in range(33):
+        scene = clutter(snake, seed)
+        rng = np.random.default_rng((seed, 1))
+        bullet = Bullet(scene, tmp_path)
+        try:
+            ends = free_postures(exact, scene, group, rng, 10)
+            for k, (start, goal) in enumerate(itertools.pairwise(ends)):
+                try:
+                    path = plan_path(scene, "arm", start, [goal], patient(exact, k))
+                except NoPath:
+                    continue  # a random goal may be shut in
+                points = path.points
+                assert np.array_equal(points[0], start) and np.allclose(points[-1], goal, atol=1e-6)
+                assert (points >= snake.bounds[group.indices, 0] - 1e-6).all()
+                assert (points <= snake.bounds[group.indices, 1] + 1e-6).all()
+                detours += len(points) > 2
+                worst.append(max(bullet.deepest(q) for q in states_on(points, 0.0371)))
+        finally:
+            bullet.close()
+    assert len(worst) >= 270 and detours > 50
+    # Bullet's cylinders and contacts are good to a fraction of a millimetre.
+    assert max(worst) < 1e-3
+
+
+def apart(exact, scene, group):
+    """Two free postures with something between them."""
+    rng = np.random.default_rng(1)
+    while True:
+        start, goal = free_postures(exact, scene, group, rng, 2)
+        between = start + (goal - start) * np.linspace(0.0, 1.0, 50)[:, None]
+        if not all(exact.free(scene, scene.state.with_q(q, group.indices)) for q in between):
+            return start, goal
+
+
+def test_the_same_seed_gives_the_same_path(snake, exact):
+    scene, group = clutter(snake, 3), snake.groups["arm"]
+    start, goal = apart(exact, scene, group)
+    paths = [plan_path(scene, "arm", start, [goal], search(exact, seed)).points for seed in (5, 5, 6)]
+    assert np.array_equal(paths[0], paths[1])
+    assert paths[0].shape != paths[2].shape or not np.allclose(paths[0], paths[2])
+
+
+def test_the_nearest_of_the_goals_in_a_straight_line(snake, exact):
+    scene, group = clutter(snake, 3), snake.groups["arm"]
+    start, goal = free_postures(exact, scene, group, np.random.default_rng(1), 2)
+    path = plan_path(scene, "arm", start, [goal, start + 1e-3], search(exact))
+    assert np.allclose(path.points[-1], start + 1e-3, atol=1e-6)
+
+
+def test_shorter_and_still_free(snake, exact):
+    scene, group = clutter(snake, 4), snake.groups["arm"]
+    checker = SphereChecker(SphereModel.of(snake, None), group, scene)
+    rng = np.random.default_rng(2)
+    run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
+    gained = []
+    while len(gained) < 20:
+        start, goal = free_postures(exact, scene, group, rng, 2)
+        if not checker.valid([start, goal]).all():
+            continue
+        path = rrt_connect(checker, snake.bounds[group.indices], start, [goal], run)
+        short = shorten(path, checker, run)
+        assert np.allclose(short.points[[0, -1]], path.points[[0, -1]])
+        assert all(checker.edge(a, b) for a, b in itertools.pairwise(short.points))
+        assert short.length <= path.length + 1e-6
+        gained.append(path.length - short.length)
+    assert np.mean(gained) > 0.2
+
+
+# -- where spheres and exact geometry disagree ----------------------------------------------------------------------
+
+def slot(model, gap):
+    """Two plates beside the straight snake's last link, ``gap`` [m] from it on either side."""
+    half = 0.03 + gap
+    plate = ((Box((0.4, 0.02, 0.4)), np.eye(4)),)
+    plates = [WorldObject("plate%d" % side, pose((1.45, side * (half + 0.01), 0.0)), plate) for side in (-1, 1)]
+    return Scene(model).with_objects(plates)
+
+
+def test_a_start_that_only_spheres_call_a_collision_is_left_by_exact_geometry(snake, exact):
+    scene, group = slot(snake, 0.006), snake.groups["arm"]
+    inside, outside = np.zeros(4), np.array([1.5, 0.2, 0.5, -0.3])
+    checker = SphereChecker(SphereModel.of(snake, None), group, scene)
+    assert not checker.valid(inside)[0] and exact.free(scene, scene.state.with_q(inside, group.indices))
+    for start, goal in ((inside, outside), (outside, inside)):
+        path = plan_path(scene, "arm", start, [goal], search(exact))
+        assert np.array_equal(path.points[0], start) and np.allclose(path.points[-1], goal, atol=1e-6)
+        assert all(exact.free(scene, scene.state.with_q(q, group.indices)) for q in states_on(path.points, 0.011))
+
+
+class Refusing:
+    """An exact checker that refuses what it is told to, for so many questions about states between the ends."""
+
+    def __init__(self, exact, ends, times):
+        self.model, self.meshes = exact.model, exact.meshes
+        self._exact, self._ends, self._left = exact, ends, times
+
+    def free(self, scene, state, group):
+        if any(np.allclose(state.q, end) for end in self._ends):
+            return True
+        self._left -= 1
+        return self._left < 0 and self._exact.free(scene, state, group)
+
+    def contacts(self, *arguments, **more):
+        return self._exact.contacts(*arguments, **more)
+
+
+def test_a_path_that_exact_geometry_refuses_is_not_returned(snake, exact):
+    scene, group = clutter(snake, 3), snake.groups["arm"]
+    start, goal = apart(exact, scene, group)
+    twice = Refusing(exact, (start, goal), 2)
+    assert np.allclose(plan_path(scene, "arm", start, [goal], search(twice)).points[-1], goal, atol=1e-6)
+    with pytest.raises(NoPath):
+        plan_path(scene, "arm", start, [goal], search(Refusing(exact, (start, goal), 10**9), allowed_time=0.3))
+
+
+# -- no path --------------------------------------------------------------------------------------------------------
+
+def test_a_collision_at_an_end_is_named(snake, exact):
+    scene = Scene(snake).with_object(WorldObject("post", pose((0.6, 0.0, 0.0)), ((Cylinder(0.05, 1.0), np.eye(4)),)))
+    free, hit = np.array([1.5, 0.0, 0.0, 0.0]), np.zeros(4)
+    for start, goal, what in ((hit, free, "start"), (free, hit, "goal")):
+        with pytest.raises(NoPath, match="%s is in collision: link 'l1' and object 'post'" % what):
+            plan_path(scene, "arm", start, [goal], search(exact))
+
+
+@pytest.mark.parametrize(("start", "goals", "text"), [
+    ([0.0] * 3, [[0.0] * 4], "need 4 values"), ([0.0] * 4, np.empty((0, 4)), "need 4 values"),
+    ([0.0] * 4, [[float("nan")] * 4], "not finite")])
+def test_what_are_no_postures_is_refused(snake, exact, start, goals, text):
+    with pytest.raises(NoPath, match=text):
+        plan_path(Scene(snake), "arm", start, goals, search(exact))
+
+
+def shut_in(model):
+    """The straight arm lies in a tunnel, where no joint can turn far enough to get out."""
+    walls = [WorldObject("wall%d%d" % (k, side), pose(offset), ((Box((1.6, 0.02, 0.2) if k else (1.6, 0.2, 0.02)),
+                                                                np.eye(4)),))
+             for k in (0, 1) for side in (-1, 1)
+             for offset in [(1.0, 0.065 * side, 0.0) if k else (1.0, 0.0, 0.065 * side)]]
+    return Scene(model).with_objects(walls), np.zeros(4), np.array([1.5, 0.2, 0.5, -0.3])
+
+
+def test_time_that_is_over_and_a_stop_are_told_apart(snake, exact):
+    scene, start, goal = shut_in(snake)
+    assert exact.free(scene, scene.state.with_q(goal, snake.groups["arm"].indices), "arm")
+    with pytest.raises(NoPath, match="time was over") as caught:
+        plan_path(scene, "arm", start, [goal], search(exact, allowed_time=0.4))
+    assert caught.value.late and not caught.value.stopped
+    asked = itertools.count()
+    with pytest.raises(NoPath, match="stopped while") as caught:
+        plan_path(scene, "arm", start, [goal], search(exact, stop=lambda: next(asked) > 10))
+    assert caught.value.stopped and not caught.value.late
+
+
+def test_warming_up_compiles_all_that_planning_needs(tmp_path):
+    """What set-up runs fills the cache; planning afterwards compiles nothing."""
+    code = """
+import runpy, sys
+runpy.run_module("motion_planning", run_name="__main__")
+from motion_planning.planners import kernels as planning
+from motion_planning.spheres import kernel
+for function in (planning.grow, planning.shortcut, kernel.free_states, kernel.edge_is_free):
+    print(function.__name__, len(function.signatures))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["grow", "1", "shortcut", "1", "free_states", "1", "edge_is_free", "1"]
