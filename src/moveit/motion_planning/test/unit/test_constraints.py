@@ -281,6 +281,20 @@ def test_poses_of_both_hands(scene, exact):
     assert len(samples) == 3 and all(kept(scene, "both_arms", goal, sample) is None for sample in samples)
 
 
+@pytest.mark.parametrize("turned", [True, False])
+def test_a_point_beside_the_links_origin_is_put_there(scene, exact, turned):
+    point = np.array((0.02, -0.03, 0.12))
+    pose = at(0.7, 0.3, 1.0, rpy_matrix(math.pi, 0, 0))
+    goal = ConstraintSet("", (), [PositionTarget("left_gripper", ((Sphere(0.005), pose),), point)],
+                         [OrientationTarget("left_gripper", pose[:3, :3])] if turned else ())
+    samples = take(sampler(scene.model, "left_arm", goal, scene, exact, 0), 3)
+    assert len(samples) == 3
+    for sample in samples:
+        state = scene.state.with_q(sample, scene.model.groups["left_arm"].indices)
+        tip = scene.with_state(state).frame("left_gripper")
+        assert np.linalg.norm((tip @ np.append(point, 1.0))[:3] - pose[:3, 3]) <= 0.005 + 1e-9
+
+
 @pytest.mark.parametrize("goal", [
     ConstraintSet("", (), [PositionTarget("left_gripper", ((Box((0.2, 0.3, 0.1)), at(0.7, 0.2, 1.1)),))]),
     ConstraintSet("", (), [PositionTarget("left_gripper", ((Cylinder(0.1, 0.3), at(0.7, 0.2, 1.1)),), (0, 0, 0.1))]),

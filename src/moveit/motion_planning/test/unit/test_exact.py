@@ -8,7 +8,7 @@ import pytest
 
 from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshUnreadable, ModelError, PlanningModel
-from motion_planning.scene import OCTOMAP, Cone, Octree, Scene, TriangleMesh, WorldObject
+from motion_planning.scene import OCTOMAP, AllowedCollisions, Cone, Octree, Scene, TriangleMesh, WorldObject
 from urdf_model import Box, Cylinder, Plane, Sphere
 from urdf_model.transforms import axis_rotation, quaternion_from_matrix, rigid
 
@@ -177,6 +177,8 @@ def test_states_that_are_none():
     scene, exact = slider()
     with pytest.raises(ModelError, match="not all finite"):
         exact.free(scene, scene.state.with_q([math.nan, 0.0]))
+    with pytest.raises(ModelError, match="pose of link 'base' is not finite"):
+        exact.free(scene, scene.state.with_base(at(math.nan)))
     with pytest.raises(ModelError, match="expected 2 joint values"):
         exact.free(scene, scene.state.with_q([0.0]))
 
@@ -252,20 +254,22 @@ def bullet_distances(shapes, poses, client):
     return found
 
 
-def test_pybullet_agrees_about_baxter(baxter, meshes, bullet):
-    """Every pair of shapes but the two meshes, at random postures."""
-    exact = ExactChecker(baxter, meshes)
+@pytest.mark.parametrize("name, states, least", [("baxter", 25, 300), ("probot", 200, 5)])
+def test_pybullet_agrees_about_robots(name, states, least, request, meshes, bullet):
+    """Every pair of shapes but Baxter's two meshes, at random postures, whatever the SRDF says of it."""
+    model = request.getfixturevalue(name)
+    exact = ExactChecker(model, meshes)
     generator = np.random.default_rng(7)
-    scene = Scene(baxter)
-    links = [(name, shape) for name in baxter.links for shape in baxter.robot.links[name].collisions
+    scene = Scene(model, allowed=AllowedCollisions())
+    links = [(name, shape) for name in model.links for shape in model.robot.links[name].collisions
              if isinstance(shape.geometry, Box | Sphere | Cylinder)]
     compared = touching = 0
-    for q in generator.uniform(*baxter.bounds.T, (25, len(baxter.variables))):
+    for q in generator.uniform(*model.bounds.T, (states, len(model.variables))):
         state = scene.state.with_q(q)
         ours = {tuple(sorted((one.a, one.b))) for one in exact.contacts(scene, state, most=10_000)}
-        frames = baxter.frames(q)
+        frames = model.frames(q)
         distances = bullet_distances([shape.geometry for _, shape in links],
-                                     [frames[baxter.link_index[name]] @ shape.origin for name, shape in links], bullet)
+                                     [frames[model.link_index[name]] @ shape.origin for name, shape in links], bullet)
         theirs = {}
         for (i, j), distance in distances.items():
             pair = tuple(sorted((links[i][0], links[j][0])))
@@ -276,7 +280,7 @@ def test_pybullet_agrees_about_baxter(baxter, meshes, bullet):
                 compared, touching = compared + 1, touching + (distance < 0.0)
         only_ours = [pair for pair in ours if pair not in theirs and not {"torso", "pedestal"} & set(pair)]
         assert only_ours == [], q
-    assert touching > 300 and compared - touching > 100
+    assert touching > least and compared - touching > least // 3, (touching, compared)
 
 
 @pytest.mark.parametrize("mine", ["box", "sphere", "cylinder"])

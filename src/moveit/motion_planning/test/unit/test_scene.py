@@ -67,6 +67,12 @@ def test_remove_takes_what_is_known_of_the_object_too(scene):
     (lambda: WorldObject("b", np.full((4, 4), np.nan), ()), "finite"),
     (lambda: WorldObject("b", np.zeros((4, 4)), ()), "no rotation"),
     (lambda: WorldObject("b", np.eye(3), ()), "finite \\(4, 4\\)"),
+    (lambda: WorldObject("b", at(1e9), ()), "1e\\+09 m away"),
+    (lambda: box(pose=at(np.inf)), "finite"),
+    (lambda: WorldObject("b", at(), ((Box((0.1, -0.2, 0.1)), at()),)), "Box of object 'b' has the sizes 0.1, -0.2"),
+    (lambda: WorldObject("b", at(), ((Sphere(np.nan), at()),)), "sizes nan"),
+    (lambda: WorldObject("b", at(), ((Cone(0.1, 1e9), at()),)), "sizes 0.1, 1e\\+09"),
+    (lambda: WorldObject("b", at(), ((TriangleMesh(1e9 * np.eye(3), [[0, 1, 2]]), at()),)), "mesh of object 'b'"),
 ])
 def test_poses_are_checked(bad, words):
     with pytest.raises(SceneError, match=words):

@@ -150,7 +150,10 @@ class ExactChecker:
                                                                               strict=True)))
         movers = self._movers(scene, state)
         pairs, active, memory = self._pairing(scene, movers, group)
-        return _Query((self.model.kinematics, q, np.array(state.base)), movers, pairs, active,
+        base = np.array(state.base)
+        if not math.isfinite(base.sum()):
+            raise ModelError("the pose of link '%s' is not finite: %s" % (self.model.root, base.tolist()))
+        return _Query((self.model.kinematics, q, base), movers, pairs, active,
                       self._fixed(scene), scene.allowed, memory)
 
     def _near(self, query):

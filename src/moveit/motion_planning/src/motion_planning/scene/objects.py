@@ -9,10 +9,12 @@ from types import MappingProxyType
 import numpy as np
 
 from motion_planning.errors import PlanningError
-from motion_planning.shapes import read_only
+from motion_planning.shapes import TriangleMesh, read_only
 
 #: The name that the octomap has in an AllowedCollisions and in contacts.
 OCTOMAP = "<octomap>"
+#: What is farther away or larger is a mistake [m]; collision checks would lose millimetres there.
+FARTHEST = 1e5
 
 
 class SceneError(PlanningError):
@@ -26,7 +28,7 @@ class WorldObject:
     pose (4, 4): of the object in the planning frame, or in the link that holds it. shapes: ((shape, pose (4, 4) in the
     object), ...), shapes of urdf_model (Box, Cylinder, Sphere, Plane) or of motion_planning.shapes.
     subframes: {name: pose (4, 4) in the object}. type: (key, database), as ObjectType has them.
-    Raises SceneError for a pose that is none.
+    Raises SceneError for a pose that is none, and for a size below 0, not finite, or beyond any scene.
     """
 
     id: str
@@ -38,6 +40,8 @@ class WorldObject:
     def __post_init__(self):
         object.__setattr__(self, "pose", _pose(self.pose, self.id))
         object.__setattr__(self, "shapes", tuple((shape, _pose(pose, self.id)) for shape, pose in self.shapes))
+        for shape, _ in self.shapes:
+            _check_size(shape, self.id)
         if not isinstance(self.subframes, MappingProxyType):
             checked = {name: _pose(pose, self.id) for name, pose in self.subframes.items()}
             object.__setattr__(self, "subframes", MappingProxyType(checked))
@@ -78,11 +82,24 @@ class AttachedBody:
         return self.object.id
 
 
+def _check_size(shape, name):
+    sizes = (*getattr(shape, "size", ()), *(getattr(shape, one) for one in ("radius", "length") if hasattr(shape, one)))
+    if not all(0.0 <= size <= FARTHEST for size in sizes):
+        raise SceneError("a %s of object '%s' has the sizes %s; expected 0 to %g m"
+                         % (type(shape).__name__, name, ", ".join("%g" % size for size in sizes), FARTHEST))
+    if isinstance(shape, TriangleMesh) and np.abs(shape.vertices).max() > FARTHEST:
+        raise SceneError("a mesh of object '%s' reaches %g m; expected at most %g"
+                         % (name, np.abs(shape.vertices).max(), FARTHEST))
+
+
 def _pose(pose, name):
     matrix = read_only(pose)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
         raise SceneError("a pose of object '%s' is %s; expected a finite (4, 4) matrix"
                          % (name, np.asarray(pose).tolist()))
+    away = float(np.abs(matrix[:3, 3]).max())
+    if away > FARTHEST:
+        raise SceneError("object '%s' is %g m away; expected at most %g" % (name, away, FARTHEST))
     if abs(np.linalg.det(matrix[:3, :3]) - 1.0) > 1e-3 or not np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0)):
         raise SceneError("a pose of object '%s' holds no rotation: %s" % (name, matrix.tolist()))
     return matrix
