@@ -7,6 +7,9 @@ from baxter_model import SIDES, joint_names
 
 MODES = (1, 2, 3, 4)
 _LIMB = re.compile(r"/robot/limb/(left|right)/(\w+)$")
+# Single joints as in the vendor's simulator, and procedures that take an arm through postures; the field that says so.
+_JOINT = re.compile(r"/robot/\w+_joint_\w+_controller/joints/\w+/command$")
+_PROCEDURE = re.compile(r"/robustcontroller/\w+/\w+/enable$")
 # Whatever they say, it is not for the arms; a world that is changed, started anew or paused is another matter.
 _WORLD = re.compile(r"^/gazebo/|/goal$|^/robot/sim/|^/robot/set_super_|/set_(parameters|physics)")
 
@@ -27,6 +30,10 @@ def may_move(name, value, style):
     """
     if _WORLD.search(name):
         return True
+    if _JOINT.match(name):
+        return style == "damaged" or value is None or math.isfinite(value["data"])
+    if _PROCEDURE.match(name):
+        return style == "damaged" or value is None or bool(value["isEnabled"])
     limb = _LIMB.match(name)
     if limb is None:
         return False

@@ -124,6 +124,18 @@ def test_what_else_may_move_an_arm(modules, name, moves):
     assert modules.commands.may_move(name, {}, "plausible") is moves
 
 
+@pytest.mark.parametrize(("name", "value", "moves"), [
+    ("/robot/left_joint_position_controller/joints/left_s0_controller/command", {"data": 0.1}, True),
+    ("/robot/right_joint_effort_controller/joints/right_w2_controller/command", {"data": math.nan}, False),
+    ("/robot/head_position_controller/joints/head_controller/command", {"data": 0.1}, False),
+    ("/robustcontroller/left/Tare/enable", {"isEnabled": True}, True),
+    ("/robustcontroller/left/CalibrateArm/enable", {"isEnabled": False}, False),
+])
+def test_single_joints_and_procedures_may_move_an_arm(modules, name, value, moves):
+    assert modules.commands.may_move(name, value, "plausible") is moves
+    assert modules.commands.may_move(name, value, "damaged") is (moves or "head" not in name)
+
+
 def test_headers_are_read_as_written(modules):
     fields = {"callerid": "/a", "md5sum": "*"}
     assert modules.tcpros.parsed(modules.tcpros.header(fields)[4:]) == fields
