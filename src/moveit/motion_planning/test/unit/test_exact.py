@@ -119,6 +119,28 @@ def test_cubes_of_an_octomap_are_solid():
     assert exact.free(allowed, full.state.with_joints({"x": 2.4}))
 
 
+@pytest.mark.parametrize("kind", ["box", "sphere", "cylinder", "mesh"])
+def test_an_octomap_is_what_its_cubes_are(kind):
+    """Cubes of several sizes, one in another, against boxes of the same sizes at the same places."""
+    cubes = [(0.05, 0.05, 0.05, 0.1), (0.4, 0.4, 0.4, 0.8), (-0.05, 0.15, 0.05, 0.1), (-0.3, -0.1, 0.1, 0.2)]
+    scene, exact = slider(kind)
+    generator = np.random.default_rng(3)
+    touching = 0
+    for _ in range(200):
+        turn = axis_rotation((0.6, 0.0, 0.8), generator.uniform(-3.0, 3.0))
+        frame = rigid(turn, generator.uniform(-0.6, 0.6, 3))
+        boxes = scene.with_objects([WorldObject("b%d" % k, frame @ at(*cube[:3]), ((Box(3 * cube[3:]), np.eye(4)),))
+                                    for k, cube in enumerate(cubes)])
+        octomap = scene.with_octomap(Octree(0.1, cubes), frame)
+        if 1e-3 < exact.distance(boxes, group="car") or exact.contacts(boxes, group="car") and max(
+                contact.depth for contact in exact.contacts(boxes, group="car")) > 1e-3:
+            free = exact.free(boxes, group="car")
+            touching += not free
+            assert exact.free(octomap, group="car") is free
+            assert (exact.contacts(octomap, group="car") == []) is free
+    assert 20 < touching < 180
+
+
 def test_an_octomap_without_a_cube_is_free():
     scene, exact = slider()
     assert exact.free(scene.with_octomap(Octree(0.1, [])))

@@ -182,7 +182,8 @@ class ExactChecker:
             return Contact(*names, *query.plane_point(i, j), depth)
         result = fcl.CollisionResult()
         if not fcl.collide(a, b, _ALL, result):
-            return None
+            # Where shapes barely touch, FCL may find that they do, but not where.
+            return _touch(names, query.poses[i], query.pose(j)) if self._touches(query, i, j) else None
         found = result.contacts
         # Between triangles FCL's depths are those of their planes: the least one is the nearest to the truth.
         both = isinstance(part.shape, TriangleMesh) and isinstance(other.shape, TriangleMesh)
@@ -319,6 +320,14 @@ class _Query:
         height = float(plane[:3, 2] @ (other[:3, 3] - plane[:3, 3]))
         away = plane[:3, 2] if height >= 0.0 else -plane[:3, 2]
         return other[:3, 3] - height * plane[:3, 2], away if is_plane else -away
+
+
+def _touch(names, pose, other):
+    """The Contact of two shapes at ``pose`` and ``other`` (4, 4) of which no more is known than that they touch."""
+    way = other[:3, 3] - pose[:3, 3]
+    length = float(np.linalg.norm(way))
+    normal = way / length if length > 1e-9 else np.array((0.0, 0.0, 1.0))
+    return Contact(*names, 0.5 * (pose[:3, 3] + other[:3, 3]), normal, 0.0)
 
 
 def _read(geometry, meshes):

@@ -17,6 +17,10 @@ def occupied_tree(octree):
     levels = np.rint(np.log2(boxes[:, 3] / octree.resolution)).astype(np.int64)
     keys = np.floor(boxes[:, :3] / octree.resolution).astype(np.int64) + 2 ** (OCTREE_DEPTH - 1)
     codes = sum(_spread(keys[:, axis]) << axis for axis in range(3))
+    for level in np.unique(levels):
+        # A cube within a larger one adds nothing, and would take the larger one's place in the stream.
+        covered = (levels < level) & np.isin(codes >> (3 * level), codes[levels == level] >> (3 * level))
+        codes, levels = codes[~covered], levels[~covered]
     nodes, inner = [], np.empty(0, np.int64)
     for level in range(OCTREE_DEPTH):
         leaves = np.unique(codes[levels == level] >> (3 * level))
