@@ -32,6 +32,7 @@ SUITES = {
     "load": ("physics_bench", "loading and stepping Baxter beside PyBullet's own loaders"),
     "control": ("control_tick_bench", "the controllers of 18 joints beside a physics step"),
     "robot": ("robot_bench", "a tick of Baxter's control logic beside the physics step of the same world"),
+    "planning": ("planning_bench", "paths for Baxter and PROBOT beside OMPL's RRTConnect on exact geometry"),
     "tick": ("tick_bench", "a tick of /gazebo beside the physics step in it, CPU time, without a lab around it"),
     "collision": ("self_collision_bench", "a physics step of Baxter with self-collision beside one without"),
     "physics": ("world_bench", "the whole stack flat out beside bare steps: alone, with objects, clients, in contact"),

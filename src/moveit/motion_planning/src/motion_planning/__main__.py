@@ -1,28 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``python3 -m motion_planning``: compile the planner into the cache, so that no start has to wait for it."""
-import time
+from motion_planning.planners import warm_up
 
-import numpy as np
-
-from motion_planning.model import PlanningModel
-from motion_planning.planners import NoPath, Path, Run, rrt_connect, shorten
-from motion_planning.scene import Scene
-from motion_planning.spheres import SphereChecker, SphereModel
-
-# Compiled code does not depend on the robot: any will do. This one cannot pass its base.
-URDF = """<robot name="two"><link name="base"><collision><geometry><box size="0.1 0.1 4"/></geometry></collision></link>
-<link name="arm"><collision><origin xyz="1 0 0"/><geometry><sphere radius="0.1"/></geometry></collision></link>
-<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>
-<limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
-SRDF = "<robot name='two'><group name='arm'><joint name='turn'/></group></robot>"
-
-model = PlanningModel.from_xml(URDF, SRDF)
-checker = SphereChecker(SphereModel.of(model, None), model.groups["arm"], Scene(model))
-run = Run(seed=1, deadline=0.0, clock=time.monotonic)
-ends = np.array([[0.5], [2.5]])
-try:
-    rrt_connect(checker, model.bounds, ends[0], ends[1:], run)
-except NoPath:
-    pass  # as it has to be: what counts is that everything is compiled now
-shorten(Path(ends), checker, run)
-checker.valid(ends)
+warm_up()

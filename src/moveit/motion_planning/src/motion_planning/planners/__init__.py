@@ -3,5 +3,6 @@
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.planning import Search, plan_path
 from motion_planning.planners.trees import Path, Run, rrt_connect, shorten
+from motion_planning.planners.warming import warm_up
 
-__all__ = ["NoPath", "Path", "Run", "Search", "plan_path", "rrt_connect", "shorten"]
+__all__ = ["NoPath", "Path", "Run", "Search", "plan_path", "rrt_connect", "shorten", "warm_up"]

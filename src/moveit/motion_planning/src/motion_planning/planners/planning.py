@@ -51,6 +51,8 @@ def sphere_model_of(exact):
 def plan_path(scene, group, start, goals, search):
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k) of the group named ``group``.
 
+    Its times are of "tables", "ends" (the exact check of start and goals), "way out", "search", "shorten" and "exact".
+
     It is looked for and shortened by spheres that contain the robot, then every state on it, as close as those that the
     spheres were asked about and between them, is checked by ``search.exact``. Where exact geometry is free and the
     spheres are not, it leads out of there by exact geometry. Raises NoPath.
@@ -62,21 +64,26 @@ class _Planning:
     def __init__(self, scene, group, search):
         self.scene, self.search, self.model = scene, search, scene.model
         self.group = self.model.group(group)
-        self.begin = search.clock()
+        self.begin = self.last = search.clock()
+        self.times = {}
         self.random = np.random.default_rng(search.seed & (1 << 63) - 1)
         self.checker = SphereChecker(sphere_model_of(search.exact), self.group, scene)
+        self._note("tables")
         self.bounds = np.array(self.model.bounds[self.group.indices])
 
     def path(self, start, goals):
         start, goals = self._postures(start, goals)
         self._free_or_raise("the start", [start])
         goals = self._free_or_raise("every goal" if len(goals) > 1 else "the goal", goals)
+        self._note("ends")
         try:
-            return self._by_spheres(start, goals)
+            return self._by_spheres(start, goals)._replace(times=self.times)
         except NoPath as error:
             if error.stopped or not self._left(1.0):
                 raise
-        return self._by_exact(start, goals)
+        found = self._by_exact(start, goals)
+        self._note("search")
+        return found._replace(times=self.times)
 
     # -- ends ---------------------------------------------------------------------------------------------------
 
@@ -120,13 +127,18 @@ class _Planning:
                     raise
         entries = np.array([way[0] for way in inwards])
         checker, seed = self.checker, self.search.seed
+        self._note("way out")
         while True:
             found = rrt_connect(checker, self.bounds, outwards[-1], entries, run._replace(seed=seed), REACH)
+            self._note("search")
             short = shorten(found, checker, run._replace(seed=seed))
+            self._note("shorten")
             inward = inwards[int(np.abs(entries - short.points[-1]).max(axis=1).argmin())]
             path = short._replace(points=np.concatenate([outwards[:-1], short.points, inward[1:]]))
             path.points[0], path.points[-1] = start, inward[-1]
-            if self._path_is_free(path.points, run):
+            free = self._path_is_free(path.points, run)
+            self._note("exact")
+            if free:
                 return path
             run.check("a path was looked for that exact geometry agrees with")
             checker, seed = checker.at(max(_FINEST, _FINER * checker.resolution)), seed + 1
@@ -233,6 +245,12 @@ class _Planning:
 
     def _run(self, share):
         return Run(self.search.seed, self.begin + share * self.search.allowed_time, self.search.clock, self.search.stop)
+
+    def _note(self, part):
+        """Add the time since the last note to that of a part of the work."""
+        now = self.search.clock()
+        self.times[part] = self.times.get(part, 0.0) + now - self.last
+        self.last = now
 
     def _left(self, share):
         return self.search.clock() < self.begin + share * self.search.allowed_time

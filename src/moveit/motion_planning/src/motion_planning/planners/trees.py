@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """RRT-Connect (Kuffner and LaValle 2000) and shortcuts, on a SphereChecker."""
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -19,10 +20,12 @@ _ROOM_MORE = 2 * _TRIES + 2
 
 
 class Path(NamedTuple):
-    """points (m, k): corners of a path of straight lines, the first is the start. samples: how many were drawn."""
+    """points (m, k): corners of a path of straight lines, the first is the start. samples: how many were drawn.
+    times: {part of the work: s}, where it was measured."""
 
     points: np.ndarray
     samples: int = 0
+    times: Mapping = MappingProxyType({})
 
     @property
     def length(self):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from motion_planning.errors import PlanningError
 from motion_planning.shapes import TriangleMesh
 from motion_planning.spheres import cover as covers
 from motion_planning.spheres.cover import boxes_of_cells, cover, mesh_samples, voxels
@@ -44,12 +45,16 @@ class SphereModel:
     def of(cls, model, meshes, tolerance=TOLERANCE_M):
         """Return the SphereModel of a PlanningModel.
 
-        ``meshes``: function from a mesh's filename to its TriangleMesh in the file's own scale. Raises what it raises.
+        ``meshes``: function from a mesh's filename to its TriangleMesh in the file's own scale. What it raises
+        PlanningError for is left out, as ExactChecker leaves it out and says so.
         """
-        parts = {}
+        parts = {name: [] for name in model.links}
         for name in model.links:
-            shapes = model.robot.links[name].collisions
-            parts[name] = [(_scaled(shape.geometry, meshes), shape.origin) for shape in shapes]
+            for shape in model.robot.links[name].collisions:
+                try:
+                    parts[name].append((_scaled(shape.geometry, meshes), shape.origin))
+                except PlanningError:
+                    continue
         return cls(model, parts, tolerance)
 
     def spheres(self, link):
