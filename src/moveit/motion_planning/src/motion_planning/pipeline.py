@@ -1,0 +1,364 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From a request to a timed trajectory, or to the reason why there is none."""
+import enum
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from motion_planning.errors import PlanningError
+from motion_planning.planners import NoPath, Search
+from motion_planning.scene import Scene
+from motion_planning.timing import Timed, time_path
+
+# How far [rad or m] corners may be cut, tried in this order: a curve that meets something is drawn tighter.
+_CORNERS = (0.05, 0.01, 0.001)
+# States of the timed trajectory are checked so far apart at most [rad or m, in any joint].
+_RESOLUTION = 0.03
+# Postures of goals that a planner gets, and how long [s] more than one are looked for.
+_GOALS, _MORE_GOALS_S = 8, 0.02
+# Share of the allowed time for goal postures, and random states around a start that touches something.
+_SHARE_FOR_GOALS, _JIGGLES = 0.5, 100
+# Contacts that a sentence names.
+_NAMED = 3
+
+
+class Code(enum.IntEnum):
+    """Values of moveit_msgs/MoveItErrorCodes that planning gives."""
+
+    SUCCESS = 1
+    FAILURE = 99999
+    PLANNING_FAILED = -1
+    INVALID_MOTION_PLAN = -2
+    TIMED_OUT = -6
+    PREEMPTED = -7
+    START_STATE_IN_COLLISION = -10
+    START_STATE_VIOLATES_PATH_CONSTRAINTS = -11
+    GOAL_IN_COLLISION = -12
+    GOAL_VIOLATES_PATH_CONSTRAINTS = -13
+    GOAL_CONSTRAINTS_VIOLATED = -14
+    INVALID_GROUP_NAME = -15
+    INVALID_GOAL_CONSTRAINTS = -16
+    INVALID_ROBOT_STATE = -17
+    START_STATE_INVALID = -26
+    NO_IK_SOLUTION = -31
+
+
+class PlanningFailure(PlanningError):
+    """Why there is no plan. code: a :class:`Code`; contacts: exact.Contacts that are in the way; joints: {joint: value}
+    of those that are."""
+
+    def __init__(self, code, text, contacts=(), joints=None):
+        super().__init__(text)
+        self.code, self.contacts, self.joints = code, list(contacts), dict(joints or {})
+
+
+@dataclass(frozen=True, eq=False)
+class PlanQuery:
+    """What is asked for.
+
+    scene: Scene with the robot at the start; group: name; goals: ConstraintSets, of which one has to be met.
+    path_constraints: ConstraintSet that holds all the way, or None. allowed_time [s]; attempts: plans of which the
+    shortest counts. velocity_scaling, acceleration_scaling: 0 < f <= 1. timing: algorithm of timing.time_path.
+    start_bounds_error: by how much [rad or m] the start may be beyond a limit; it is brought onto it.
+    jiggle: share of a joint's range within which a start that touches something is moved to one that does not.
+    """
+
+    scene: Scene
+    group: str
+    goals: list
+    path_constraints: Any = None
+    planner_id: str = ""
+    allowed_time: float = 5.0
+    attempts: int = 1
+    velocity_scaling: float = 1.0
+    acceleration_scaling: float = 1.0
+    timing: str = "time_optimal_trajectory_generation"
+    start_bounds_error: float = 0.05
+    jiggle: float = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Tools:
+    """What plans are made with: exact: ExactChecker; plan_path, sampler: as planners and constraints have them; clock:
+    function that gives the time [s]; seed: of all that is random; stop(): true ends the planning."""
+
+    exact: Any
+    plan_path: Callable
+    sampler: Callable
+    clock: Callable
+    seed: int = 0
+    stop: Callable = field(default=lambda: False)
+
+
+class Plan(NamedTuple):
+    """start: State of the whole robot; path (m, k) of the group's joints; timed: timing.Timed; planning_time [s]."""
+
+    start: Any
+    path: np.ndarray
+    timed: Timed
+    planning_time: float
+
+
+def plan(query, tools):
+    """Return a :class:`Plan` for a :class:`PlanQuery`. Raises PlanningFailure.
+
+    Nothing of the returned trajectory was checked by an approximation alone: its states, as controllers play them,
+    are free of collisions in ``tools.exact``.
+    """
+    return _Planning(query, tools).run()
+
+
+class _Planning:
+    """One request on its way."""
+
+    def __init__(self, query, tools):
+        self.query, self.tools = query, tools
+        self.model = query.scene.model
+        self.begin = tools.clock()
+        if query.group not in self.model.groups:
+            raise PlanningFailure(Code.INVALID_GROUP_NAME, "robot '%s' has no group '%s'; its groups are %s" % (
+                self.model.name, query.group, ", ".join(self.model.groups) or "none"))
+        self.group = self.model.groups[query.group]
+        self.names, self.indices = self.group.joints, self.group.indices
+        if not self.names:
+            raise PlanningFailure(Code.INVALID_GROUP_NAME, "group '%s' has no joint that moves" % query.group)
+
+    def run(self):
+        query = self.query
+        if not (math.isfinite(query.allowed_time) and query.allowed_time > 0.0):
+            raise PlanningFailure(Code.FAILURE, "the allowed planning time is %r s; it must be above 0"
+                                  % query.allowed_time)
+        if not query.goals:
+            raise PlanningFailure(Code.INVALID_GOAL_CONSTRAINTS, "the request has no goal constraints")
+        scene, lead = self._start()
+        start = scene.state.q[self.indices]
+        if self._is_met(scene.state, scene):
+            return self._timed(scene, lead, start[None])
+        goals = self._goals(scene)
+        paths = []
+        for attempt in range(max(1, min(query.attempts, 50))):
+            if paths and (self._elapsed() > 0.5 * query.allowed_time or self.tools.stop()):
+                break
+            try:
+                paths.append(self._path(scene, start, goals, attempt))
+            except PlanningFailure:
+                if not paths:
+                    raise
+                break
+        paths.sort(key=lambda path: float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()))
+        return self._timed(scene, lead, paths[0])
+
+    # -- start --------------------------------------------------------------------------------------------------
+
+    def _start(self):
+        """(scene with a start that will do, the states (m, k) that lead there from where the robot is)."""
+        scene = self._within_limits(self.query.scene)
+        q = self.query.scene.state.q[self.indices]
+        lead = np.empty((0, len(q))) if scene is self.query.scene else q[None]
+        contacts = self.tools.exact.contacts(scene, scene.state, self.query.group)
+        if contacts:
+            free = self._free_near(scene)
+            if free is None:
+                raise PlanningFailure(Code.START_STATE_IN_COLLISION, "the start state is in collision: %s; move the "
+                                      "robot or allow the two to touch" % _named(contacts), contacts)
+            lead, scene = q[None], scene.with_state(scene.state.with_q(free, self.indices))
+        violated = self._violated(self.query.path_constraints, scene.state, scene)
+        if violated:
+            raise PlanningFailure(Code.START_STATE_VIOLATES_PATH_CONSTRAINTS,
+                                  "the start state violates the path constraints: %s" % violated)
+        return scene, lead
+
+    def _within_limits(self, scene):
+        q = scene.state.q
+        bad = self.model.beyond_limits(q, self.query.start_bounds_error, self.indices)
+        if bad:
+            sentence = ", ".join("joint '%s' is at %.4f, its limits are %.4f and %.4f" % one for one in bad)
+            raise PlanningFailure(Code.START_STATE_INVALID, "the start state is out of bounds: %s (%.3g more is let "
+                                  "pass)" % (sentence, self.query.start_bounds_error), joints={b[0]: b[1] for b in bad})
+        inside = np.clip(q, *self.model.bounds.T)
+        inside = np.where(self.model.continuous, q, inside)[self.indices]
+        if np.array_equal(inside, q[self.indices]):
+            return scene
+        return scene.with_state(scene.state.with_q(inside, self.indices))
+
+    def _free_near(self, scene):
+        """A free posture (k,) near the scene's, or None."""
+        random = np.random.default_rng(self.tools.seed)
+        low, high = self.model.bounds[self.indices].T
+        q = scene.state.q[self.indices]
+        for i in range(_JIGGLES):
+            reach = self.query.jiggle * (high - low) * (i + 1) / _JIGGLES
+            near = np.clip(q + reach * random.uniform(-1.0, 1.0, len(q)), low, high)
+            if self.tools.exact.free(scene, scene.state.with_q(near, self.indices), self.query.group):
+                return near
+            self._look_up()
+        return None
+
+    # -- goals --------------------------------------------------------------------------------------------------
+
+    def _goals(self, scene):
+        """Postures (g, k) that meet one of the goals and touch nothing."""
+        found, failures = [], []
+        for goal in self.query.goals:
+            try:
+                samples = self._samples(goal, scene, self.tools.exact)
+                found += self._some(samples, scene, len(self.query.goals))
+            except PlanningFailure:
+                raise
+            except PlanningError as error:
+                failures.append(PlanningFailure(Code.INVALID_GOAL_CONSTRAINTS, str(error)))
+        if found:
+            return np.array(found)
+        if failures:
+            raise failures[0]
+        raise self._why_no_goal(scene)
+
+    def _some(self, samples, scene, sets):
+        found, begin = [], self._elapsed()
+        refused = ""
+        for q in samples:
+            self._look_up()
+            violated = self._violated(self.query.path_constraints, scene.state.with_q(q, self.indices), scene)
+            if violated:
+                refused = violated
+            else:
+                found.append(np.array(q))
+            late = self._elapsed() - begin
+            if len(found) >= max(1, _GOALS // sets) or found and late > _MORE_GOALS_S or \
+                    late > _SHARE_FOR_GOALS * self.query.allowed_time / sets:
+                break
+        if refused and not found:
+            raise PlanningFailure(Code.GOAL_VIOLATES_PATH_CONSTRAINTS,
+                                  "no posture of the goal keeps the path constraints: %s" % refused)
+        return found
+
+    def _why_no_goal(self, scene):
+        """The PlanningFailure of the goal that got furthest."""
+        unreached = None
+        for goal in self.query.goals:
+            samples = self._samples(goal, scene, None)
+            q = next(iter(samples), None)
+            if q is None:
+                why = getattr(samples, "reason", None)
+                unreached = unreached or PlanningFailure(
+                    Code.NO_IK_SOLUTION if why else Code.GOAL_CONSTRAINTS_VIOLATED, "no posture of group '%s' meets "
+                    "the goal: %s" % (self.query.group, why or "its constraints leave none"))
+                continue
+            state = scene.state.with_q(q, self.indices)
+            contacts = self.tools.exact.contacts(scene, state, self.query.group)
+            if contacts:
+                return PlanningFailure(Code.GOAL_IN_COLLISION, "the goal is in collision: %s" % _named(contacts),
+                                       contacts)
+            violated = self._violated(goal, state, scene)
+            if violated:
+                unreached = unreached or PlanningFailure(Code.GOAL_CONSTRAINTS_VIOLATED, violated)
+        return unreached or PlanningFailure(Code.TIMED_OUT, "no posture of the goal was found within %.2f s"
+                                            % (_SHARE_FOR_GOALS * self.query.allowed_time))
+
+    def _samples(self, goal, scene, exact):
+        return self.tools.sampler(self.model, self.query.group, goal, scene, exact, self.tools.seed)
+
+    def _is_met(self, state, scene):
+        return any(not self._violated(goal, state, scene) for goal in self.query.goals)
+
+    def _violated(self, constraints, state, scene):
+        """The sentence on the first constraint that ``state`` does not meet, or an empty one."""
+        if constraints is None:
+            return ""
+        return next((sentence for satisfied, _, sentence in constraints.evaluate(self.model, state, scene)
+                     if not satisfied), "")
+
+    # -- path ---------------------------------------------------------------------------------------------------
+
+    def _path(self, scene, start, goals, attempt):
+        left = self.query.allowed_time - self._elapsed()
+        search = Search(exact=self.tools.exact, seed=self.tools.seed + attempt, allowed_time=max(left, 0.01),
+                        clock=self.tools.clock, planner_id=self.query.planner_id, stop=self.tools.stop)
+        try:
+            path = self.tools.plan_path(scene, self.query.group, start, goals, search)
+        except NoPath as error:
+            self._look_up()
+            late = self._elapsed() >= 0.98 * self.query.allowed_time
+            raise PlanningFailure(Code.TIMED_OUT if late else Code.PLANNING_FAILED, str(error)) from None
+        return np.asarray(getattr(path, "points", path), dtype=float)
+
+    def _timed(self, scene, lead, path):
+        velocity = self.model.velocity[self.indices] * self.query.velocity_scaling
+        acceleration = self.model.acceleration[self.indices] * self.query.acceleration_scaling
+        whole = np.concatenate([lead, path])
+        hit = None
+        through = self.query.timing.startswith("iterative")  # its splines keep to the lines by the points being near
+        for tolerance in _CORNERS:
+            points = _dense(whole, 2.0 * tolerance) if through else whole
+            timed = time_path(points, velocity, acceleration, self.query.timing, tolerance=tolerance)
+            hit = self._first_hit(scene, timed, len(lead) > 0)
+            if hit is None:
+                return Plan(self.query.scene.state, whole, timed, self._elapsed())
+        raise PlanningFailure(Code.INVALID_MOTION_PLAN, "a path was found, but the timed trajectory is not valid: %s"
+                              % hit[0], hit[1])
+
+    def _first_hit(self, scene, timed, from_collision):
+        """None, or (sentence, contacts) of the first state of a trajectory that may not be."""
+        states, _, _ = timed.sampled(_spaced(timed))
+        low, high = self.model.bounds[self.indices].T
+        turns = self.model.continuous[self.indices]
+        # Who starts a little beyond a limit is led back.
+        low, high = np.where(turns, -np.inf, np.minimum(low, states[0])), np.where(turns, np.inf,
+                                                                                  np.maximum(high, states[0]))
+        beyond = np.argwhere((states < low - 1e-6) | (states > high + 1e-6))
+        if len(beyond):
+            at, joint = beyond[0]
+            return "joint '%s' reaches %.4f, its limits are %.4f and %.4f" % (
+                self.names[joint], states[at, joint], low[joint], high[joint]), []
+        left = not from_collision
+        for q in states:
+            self._look_up()
+            state = scene.state.with_q(q, self.indices)
+            if not self.tools.exact.free(scene, state, self.query.group):
+                if left:
+                    contacts = self.tools.exact.contacts(scene, state, self.query.group)
+                    return _named(contacts), contacts
+            else:
+                left = True  # out of what the start state touched
+                violated = self._violated(self.query.path_constraints, state, scene)
+                if violated:
+                    return violated, []
+        return None
+
+    # -- time ---------------------------------------------------------------------------------------------------
+
+    def _elapsed(self):
+        return self.tools.clock() - self.begin
+
+    def _look_up(self):
+        if self.tools.stop():
+            raise PlanningFailure(Code.PREEMPTED, "planning was stopped after %.2f s" % self._elapsed())
+
+
+def _dense(path, spacing):
+    """The path (m, k) with points added, so that no joint moves by more than ``spacing`` between two."""
+    pieces = []
+    for a, b in itertools.pairwise(path):
+        count = max(1, math.ceil(float(np.abs(b - a).max()) / spacing))
+        pieces.append(a + (b - a) * np.arange(count)[:, None] / count)
+    return np.concatenate([*pieces, path[-1:]])
+
+
+def _spaced(timed):
+    """Times (n,) at which the joints are at most ``_RESOLUTION`` apart, the points among them."""
+    if len(timed.times) == 1:
+        return timed.times
+    speeds, _ = timed.peaks()
+    counts = np.maximum(1, np.ceil(speeds.max(axis=1) * np.diff(timed.times) / _RESOLUTION)).astype(int)
+    pieces = (np.linspace(a, b, count, endpoint=False)
+              for (a, b), count in zip(itertools.pairwise(timed.times), counts, strict=True))
+    return np.concatenate([*pieces, timed.times[-1:]])
+
+
+def _named(contacts):
+    named = "; ".join(map(str, contacts[:_NAMED]))
+    return named + ("; and %d more" % (len(contacts) - _NAMED) if len(contacts) > _NAMED else "")

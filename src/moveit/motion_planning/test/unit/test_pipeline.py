@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Requests to timed trajectories; each way to fail has its code and its sentence."""
+import time
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from motion_planning.exact import ExactChecker
+from motion_planning.pipeline import Code, PlanningFailure, PlanQuery, Tools, plan
+from motion_planning.planners import NoPath, plan_path
+from motion_planning.scene import Scene, WorldObject
+from urdf_model import Box
+from urdf_model.transforms import rigid
+
+BENT = (0.0, 0.3, 0.4, 0.0, 0.6, 0.0)
+ASIDE = (1.2, 0.3, 0.4, 0.0, 0.6, 0.5)
+# Joints 2 to 6, the tool far out.
+FORWARD = (-0.6, 0.4, 0.0, 0.4, 0.0)
+GROUP = "manipulator"
+
+
+@dataclass
+class Goal:
+    """A constraint set that one posture meets, or none."""
+
+    q: np.ndarray | None
+    tolerance: float = 1e-3
+
+    def evaluate(self, model, state, scene):
+        off = np.inf if self.q is None else float(np.abs(state.q - self.q).max())
+        return [(off <= self.tolerance, off, "the arm is off by %.3f" % off)]
+
+
+@dataclass
+class Upright:
+    """A path constraint: joint_2 stays above a bound."""
+
+    least: float
+
+    def evaluate(self, model, state, scene):
+        value = state.q[1]
+        return [(value >= self.least, self.least - value, "joint_2 is at %.3f, below %.3f" % (value, self.least))]
+
+
+@dataclass
+class Samples:
+    """Goal postures as constraints.sampler gives them."""
+
+    scene: Scene
+    goal: Goal
+    exact: ExactChecker | None
+    reason: str | None = None
+
+    def __iter__(self):
+        if self.goal.q is None:
+            self.reason = "out of reach: the arm is too short"
+        elif self.exact is None or self.exact.free(self.scene, self.scene.state.with_q(self.goal.q), GROUP):
+            yield self.goal.q
+
+
+def sampler(model, group, goal, scene, exact, seed):
+    return Samples(scene, goal, exact)
+
+
+@dataclass
+class Lab:
+    """A robot in a scene, and its checker."""
+
+    scene: Scene
+    exact: ExactChecker
+    plan_path: object = plan_path
+    stop: object = field(default=lambda: False)
+
+    def query(self, *goals, **options):
+        return PlanQuery(self.scene, options.pop("group", GROUP), [Goal(np.array(q)) for q in goals], **options)
+
+    def plan(self, *goals, **options):
+        return self.run(self.query(*goals, **options))
+
+    def run(self, query):
+        return plan(query, Tools(self.exact, self.plan_path, sampler, time.monotonic, 1, self.stop))
+
+    def refused(self, *goals, **options):
+        with pytest.raises(PlanningFailure) as failure:
+            self.plan(*goals, **options)
+        return failure.value
+
+    def with_box(self, name, position, size):
+        pose = rigid(np.eye(3), position)
+        return replace(self, scene=self.scene.with_object(WorldObject(name, pose, ((Box(size), np.eye(4)),))))
+
+    def tip(self, q):
+        return self.scene.model.frame_of(np.array(q), "tool0")[:3, 3]
+
+
+@pytest.fixture(scope="module")
+def checker(probot, meshes):
+    return ExactChecker(probot, meshes)
+
+
+@pytest.fixture
+def lab(probot, checker):
+    return Lab(Scene(probot, probot.state(np.array(BENT))), checker)
+
+
+def assert_valid(lab, found, resolution=0.01):
+    """What a controller would play: from the start to rest, within the limits, touching nothing."""
+    model, timed = lab.scene.model, found.timed
+    q, v, a = timed.sampled(np.linspace(0.0, timed.duration, max(500, int(timed.duration / 0.002))))
+    assert (np.abs(v) <= model.velocity * 1.001).all() and (np.abs(a) <= model.acceleration * 1.001).all()
+    assert (q >= model.bounds[:, 0] - 1e-6).all() and (q <= model.bounds[:, 1] + 1e-6).all()
+    assert np.allclose(v[[0, -1]], 0.0, atol=1e-6)
+    last = q[0] + 1.0
+    for state in q:
+        if np.abs(state - last).max() > resolution:
+            assert lab.exact.free(lab.scene, lab.scene.state.with_q(state)), state
+            last = state
+
+
+def test_a_free_way_is_planned(lab):
+    found = lab.plan(ASIDE)
+    assert np.allclose(found.timed.positions[0], BENT) and np.allclose(found.timed.positions[-1], ASIDE)
+    assert found.planning_time > 0.0 and found.start is lab.scene.state
+    assert_valid(lab, found)
+
+
+@pytest.mark.parametrize("timing", ["time_optimal_trajectory_generation", "iterative_time_parameterization", "ruckig"])
+def test_ways_around_a_wall_are_valid_as_played(lab, timing):
+    left, right = (-0.9, *FORWARD), (0.9, *FORWARD)
+    x, y, z = lab.tip((0.0, *FORWARD))
+    lab = lab.with_box("wall", (x, y, z), (0.1, 0.04, 0.2))
+    lab.scene = lab.scene.with_state(lab.scene.state.with_q(np.array(left)))
+    found = lab.plan(right, timing=timing)
+    assert len(found.path) > 2
+    assert_valid(lab, found)
+
+
+def test_scaling_slows(lab):
+    whole, tenth = lab.plan(ASIDE), lab.plan(ASIDE, velocity_scaling=0.1, acceleration_scaling=0.1)
+    assert tenth.timed.duration > 3.0 * whole.timed.duration
+
+
+def test_a_goal_that_is_met_is_one_point(lab):
+    found = lab.plan(BENT)
+    assert len(found.timed.times) == 1 and np.allclose(found.timed.positions[0], BENT)
+
+
+def test_one_goal_of_several_is_enough(lab):
+    query = replace(lab.query(ASIDE), goals=[Goal(None), Goal(np.array(ASIDE))])
+    assert np.allclose(lab.run(query).timed.positions[-1], ASIDE)
+
+
+def test_unknown_groups(lab):
+    failure = lab.refused(ASIDE, group="legs")
+    assert failure.code == Code.INVALID_GROUP_NAME and "'legs'" in str(failure) and "manipulator" in str(failure)
+
+
+def test_requests_without_goals_or_time(lab):
+    assert lab.refused().code == Code.INVALID_GOAL_CONSTRAINTS
+    for allowed in (0.0, float("nan"), -1.0):
+        assert lab.refused(ASIDE, allowed_time=allowed).code == Code.FAILURE
+
+
+def test_a_start_in_collision_names_the_pair(lab):
+    lab = lab.with_box("crate", lab.tip(BENT), (0.3, 0.3, 0.3))
+    failure = lab.refused(ASIDE)
+    assert failure.code == Code.START_STATE_IN_COLLISION
+    assert "'crate'" in str(failure) and "link_6" in str(failure)
+    assert "crate" in [contact.b for contact in failure.contacts]
+
+
+def test_a_start_that_just_touches_is_led_out(lab):
+    """A small box comes towards the tip, along the tool's axis, until they touch."""
+    pose = lab.scene.model.frame_of(np.array(BENT), "tool0")
+    for ahead in np.arange(0.1, 0.0, -0.001):
+        touching = lab.with_box("cube", pose[:3, 3] + ahead * pose[:3, 2], (0.02, 0.02, 0.02))
+        if touching.exact.contacts(touching.scene):
+            break
+    found = touching.plan(ASIDE, jiggle=0.05)
+    assert np.allclose(found.timed.positions[0], BENT) and np.allclose(found.timed.positions[-1], ASIDE)
+    last = touching.scene.state.with_q(found.timed.positions[-1])
+    assert touching.exact.free(touching.scene, last)
+
+
+def test_a_start_out_of_bounds_names_the_joint(lab, probot):
+    beyond = np.array(BENT)
+    beyond[1] = probot.bounds[1, 1] + 0.3
+    lab.scene = lab.scene.with_state(lab.scene.state.with_q(beyond))
+    failure = lab.refused(ASIDE)
+    assert failure.code == Code.START_STATE_INVALID and "joint_2" in str(failure)
+    assert failure.joints == {"joint_2": pytest.approx(beyond[1])}
+
+
+def test_a_start_a_little_out_of_bounds_comes_back(lab, probot):
+    beyond = np.array(BENT)
+    beyond[4] = probot.bounds[4, 0] - 0.02
+    lab.scene = lab.scene.with_state(lab.scene.state.with_q(beyond))
+    found = lab.plan(ASIDE)
+    assert found.timed.positions[0, 4] == pytest.approx(beyond[4])
+    assert (found.timed.positions[5:, 4] > probot.bounds[4, 0] - 0.02).all()
+    assert found.path[1, 4] == pytest.approx(probot.bounds[4, 0])
+
+
+def test_a_goal_in_collision_names_the_pair(lab):
+    lab = lab.with_box("crate", lab.tip(ASIDE), (0.06, 0.06, 0.06))
+    failure = lab.refused(ASIDE)
+    assert failure.code == Code.GOAL_IN_COLLISION and "'crate'" in str(failure)
+    assert failure.contacts
+
+
+def test_a_goal_out_of_reach_has_its_reason(lab):
+    with pytest.raises(PlanningFailure) as refused:
+        lab.run(replace(lab.query(), goals=[Goal(None)]))
+    failure = refused.value
+    assert failure.code == Code.NO_IK_SOLUTION and "the arm is too short" in str(failure)
+
+
+def test_path_constraints_at_both_ends(lab):
+    failure = lab.refused(ASIDE, path_constraints=Upright(0.5))
+    assert failure.code == Code.START_STATE_VIOLATES_PATH_CONSTRAINTS and "joint_2 is at 0.300" in str(failure)
+    low = (1.2, -0.3, 0.4, 0.0, 0.6, 0.5)
+    failure = lab.refused(low, path_constraints=Upright(0.0))
+    assert failure.code == Code.GOAL_VIOLATES_PATH_CONSTRAINTS and "joint_2 is at -0.300" in str(failure)
+
+
+def test_path_constraints_hold_on_the_way(lab):
+    """A planner that does not know of them may not pass one that breaks them."""
+    lab.plan_path = lambda scene, group, start, goals, search: np.array([start, np.array(BENT) - 0.5, goals[0]])
+    failure = lab.refused(ASIDE, path_constraints=Upright(0.2))
+    assert failure.code in (Code.INVALID_MOTION_PLAN, Code.PLANNING_FAILED) and "joint_2" in str(failure)
+
+
+def test_a_path_through_something_is_not_passed_on(lab):
+    middle = 0.5 * (np.array(BENT) + np.array(ASIDE))
+    lab = lab.with_box("post", lab.tip(middle), (0.05, 0.05, 0.05))
+    lab.plan_path = lambda scene, group, start, goals, search: np.array([start, goals[0]])
+    failure = lab.refused(ASIDE)
+    assert failure.code == Code.INVALID_MOTION_PLAN and "'post'" in str(failure)
+
+
+def test_planners_reasons_come_through(lab):
+    def none(scene, group, start, goals, search):
+        raise NoPath("the two trees did not meet")
+
+    lab.plan_path = none
+    failure = lab.refused(ASIDE)
+    assert failure.code == Code.PLANNING_FAILED and "did not meet" in str(failure)
+
+
+def test_stop_ends_planning(lab):
+    lab.stop = lambda: True
+    assert lab.refused(ASIDE).code == Code.PREEMPTED
+
+
+def test_the_shortest_of_several_attempts_counts(lab):
+    lengths = iter([3.0, 1.0, 2.0])
+
+    def by_way(scene, group, start, goals, search):
+        aside = np.array(start)
+        aside[0] -= next(lengths) * 0.1
+        return np.array([start, aside, goals[0]])
+
+    lab.plan_path = by_way
+    assert lab.plan(ASIDE, attempts=3).path[1, 0] == pytest.approx(-0.1)
