@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node move_group: motion planning behind MoveIt's actions, services and topics."""

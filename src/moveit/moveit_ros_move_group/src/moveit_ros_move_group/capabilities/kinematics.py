@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""compute_ik and compute_fk."""
+import rospy
+from moveit_msgs.msg import MoveItErrorCodes
+from moveit_msgs.srv import GetPositionFK, GetPositionFKResponse, GetPositionIK, GetPositionIKResponse
+
+from motion_planning.errors import PlanningError
+from motion_planning.kinematics import ik
+from moveit_ros_move_group.context import RequestError, answered
+from moveit_ros_move_group.convert.constraints import constraint_set_of
+from moveit_ros_move_group.convert.geometry import matrix_of, stamped
+from moveit_ros_move_group.convert.scene_out import state_message
+from urdf_model.transforms import inverse
+
+# [s], for a request without a time-out.
+_TIMEOUT_S = 0.05
+
+
+class Kinematics:
+    """Both services. timeouts: {group: kinematics_solver_timeout [s]}."""
+
+    def __init__(self, context, timeouts):
+        self.context, self._timeouts = context, timeouts
+        self._services = [rospy.Service("compute_ik", GetPositionIK, self._ik),
+                          rospy.Service("compute_fk", GetPositionFK, self._fk)]
+
+    @answered("compute_ik", GetPositionIKResponse)
+    def _ik(self, request, response):
+        request, context = request.ik_request, self.context
+        group = context.group(request.group_name)
+        scene = context.scene_from(request.robot_state, "compute_ik")
+        poses = self._poses(request, group, scene)
+        timeout = request.timeout.to_sec() or self._timeouts.get(group.name, _TIMEOUT_S)
+        constraints = constraint_set_of(request.constraints, scene, context.monitor.reader)
+        touching = []
+
+        def accept(q):
+            state = scene.state.with_q(q)
+            if request.avoid_collisions and not context.exact.free(scene, state, group.name):
+                touching[:] = context.exact.contacts(scene, state, group.name)
+                return "; ".join(map(str, touching[:3]))
+            return constraints.broken(context.model, state, scene, context.exact) if constraints is not None else None
+
+        try:
+            q = ik(context.model, group, poses, scene.state, timeout, accept)
+        except PlanningError as error:
+            raise RequestError(MoveItErrorCodes.NO_IK_SOLUTION, str(error), touching) from None
+        response.solution = state_message(context.model, scene.state.with_q(q), rospy.Time.now(), attached=False)
+
+    def _poses(self, request, group, scene):
+        """{link: pose (4, 4) in the planning frame} that a PositionIKRequest asks for."""
+        if request.pose_stamped_vector:
+            links, poses = list(request.ik_link_names), request.pose_stamped_vector
+            if len(links) != len(poses):
+                raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "%d poses but %d ik_link_names; name a link for "
+                                   "each" % (len(poses), len(links)))
+        else:
+            links, poses = [request.ik_link_name or group.tip], [request.pose_stamped]
+            if links == [None]:
+                raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "group '%s' is no chain; name the link for the "
+                                   "pose" % group.name)
+        unknown = [link for link in links if link not in self.context.model.link_index]
+        if unknown:
+            raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "the robot has no link '%s'" % unknown[0])
+        return {link: self.context.frame(scene, pose.header.frame_id) @ matrix_of(pose.pose, "the pose of '%s'" % link)
+                for link, pose in zip(links, poses, strict=True)}
+
+    @answered("compute_fk", GetPositionFKResponse)
+    def _fk(self, request, response):
+        context, model = self.context, self.context.model
+        scene = context.scene_from(request.robot_state, "compute_fk")
+        frame = request.header.frame_id.lstrip("/") or model.frame
+        seen_from = inverse(context.frame(scene, frame))
+        frames, stamp = scene.link_frames, rospy.Time.now()
+        for link in request.fk_link_names:
+            if link in model.link_index:
+                response.fk_link_names.append(link)
+                response.pose_stamped.append(stamped(seen_from @ frames[model.link_index[link]], frame, stamp))
+        unknown = [link for link in request.fk_link_names if link not in model.link_index]
+        if unknown or not request.fk_link_names:
+            raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "the robot has no link %s"
+                               % ", ".join("'%s'" % link for link in unknown) if unknown else "no link is named")

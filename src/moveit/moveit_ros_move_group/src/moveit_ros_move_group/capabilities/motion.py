@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""plan_kinematic_path, and the actions move_group and execute_trajectory."""
+import threading
+import time
+
+import actionlib
+import numpy as np
+import rospy
+from moveit_msgs.msg import (
+    ExecuteTrajectoryAction,
+    ExecuteTrajectoryFeedback,
+    ExecuteTrajectoryResult,
+    MotionPlanResponse,
+    MoveGroupAction,
+    MoveGroupFeedback,
+    MoveGroupResult,
+    MoveItErrorCodes,
+)
+from moveit_msgs.srv import ExecuteKnownTrajectory, ExecuteKnownTrajectoryResponse, GetMotionPlan, GetMotionPlanResponse
+from std_msgs.msg import String
+
+from motion_planning.errors import PlanningError
+from moveit_ros_move_group.context import RequestError, tell
+from moveit_ros_move_group.convert.scene_out import state_message, trajectory_message
+from moveit_ros_move_group.planning import scene_with_diff
+from moveit_ros_move_group.texts import result_text
+
+# How long [s] a joint state newer than the goal is waited for.
+_STATE_TIMEOUT_S = 1.0
+# Replanning, where neither the goal nor a parameter says how often.
+_REPLAN_ATTEMPTS = 5
+# The rest of a running trajectory is checked at states at most so far apart [rad or m, in any joint].
+_LOOK_AHEAD = 0.05
+
+
+class PlanService:
+    """``plan_kinematic_path``"""
+
+    def __init__(self, context, planner):
+        self.context, self._planner = context, planner
+        self._service = rospy.Service("plan_kinematic_path", GetMotionPlan, self._serve)
+
+    def _serve(self, request):
+        response = MotionPlanResponse()
+        request = request.motion_plan_request
+        response.group_name = request.group_name
+        begin = time.monotonic()
+        try:
+            scene = self.context.scene_from(request.start_state, "plan_kinematic_path")
+            response.trajectory_start = state_message(self.context.model, scene.state, rospy.Time.now())
+            plan = self._planner.plan(request, scene)
+            response.trajectory = show(self.context, request.group_name, plan)
+            response.planning_time = plan.planning_time
+            response.error_code.val = MoveItErrorCodes.SUCCESS
+        except Exception as error:  # the node outlives whatever a request does to it
+            response.error_code.val = failed(self.context, "plan_kinematic_path", error, request.group_name)[0]
+            response.planning_time = time.monotonic() - begin
+        return GetMotionPlanResponse(response)
+
+
+class MoveAction:
+    """The action ``move_group``: plan, or plan and execute."""
+
+    def __init__(self, context, planner, may_execute):
+        self.context, self._planner, self._may_execute = context, planner, may_execute
+        self._replan_attempts = rospy.get_param("~plan_execution/max_replan_attempts", _REPLAN_ATTEMPTS)
+        self._changed = threading.Event()
+        context.monitor.on_change(self._changed.set)
+        self._server = actionlib.SimpleActionServer("move_group", MoveGroupAction, self._run, auto_start=False)
+        self._server.start()
+
+    def _run(self, goal):
+        result = MoveGroupResult()
+        group = goal.request.group_name
+        plan_only = goal.planning_options.plan_only or not self._may_execute or self.context.executor is None
+        reason = ""
+        try:
+            self._feedback("PLANNING")
+            self.context.group(group)
+            self._wait_for_state(group)
+            if plan_only:
+                self._plan_only(goal, result)
+            else:
+                reason = self._plan_and_execute(goal, result)
+        except Exception as error:  # the node outlives whatever a request does to it
+            result.error_code.val, reason = failed(self.context, "move_group", error, group)
+        finally:
+            self._feedback("IDLE")
+        empty = len(result.planned_trajectory.joint_trajectory.points) < 2
+        finish(self._server, result, result_text(result.error_code.val, reason, empty=empty and not (
+            plan_only and result.error_code.val == MoveItErrorCodes.SUCCESS), plan_only=plan_only))
+
+    def _wait_for_state(self, group):
+        joints = self.context.model.groups[group].joints
+        late = self.context.monitor.wait_for_state(rospy.Time.now(), _STATE_TIMEOUT_S, joints,
+                                                   self._server.is_preempt_requested)
+        if late:
+            rospy.logwarn("move_group: %s", late)
+
+    def _plan_only(self, goal, result):
+        context, options = self.context, goal.planning_options
+        scene = context.scene_from(goal.request.start_state, "move_group")
+        scene = scene_with_diff(context, scene, options.planning_scene_diff, "move_group", keep_robot=False)
+        self._plan(goal.request, scene, result)
+        result.error_code.val = MoveItErrorCodes.SUCCESS
+
+    def _plan(self, request, scene, result):
+        result.trajectory_start = state_message(self.context.model, scene.state, rospy.Time.now())
+        plan = self._planner.plan(request, scene, self._server.is_preempt_requested)
+        result.planned_trajectory = show(self.context, request.group_name, plan)
+        result.planning_time = plan.planning_time
+        return plan
+
+    def _plan_and_execute(self, goal, result):
+        """Fill the result; return the reason where it is no success."""
+        context, options, request = self.context, goal.planning_options, goal.request
+        if request.start_state.joint_state.name and not request.start_state.is_diff:
+            rospy.logwarn("move_group: the start state is for planning alone; the robot starts where it is")
+        group = context.model.groups[request.group_name]
+        silent = [name for name in group.joints if name in context.monitor.missing_joints()]
+        if silent:
+            raise RequestError(MoveItErrorCodes.INVALID_ROBOT_STATE, "the complete state of the robot is not yet "
+                               "known: no joint state has come for %s on %s"
+                               % (", ".join(silent), context.monitor.joint_state_topic))
+        attempts = 1 + ((options.replan_attempts or self._replan_attempts) if options.replan else 0)
+        for attempt in range(attempts):
+            self._changed.clear()
+            scene = context.monitor.scene()
+            scene = scene_with_diff(context, scene, options.planning_scene_diff, "move_group", keep_robot=True)
+            plan = self._plan(request, scene, result)
+            if len(plan.timed.times) < 2:
+                result.error_code.val = MoveItErrorCodes.SUCCESS
+                return ""
+            self._feedback("MONITOR")
+            watch = _RestOfTheWay(context, group, plan.timed, self._changed, options.planning_scene_diff)
+            outcome = context.executor.execute(result.planned_trajectory, self._server.is_preempt_requested, watch.hit)
+            result.executed_trajectory = result.planned_trajectory
+            result.error_code.val = outcome.code
+            again = outcome.code == MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
+            if not again or attempt + 1 == attempts:
+                break
+            rospy.loginfo("move_group: %s; planning again", outcome.text)
+            self._pause(options.replan_delay)
+            self._feedback("PLANNING")
+        if outcome.code != MoveItErrorCodes.SUCCESS:
+            context.failures.tell("move_group", outcome.code, outcome.text, request.group_name, watch.contacts,
+                                  outcome.joints)
+        return outcome.text
+
+    def _pause(self, seconds):
+        end = time.monotonic() + max(0.0, min(seconds, 60.0))
+        while time.monotonic() < end and not self._server.is_preempt_requested() and not rospy.is_shutdown():
+            time.sleep(0.01)
+
+    def _feedback(self, state):
+        if self._server.is_active():
+            self._server.publish_feedback(MoveGroupFeedback(state))
+
+
+class _RestOfTheWay:
+    """Looks whether a change of the scene stands in what is left of a trajectory. contacts: of the last look."""
+
+    def __init__(self, context, group, timed, changed, diff):
+        self._context, self._group, self._timed = context, group, timed
+        self._changed, self._diff = changed, diff
+        self._begin = rospy.get_time()
+        self.contacts = []
+
+    def hit(self):
+        """None, or the sentence what is in the way. Looks only after a change."""
+        if not self._changed.is_set():
+            return None
+        self._changed.clear()
+        scene = scene_with_diff(self._context, self._context.monitor.scene(), self._diff, "move_group", keep_robot=True)
+        now = min(max(0.0, rospy.get_time() - self._begin), self._timed.duration)
+        times = np.linspace(now, self._timed.duration, 200)
+        before = None
+        for q in self._timed.sampled(times)[0]:
+            if before is not None and np.abs(q - before).max() < _LOOK_AHEAD:
+                continue
+            before = q
+            state = scene.state.with_q(q, self._group.indices)
+            if not self._context.exact.free(scene, state, self._group.name):
+                self.contacts = self._context.exact.contacts(scene, state, self._group.name)
+                return "in the way of what is left: %s" % self.contacts[0]
+        return None
+
+
+class ExecuteAction:
+    """The action ``execute_trajectory``."""
+
+    def __init__(self, context):
+        self.context = context
+        self._server = actionlib.SimpleActionServer("execute_trajectory", ExecuteTrajectoryAction, self._run,
+                                                    auto_start=False)
+        self._server.start()
+
+    def _run(self, goal):
+        result, reason = ExecuteTrajectoryResult(), ""
+        try:
+            if self.context.executor is None:
+                raise RequestError(MoveItErrorCodes.CONTROL_FAILED, "~allow_trajectory_execution is false")
+            self._server.publish_feedback(ExecuteTrajectoryFeedback("MONITOR"))
+            outcome = self.context.executor.execute(goal.trajectory, self._server.is_preempt_requested)
+            result.error_code.val, reason = outcome.code, outcome.text
+            if outcome.code != MoveItErrorCodes.SUCCESS:
+                self.context.failures.tell("execute_trajectory", outcome.code, outcome.text, joints=outcome.joints)
+        except Exception as error:  # the node outlives whatever a request does to it
+            result.error_code.val, reason = failed(self.context, "execute_trajectory", error)
+        self._server.publish_feedback(ExecuteTrajectoryFeedback("IDLE"))
+        finish(self._server, result, result_text(result.error_code.val, reason))
+
+
+class ExecuteService:
+    """``execute_kinematic_path``, which old clients look for."""
+
+    def __init__(self, context):
+        self.context = context
+        self._service = rospy.Service("execute_kinematic_path", ExecuteKnownTrajectory, self._serve)
+
+    def _serve(self, request):
+        response = ExecuteKnownTrajectoryResponse()
+        if not request.wait_for_execution:
+            threading.Thread(target=self._execute, args=(request.trajectory,), daemon=True).start()
+            response.error_code.val = MoveItErrorCodes.SUCCESS
+            return response
+        response.error_code.val = self._execute(request.trajectory)
+        return response
+
+    def _execute(self, trajectory):
+        outcome = self.context.executor.execute(trajectory)
+        if outcome.code != MoveItErrorCodes.SUCCESS:
+            self.context.failures.tell("execute_kinematic_path", outcome.code, outcome.text, joints=outcome.joints)
+        return outcome.code
+
+
+class StopEvent:
+    """The topic ``trajectory_execution_event``: "stop" ends what is being executed."""
+
+    def __init__(self, executor):
+        self._executor = executor
+        self._subscriber = rospy.Subscriber("trajectory_execution_event", String, self._on_event, queue_size=10)
+
+    def _on_event(self, message):
+        if message.data == "stop":
+            self._executor.stop()
+        else:
+            rospy.logwarn("trajectory_execution_event knows 'stop', not '%s'", message.data)
+
+
+def show(context, group, plan):
+    """Publish a pipeline.Plan as the planned path; return its RobotTrajectory."""
+    trajectory = trajectory_message(context.model.groups[group].joints, plan.timed, context.model.frame)
+    context.show_path(plan.start, trajectory)
+    return trajectory
+
+
+def failed(context, request, error, group=""):
+    """Tell of an exception; return (code, reason)."""
+    if isinstance(error, PlanningError):
+        return tell(context, request, error, group), str(error)
+    text = "%s: %s" % (type(error).__name__, error)
+    rospy.logerr("%s: %s", request, text)
+    context.failures.tell(request, MoveItErrorCodes.FAILURE, text, group)
+    return MoveItErrorCodes.FAILURE, text
+
+
+def finish(server, result, text):
+    """End an action's goal as MoveIt does: succeeded, preempted or aborted."""
+    if result.error_code.val == MoveItErrorCodes.SUCCESS:
+        server.set_succeeded(result, text)
+    elif result.error_code.val == MoveItErrorCodes.PREEMPTED:
+        server.set_preempted(result, text)
+    else:
+        server.set_aborted(result, text)

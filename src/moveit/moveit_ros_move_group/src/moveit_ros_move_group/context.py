@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the node's services and actions share."""
+import functools
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import rospy
+from moveit_msgs.msg import DisplayTrajectory, MoveItErrorCodes
+
+from motion_planning.errors import PlanningError
+from moveit_ros_move_group.convert.scene_out import state_message
+
+
+class RequestError(PlanningError):
+    """A request that cannot be done, with a value of MoveItErrorCodes."""
+
+    def __init__(self, code, text, contacts=(), joints=None):
+        super().__init__(text)
+        self.code, self.contacts, self.joints = code, list(contacts), dict(joints or {})
+
+
+@dataclass
+class Context:
+    """model: PlanningModel; monitor: SceneMonitor; exact: ExactChecker; failures: Failures; pipelines: {name:
+    Pipeline}, default_pipeline: name; executor: Executor, None where nothing may be moved."""
+
+    model: Any
+    monitor: Any
+    exact: Any
+    failures: Any
+    pipelines: dict
+    default_pipeline: str
+    executor: Any
+
+    def __post_init__(self):
+        self._paths = rospy.Publisher("~display_planned_path", DisplayTrajectory, queue_size=10, latch=True)
+
+    def group(self, name):
+        """Return a Group. Raises RequestError."""
+        if name not in self.model.groups:
+            raise RequestError(MoveItErrorCodes.INVALID_GROUP_NAME, "robot '%s' has no group '%s'; its groups are %s"
+                               % (self.model.name, name, ", ".join(self.model.groups) or "none"))
+        return self.model.groups[name]
+
+    def scene_from(self, state, request):
+        """Return the scene with the robot in the RobotState of a request, over where it is now.
+
+        Raises RequestError for one that cannot be understood. A state without joints that is no diff is taken for the
+        current one with a warning: half of all clients forget the flag.
+        """
+        scene, errors = self.monitor.scene(), []
+        empty = not (state.joint_state.name or state.multi_dof_joint_state.joint_names)
+        if empty and not state.is_diff and not state.attached_collision_objects:
+            rospy.logwarn_throttle(60.0, "%s: the robot state is empty and no diff; taken as the current state"
+                                   % request)
+            return scene
+        scene = self.monitor.reader.with_robot_state(scene, state, errors)
+        if errors:
+            raise RequestError(MoveItErrorCodes.INVALID_ROBOT_STATE, errors[0])
+        return scene
+
+    def frame(self, scene, name):
+        """Return the pose (4, 4) of a frame in the planning frame. Raises RequestError."""
+        try:
+            return self.monitor.reader.frame(scene, name)
+        except PlanningError as error:
+            raise RequestError(MoveItErrorCodes.FRAME_TRANSFORM_FAILURE, str(error)) from None
+
+    def show_path(self, start, trajectory):
+        """Publish a RobotTrajectory that begins in a State as the planned path."""
+        self._paths.publish(DisplayTrajectory(self.model.name, [trajectory],
+                                              state_message(self.model, start, attached=True)))
+
+
+def answered(name, response_type):
+    """A decorator for methods ``f(self, request, response)`` that serve ``name``: failures become error codes.
+
+    The response's ``error_code``, if it has one, is SUCCESS unless the method raises RequestError, which is told to
+    the context's failures, or anything else, which becomes FAILURE.
+    """
+    def decorate(method):
+        @functools.wraps(method)
+        def serve(self, request):
+            response = response_type()
+            code = MoveItErrorCodes.SUCCESS
+            try:
+                method(self, request, response)
+            except PlanningError as error:
+                code = tell(self.context, name, error, _group_of(request))
+            except Exception as error:  # the node outlives whatever a request does to it
+                rospy.logerr("%s: %s: %s", name, type(error).__name__, error)
+                code = MoveItErrorCodes.FAILURE
+            if hasattr(response, "error_code"):
+                response.error_code.val = response.error_code.val or code
+            return response
+        return serve
+    return decorate
+
+
+def tell(context, name, error, group=""):
+    """Tell the context's failures of a PlanningError; return its code."""
+    code = int(getattr(error, "code", MoveItErrorCodes.FAILURE))
+    context.failures.tell(name, code, str(error), group, getattr(error, "contacts", ()), getattr(error, "joints", None))
+    return code
+
+
+def _group_of(request):
+    return getattr(request, "group_name", "") or getattr(getattr(request, "ik_request", None), "group_name", "")
+
+
+def wall_clock():
+    """Planning takes wall time, whatever the simulation's clock does."""
+    return time.monotonic()

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What messages do to a scene, with MoveIt's meaning of each."""
+import math
+
+import numpy as np
+from moveit_msgs.msg import CollisionObject
+
+from motion_planning.errors import PlanningError
+from motion_planning.scene import AllowedCollisions, Scene, SceneError, WorldObject
+from moveit_ros_move_group.convert.geometry import (
+    MessageError,
+    matrix_of,
+    mesh_shape_of,
+    plane_shape_of,
+    shape_of,
+)
+from moveit_ros_move_group.convert.octomap import octree_of
+from urdf_model.transforms import inverse
+
+_OPERATIONS = {CollisionObject.ADD: "ADD", CollisionObject.REMOVE: "REMOVE", CollisionObject.APPEND: "APPEND",
+               CollisionObject.MOVE: "MOVE"}
+
+
+class SceneReader:
+    """Applies messages to scenes; frames that a scene does not know are looked up by ``find_frame``.
+
+    find_frame(name): pose (4, 4) in the planning frame; raises PlanningError where there is none.
+    """
+
+    def __init__(self, find_frame=None):
+        self._find_frame = find_frame
+
+    def frame(self, scene, name):
+        """Return the pose (4, 4) of a frame in the planning frame, which an empty name means. Raises PlanningError."""
+        name = name.lstrip("/")
+        if not name or name == scene.model.frame:
+            return np.eye(4)
+        if scene.has_frame(name) or self._find_frame is None:
+            return scene.frame(name)
+        return self._find_frame(name)
+
+    # -- objects ------------------------------------------------------------------------------------------------
+
+    def with_collision_object(self, scene, message):
+        """Return the scene after a CollisionObject. Raises PlanningError; the sentence names the object."""
+        operation = _operation(message)
+        try:
+            if operation == CollisionObject.REMOVE:
+                return scene.without_object(message.id)
+            frame = self.frame(scene, message.header.frame_id)
+            if operation == CollisionObject.MOVE:
+                return _moved(scene, message, frame)
+            new = _object_of(message, frame)
+            return scene.with_object(new) if operation == CollisionObject.ADD else scene.appended(new)
+        except PlanningError as error:
+            raise type(error)(_about("collision object", _OPERATIONS[operation], message.id, error)) from None
+
+    def with_attached_object(self, scene, message):
+        """Return the scene after an AttachedCollisionObject. Raises PlanningError; the sentence names the object."""
+        what = message.object
+        operation = _operation(what)
+        try:
+            if operation == CollisionObject.REMOVE:
+                if message.link_name and message.link_name not in scene.model.link_index:
+                    raise SceneError("the robot has no link '%s'" % message.link_name)
+                return scene.detach(what.id, message.link_name)
+            if operation == CollisionObject.MOVE:
+                raise SceneError("what is attached moves with its link; MOVE is for objects of the world")
+            if not (what.primitives or what.meshes or what.planes):
+                return scene.attach(what.id, message.link_name, message.touch_links, message.detach_posture)
+            if message.link_name not in scene.model.link_index:
+                return scene.attach(what.id, message.link_name)  # says that there is no such link
+            link = scene.frame(message.link_name)
+            frame = self.frame(scene, what.header.frame_id) if what.header.frame_id else link
+            new = _object_of(what, inverse(link) @ frame)
+            if operation == CollisionObject.APPEND and what.id in scene.state.attached:
+                return scene.attach_more(new, message.link_name)
+            return scene.attach(new, message.link_name, message.touch_links, message.detach_posture)
+        except PlanningError as error:
+            raise type(error)(_about("attached object", _OPERATIONS[operation], what.id, error)) from None
+
+    # -- states -------------------------------------------------------------------------------------------------
+
+    def with_robot_state(self, scene, message, errors):
+        """Return the scene after a RobotState: over what is there if it is a diff, else without what the robot held.
+
+        Joints that the model does not have are ignored. What cannot be understood is told to ``errors`` (list).
+        """
+        try:
+            scene = scene.with_state(state_over(scene, message, self))
+        except PlanningError as error:
+            errors.append(str(error))
+        if not message.is_diff:
+            scene = scene.with_state(scene.state.with_attached({}))
+        return self._each(scene, message.attached_collision_objects, self.with_attached_object, errors)
+
+    def with_planning_scene(self, scene, message):
+        """Return (scene after a PlanningScene message, list of sentences on what could not be applied)."""
+        errors = []
+        if not message.is_diff:
+            scene = Scene(scene.model, scene.state.with_attached({}), name=message.name)
+        if message.fixed_frame_transforms:
+            scene = self._with_transforms(scene, message.fixed_frame_transforms, errors)
+        held_before = set(scene.state.attached)
+        state = message.robot_state
+        if state.joint_state.name or state.multi_dof_joint_state.joint_names or state.attached_collision_objects:
+            scene = self.with_robot_state(scene, state, errors)
+        matrix = message.allowed_collision_matrix
+        if matrix.entry_names or matrix.default_entry_names:
+            try:
+                scene = scene.with_allowed(AllowedCollisions.from_matrix(
+                    matrix.entry_names, [row.enabled for row in matrix.entry_values], matrix.default_entry_names,
+                    matrix.default_entry_values))
+            except ValueError as error:
+                errors.append(str(error))
+        try:
+            scene = scene.with_padding({entry.link_name: entry.padding for entry in message.link_padding},
+                                       {entry.link_name: entry.scale for entry in message.link_scale})
+        except SceneError as error:
+            errors.append(str(error))
+        scene = self._with_world(scene, message.world, held_before, errors)
+        if message.object_colors:
+            scene = scene.with_colours({entry.id: (entry.color.r, entry.color.g, entry.color.b, entry.color.a)
+                                        for entry in message.object_colors})
+        return scene, errors
+
+    def with_world(self, scene, message):
+        """Return (scene after a PlanningSceneWorld, which replaces the world, errors)."""
+        errors = []
+        return self._with_world(scene.without_object("").with_octomap(None), message, set(), errors), errors
+
+    def _with_world(self, scene, message, held_before, errors):
+        # One who attaches an object often removes it from the world in the same message; it has left it by then.
+        taken = {name for name in scene.state.attached if name not in held_before and name not in scene.objects}
+        objects = [one for one in message.collision_objects
+                   if not (one.id in taken and one.operation == CollisionObject.REMOVE)]
+        scene = self._each(scene, objects, self.with_collision_object, errors)
+        if message.octomap.octomap.id:
+            try:
+                octree = octree_of(message.octomap.octomap)
+                pose = self.frame(scene, message.octomap.header.frame_id) @ matrix_of(message.octomap.origin, "octomap")
+                scene = scene.with_octomap(octree, pose)
+            except PlanningError as error:
+                errors.append("octomap: %s" % error)
+        return scene
+
+    def _with_transforms(self, scene, transforms, errors):
+        known = {}
+        for entry in transforms:
+            try:
+                parent = self.frame(scene, entry.header.frame_id)
+                known[entry.child_frame_id.lstrip("/")] = parent @ matrix_of(entry.transform, entry.child_frame_id)
+            except PlanningError as error:
+                errors.append("fixed frame '%s': %s" % (entry.child_frame_id, error))
+        return scene.with_transforms(known)
+
+    def _each(self, scene, messages, apply, errors):
+        for message in messages:
+            try:
+                scene = apply(scene, message)
+            except PlanningError as error:
+                errors.append(str(error))
+        return scene
+
+
+def state_over(scene, message, reader):
+    """Return the scene's State with the joints and the base of a RobotState message in place.
+
+    Raises MessageError for lists of different lengths and values that are not finite.
+    """
+    model, state = scene.model, scene.state
+    joints = message.joint_state
+    if len(joints.name) != len(joints.position):
+        raise MessageError("the robot state has %d joint names but %d positions"
+                           % (len(joints.name), len(joints.position)))
+    bad = [name for name, value in zip(joints.name, joints.position, strict=True) if not math.isfinite(value)]
+    if bad:
+        raise MessageError("the robot state's value of joint '%s' is not finite" % bad[0])
+    state = state.with_joints({name: value for name, value in zip(joints.name, joints.position, strict=True)
+                               if name in model.index})
+    multi = message.multi_dof_joint_state
+    if len(multi.joint_names) != len(multi.transforms):
+        raise MessageError("the robot state has %d multi-DOF joints but %d transforms"
+                           % (len(multi.joint_names), len(multi.transforms)))
+    for name, transform in zip(multi.joint_names, multi.transforms, strict=True):
+        if model.virtual_joint is not None and name == model.virtual_joint.name:
+            frame = reader.frame(scene, multi.header.frame_id)
+            state = state.with_base(frame @ matrix_of(transform, "joint '%s'" % name))
+    return state
+
+
+def _operation(message):
+    value = message.operation
+    # rospy reads a byte as a number, but clients in Python set what they like.
+    value = value[0] if isinstance(value, bytes) and value else value
+    if value not in _OPERATIONS:
+        raise MessageError("operation %r of object '%s' is none of ADD 0, REMOVE 1, APPEND 2, MOVE 3"
+                           % (value, message.id))
+    return value
+
+
+def _about(kind, operation, name, error):
+    return "%s of %s '%s' refused: %s" % (operation, kind, name, error)
+
+
+def _is_unset(pose):
+    return not any((pose.position.x, pose.position.y, pose.position.z, pose.orientation.x, pose.orientation.y,
+                    pose.orientation.z, pose.orientation.w))
+
+
+def _object_of(message, frame):
+    """The WorldObject of a CollisionObject's shapes; ``frame`` (4, 4): its header's, where the poses shall be given."""
+    shapes = []
+    for kind, items, poses, convert in (("primitives", message.primitives, message.primitive_poses, shape_of),
+                                        ("meshes", message.meshes, message.mesh_poses, mesh_shape_of),
+                                        ("planes", message.planes, message.plane_poses, plane_shape_of)):
+        if len(poses) > len(items):
+            raise MessageError("%d %s but %d poses" % (len(items), kind, len(poses)))
+        for i, item in enumerate(items):
+            pose = matrix_of(poses[i], "the pose of a shape") if i < len(poses) else np.eye(4)
+            shape = convert(item)
+            if isinstance(shape, tuple):
+                shape, inner = shape
+                pose = pose @ inner
+            shapes.append((shape, pose))
+    if len(message.subframe_names) != len(message.subframe_poses):
+        raise MessageError("%d subframes but %d poses" % (len(message.subframe_names), len(message.subframe_poses)))
+    subframes = {name: matrix_of(pose, "subframe '%s'" % name)
+                 for name, pose in zip(message.subframe_names, message.subframe_poses, strict=True)}
+    pose = matrix_of(message.pose, "its pose")
+    if _is_unset(message.pose) and len(shapes) == 1:
+        shape, pose = shapes[0]
+        shapes = [(shape, np.eye(4))]
+    return WorldObject(message.id, frame @ pose, tuple(shapes), subframes, (message.type.key, message.type.db))
+
+
+def _moved(scene, message, frame):
+    if message.primitives or message.meshes or message.planes:
+        raise MessageError("a MOVE carries poses only, this one has shapes too; ADD replaces an object")
+    poses = [matrix_of(pose, "the pose of a shape")
+             for pose in (*message.primitive_poses, *message.mesh_poses, *message.plane_poses)]
+    if _is_unset(message.pose) and len(poses) == 1:
+        return scene.moved(message.id, frame @ poses[0], [np.eye(4)])
+    return scene.moved(message.id, frame @ matrix_of(message.pose, "its pose"), poses or None)

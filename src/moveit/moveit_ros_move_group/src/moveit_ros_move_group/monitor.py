@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeps the planning scene up to date with the topics and services that change it, and publishes its changes."""
+import math
+import threading
+import time
+
+import numpy as np
+import rospy
+import tf2_ros
+from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene, PlanningSceneWorld
+from sensor_msgs.msg import JointState
+
+from motion_planning.errors import PlanningError
+from motion_planning.scene import Scene
+from moveit_ros_move_group.convert.geometry import MessageError, matrix_of
+from moveit_ros_move_group.convert.scene_in import SceneReader
+from moveit_ros_move_group.convert.scene_out import scene_diff, scene_message
+
+# How long [s] a frame that tf does not know yet is waited for, in wall time.
+_FRAME_TIMEOUT_S = 0.5
+_NAMES = {"joint_state_topic": "joint_states", "attached_collision_object_topic": "attached_collision_object",
+          "planning_scene_topic": "planning_scene"}
+
+
+class SceneMonitor:
+    """The scene as it is now: what messages said, with the robot where its joint states say it is.
+
+    continuous: names of the joints that turn without end. Calls may come from any thread.
+    """
+
+    def __init__(self, model, say_failure):
+        """say_failure(request, text): told what could not be applied."""
+        self.model = model
+        self.continuous = {name for name, turns in zip(model.variables, model.continuous, strict=True) if turns}
+        self._say_failure = say_failure
+        self._lock, self._news = threading.RLock(), threading.Condition()
+        self._scene, self._octomap = Scene(model), None
+        self._values, self._stamps, self._updates = {}, {}, 0
+        self._base, self._newest_stamp = np.eye(4), rospy.Time()
+        self._listeners = []
+        self._buffer = None
+        self.reader = SceneReader(self.tf_frame)
+        options = rospy.get_param("~planning_scene_monitor_options", {})
+        topics = {key: options.get(key, usual) for key, usual in _NAMES.items()}
+        if model.virtual_joint is not None and model.virtual_joint.type != "fixed":
+            self._listen_to_tf()
+        self._bounds_error = float(np.finfo(float).eps)
+        settings = rospy.get_param("~planning_scene_monitor", {})
+        self._publishes = bool(settings.get("publish_planning_scene", False))
+        self._publishes_states = bool(settings.get("publish_state_updates", False))
+        self._hz = float(settings.get("publish_planning_scene_hz", 4.0) or 4.0)
+        self._publisher = rospy.Publisher(options.get("monitored_planning_scene_topic", "~monitored_planning_scene"),
+                                          PlanningScene, queue_size=100)
+        self._subscribers = [
+            rospy.Subscriber(topics["joint_state_topic"], JointState, self._on_joint_state, queue_size=25),
+            rospy.Subscriber(topics["planning_scene_topic"], PlanningScene, self._on_scene, queue_size=100),
+            rospy.Subscriber("collision_object", CollisionObject, self._on_object, queue_size=1024),
+            rospy.Subscriber(topics["attached_collision_object_topic"], AttachedCollisionObject, self._on_attached,
+                             queue_size=1024),
+            rospy.Subscriber("planning_scene_world", PlanningSceneWorld, self._on_world, queue_size=10)]
+        self.joint_state_topic = self._subscribers[0].resolved_name
+        threading.Thread(target=self._publish_changes, daemon=True).start()
+
+    # -- the scene ----------------------------------------------------------------------------------------------
+
+    def scene(self):
+        """The Scene with the robot where it is now, joints without a joint state where the scene had them."""
+        with self._lock:
+            scene = self._scene
+            q = scene.state.q.copy()
+            for name, value in self._values.items():
+                q[self.model.index[name]] = value
+            state = scene.state.with_q(self._onto_limits(q))
+            return scene.with_state(state.with_base(self._robot_base(state.base)))
+
+    def octomap(self):
+        """The OctomapWithPose that the scene's octomap came with, or None."""
+        return self._octomap
+
+    def apply(self, message, request):
+        """Apply a PlanningScene; return the list of sentences on what could not be. ``request`` names who asked."""
+        # Where attached things hang depends on where the robot is.
+        errors = self._change(lambda _: self.reader.with_planning_scene(self.scene(), message), request)
+        if message.world.octomap.octomap.id:
+            self._octomap = message.world.octomap
+        elif not message.is_diff:
+            self._octomap = None
+        return errors
+
+    def clear_octomap(self):
+        self._octomap = None
+        self._change(lambda scene: (scene.with_octomap(None), []), "clear_octomap")
+
+    def change(self, function, request):
+        """Put ``function(scene)`` in the scene's place. Raises PlanningError and leaves the scene as it is."""
+        with self._lock:
+            self._scene = function(self._scene)
+        self._tell()
+
+    def on_change(self, listener):
+        """``listener()`` is called after each change of the scene that is not the robot's motion."""
+        self._listeners.append(listener)
+
+    def _change(self, function, request):
+        with self._lock:
+            try:
+                self._scene, errors = function(self._scene)
+            except PlanningError as error:
+                errors = [str(error)]
+        for error in errors:
+            self._say_failure(request, error)
+        self._tell()
+        return errors
+
+    def _tell(self):
+        for listener in self._listeners:
+            listener()
+
+    def _on_scene(self, message):
+        self.apply(message, "planning_scene")
+
+    def _on_object(self, message):
+        self._change(lambda scene: (self.reader.with_collision_object(scene, message), []), "collision_object")
+
+    def _on_attached(self, message):
+        self._change(lambda _: (self.reader.with_attached_object(self.scene(), message), []),
+                     "attached_collision_object")
+
+    def _on_world(self, message):
+        self._octomap = message.octomap if message.octomap.octomap.id else None
+        self._change(lambda scene: self.reader.with_world(scene, message), "planning_scene_world")
+
+    # -- the robot ----------------------------------------------------------------------------------------------
+
+    def joint_values(self):
+        """{joint: newest value} of the joints that have been heard of."""
+        with self._lock:
+            return dict(self._values)
+
+    def joint_update(self):
+        """(number of the newest joint state, {joint: value})"""
+        with self._lock:
+            return self._updates, dict(self._values)
+
+    def missing_joints(self):
+        """Joints of the model that no message has told a value of; passive ones do not count."""
+        with self._lock:
+            return [name for name in self.model.variables
+                    if name not in self._values and name not in self.model.passive]
+
+    def state_stamp(self):
+        """The stamp of the newest joint state."""
+        return self._newest_stamp
+
+    def wait_for_state(self, after, timeout_s, joints=(), given_up=lambda: False):
+        """Wait in wall time until each of ``joints`` has a value no older than ``after`` (rospy.Time).
+
+        Returns None, or the sentence why that did not come to be.
+        """
+        deadline = time.monotonic() + timeout_s
+        with self._news:
+            while not rospy.is_shutdown() and not given_up():
+                with self._lock:
+                    late = [name for name in joints if self._stamps.get(name, rospy.Time()) < after
+                            or name not in self._values]
+                if not late:
+                    return None
+                rest = deadline - time.monotonic()
+                if rest <= 0.0:
+                    break
+                self._news.wait(min(rest, 0.05))
+        never = [name for name in late if name not in self._values]
+        if never:
+            return "no joint state has come for %s; is %s the right topic, and does every joint stand in it?" % (
+                ", ".join(never), self.joint_state_topic)
+        return "the newest joint state of %s is of %.3f s, older than the request (%.3f s); do clocks agree?" % (
+            late[0], self._stamps[late[0]].to_sec(), after.to_sec())
+
+    def _on_joint_state(self, message):
+        if len(message.name) != len(message.position):
+            return
+        stamp = message.header.stamp
+        with self._lock:
+            if stamp + rospy.Duration(1.0) < self._newest_stamp:
+                self._stamps.clear()  # time has gone back, as by a reset of the simulation
+            for name, value in zip(message.name, message.position, strict=True):
+                if name in self.model.index and math.isfinite(value):
+                    self._values[name], self._stamps[name] = value, stamp
+            self._newest_stamp = stamp
+            self._updates += 1
+        with self._news:
+            self._news.notify_all()
+
+    def _onto_limits(self, q):
+        low, high = self.model.bounds.T
+        near = ~self.model.continuous & (q > low - self._bounds_error) & (q < high + self._bounds_error)
+        return np.where(near, np.clip(q, low, high), q)
+
+    def _robot_base(self, before):
+        joint = self.model.virtual_joint
+        if self._buffer is None or joint is None:
+            return before
+        try:
+            found = self._buffer.lookup_transform_core(joint.parent_frame, joint.child_link, rospy.Time())
+            return matrix_of(found.transform)
+        except (tf2_ros.TransformException, MessageError) as error:
+            rospy.logwarn_throttle(30.0, "tf does not say where '%s' is in '%s' (%s); taken as the same"
+                                   % (joint.child_link, joint.parent_frame, error))
+            return before
+
+    # -- frames -------------------------------------------------------------------------------------------------
+
+    def tf_frame(self, name):
+        """Return the pose (4, 4) of a tf frame in the planning frame. Raises PlanningError."""
+        self._listen_to_tf()
+        deadline = time.monotonic() + _FRAME_TIMEOUT_S
+        while True:
+            for known in (self.model.frame, self.model.root):
+                try:
+                    found = matrix_of(self._buffer.lookup_transform_core(known, name, rospy.Time()).transform)
+                    return found if known == self.model.frame else self.scene().frame(known) @ found
+                except tf2_ros.TransformException as error:
+                    reason = str(error)
+            if time.monotonic() > deadline or rospy.is_shutdown():
+                raise MessageError("'%s' is no frame: neither of the robot, nor an object or subframe of the scene, "
+                                   "nor does tf lead from it to '%s' (%s)" % (name, self.model.frame, reason))
+            time.sleep(0.02)
+
+    def _listen_to_tf(self):
+        if self._buffer is None:
+            self._buffer = tf2_ros.Buffer(debug=False)
+            self._listener = tf2_ros.TransformListener(self._buffer)
+
+    # -- what is published ---------------------------------------------------------------------------------------
+
+    def _publish_changes(self):
+        published = None
+        while not rospy.is_shutdown():
+            time.sleep(1.0 / self._hz)
+            if not self._publishes:
+                continue
+            try:
+                published = self._publish_change(published)
+            except rospy.ROSException:
+                return
+
+    def _publish_change(self, published):
+        scene, stamp = self.scene(), self.state_stamp()
+        if published is None:
+            self._publisher.publish(scene_message(scene, octomap=self._octomap, stamp=stamp))
+            return scene
+        if np.array_equal(scene.state.q, published.state.q) and scene.state.attached is published.state.attached and \
+                np.array_equal(scene.state.base, published.state.base) or not self._publishes_states and \
+                scene.state.attached is published.state.attached:
+            scene = scene.with_state(published.state)
+        unchanged = scene.state is published.state and all(
+            getattr(scene, name) is getattr(published, name)
+            for name in ("objects", "allowed", "colours", "octomap", "transforms", "link_padding", "link_scale"))
+        if not unchanged:
+            self._publisher.publish(scene_diff(published, scene, stamp, self._octomap))
+        return scene

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node: reads what it needs, builds the core, serves."""
+import argparse
+import logging
+import signal
+import sys
+import threading
+import time
+
+import rospy
+
+from model_files.resources import ResourceFinder
+from motion_planning.errors import PlanningError
+from motion_planning.exact import ExactChecker
+from motion_planning.model import MeshReader, PlanningModel
+from moveit_ros_move_group import settings
+from moveit_ros_move_group.capabilities import cartesian, kinematics, motion, planners, scene
+from moveit_ros_move_group.context import Context
+from moveit_ros_move_group.execution import Executor
+from moveit_ros_move_group.failures import Failures
+from moveit_ros_move_group.monitor import SceneMonitor
+from moveit_ros_move_group.planning import Planner
+from rospy_limits.node import limit_ports
+
+# Wall time to wait for the robot's model [s].
+_DESCRIPTION_TIMEOUT_S = 60.0
+
+
+class StartError(PlanningError):
+    """Something that the node cannot start without."""
+
+
+def build():
+    """Return what has to be kept alive. Raises PlanningError."""
+    name = rospy.get_param("~robot_description", rospy.get_param("~planning_scene_monitor_options/robot_description",
+                                                                  "robot_description"))
+    urdf = _wait_for_param(name)
+    srdf = _wait_for_param(name + "_semantic")
+    limits = rospy.get_param(name + "_planning/joint_limits", None)
+    model = PlanningModel.from_xml(urdf, srdf, {"joint_limits": limits} if limits else None)
+    failures = Failures(model.frame)
+    monitor = SceneMonitor(model, lambda request, text: failures.tell(request, 0, text))
+    exact = ExactChecker(model, MeshReader(ResourceFinder()))
+    pipes, usual, complaints = settings.pipelines(model.groups)
+    wanted, unknown = settings.capabilities()
+    for text in (*model.warnings, *exact.warnings, *complaints, *unknown):
+        rospy.logwarn("%s", text)
+    may_execute = rospy.get_param("~allow_trajectory_execution", True)
+    context = Context(model, monitor, exact, failures, pipes, usual, _executor(monitor) if may_execute else None)
+    kept = [context, *_capabilities(context, wanted, name, may_execute)]
+    if context.executor is not None:
+        kept.append(motion.StopEvent(context.executor))
+    return kept
+
+
+def _executor(monitor):
+    controllers, complaints = settings.controllers()
+    for text in complaints:
+        rospy.logwarn("%s", text)
+    rospy.loginfo("controllers: %s", ", ".join(map(str, controllers)) or "none; plans cannot be executed")
+    return Executor(controllers, settings.execution_settings(), monitor, settings.initial_positions(monitor.model))
+
+
+def _capabilities(context, wanted, description, may_execute):
+    planner = Planner(context)
+    timeouts = {group: entry["kinematics_solver_timeout"]
+                for group, entry in (rospy.get_param(description + "_kinematics", {}) or {}).items()
+                if isinstance(entry, dict) and isinstance(entry.get("kinematics_solver_timeout"), (int, float))}
+    offered = {
+        "MoveGroupCartesianPathService": lambda: cartesian.CartesianPath(context),
+        "MoveGroupKinematicsService": lambda: kinematics.Kinematics(context, timeouts),
+        "MoveGroupExecuteTrajectoryAction": lambda: motion.ExecuteAction(context),
+        "MoveGroupMoveAction": lambda: motion.MoveAction(context, planner, may_execute),
+        "MoveGroupPlanService": lambda: motion.PlanService(context, planner),
+        "MoveGroupQueryPlannersService": lambda: planners.Planners(context),
+        "MoveGroupStateValidationService": lambda: scene.StateValidity(context),
+        "MoveGroupGetPlanningSceneService": lambda: scene.GetScene(context),
+        "ApplyPlanningSceneService": lambda: scene.ApplyScene(context),
+        "ClearOctomapService": lambda: scene.ClearOctomap(context),
+        "MoveGroupExecuteService": lambda: motion.ExecuteService(context),
+    }
+    return [make() for name, make in offered.items() if "move_group/" + name in wanted]
+
+
+def _wait_for_param(name):
+    start = told = time.monotonic()
+    while not rospy.is_shutdown():
+        if rospy.has_param(name):
+            return rospy.get_param(name)
+        now = time.monotonic()
+        if now - start > _DESCRIPTION_TIMEOUT_S:
+            break
+        if now - told > 5.0:
+            rospy.loginfo("waiting for parameter %s", rospy.resolve_name(name))
+            told = now
+        time.sleep(0.05)
+    raise StartError("parameter %s is not set; load the robot first (planning_context.launch with "
+                     "load_robot_description:=true)" % rospy.resolve_name(name))
+
+
+def _end_on_signals():
+    """End on Ctrl-C, from a thread of its own: where the main thread is interrupted it may hold a lock of rospy's that
+    the shutdown waits for."""
+    def end(number, _frame):
+        threading.Thread(target=rospy.signal_shutdown, args=("signal %d" % number,)).start()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, end)
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Plan and execute motions behind MoveIt's interface.")
+    parser.add_argument("--debug", action="store_true", help="log more")
+    options = parser.parse_args(rospy.myargv()[1:])
+    _end_on_signals()
+    try:
+        limit_ports()
+        rospy.init_node("move_group", disable_signals=True, log_level=rospy.DEBUG if options.debug else rospy.INFO)
+        logging.getLogger("actionlib").setLevel(logging.WARNING)
+        kept = build()  # noqa: F841  (keeps services and subscribers alive)
+    except (PlanningError, rospy.ROSInitException) as error:
+        if not rospy.is_shutdown():
+            sys.exit("move_group: %s" % error)
+        return
+    # Scripts wait for this line.
+    print("\nYou can start planning now!\n", flush=True)
+    rospy.spin()

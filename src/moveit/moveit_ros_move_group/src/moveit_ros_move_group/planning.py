@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""MotionPlanRequests to plans."""
+import itertools
+import math
+import re
+from dataclasses import replace
+
+import rospy
+from moveit_msgs.msg import MoveItErrorCodes
+
+from motion_planning import pipeline
+from motion_planning.constraints import sampler
+from motion_planning.errors import PlanningError
+from motion_planning.planners import plan_path
+from moveit_ros_move_group.capabilities.cartesian import slowed
+from moveit_ros_move_group.context import RequestError, wall_clock
+from moveit_ros_move_group.convert.constraints import constraint_set_of
+
+# [s], where a request has none.
+_USUAL_TIME_S = 5.0
+# The planner that stands for the others.
+OURS = "RRTConnect"
+
+
+class Planner:
+    """Plans requests. Calls may come from any thread."""
+
+    def __init__(self, context):
+        self._context = context
+        self._warned = set()
+        self._seeds = itertools.count()
+
+    def plan(self, request, scene, stop=lambda: False):
+        """Return a pipeline.Plan for a MotionPlanRequest from the state of ``scene``. Raises PlanningError."""
+        context = self._context
+        pipe = self._pipeline(request)
+        self._remark_on_planner(request, pipe)
+        try:
+            goals = [constraint_set_of(goal, scene, context.monitor.reader) for goal in request.goal_constraints]
+            path_constraints = constraint_set_of(request.path_constraints, scene, context.monitor.reader)
+        except PlanningError as error:
+            raise RequestError(getattr(error, "code", MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS), str(error)) from None
+        if any(goal is None for goal in goals):
+            raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "a goal without any constraint says nothing")
+        query = pipeline.PlanQuery(
+            scene, request.group_name, goals, path_constraints, request.planner_id,
+            request.allowed_planning_time if request.allowed_planning_time > 0.0 else _USUAL_TIME_S,
+            request.num_planning_attempts, _scaling(request.max_velocity_scaling_factor),
+            _scaling(request.max_acceleration_scaling_factor), pipe.timing, pipe.start_bounds_error, pipe.jiggle)
+        tools = pipeline.Tools(context.exact, plan_path, sampler, wall_clock, next(self._seeds),
+                               lambda: stop() or rospy.is_shutdown())
+        plan = pipeline.plan(query, tools)
+        return self._limited(request, plan)
+
+    def _limited(self, request, plan):
+        """The plan, slowed to ``max_cartesian_speed`` where the request limits a link's speed."""
+        speed, link = request.max_cartesian_speed, request.cartesian_speed_limited_link
+        group = self._context.group(request.group_name)
+        link = link or group.tip
+        if not speed > 0.0 or len(plan.timed.times) < 2 or link not in self._context.model.link_index:
+            return plan
+        return plan._replace(timed=slowed(self._context.model, plan.start, group, link, plan.timed, speed))
+
+    def _pipeline(self, request):
+        name = request.pipeline_id or self._context.default_pipeline
+        if name not in self._context.pipelines:
+            raise RequestError(MoveItErrorCodes.FAILURE, "there is no planning pipeline '%s'; there are %s"
+                               % (name, ", ".join(self._context.pipelines)))
+        return self._context.pipelines[name]
+
+    def _remark_on_planner(self, request, pipe):
+        """Warn once of a planner that another stands for, and of a name that nobody knows."""
+        asked = request.planner_id or pipe.default_planner(request.group_name)
+        name = re.sub(r"^.*\[(.*)\]$", r"\1", asked)
+        kind = pipe.planners.get(name, {}).get("type", name).rpartition("::")[2]
+        kind = kind[:-len("kConfigDefault")] if kind.endswith("kConfigDefault") else kind
+        if not name or kind == OURS or asked in self._warned:
+            return
+        self._warned.add(asked)
+        if name in pipe.planners:
+            rospy.logwarn("planner '%s' is not built in; RRTConnect, with paths shortened, plans in its place", name)
+        else:
+            rospy.logwarn("there is no planner '%s' in pipeline '%s'; RRTConnect plans. Its planners are %s", name,
+                          pipe.name, ", ".join(pipe.planners) or "not listed")
+
+
+def _scaling(factor):
+    """A scaling factor as MoveIt takes it: 1 for what is not above 0 or above 1."""
+    return factor if math.isfinite(factor) and 0.0 < factor <= 1.0 else 1.0
+
+
+def scene_with_diff(context, scene, diff, request, keep_robot):
+    """Return ``scene`` with a request's planning_scene_diff applied; ``keep_robot``: without its robot state.
+
+    Raises RequestError for a diff that cannot be applied as a whole.
+    """
+    if not diff.is_diff and not (diff.world.collision_objects or diff.robot_state.joint_state.name):
+        return scene  # nothing was filled in
+    before = scene.state
+    changed, errors = context.monitor.reader.with_planning_scene(scene, _as_diff(diff))
+    if errors:
+        raise RequestError(MoveItErrorCodes.FAILURE, "%s: planning_scene_diff: %s" % (request, errors[0]))
+    return changed.with_state(replace(changed.state, q=before.q, base=before.base)) if keep_robot else changed
+
+
+def _as_diff(message):
+    message.is_diff = True
+    message.robot_state.is_diff = True
+    return message

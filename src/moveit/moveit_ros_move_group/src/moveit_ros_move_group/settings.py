@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What move_group reads from the parameter server."""
+import math
+from dataclasses import dataclass, field
+
+import rospy
+
+from moveit_ros_move_group.controllers import read_list
+from moveit_ros_move_group.execution import ExecutionSettings
+
+DEFAULT_CAPABILITIES = (
+    "move_group/MoveGroupCartesianPathService", "move_group/MoveGroupKinematicsService",
+    "move_group/MoveGroupExecuteTrajectoryAction", "move_group/MoveGroupMoveAction",
+    "move_group/MoveGroupPlanService", "move_group/MoveGroupQueryPlannersService",
+    "move_group/MoveGroupStateValidationService", "move_group/MoveGroupGetPlanningSceneService",
+    "move_group/ApplyPlanningSceneService", "move_group/ClearOctomapService")
+# Known by name; of these the node has the service for known trajectories alone.
+OTHER_CAPABILITIES = ("move_group/MoveGroupPickPlaceAction", "move_group/MoveGroupExecuteService",
+                      "move_group/TfPublisher",
+                      "pilz_industrial_motion_planner/MoveGroupSequenceAction",
+                      "pilz_industrial_motion_planner/MoveGroupSequenceService")
+# Adapters that decide how a path is timed; the last in the list that is there counts.
+_TIMINGS = {"AddTimeParameterization": "time_optimal_trajectory_generation",
+            "AddTimeOptimalParameterization": "time_optimal_trajectory_generation",
+            "AddIterativeSplineParameterization": "iterative_spline_parameterization",
+            "AddRuckigTrajectorySmoothing": "ruckig"}
+_FAKE = "moveit_fake_controller_manager/MoveItFakeControllerManager"
+
+
+@dataclass
+class Pipeline:
+    """A planning pipeline: name; planners: {name: {key: text}}; groups: {group: {key: value}}; timing: algorithm;
+    start_bounds_error [rad or m]; jiggle: share of a joint's range."""
+
+    name: str
+    planners: dict = field(default_factory=dict)
+    groups: dict = field(default_factory=dict)
+    timing: str = "time_optimal_trajectory_generation"
+    start_bounds_error: float = 0.05
+    jiggle: float = 0.02
+
+    def planner_ids(self):
+        """Names as query_planner_interface gives them: ``group[planner]`` and plain."""
+        ids = ["%s[%s]" % (group, planner) for group, entry in self.groups.items()
+               for planner in entry.get("planner_configs") or [] if planner in self.planners]
+        return ids + list(self.planners)
+
+    def default_planner(self, group):
+        return str(self.groups.get(group, {}).get("default_planner_config") or "")
+
+
+def pipelines(groups):
+    """Return ({name: Pipeline}, the default one's name, list of complaints); ``groups``: names of the model's."""
+    named, complaints = rospy.get_param("~planning_pipelines", {}), []
+    found = {}
+    for name, tree in named.items() if isinstance(named, dict) else ():
+        if not isinstance(tree, dict) or "planning_plugin" not in tree:
+            complaints.append("pipeline '%s' has no planning_plugin; it is left out" % name)
+            continue
+        found[name] = _pipeline(name, tree, groups)
+    if not found:
+        found["ompl"] = _pipeline("ompl", rospy.get_param("~", {}), groups)
+    usual = rospy.get_param("~default_planning_pipeline", "")
+    if usual not in found:
+        first = next(iter(found))
+        if usual:
+            complaints.append("there is no pipeline '%s' for default_planning_pipeline; '%s' is taken" % (usual, first))
+        usual = first
+    return found, usual, complaints
+
+
+def _pipeline(name, tree, groups):
+    pipeline = Pipeline(name)
+    configs = tree.get("planner_configs")
+    pipeline.planners = {key: {k: str(v) for k, v in (value or {}).items()} for key, value in configs.items()} \
+        if isinstance(configs, dict) else {}
+    pipeline.groups = {group: tree[group] for group in groups if isinstance(tree.get(group), dict)}
+    for adapter in str(tree.get("request_adapters", "")).split():
+        pipeline.timing = _TIMINGS.get(adapter.rpartition("/")[2], pipeline.timing)
+    pipeline.start_bounds_error = _number(tree.get("start_state_max_bounds_error"), pipeline.start_bounds_error)
+    pipeline.jiggle = _number(tree.get("jiggle_fraction"), pipeline.jiggle)
+    return pipeline
+
+
+def execution_settings():
+    """Return the ExecutionSettings of ``~trajectory_execution``."""
+    tree = rospy.get_param("~trajectory_execution", {})
+    usual = ExecutionSettings()
+    tolerance = _number(tree.get("allowed_start_tolerance"), usual.start_tolerance)
+    by_joint = tree.get("joints_allowed_start_tolerance")
+    if isinstance(by_joint, dict):
+        tolerance = _Tolerances(tolerance, by_joint)
+    return ExecutionSettings(
+        bool(tree.get("execution_duration_monitoring", usual.monitored)),
+        _number(tree.get("allowed_execution_duration_scaling"), usual.scaling),
+        _number(tree.get("allowed_goal_duration_margin"), usual.margin), tolerance,
+        bool(tree.get("wait_for_trajectory_completion", usual.wait_for_rest)),
+        _number(tree.get("controller_connection_timeout"), usual.connection_timeout))
+
+
+class _Tolerances(dict):
+    """Tolerances of some joints, and one for all others."""
+
+    def __init__(self, usual, by_joint):
+        super().__init__(by_joint)
+        self._usual = usual
+
+    def get(self, name, default=None):
+        return super().get(name, self._usual)
+
+
+def controllers():
+    """Return (list of Controllers, list of complaints) of ``~controller_list``."""
+    fake = rospy.get_param("~moveit_controller_manager", "") == _FAKE
+    entries = rospy.get_param("~controller_list", [])
+    return read_list(entries, fake)
+
+
+def initial_positions(model):
+    """Return {joint: value} of the group states that ``~initial`` names, as fake controllers begin with them."""
+    found = {}
+    entries = rospy.get_param("~initial", [])
+    for entry in entries if isinstance(entries, list) else ():
+        group = model.groups.get(entry.get("group")) if isinstance(entry, dict) else None
+        if group is not None:
+            found.update(group.states.get(entry.get("pose"), {}))
+    return found
+
+
+def capabilities():
+    """Return (set of the capabilities that are wanted, list of complaints)."""
+    wanted = set(DEFAULT_CAPABILITIES) | set(str(rospy.get_param("~capabilities", "")).split())
+    wanted -= set(str(rospy.get_param("~disable_capabilities", "")).split())
+    unknown = sorted(wanted - set(DEFAULT_CAPABILITIES) - set(OTHER_CAPABILITIES))
+    return wanted, ["there is no capability '%s'; it is left out" % name for name in unknown]
+
+
+def _number(value, usual):
+    return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else usual

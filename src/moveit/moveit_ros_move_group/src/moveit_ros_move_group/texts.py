@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Result texts, as clients of MoveIt compare them."""
+from moveit_msgs.msg import MoveItErrorCodes
+
+# Field and class share names; only the constants are of interest.
+_NAMES = {value: name for name, value in vars(MoveItErrorCodes).items() if isinstance(value, int) and name.isupper()}
+
+
+def result_text(code, reason="", *, empty=False, plan_only=False):
+    """Return the text of an action's result; ``empty``: nothing had to be moved, or no plan was found.
+
+    Where MoveIt has a bare code the ``reason`` stands beside it.
+    """
+    codes = MoveItErrorCodes
+    if code == codes.SUCCESS:
+        if empty:
+            return "Requested path and goal constraints are already met."
+        return "Motion plan was computed succesfully." if plan_only else "Solution was found and executed."
+    fixed = {
+        codes.INVALID_GROUP_NAME: "Invalid group in motion plan request",
+        codes.PLANNING_FAILED: "No motion plan found. No execution attempted." if empty else "",
+        codes.INVALID_MOTION_PLAN: "No motion plan found. No execution attempted." if empty else
+            "Motion plan was found but it seems to be invalid (possibly due to postprocessing). Not executing.",
+        codes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
+            "Solution found but the environment changed during execution and the path was aborted",
+    }.get(code)
+    text = fixed or _NAMES.get(code, "error code %d" % code)
+    if not reason:
+        return text
+    return "%s %s" % (text, reason) if text.endswith(".") else "%s: %s" % (text, reason)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Constraints messages to constraint sets."""
+import math
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
+from moveit_msgs.msg import (
+    BoundingVolume,
+    Constraints,
+    JointConstraint,
+    OrientationConstraint,
+    PositionConstraint,
+    VisibilityConstraint,
+)
+from shape_msgs.msg import SolidPrimitive
+
+from motion_planning.errors import PlanningError
+from moveit_ros_move_group.convert.constraints import constraint_set_of
+from moveit_ros_move_group.convert.geometry import pose_of
+from moveit_ros_move_group.convert.scene_in import SceneReader
+from urdf_model.transforms import axis_rotation, rigid
+
+READER = SceneReader()
+UNIT = Quaternion(0.0, 0.0, 0.0, 1.0)
+
+
+def position(point, frame="", link="hand", offset=(0.0, 0.0, 0.0), radius=0.01):
+    message = PositionConstraint(link_name=link, weight=1.0, target_point_offset=Vector3(*offset),
+                                 constraint_region=BoundingVolume(
+                                     primitives=[SolidPrimitive(SolidPrimitive.SPHERE, [radius])],
+                                     primitive_poses=[Pose(Point(*point), UNIT)]))
+    message.header.frame_id = frame
+    return message
+
+
+def broken(scene, **constraints):
+    found = constraint_set_of(Constraints(**constraints), scene, READER)
+    return found.broken(scene.model, scene.state, scene)
+
+
+def test_nothing_is_none(scene):
+    assert constraint_set_of(Constraints(name="empty"), scene, READER) is None
+
+
+def test_joints(scene):
+    assert broken(scene, joint_constraints=[JointConstraint("turn", 0.45, 0.1, 0.0, 1.0)]) is None
+    assert "'turn' is at 0.5" in broken(scene, joint_constraints=[JointConstraint("turn", 0.45, 0.01, 0.0, 1.0)])
+
+
+def test_positions_in_frames_and_with_offsets(scene):
+    there = scene.frame("hand")[:3, 3]
+    assert broken(scene, position_constraints=[position(there)]) is None
+    assert "hand" in broken(scene, position_constraints=[position(there + 0.1)])
+    assert broken(scene, position_constraints=[position((0.2, 0.0, 0.0), "arm")]) is None
+    ahead = (scene.frame("hand") @ (0.3, 0.0, 0.0, 1.0))[:3]
+    assert broken(scene, position_constraints=[position(ahead, offset=(0.3, 0.0, 0.0))]) is None
+
+
+@pytest.mark.parametrize("as_vector", [False, True])
+def test_orientations(scene, as_vector):
+    turn = scene.frame("hand")[:3, :3] @ axis_rotation((0.0, 0.0, 1.0), 0.2)
+    message = OrientationConstraint(link_name="hand", orientation=pose_of(rigid(turn, (0.0, 0.0, 0.0))).orientation,
+                                    absolute_x_axis_tolerance=0.1, absolute_y_axis_tolerance=0.1,
+                                    absolute_z_axis_tolerance=0.3, parameterization=int(as_vector), weight=1.0)
+    assert broken(scene, orientation_constraints=[message]) is None
+    message.absolute_z_axis_tolerance = 0.1
+    assert "hand" in broken(scene, orientation_constraints=[message])
+
+
+def test_visibility(scene):
+    """The hand looks along its x axis at a disc that faces it."""
+    faces = axis_rotation((0.0, 1.0, 0.0), -0.5 * math.pi)  # z of the disc against x of the hand
+    target = scene.frame("hand") @ rigid(faces, (1.0, 0.0, 0.0))
+    message = VisibilityConstraint(target_radius=0.0, cone_sides=4, max_view_angle=0.2, sensor_view_direction=2,
+                                   weight=1.0)
+    message.target_pose = PoseStamped(pose=pose_of(target))
+    message.sensor_pose.header.frame_id, message.sensor_pose.pose.orientation = "hand", UNIT
+    assert broken(scene, visibility_constraints=[message]) is None
+    message.target_pose.pose = pose_of(target @ rigid(axis_rotation((1.0, 0.0, 0.0), 1.0), (0.0, 0.0, 0.0)))
+    assert "turned away" in broken(scene, visibility_constraints=[message])
+
+
+@pytest.mark.parametrize("constraints, sentence", [
+    ({"position_constraints": [position((0.0, 0.0, 0.0), "nowhere")]}, "nowhere"),
+    ({"position_constraints": [PositionConstraint(link_name="hand")]}, "no region"),
+    ({"position_constraints": [position((math.nan, 0.0, 0.0))]}, "not finite"),
+    ({"joint_constraints": [JointConstraint("turn", math.inf, 0.0, 0.0, 1.0)]}, "not finite"),
+    ({"joint_constraints": [JointConstraint("turn", 0.0, -1.0, 0.0, 1.0)]}, "0 or more"),
+    ({"orientation_constraints": [OrientationConstraint(link_name="hand",
+                                                        orientation=Quaternion(0.0, 0.0, 0.0, 3.0))]}, "length 3"),
+])
+def test_what_cannot_be_understood_is_told(scene, constraints, sentence):
+    with pytest.raises(PlanningError, match=sentence):
+        constraint_set_of(Constraints(**constraints), scene, READER)
+
+
+def test_unknown_names_are_told_when_asked(scene):
+    with pytest.raises(PlanningError, match="nose"):
+        broken(scene, joint_constraints=[JointConstraint("nose", 0.0, 0.1, 0.1, 1.0)])
+    with pytest.raises(PlanningError, match="nose"):
+        broken(scene, position_constraints=[position(np.zeros(3), link="nose")])
