@@ -63,14 +63,15 @@ def ball(spheres):
 
 def _greedy(wanted, centres, reach):
     """Indices of centres whose balls with radius ``reach`` contain all points ``wanted``, most points first."""
-    contained = np.empty((len(centres), len(wanted)), dtype=bool)
-    points = np.sum(wanted * wanted, axis=1)
-    for begin in range(0, len(centres), 256):
-        some = centres[begin : begin + 256]
-        square = points + np.sum(some * some, axis=1)[:, None] - 2.0 * some @ wanted.T
-        contained[begin : begin + 256] = square <= np.square(np.maximum(reach[begin : begin + 256], 0.0))[:, None]
+    # A row for each point: what a step of the choice reads is one piece of memory.
+    contains = np.empty((len(wanted), len(centres)), dtype=bool)
+    squares, limits = np.sum(centres * centres, axis=1), np.square(np.maximum(reach, 0.0))
+    for begin in range(0, len(wanted), 256):
+        some = wanted[begin : begin + 256]
+        distance = squares + np.sum(some * some, axis=1)[:, None] - 2.0 * some @ centres.T
+        contains[begin : begin + 256] = distance <= limits
     left = np.ones(len(wanted), dtype=bool)
-    gain = contained.sum(axis=1)
+    gain = contains.sum(axis=0)
     chosen = []
     while left.any():
         best = int(gain.argmax())
@@ -78,15 +79,16 @@ def _greedy(wanted, centres, reach):
             raise CoverError("%d of %d samples of a solid are in no sphere; its parts may be too different in size"
                              % (left.sum(), len(left)))
         chosen.append(best)
-        new = np.flatnonzero(left & contained[best])
+        new = np.flatnonzero(left & contains[:, best])
         left[new] = False
-        gain -= contained[:, new].sum(axis=1)
+        gain -= contains[new].sum(axis=0)
     # What later spheres contain as well is not needed.
-    times = contained[chosen].sum(axis=0)
+    contained = np.ascontiguousarray(contains[:, chosen].T)
+    times = contained.sum(axis=0)
     kept = []
-    for k in chosen:
-        if (times[contained[k]] > 1).all():
-            times = times - contained[k]
+    for k, inside in zip(chosen, contained, strict=True):
+        if (times[inside] > 1).all():
+            times = times - inside
         else:
             kept.append(k)
     return np.array(kept, dtype=int)
@@ -95,11 +97,17 @@ def _greedy(wanted, centres, reach):
 def _shrunk(spheres, wanted, between):
     """Make each sphere as small as what it alone contains allows."""
     spheres = spheres.copy()
-    distance = np.linalg.norm(wanted[None, :, :] - spheres[:, None, :3], axis=2) + between + ROUNDING
+    distance = np.array([np.sqrt(np.sum(np.square(wanted - centre), axis=1)) for centre in spheres[:, :3]])
+    distance += between + ROUNDING
+    inside = distance <= spheres[:, 3:] + 1e-9
+    times = inside.sum(axis=0)
     for k in np.argsort(-spheres[:, 3]):
-        inside = distance <= spheres[:, 3:] + 1e-9
-        alone = inside[k] & (inside.sum(axis=0) == 1)
+        alone = inside[k] & (times == 1)
         spheres[k, 3] = min(spheres[k, 3], max(distance[k, alone].max(initial=0.0), 1e-4))
+        now = distance[k] <= spheres[k, 3] + 1e-9
+        times += now
+        times -= inside[k]
+        inside[k] = now
     return spheres
 
 
