@@ -63,6 +63,7 @@ def _executor(monitor):
 
 def _capabilities(context, wanted, description, may_execute):
     planner = Planner(context)
+    planner.warm_up()
     timeouts = {group: entry["kinematics_solver_timeout"]
                 for group, entry in (rospy.get_param(description + "_kinematics", {}) or {}).items()
                 if isinstance(entry, dict) and isinstance(entry.get("kinematics_solver_timeout"), (int, float))}

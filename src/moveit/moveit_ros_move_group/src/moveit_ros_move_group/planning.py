@@ -5,13 +5,16 @@ import math
 import re
 from dataclasses import replace
 
+import numpy as np
 import rospy
 from moveit_msgs.msg import MoveItErrorCodes
 
 from motion_planning import pipeline
 from motion_planning.constraints import sampler
 from motion_planning.errors import PlanningError
-from motion_planning.planners import plan_path
+from motion_planning.planners import Search, plan_path
+from motion_planning.scene import Scene
+from motion_planning.timing import time_path
 from moveit_ros_move_group.capabilities.cartesian import slowed
 from moveit_ros_move_group.context import RequestError, wall_clock
 from moveit_ros_move_group.convert.constraints import constraint_set_of
@@ -51,6 +54,22 @@ class Planner:
                                lambda: stop() or rospy.is_shutdown())
         plan = pipeline.plan(query, tools)
         return self._limited(request, plan)
+
+    def warm_up(self):
+        """Load compiled code and make the robot's spheres, so that the first request does not wait for them."""
+        context = self._context
+        scene = Scene(context.model)
+        for name, group in context.model.groups.items():
+            if not group.joints:
+                continue
+            q = scene.state.q[group.indices]
+            near = np.clip(q + 0.1, *context.model.bounds[group.indices].T)
+            try:
+                plan_path(scene, name, q, near[None], Search(context.exact, 0, 1.0, wall_clock))
+            except PlanningError:
+                pass  # as where the robot touches itself in its zero position
+            time_path(np.array([q, near]), context.model.velocity[group.indices],
+                      context.model.acceleration[group.indices])
 
     def _limited(self, request, plan):
         """The plan, slowed to ``max_cartesian_speed`` where the request limits a link's speed."""
