@@ -168,7 +168,7 @@ def test_planners_of_every_arm_are_configured():
 
 @pytest.mark.parametrize("name", LAUNCH_FILES)
 def test_launch_file_finds_what_it_starts(name):
-    for node in (node for node in load(name).nodes if node.package != "moveit_ros_move_group"):
+    for node in load(name).nodes:
         assert roslib.packages.find_node(node.package, node.type), "%s/%s" % (node.package, node.type)
 
 
