@@ -205,6 +205,36 @@ def test_states_that_are_none():
         exact.free(scene, scene.state.with_q([0.0]))
 
 
+def test_the_first_of_many_postures_that_touches(baxter, meshes):
+    scene, exact = slider()
+    scene = scene.with_object(thing(SHAPES["box"], 1.0))
+    ways = np.linspace(0.0, 2.0, 21)[:, None]  # it touches from 0.8 to 1.2
+    assert exact.first_blocked(scene, ways, "car") in (8, 9)
+    assert exact.first_blocked(scene, ways[:8], "car") is None
+    assert exact.first_blocked(scene, np.hstack([ways, 0.0 * ways])) in (8, 9)
+    assert exact.first_blocked(scene, np.empty((0, 2))) is None
+    assert exact.first_blocked(scene, np.hstack([ways, ways]), "finger") is None
+    for bad, words in ((np.zeros((3, 5)), "postures of 1 joints"), (np.zeros(3), "postures of 1"),
+                       ([[0.0], [math.nan]], "posture 1")):
+        with pytest.raises(ModelError, match=words):
+            exact.first_blocked(scene, bad, "car")
+    # Whatever was asked before, as if each was asked alone.
+    exact, scene = ExactChecker(baxter, meshes), Scene(baxter)
+    generator = np.random.default_rng(9)
+    scene = scene.with_allowed(scene.allowed.with_entries({
+        (a, b): True for k, a in enumerate(baxter.links) for b in baxter.links[:k]})).with_objects(
+        [thing(Box((0.1, 0.1, 0.1)), *generator.uniform(-1.2, 1.2, 3), name="box%d" % k) for k in range(30)])
+    scene = scene.with_allowed(scene.allowed.with_entries({
+        (contact.a, contact.b): True for contact in exact.contacts(scene, most=10_000)}))
+    postures = generator.uniform(*baxter.bounds.T, (300, len(baxter.variables)))
+    for group in (None, "left_arm"):
+        free = np.array([exact.free(scene, scene.state.with_q(q), group) for q in postures])
+        assert 50 < free.sum() < 250
+        assert exact.first_blocked(scene, postures[free], group) is None
+        for blocked in postures[~free][:20]:
+            assert exact.first_blocked(scene, np.vstack([postures[free][:50], blocked]), group) == 50
+
+
 def test_the_number_of_contacts_is_bounded():
     scene, exact = slider()
     many = scene.with_objects([thing(Sphere(0.05), 0.001 * k, name="ball%d" % k) for k in range(60)])

@@ -75,6 +75,9 @@ class ExactChecker:
         self._tables = OrderedDict()
         self._robot = self._robot_parts(meshes)
         self._pairs = np.empty((256, 2), dtype=np.int64)
+        # Shapes of the robot that no joint moves.
+        self._still = frozenset(k for k, part in enumerate(self._robot) if not any(
+            joint.movable for joint in model.robot.chain(model.root, part.name)))
 
     def free(self, scene, state=None, group=None):
         """Whether nothing touches in ``state``, the scene's where None.
@@ -88,6 +91,33 @@ class ExactChecker:
                 if self._touches(query, i, j):
                     return False
         return True
+
+    def first_blocked(self, scene, postures, group=None):
+        """Return the number of the first of ``postures`` at which something touches, None where all are free.
+
+        postures: (m, n), or (m, k) values of the joints of ``group``, the rest as in the scene's state; quicker than to
+        ask :meth:`free` about each. Errors are those of :meth:`free`.
+        """
+        indices = slice(None) if group is None else self.model.group(group).indices
+        whole = np.tile(scene.state.q, (len(postures), 1))
+        rows = np.asarray(postures, dtype=np.float64)
+        # Whole postures are told by their length; of a group that has all joints, in its own order, they are the same.
+        if len(rows) and rows.shape[1:] == (len(self.model.variables),) != whole[0, indices].shape:
+            indices = slice(None)
+        if rows.shape != whole[:, indices].shape:
+            raise ModelError("expected postures of %d joints, got an array of shape %s"
+                             % (whole[:, indices].shape[1], rows.shape))
+        whole[:, indices] = rows
+        if not np.isfinite(whole).all():
+            raise ModelError("joint values of posture %d are not all finite"
+                             % np.flatnonzero(~np.isfinite(whole).all(axis=1))[0])
+        with self._lock:
+            query = self._query(scene, None, group)
+            for number, q in enumerate(whole):
+                query.move(q, self._still)
+                if any(self._touches(query, i, j) for i, j in self._near(query)):
+                    return number
+        return None
 
     def contacts(self, scene, state=None, group=None, most=100):
         """Return a list of Contact, one for each two things that touch, the deepest of theirs; at most ``most``.
@@ -275,6 +305,11 @@ class _Query:
         self.robot, self.movers, self.pairs, self.active, self.fixed = robot, movers, pairs, active, fixed
         self.poses = np.empty((len(movers.parts), 4, 4))
         self._allowed, self._memory, self._placed = allowed, memory, set()
+
+    def move(self, q, still):
+        """Go on with the robot at ``q`` (n,); movers in ``still`` stay where they are."""
+        self.robot = self.robot[0], q, self.robot[2]
+        self._placed &= still
 
     def may_touch(self, i, j):
         """Whether mover ``i`` may touch the fixed shape ``j`` < 0; two movers that may are not asked about."""
