@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 
+from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import Path, Run, rrt_connect, shorten
@@ -31,3 +32,6 @@ def warm_up():
         pass  # as it has to be: what counts is that everything is compiled now
     shorten(Path(ends), checker, run)
     checker.valid(ends)
+    exact = ExactChecker(model, None)
+    exact.free(Scene(model))
+    exact.distance(Scene(model))
