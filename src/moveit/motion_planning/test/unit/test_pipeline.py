@@ -8,7 +8,7 @@ import pytest
 
 from motion_planning.exact import ExactChecker
 from motion_planning.pipeline import Code, PlanningFailure, PlanQuery, Tools, plan
-from motion_planning.planners import NoPath, plan_path
+from motion_planning.planners import NoPath, plan_path, warm_up
 from motion_planning.scene import Scene, WorldObject
 from urdf_model import Box
 from urdf_model.transforms import rigid
@@ -92,6 +92,12 @@ class Lab:
 
     def tip(self, q):
         return self.scene.model.frame_of(np.array(q), "tool0")[:3, 3]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    """The time that a plan may take is none for the compiler."""
+    warm_up()
 
 
 @pytest.fixture(scope="module")
