@@ -10,7 +10,7 @@ import time
 import numpy as np
 import planning_problems as problems
 
-from motion_planning.planners import NoPath, Search, plan_path, warm_up
+from motion_planning.planners import NoPath, Search, plan_path, prepare
 
 # Allowed for each problem [s]; the peer is given up on after so long.
 LIMIT_S, PEER_LIMIT_S = 1.0, 10.0
@@ -24,7 +24,8 @@ def measure(report, quick, number):
     share = 10 if quick else 1
     baxter, probot = problems.baxter(), problems.probot()
     # Spheres are made, and everything is compiled, before the first that counts.
-    warm_up()
+    prepare(baxter.exact)
+    prepare(probot.exact)
     solve(problems.table(baxter, problems.BAXTER_PLACE, -1 - number), patience_s=100.0)
     solve(problems.table(probot, problems.PROBOT_PLACE, -1 - number), patience_s=100.0)
     try:
@@ -32,6 +33,7 @@ def measure(report, quick, number):
     except OSError as error:
         print("the bookshelf problems could not be fetched (%s); they are left out" % error)
     else:
+        solve(bookshelf[0], patience_s=100.0)
         # Each round has some of each level.
         some = bookshelf[number % 5 :: 5 * share]
         found = [solve(problem) for problem in some]

@@ -233,7 +233,7 @@ def test_a_path_that_exact_geometry_refuses_is_not_returned(snake, exact):
     twice = Refusing(exact, (start, goal), 2)
     assert np.allclose(plan_path(scene, "arm", start, [goal], search(twice)).points[-1], goal, atol=1e-6)
     with pytest.raises(NoPath):
-        plan_path(scene, "arm", start, [goal], search(Refusing(exact, (start, goal), 10**9), allowed_time=0.3))
+        plan_path(scene, "arm", start, [goal], patient(Refusing(exact, (start, goal), 10**9), 1))
 
 
 # -- no path --------------------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ import numpy as np
 
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import REACH, Path, Run, rrt_connect, shorten
+from motion_planning.planners.warming import warm_up
 from motion_planning.spheres import SphereChecker, SphereModel
 
 # The share of the time that spheres get before a search by exact geometry alone begins.
@@ -48,6 +49,15 @@ def sphere_model_of(exact):
         return _sphere_models[exact]
 
 
+def prepare(exact):
+    """Make all that does not depend on a scene, so that the first plan need not: spheres of links, compiled code."""
+    spheres = sphere_model_of(exact)
+    for link in exact.model.links:
+        spheres.spheres(link)
+        spheres.fixed(link)
+    warm_up()
+
+
 def plan_path(scene, group, start, goals, search):
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k) of the group named ``group``.
 
@@ -64,11 +74,12 @@ class _Planning:
     def __init__(self, scene, group, search):
         self.scene, self.search, self.model = scene, search, scene.model
         self.group = self.model.group(group)
-        self.begin = self.last = search.clock()
-        self.times = {}
+        self.last, self.times = search.clock(), {}
         self.random = np.random.default_rng(search.seed & (1 << 63) - 1)
         self.checker = SphereChecker(sphere_model_of(search.exact), self.group, scene)
         self._note("tables")
+        # The first plan of a robot may have to make its spheres: that shall not use up its time.
+        self.begin = self.last
         self.bounds = np.array(self.model.bounds[self.group.indices])
 
     def path(self, start, goals):

@@ -48,11 +48,11 @@ def cover(parts, tolerance):
     return np.concatenate([np.array(found).reshape(-1, 4), _shrunk(spheres, wanted, between)])
 
 
-def ball(spheres):
-    """Return (4,): a ball around all ``spheres`` (n, 4); Ritter's, made smaller by steps towards what is furthest."""
+def ball(spheres, steps=100):
+    """Return (4,): a ball around all ``spheres`` (n, 4), made smaller by ``steps`` towards what is furthest."""
     centre = 0.5 * ((spheres[:, :3] - spheres[:, 3:]).min(0) + (spheres[:, :3] + spheres[:, 3:]).max(0))
     best = np.append(centre, np.inf)
-    for turn in range(200):
+    for turn in range(steps):
         reach = np.linalg.norm(spheres[:, :3] - centre, axis=1) + spheres[:, 3]
         far = reach.argmax()
         if reach[far] < best[3]:

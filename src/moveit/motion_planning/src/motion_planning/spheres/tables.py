@@ -253,7 +253,7 @@ def _sphere_tree(some, spheres, skips):
     halves = order[: len(some) // 2], order[len(some) // 2 :]
     for half in sorted(halves, key=lambda half: -half[:, 3].max()):
         number = len(spheres)
-        spheres.append(ball(half).tolist())
+        spheres.append(ball(half, steps=12).tolist())
         skips.append(0)
         _sphere_tree(half, spheres, skips)
         skips[number] = len(spheres)
