@@ -25,6 +25,8 @@ GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
 STEPS=(apt venv pip meshes overlay build urdf kernels)
 # Python packages with compiled inner loops: `python3 -m NAME` fills their cache.
 COMPILED=(baxter_sim_kinematics baxter_sim_hardware motion_planning)
+# Robots whose first plan is not to wait until their shapes have been gone through.
+PLANNED_FOR=("$DESCRIPTION/urdf/baxter.urdf.xacro" "$LAB_ROOT/src/probot/probot_description/urdf/probot_anno.xacro")
 declare -A TITLES=(
     [apt]="Debian packages"
     [venv]="virtual environment"
@@ -265,6 +267,9 @@ step_kernels() {
     for package in "${COMPILED[@]}"; do
         run bash -c 'source "$1/tools/environment.bash" && use_build && python3 -m "$2"' compile "$LAB_ROOT" "$package"
     done
+    # Nor are the spheres by which collisions are looked for: they are kept beside the compiled code.
+    run bash -c 'source "$1/tools/environment.bash" && use_build && shift &&
+        rosrun motion_planning prepare_robots "$@"' prepare "$LAB_ROOT" "${PLANNED_FOR[@]}"
 }
 
 # --- main -------------------------------------------------------------------------------------------------------------

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The commands of this package. They need no master."""
 import argparse
+import os
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from model_files.resources import ResourceFinder
 from motion_planning.collision_pairs import ALWAYS_SHARE, TRIALS, disabled_pairs, summary
 from motion_planning.errors import PlanningError
+from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshReader, PlanningModel
+from motion_planning.planners.planning import prepare
 from motion_planning.srdf import element_of, with_disabled_pairs
 
 
@@ -45,6 +49,30 @@ def collisions_updater(arguments=None):
         return 1
     print(summary(pairs), file=sys.stderr)
     return 0
+
+
+def prepare_robots(arguments=None):
+    """``prepare_robots``: make the spheres of robots, which planning then finds on disk. Returns the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="prepare_robots", description="Make all that planning needs to know of a robot's shape, so that the "
+        "first start of move_group does not wait for it.")
+    parser.add_argument("urdf", type=Path, nargs="+", help="a robot: URDF or xacro file")
+    files = parser.parse_args(arguments).urdf
+    with ProcessPoolExecutor(min(len(files), os.cpu_count() or 1)) as workers:
+        failures = [text for text in workers.map(_prepare_one, files) if text]
+    for text in failures:
+        print("prepare_robots: " + text, file=sys.stderr)
+    return 1 if failures else 0
+
+
+def _prepare_one(path):
+    """Return why the robot of a file cannot be prepared, None where it is."""
+    try:
+        model = PlanningModel.from_xml(_text(path), "")
+        prepare(ExactChecker(model, MeshReader(ResourceFinder())))
+    except (ValueError, OSError) as error:
+        return "%s: %s" % (path, error)
+    return None
 
 
 def _text(path):
