@@ -119,7 +119,7 @@ def start_unit_under_comma_locale(targets):
         detail = getattr(error, "stderr", None) or ""
         return FailedStart(f"cannot make the locale {comma_locale.NAME}: {error}\n{detail}")
     # What takes long or builds has nothing to do with decimal points. Two pytests share no cache.
-    arguments = ["-p", "lab_tests.comma_locale", "-p", "no:cacheprovider", "-m", "not long and not build"]
+    arguments = ["-p", "lab_tests.comma_locale", "-p", "no:cacheprovider", "-m", "not long and not build and not once"]
     return UnitRun("unit-comma-locale", targets, arguments, environment, WORK / "unit-comma-locale.txt")
 
 
@@ -131,6 +131,8 @@ def layers(selection, long: bool, stretch: float, ending: contextlib.ExitStack):
         # A single test that is named runs, long or not; a -m of the user's own comes later and wins.
         is_single = any("::" in target for target in selection.unit_targets)
         marker = [] if long or is_single else ["-p", "lab_tests.long_tests"]
+        if selection.is_whole_suite:
+            marker += ["-m", "not tree"]  # the run under the second locale has these: each runs as long as the other
         runs = {"unit tests": UnitRun("unit", selection.unit_targets, marker + selection.pytest_arguments)}
         ending.callback(runs["unit tests"].kill)
         if selection.is_whole_suite:

@@ -2,6 +2,7 @@
 """The test runner must not miss a failure: discovery, selection, counting, and what a test leaves behind."""
 
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -14,6 +15,7 @@ from lab_tests import comma_locale, processes, rostests
 from lab_tests.discovery import Rostest, SelectionError, select, take_inventory
 from lab_tests.results import read_junit, read_rostest_results
 
+ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = "<package format='3'><name>%s</name></package>"
 PASSING = "<testsuite tests='2'><testcase name='a' classname='T'/><testcase name='b' classname='T'/></testsuite>"
 FAILING = "<testsuite tests='1'><testcase name='a' classname='T'><failure message='1 is not 2'/></testcase></testsuite>"
@@ -197,3 +199,11 @@ def test_a_test_may_take_what_its_file_says(tmp_path):
     text = "<launch><test time-limit='2000'/><group><test time-limit='500'/></group></launch>"
     (tmp_path / "a.test").write_text(text)
     assert rostests.declared_s(tmp_path / "a.test") == 2560.0
+
+
+def test_every_test_is_in_one_of_the_two_runs():
+    """The first run leaves out what is marked `tree`, the one under the second locale `build` and `once`."""
+    marks = {path: set(re.findall(r"pytest\.mark\.(tree|once|build)\b", path.read_text(encoding="utf-8")))
+             for folder in ("src", "tests") for path in (ROOT / folder).rglob("test_*.py") if path != Path(__file__)}
+    assert {mark for found in marks.values() for mark in found} == {"tree", "once", "build"}
+    assert not [str(path) for path, found in marks.items() if "tree" in found and len(found) > 1]

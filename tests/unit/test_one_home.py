@@ -12,6 +12,8 @@ from workspace_tree import ROOT, is_python, own_files
 import baxter_model
 from baxter_model import JOINTS, SIDES
 
+pytestmark = pytest.mark.tree
+
 HOME = "src/baxter/baxter_common/baxter_model/"
 LIBRARY = "src/cwru_baxter/baxter_traj_streamer/src/cpp/baxter_traj_streamer.cpp"
 IK_LAUNCH = "src/baxter/baxter_simulator/baxter_sim_kinematics/launch/baxter_sim_kinematics.launch"

@@ -5,7 +5,10 @@ import re
 import subprocess
 from pathlib import Path
 
+import pytest
 from workspace_tree import ROOT, is_in_tests, own_files, packages
+
+pytestmark = pytest.mark.tree
 
 TOPS = "src|docs|tests|tools|docker|rosinstall"
 PATTERN = r"(?<![\w./~$}{*+-])((?:%s)/[\w./-]*[\w/])"

@@ -4,7 +4,10 @@
 import ast
 from pathlib import Path
 
+import pytest
 from workspace_tree import ROOT, is_in_tests, is_python, own_files
+
+pytestmark = pytest.mark.tree
 
 MOST_PARAMETERS = 7
 

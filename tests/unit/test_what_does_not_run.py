@@ -13,6 +13,8 @@ from lab_tests import rostests
 from lab_tests.discovery import select, take_inventory
 from lab_tests.results import Tally, read_junit, read_rostest_results, summary
 
+pytestmark = pytest.mark.tree
+
 ROOT = Path(__file__).resolve().parents[2]
 SKIPS = """<testsuite><testcase classname="a" name="b"><skipped type="pytest.skip" message="no zsh
  here"/></testcase><testcase classname="a" name="c"><skipped message="%s"/></testcase></testsuite>"""

@@ -6,6 +6,8 @@ import re
 import pytest
 from workspace_tree import ROOT, own_files
 
+pytestmark = pytest.mark.tree
+
 LIST, HERE = "CONTRIBUTING.md", "tests/unit/test_words.py"
 #: File to words in it that others chose: names on the wire, a part of the machine.
 OF_OTHERS = {

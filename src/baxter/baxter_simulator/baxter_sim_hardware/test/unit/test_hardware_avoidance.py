@@ -11,6 +11,8 @@ from baxter_sim_hardware.arms import avoidance, collision
 from baxter_sim_hardware.topics.collision import guards_of
 from baxter_sim_kinematics import Chain
 
+pytestmark = pytest.mark.once
+
 POSITION, VELOCITY = 1, 2
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)
 FOLDED, UNFOLDED = ([poses().angles(pose, name.split("_")[0])[name] for name in NAMES]

@@ -8,6 +8,8 @@ from baxter_core_msgs.msg import EndEffectorCommand, HeadPanCommand
 from geometry_msgs.msg import TwistStamped
 from std_msgs.msg import Empty
 
+pytestmark = pytest.mark.once
+
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
 SIDES = ("left", "right")
 WAY = np.tile([0.4, -0.4, 0.3, 0.4, -0.4, 0.4, 0.5], 2)

@@ -13,6 +13,8 @@ from baxter_sim_hardware.sensing import sensors
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 
+pytestmark = pytest.mark.once
+
 SIDES = ("left", "right")
 WALL = """<robot name="wall"><link name="wall"><collision><geometry><box size="0.02 0.6 0.6"/></geometry></collision>
 </link></robot>"""
