@@ -62,13 +62,15 @@ def run_linter(name: str) -> Tally:
 class UnitRun:
     """One pytest process, which starts at once; its own output goes to the terminal, or into a file."""
 
-    def __init__(self, title: str, targets, arguments, environment=None, output: Path | None = None):
+    def __init__(self, title: str, targets, arguments, environment=None, output: Path | None = None,
+                 leaves_out_long: bool = False):
         self._title, self._output = title, output
         self._report, self._left_out = WORK / f"{title}.xml", WORK / f"{title}-left-out.txt"
         self._report.unlink(missing_ok=True)
         self._left_out.unlink(missing_ok=True)
-        options = ["-q", "--continue-on-collection-errors", f"--junitxml={self._report}", *arguments]
-        if "lab_tests.long_tests" in arguments:
+        options = ["-q", "-p", "lab_tests.long_tests", "--continue-on-collection-errors", f"--junitxml={self._report}",
+                   *arguments]
+        if leaves_out_long:
             options.append(f"--leave-out-long={self._left_out}")
         environment = {**(environment or os.environ)}
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT / "tools"), environment.get("PYTHONPATH")]))
@@ -130,10 +132,10 @@ def layers(selection, long: bool, stretch: float, ending: contextlib.ExitStack):
     if selection.unit_targets:
         # A single test that is named runs, long or not; a -m of the user's own comes later and wins.
         is_single = any("::" in target for target in selection.unit_targets)
-        marker = [] if long or is_single else ["-p", "lab_tests.long_tests"]
-        if selection.is_whole_suite:
-            marker += ["-m", "not tree"]  # the run under the second locale has these: each runs as long as the other
-        runs = {"unit tests": UnitRun("unit", selection.unit_targets, marker + selection.pytest_arguments)}
+        # The run under the second locale has what is marked as tree: each runs as long as the other.
+        elsewhere = ["--in-the-other-run=tree"] if selection.is_whole_suite else []
+        runs = {"unit tests": UnitRun("unit", selection.unit_targets, elsewhere + selection.pytest_arguments,
+                                      leaves_out_long=not (long or is_single))}
         ending.callback(runs["unit tests"].kill)
         if selection.is_whole_suite:
             # At the same time: each keeps one core busy.

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tests that did not run are counted and named, with the reason."""
 
+import contextlib
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
+import run_tests
 from lab_tests import rostests
-from lab_tests.discovery import select, take_inventory
+from lab_tests.discovery import Selection, select, take_inventory
 from lab_tests.results import Tally, read_junit, read_rostest_results, summary
 
 pytestmark = pytest.mark.tree
@@ -72,25 +75,38 @@ def test_slow():
     pass
 
 @pytest.mark.long
+@pytest.mark.tree
 def test_slower():
+    pass
+
+@pytest.mark.tree
+def test_in_the_other_run():
     pass
 """
 
 
-@pytest.mark.parametrize(("options", "ran", "left_out"), [
-    ([], "1 passed, 2 deselected", ["test_a.py::test_slow", "test_a.py::test_slower"]),
-    (["-k", "slower"], "3 deselected", ["test_a.py::test_slower"]),
-    (["-m", "long"], "2 passed, 1 deselected", None),
+@pytest.mark.parametrize(("words", "ran", "left_out"), [
+    ([], ["test_quick"], ["test_a.py::test_slow", "test_a.py::test_slower"]),
+    (["--long"], ["test_quick", "test_slow", "test_slower"], None),
+    (["-k", "slower"], [], ["test_a.py::test_slower"]),
+    (["-m", "long"], ["test_slow", "test_slower"], None),
+    (["-m", "tree"], ["test_slower", "test_in_the_other_run"], None),
 ])
-def test_long_tests_are_left_out_and_named(tmp_path, options, ran, left_out):
+def test_long_tests_are_left_out_and_named(tmp_path, monkeypatch, words, ran, left_out):
     (tmp_path / "test_a.py").write_text(LONG)
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long: long\n")
-    command = [sys.executable, "-m", "pytest", "-p", "lab_tests.long_tests", "--leave-out-long=names.txt", *options]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join((str(ROOT / "tools"), os.environ["PYTHONPATH"]))}
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert ran in done.stdout, done.stdout + done.stderr
-    names = tmp_path / "names.txt"
-    assert (names.read_text().splitlines() if names.exists() else None) == left_out
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long: long\n    tree: tree\n")
+    monkeypatch.setattr(run_tests, "ROOT", tmp_path)
+    monkeypatch.setattr(run_tests, "WORK", tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "tools"), prepend=os.pathsep)
+    monkeypatch.setattr(run_tests, "start_unit_under_comma_locale", lambda targets: run_tests.FailedStart("not here"))
+    is_long, arguments = "--long" in words, [word for word in words if word != "--long"]
+    selection = Selection([], ["test_a.py"], [], arguments, is_whole_suite=not arguments)
+    with contextlib.ExitStack() as ending:
+        tally = next(run for title, run in run_tests.layers(selection, is_long, 1.0, ending) if title == "unit tests")()
+    report = ElementTree.parse(tmp_path / "unit.xml")
+    assert [case.get("name") for case in report.iter("testcase")] == ran
+    assert tally.long == (left_out or [])
+    assert (tally.passed, tally.failed) == (len(ran), 0)
 
 
 def test_long_rostests_of_what_was_named_are_left_out():

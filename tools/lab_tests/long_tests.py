@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A pytest plugin: `--leave-out-long=FILE` runs no test that is marked as long, and writes their names into FILE."""
+"""A pytest plugin that leaves tests out by their marks, unless the caller says with -m which marks run.
+
+`--leave-out-long=FILE` runs no test that is marked as long, and writes their names into FILE. `--in-the-other-run=MARK`
+runs no test with MARK that is not long: another pytest has these at the same time.
+"""
 
 from pathlib import Path
 
@@ -8,16 +12,28 @@ import pytest
 
 def pytest_addoption(parser):
     parser.addoption("--leave-out-long", metavar="FILE", help="run no long test; FILE gets their names, one a line")
+    parser.addoption("--in-the-other-run", metavar="MARK", help="run no test with this mark, unless it is long")
 
 
 # Last: what -k or a name has left out is not missed.
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config, items):
-    file = config.getoption("--leave-out-long")
-    # With -m the caller says which marks run.
-    if file is None or config.option.markexpr:
+    if config.option.markexpr:
         return
-    left_out = [item for item in items if item.get_closest_marker("long")]
+    file, elsewhere = config.getoption("--leave-out-long"), config.getoption("--in-the-other-run")
+    if elsewhere is not None:
+        _leave_out(config, items, lambda item: item.get_closest_marker(elsewhere) and not _is_long(item))
+    if file is not None:
+        left_out = _leave_out(config, items, _is_long)
+        Path(file).write_text("".join(f"{item.nodeid}\n" for item in left_out), encoding="utf-8")
+
+
+def _is_long(item):
+    return item.get_closest_marker("long") is not None
+
+
+def _leave_out(config, items, is_out):
+    left_out = [item for item in items if is_out(item)]
     config.hook.pytest_deselected(items=left_out)
-    items[:] = [item for item in items if item not in left_out]
-    Path(file).write_text("".join(f"{item.nodeid}\n" for item in left_out), encoding="utf-8")
+    items[:] = [item for item in items if not is_out(item)]
+    return left_out
