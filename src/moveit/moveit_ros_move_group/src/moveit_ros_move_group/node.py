@@ -2,10 +2,7 @@
 """The node: reads what it needs, builds the core, serves."""
 import argparse
 import logging
-import signal
 import sys
-import threading
-import time
 
 import rospy
 
@@ -21,21 +18,18 @@ from moveit_ros_move_group.failures import Failures
 from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_ros_move_group.planning import Planner
 from rospy_limits.node import limit_ports
+from rospy_start import MissingParameter, end_on_signals, wait_for_param
 
 # Wall time to wait for the robot's model [s].
 _DESCRIPTION_TIMEOUT_S = 60.0
 
 
-class StartError(PlanningError):
-    """Something that the node cannot start without."""
-
-
 def build():
-    """Return what has to be kept alive. Raises PlanningError."""
+    """Return what has to be kept alive. Raises PlanningError, MissingParameter."""
     name = rospy.get_param("~robot_description", rospy.get_param("~planning_scene_monitor_options/robot_description",
                                                                   "robot_description"))
-    urdf = _wait_for_param(name)
-    srdf = _wait_for_param(name + "_semantic")
+    urdf = wait_for_param(name, _DESCRIPTION_TIMEOUT_S)
+    srdf = wait_for_param(name + "_semantic", _DESCRIPTION_TIMEOUT_S)
     limits = rospy.get_param(name + "_planning/joint_limits", None)
     model = PlanningModel.from_xml(urdf, srdf, {"joint_limits": limits} if limits else None)
     failures = Failures(model.frame)
@@ -83,43 +77,17 @@ def _capabilities(context, wanted, description, may_execute):
     return [make() for name, make in offered.items() if "move_group/" + name in wanted]
 
 
-def _wait_for_param(name):
-    start = told = time.monotonic()
-    while not rospy.is_shutdown():
-        if rospy.has_param(name):
-            return rospy.get_param(name)
-        now = time.monotonic()
-        if now - start > _DESCRIPTION_TIMEOUT_S:
-            break
-        if now - told > 5.0:
-            rospy.loginfo("waiting for parameter %s", rospy.resolve_name(name))
-            told = now
-        time.sleep(0.05)
-    raise StartError("parameter %s is not set; load the robot first (planning_context.launch with "
-                     "load_robot_description:=true)" % rospy.resolve_name(name))
-
-
-def _end_on_signals():
-    """End on Ctrl-C, from a thread of its own: where the main thread is interrupted it may hold a lock of rospy's that
-    the shutdown waits for."""
-    def end(number, _frame):
-        threading.Thread(target=rospy.signal_shutdown, args=("signal %d" % number,)).start()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, end)
-
-
 def main():
     parser = argparse.ArgumentParser(description="Plan and execute motions behind MoveIt's interface.")
     parser.add_argument("--debug", action="store_true", help="log more")
     options = parser.parse_args(rospy.myargv()[1:])
-    _end_on_signals()
+    end_on_signals()
     try:
         limit_ports()
         rospy.init_node("move_group", disable_signals=True, log_level=rospy.DEBUG if options.debug else rospy.INFO)
         logging.getLogger("actionlib").setLevel(logging.WARNING)
         kept = build()  # noqa: F841  (keeps services and subscribers alive)
-    except (PlanningError, rospy.ROSInitException) as error:
+    except (PlanningError, MissingParameter, rospy.ROSInitException) as error:
         if not rospy.is_shutdown():
             sys.exit("move_group: %s" % error)
         return
