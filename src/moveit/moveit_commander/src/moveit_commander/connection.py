@@ -98,9 +98,13 @@ class Connection:
         full_name = self.name(name)
         try:
             rospy.wait_for_service(full_name, SERVICE_WAIT_S)
-            return rospy.ServiceProxy(full_name, SERVICES[name])(**fields)
+            return self.service(name)(**fields)
         except (rospy.ROSException, rospy.ServiceException) as error:
             raise MoveItCommanderException("the service '%s' did not answer: %s" % (full_name, error)) from error
+
+    def service(self, name):
+        """Return a rospy.ServiceProxy of one of move_group's services, which need not be there yet."""
+        return rospy.ServiceProxy(self.name(name), SERVICES[name])
 
     def publish(self, name, message):
         """Publish on one of the topics that move_group listens to."""

@@ -30,9 +30,13 @@ class PlanningSceneInterface:
 
     def __init__(self, ns="", synchronous=True):
         self._connection, self._synchronous = connect(ns), synchronous
+        # Programs reach for these three by the names of MoveIt's class, which has not always had a method to add or
+        # move any object. They are there from the start, so that no message is lost.
+        self._pub_co = self._connection.advertise("collision_object")
+        self._pub_aco = self._connection.advertise("attached_collision_object")
+        self._apply_planning_scene_diff = self._connection.service("apply_planning_scene")
         if not synchronous:
-            for topic in ("collision_object", "attached_collision_object", "planning_scene"):
-                self._connection.advertise(topic)
+            self._connection.advertise("planning_scene")
 
     # -- objects of the world ---------------------------------------------------------------------------------------
 

@@ -63,6 +63,14 @@ class CommanderTest(unittest.TestCase):
             self.assertTrue(scene.add_box("box", conversions.list_to_pose_stamped([1, 0, 0, 0, 0, 0], "base_link")))
             self.assertIn("box", scene.get_known_object_names())
 
+    def test_a_program_publishes_and_calls_in_the_scenes_own_name(self):
+        for ns in ("", "robot1"):
+            with self.subTest(ns=ns):
+                scene, at = PlanningSceneInterface(ns=ns, synchronous=False), ns and "/" + ns
+                self.assertEqual(scene._pub_co.resolved_name, at + "/collision_object")
+                self.assertEqual(scene._pub_aco.resolved_name, at + "/attached_collision_object")
+                self.assertEqual(scene._apply_planning_scene_diff.resolved_name, at + "/apply_planning_scene")
+
     def test_without_a_server_it_says_so_and_waits_no_longer_than_told(self):
         with self.assertRaisesRegex(RuntimeError, "Unable to connect to move_group action server '/nobody/move_group'"):
             MoveGroupCommander(GROUP, robot_description="/robot_description", ns="nobody", wait_for_servers=0.2)

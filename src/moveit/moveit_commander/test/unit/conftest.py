@@ -49,7 +49,10 @@ class FakeConnection:
         self.waited_for, self.cancelled = [], 0
 
     def advertise(self, name):
-        pass
+        return SimpleNamespace(publish=lambda message: self.publish(name, message))
+
+    def service(self, name):
+        return lambda request: self.call(name, scene=request.scene)
 
     def wait_for_actions(self, names, seconds):
         self.waited_for += names

@@ -11,6 +11,7 @@ from moveit_msgs.msg import (
     PlanningScene,
     PlanningSceneComponents,
 )
+from moveit_msgs.srv import ApplyPlanningSceneRequest
 from shape_msgs.msg import SolidPrimitive
 
 from moveit_commander import MoveItCommanderException, PlanningSceneInterface, conversions
@@ -125,6 +126,14 @@ def test_on_topics_when_it_need_not_be_synchronous(connection):
     assert [name for name, _ in connection.published] == [
         "collision_object", "attached_collision_object", "planning_scene"]
     assert connection.called == []
+
+
+def test_what_programs_reach_for_below_the_methods(scene, connection):
+    scene._pub_co.publish(CollisionObject(id="thing", operation=CollisionObject.MOVE))
+    scene._pub_aco.publish(AttachedCollisionObject(link_name="tool"))
+    assert [name for name, _ in connection.published] == ["collision_object", "attached_collision_object"]
+    assert scene._apply_planning_scene_diff(ApplyPlanningSceneRequest(scene=PlanningScene(is_diff=True))).success
+    assert connection.called[-1] == ("apply_planning_scene", {"scene": PlanningScene(is_diff=True)})
 
 
 def matrix(*names):
