@@ -303,7 +303,7 @@ class _Planning:
 
     def _first_hit(self, scene, timed, from_collision):
         """None, or (sentence, contacts) of the first state of a trajectory that may not be."""
-        states, _, _ = timed.sampled(_spaced(timed))
+        states, _, _ = timed.sampled(timed.spaced(_RESOLUTION))
         low, high = self.model.bounds[self.indices].T
         turns = self.model.continuous[self.indices]
         # Who starts a little beyond a limit is led back.
@@ -346,17 +346,6 @@ def _dense(path, spacing):
         count = max(1, math.ceil(float(np.abs(b - a).max()) / spacing))
         pieces.append(a + (b - a) * np.arange(count)[:, None] / count)
     return np.concatenate([*pieces, path[-1:]])
-
-
-def _spaced(timed):
-    """Times (n,) at which the joints are at most ``_RESOLUTION`` apart, the points among them."""
-    if len(timed.times) == 1:
-        return timed.times
-    speeds, _ = timed.peaks()
-    counts = np.maximum(1, np.ceil(speeds.max(axis=1) * np.diff(timed.times) / _RESOLUTION)).astype(int)
-    pieces = (np.linspace(a, b, count, endpoint=False)
-              for (a, b), count in zip(itertools.pairwise(timed.times), counts, strict=True))
-    return np.concatenate([*pieces, timed.times[-1:]])
 
 
 def _named(contacts):

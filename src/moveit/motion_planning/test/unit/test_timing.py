@@ -163,3 +163,11 @@ def test_stretching_keeps_what_is_within_its_limits():
     assert within_limits(timed, np.array([1.0]), np.array([1.0])).duration == pytest.approx(timed.duration)
     assert np.isclose(timed.stretched(2.0).duration, 2.0 * timed.duration)
     assert isinstance(timed, Timed)
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_times_that_are_spaced_leave_no_gap_and_no_point_out(name):
+    timed = time_path(PATHS[name], VELOCITY, ACCELERATION)
+    times = timed.spaced(0.01)
+    assert np.isin(timed.times, times).all() and (np.diff(times) > 0.0).all()
+    assert np.abs(np.diff(timed.sampled(times)[0], axis=0)).max(initial=0.0) <= 0.01 + 1e-9

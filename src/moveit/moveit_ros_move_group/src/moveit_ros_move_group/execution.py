@@ -5,40 +5,17 @@ import threading
 import time
 from dataclasses import dataclass, field
 
-import actionlib
 import rospy
-from actionlib_msgs.msg import GoalStatus
-from control_msgs.msg import (
-    FollowJointTrajectoryAction,
-    FollowJointTrajectoryGoal,
-    FollowJointTrajectoryResult,
-    GripperCommandAction,
-    GripperCommandGoal,
-    JointTolerance,
-)
 from moveit_msgs.msg import MoveItErrorCodes
-from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from moveit_ros_move_group.controllers import (
-    FAKE,
-    FOLLOW,
-    ControllerError,
-    allowed_duration,
-    choose,
-    start_deviation,
-)
+from moveit_ros_move_group.controllers import ControllerError, allowed_duration, choose, start_deviation
+from moveit_ros_move_group.handles import TICK_S
 
-# How often [s] a running execution is looked at.
-_TICK_S = 0.01
 # How long [s] a cancelled controller may take to say so, and the joints to come to rest.
 _CANCEL_S = 0.2
 _REST_S = 1.0
 _RESTING_STATES = 3
-
-_FOLLOW_ERRORS = {value: name for name, value in vars(FollowJointTrajectoryResult).items()
-                  if isinstance(value, int) and name.isupper()}
-_STATUS_NAMES = {value: name for name, value in vars(GoalStatus).items() if isinstance(value, int) and name.isupper()}
 
 
 @dataclass
@@ -52,7 +29,6 @@ class ExecutionSettings:
     start_tolerance: object = 0.01
     wait_for_rest: bool = True
     connection_timeout: float = 15.0
-    velocity_scaling: float = 1.0
 
 
 @dataclass
@@ -67,20 +43,13 @@ class Outcome:
 class Executor:
     """One execution at a time. monitor: gives the joints' values (SceneMonitor)."""
 
-    def __init__(self, controllers, settings, monitor, initial=None):
-        """controllers: list of controllers.Controller. initial: {joint: value}, where fake controllers begin."""
+    def __init__(self, controllers, settings, monitor, handle_of):
+        """controllers: list of controllers.Controller. handle_of(controller): how it is spoken to, as
+        handles.Handles.of."""
         self._controllers, self._settings, self._monitor = controllers, settings, monitor
-        self._handles = {}
+        self._handle_of = handle_of
         self._busy = threading.Lock()
         self._stop = threading.Event()
-        self._fake_states = None
-        if any(controller.kind == FAKE for controller in controllers):
-            # Latched: who shows the joints may come later than they are said to be somewhere.
-            self._fake_states = rospy.Publisher("~fake_controller_joint_states", JointState, queue_size=100, latch=True)
-            if initial:
-                self._fake_states.publish(_joint_state(initial.keys(), initial.values()))
-        for controller in controllers:
-            self._handle(controller)
 
     def stop(self):
         """End what is being executed, if anything is."""
@@ -120,16 +89,24 @@ class Executor:
             return Outcome(MoveItErrorCodes.CONTROL_FAILED,
                            "Invalid Trajectory: start point deviates from current robot state more than the allowed "
                            "start tolerance: joint '%s' by %.4g; plan again from the current state" % off, dict([off]))
-        handles = []
-        for controller in chosen:
-            handle = self._handle(controller)
-            if not handle.connected(self._settings.connection_timeout):
+        def given_up():
+            return self._stop.is_set() or preempted()
+
+        handles = [self._handle_of(controller) for controller in chosen]
+        for controller, handle in zip(chosen, handles, strict=True):
+            if not handle.connected(self._settings.connection_timeout, given_up):
+                if given_up():
+                    return Outcome(MoveItErrorCodes.PREEMPTED, "stopped on request")
                 return Outcome(MoveItErrorCodes.CONTROL_FAILED, "Action client not connected: %s does not answer; is "
                                "the controller running, and is its name in controller_list right?" % controller)
-            handles.append(handle)
-        for controller, handle in zip(chosen, handles, strict=True):
-            handle.send(part_of(trajectory, controller.joints))
-        return self._watch(trajectory, chosen, handles, preempted, invalidated)
+        try:
+            for controller, handle in zip(chosen, handles, strict=True):
+                handle.send(part_of(trajectory, controller.joints))
+            return self._watch(trajectory, chosen, handles, preempted, invalidated)
+        except Exception:  # nothing may go on moving that nobody watches
+            for handle in handles:
+                handle.cancel()
+            raise
 
     def _watch(self, trajectory, chosen, handles, preempted, invalidated):
         duration = trajectory.points[-1].time_from_start.to_sec()
@@ -140,7 +117,7 @@ class Executor:
             running = [handle for handle in handles if not handle.done.is_set()]
             if not running:
                 break
-            running[0].done.wait(_TICK_S)
+            running[0].done.wait(TICK_S)
             now = rospy.get_time()
             begin = min(begin, now)
             if rospy.is_shutdown() or self._stop.is_set() or preempted():
@@ -148,16 +125,15 @@ class Executor:
             reason = invalidated()
             if reason:
                 return self._cancel(handles, MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE, reason)
-            failed = next((handle for handle in handles if handle.done.is_set() and handle.error()), None)
+            failed = _failed(handles)
             if failed is not None:
-                return self._cancel(handles, MoveItErrorCodes.CONTROL_FAILED, failed.error())
+                return self._cancel(handles, failed.code, failed.text)
             if self._settings.monitored and now - begin > allowed:
                 return self._cancel(handles, MoveItErrorCodes.TIMED_OUT, "%s did not end within %.2f s (%.2f s planned)"
                                     % (", ".join(map(str, chosen)), allowed, duration))
-        for handle in handles:
-            if handle.error():
-                code = MoveItErrorCodes.PREEMPTED if handle.was_preempted() else MoveItErrorCodes.CONTROL_FAILED
-                return Outcome(code, handle.error())
+        failed = _failed(handles)
+        if failed is not None:
+            return failed
         if self._settings.wait_for_rest:
             self._wait_for_rest(trajectory.joint_names, preempted)
         return Outcome(MoveItErrorCodes.SUCCESS)
@@ -178,7 +154,7 @@ class Executor:
         while time.monotonic() < deadline and not rospy.is_shutdown() and not self._stop.is_set() and not preempted():
             count, values = self._monitor.joint_update()
             if count == number:
-                time.sleep(_TICK_S)
+                time.sleep(TICK_S)
                 continue
             number, now = count, [values.get(name, math.nan) for name in names]
             if before is not None:
@@ -190,194 +166,16 @@ class Executor:
             before = now
 
     def _is_alive(self, controller):
-        return self._handle(controller).connected(0.0)
-
-    def _handle(self, controller):
-        key = controller.action or controller.name
-        if key not in self._handles:
-            if controller.kind == FAKE:
-                self._handles[key] = FakeHandle(controller, self._fake_states, self._monitor)
-            elif controller.kind == FOLLOW:
-                self._handles[key] = FollowHandle(controller)
-            else:
-                self._handles[key] = GripperHandle(controller)
-        return self._handles[key]
+        return self._handle_of(controller).connected(0.0)
 
 
-class _ActionHandle:
-    """A controller that serves an action. done: set once it has ended."""
-
-    def __init__(self, controller, action_type):
-        self.controller, self.done = controller, threading.Event()
-        self._client = actionlib.ActionClient(controller.action, action_type)
-        self._sent, self._ended = None, None  # goal handles: of the newest goal, and of the newest that is over
-
-    def connected(self, timeout_s):
-        """Whether the action's server is there; waited for so long in wall time."""
-        deadline = time.monotonic() + timeout_s
-        client = self._client
-        # actionlib's own waiting sleeps in ROS time, which may stand still.
-        while not all(end.get_num_connections() for end in (client.pub_goal, client.pub_cancel, client.status_sub,
-                                                            client.result_sub)):
-            if time.monotonic() >= deadline or rospy.is_shutdown():
-                return False
-            time.sleep(_TICK_S)
-        return True
-
-    def send(self, trajectory):
-        before, self._sent, self._ended = self._sent, None, None
-        self.done.clear()
-
-        def moved(handle):
-            # It may be called before send_goal returns, and once more for a goal that is over.
-            if handle != before and handle.get_comm_state() == actionlib.CommState.DONE:
-                self._ended = handle
-                self.done.set()
-
-        self._sent = self._client.send_goal(self._goal(trajectory), moved)
-
-    def cancel(self):
-        if self._sent is not None:
-            self._sent.cancel()
-
-    def was_preempted(self):
-        return self._status() in (GoalStatus.PREEMPTED, GoalStatus.RECALLED)
-
-    def error(self):
-        """The sentence what went wrong, empty where nothing has."""
-        status = self._status()
-        if status in (None, GoalStatus.SUCCEEDED):
-            return ""
-        return "controller %s ended with %s%s" % (self.controller, _STATUS_NAMES.get(status, status), self._detail())
-
-    def _status(self):
-        return self._ended.get_terminal_state() if self._ended is not None else None
-
-    def _goal(self, trajectory):
-        raise NotImplementedError
-
-    def _detail(self):
-        text = self._ended.get_goal_status_text()
-        return ": %s" % text if text else ""
-
-
-class FollowHandle(_ActionHandle):
-    """FollowJointTrajectory."""
-
-    def __init__(self, controller):
-        super().__init__(controller, FollowJointTrajectoryAction)
-
-    def _goal(self, trajectory):
-        goal, options = FollowJointTrajectoryGoal(trajectory=trajectory), self.controller.options
-        goal.path_tolerance = tolerances_of(options.get("path_tolerance"), self.controller.joints)
-        goal.goal_tolerance = tolerances_of(options.get("goal_tolerance"), self.controller.joints)
-        if isinstance(options.get("goal_time_tolerance"), (int, float)):
-            goal.goal_time_tolerance = rospy.Duration(options["goal_time_tolerance"])
-        return goal
-
-    def _detail(self):
-        result = self._ended.get_result()
-        if result is None:
-            return super()._detail()
-        name = _FOLLOW_ERRORS.get(result.error_code, str(result.error_code))
-        text = result.error_string or self._ended.get_goal_status_text()
-        return ", %s%s" % (name, ": %s" % text if text else "")
-
-
-class GripperHandle(_ActionHandle):
-    """GripperCommand: the last point's position is the command."""
-
-    def __init__(self, controller):
-        super().__init__(controller, GripperCommandAction)
-
-    def _goal(self, trajectory):
-        goal, options = GripperCommandGoal(), self.controller.options
-        point = trajectory.points[-1]
-        if options.get("parallel"):
-            goal.command.position = sum(point.positions)
-        else:
-            name = options.get("command_joint", trajectory.joint_names[0])
-            index = trajectory.joint_names.index(name) if name in trajectory.joint_names else 0
-            goal.command.position = point.positions[index]
-        effort = point.effort[0] if point.effort else options.get("max_effort", 0.0)
-        goal.command.max_effort = float(effort)
-        return goal
-
-    def error(self):
-        allowed = self.controller.options.get("allow_failure") and self._status() == GoalStatus.ABORTED
-        return "" if allowed else super().error()
-
-
-class FakeHandle:
-    """A controller that moves nothing and says where the joints would be."""
-
-    def __init__(self, controller, publisher, monitor):
-        self.controller, self.done = controller, threading.Event()
-        self._publisher, self._monitor = publisher, monitor
-        self._cancelled = threading.Event()
-
-    def connected(self, timeout_s):
-        return True
-
-    def send(self, trajectory):
-        self.done.clear()
-        self._cancelled.clear()
-        threading.Thread(target=self._play, args=(trajectory,), daemon=True).start()
-
-    def cancel(self):
-        self._cancelled.set()
-
-    def was_preempted(self):
-        return self._cancelled.is_set()
-
-    def error(self):
-        return ""
-
-    def _play(self, trajectory):
-        kind = self.controller.options["type"]
-        points = trajectory.points[-1:] if kind == "last point" else trajectory.points
-        if kind == "interpolate":
-            self._interpolate(trajectory)
-        else:
-            begin = rospy.get_time()
-            for point in points:
-                wait = point.time_from_start.to_sec() if kind == "via points" else 0.0
-                while rospy.get_time() - begin < wait and not self._over():
-                    time.sleep(_TICK_S)
-                if self._over():
-                    break
-                self._say(trajectory.joint_names, point.positions)
-        self.done.set()
-
-    def _interpolate(self, trajectory):
-        points, begin = trajectory.points, rospy.get_time()
-        step = 1.0 / float(self.controller.options.get("rate", 10.0) or 10.0)
-        while not self._over():
-            now = rospy.get_time() - begin
-            after = next((i for i, point in enumerate(points) if point.time_from_start.to_sec() > now), len(points))
-            if after == len(points):
-                self._say(trajectory.joint_names, points[-1].positions)
-                return
-            if after == 0:
-                self._say(trajectory.joint_names, points[0].positions)
-            else:
-                a, b = points[after - 1], points[after]
-                share = (now - a.time_from_start.to_sec()) / (b.time_from_start - a.time_from_start).to_sec()
-                self._say(trajectory.joint_names, [p + share * (q - p)
-                                                   for p, q in zip(a.positions, b.positions, strict=True)])
-            time.sleep(step)
-
-    def _over(self):
-        return self._cancelled.is_set() or rospy.is_shutdown()
-
-    def _say(self, names, positions):
-        self._publisher.publish(_joint_state(names, positions))
-
-
-def _joint_state(names, positions):
-    message = JointState(name=list(names), position=list(positions))
-    message.header.stamp = rospy.Time.now()
-    return message
+def _failed(handles):
+    """The Outcome of the first of those that have ended with an error, or None."""
+    for handle in handles:
+        if handle.done.is_set() and handle.error():
+            code = MoveItErrorCodes.PREEMPTED if handle.was_preempted() else MoveItErrorCodes.CONTROL_FAILED
+            return Outcome(code, handle.error())
+    return None
 
 
 def part_of(trajectory, joints):
@@ -395,33 +193,6 @@ def part_of(trajectory, joints):
     return part
 
 
-def tolerances_of(value, joints):
-    """Return the JointTolerances of a controller_list's path_tolerance or goal_tolerance.
-
-    A map {position|velocity|acceleration: number, list or {joint: number}}, or a list of {name, position, ...}.
-    """
-    fields = ("position", "velocity", "acceleration")
-    tolerances = {joint: JointTolerance(name=joint) for joint in joints}
-    if isinstance(value, dict):
-        for key in fields:
-            given = value.get(key)
-            for i, joint in enumerate(joints):
-                number = given.get(joint) if isinstance(given, dict) else given
-                if isinstance(given, list):
-                    number = given[i] if i < len(given) else None
-                if isinstance(number, (int, float)):
-                    setattr(tolerances[joint], key, float(number))
-    elif isinstance(value, list):
-        for entry in value:
-            if isinstance(entry, dict) and entry.get("name") in tolerances:
-                for key in fields:
-                    if isinstance(entry.get(key), (int, float)):
-                        setattr(tolerances[entry["name"]], key, float(entry[key]))
-    else:
-        return []
-    return list(tolerances.values())
-
-
 def _flaw(trajectory):
     """The sentence why a JointTrajectory cannot be executed, or an empty one."""
     count, last = len(trajectory.joint_names), -1.0
@@ -431,6 +202,10 @@ def _flaw(trajectory):
     for i, point in enumerate(trajectory.points, 1):
         if len(point.positions) != count:
             return "point %d of the trajectory has %d positions for %d joints" % (i, len(point.positions), count)
+        for name in ("velocities", "accelerations", "effort"):
+            given = len(getattr(point, name))
+            if given not in (0, count):
+                return "point %d of the trajectory has %d %s for %d joints" % (i, given, name, count)
         numbers = (*point.positions, *point.velocities, *point.accelerations)
         if not all(map(math.isfinite, numbers)):
             return "point %d of the trajectory holds a number that is not finite" % i

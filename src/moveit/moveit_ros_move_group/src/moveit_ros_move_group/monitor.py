@@ -18,6 +18,10 @@ from moveit_ros_move_group.convert.scene_out import scene_diff, scene_message
 
 # How long [s] a frame that tf does not know yet is waited for, in wall time.
 _FRAME_TIMEOUT_S = 0.5
+# For so long [s] after one that did not come no other is waited for: a scene may name thousands.
+_IMPATIENT_S = 1.0
+# How often in a second the scene is published, where no parameter says so.
+_USUAL_HZ = 4.0
 _NAMES = {"joint_state_topic": "joint_states", "attached_collision_object_topic": "attached_collision_object",
           "planning_scene_topic": "planning_scene"}
 
@@ -33,12 +37,13 @@ class SceneMonitor:
         self.model = model
         self.continuous = {name for name, turns in zip(model.variables, model.continuous, strict=True) if turns}
         self._say_failure = say_failure
-        self._lock, self._news = threading.RLock(), threading.Condition()
+        # Changes of the scene wait for each other, and may wait for tf; nobody else waits for them.
+        self._changing, self._lock, self._news = threading.RLock(), threading.RLock(), threading.Condition()
         self._scene, self._octomap = Scene(model), None
         self._values, self._stamps, self._updates = {}, {}, 0
         self._base, self._newest_stamp = np.eye(4), rospy.Time()
         self._listeners = []
-        self._buffer = None
+        self._buffer, self._patient_from = None, 0.0
         self.reader = SceneReader(self.tf_frame)
         options = rospy.get_param("~planning_scene_monitor_options", {})
         topics = {key: options.get(key, usual) for key, usual in _NAMES.items()}
@@ -48,9 +53,11 @@ class SceneMonitor:
         settings = rospy.get_param("~planning_scene_monitor", {})
         self._publishes = bool(settings.get("publish_planning_scene", False))
         self._publishes_states = bool(settings.get("publish_state_updates", False))
-        self._hz = float(settings.get("publish_planning_scene_hz", 4.0) or 4.0)
+        hz = settings.get("publish_planning_scene_hz", _USUAL_HZ)
+        self._hz = hz if isinstance(hz, (int, float)) and 0.0 < hz < math.inf else _USUAL_HZ
         self._publisher = rospy.Publisher(options.get("monitored_planning_scene_topic", "~monitored_planning_scene"),
                                           PlanningScene, queue_size=100)
+        self.joint_state_topic = rospy.resolve_name(topics["joint_state_topic"])
         self._subscribers = [
             rospy.Subscriber(topics["joint_state_topic"], JointState, self._on_joint_state, queue_size=25),
             rospy.Subscriber(topics["planning_scene_topic"], PlanningScene, self._on_scene, queue_size=100),
@@ -58,8 +65,8 @@ class SceneMonitor:
             rospy.Subscriber(topics["attached_collision_object_topic"], AttachedCollisionObject, self._on_attached,
                              queue_size=1024),
             rospy.Subscriber("planning_scene_world", PlanningSceneWorld, self._on_world, queue_size=10)]
-        self.joint_state_topic = self._subscribers[0].resolved_name
-        threading.Thread(target=self._publish_changes, daemon=True).start()
+        self._publishing = threading.Thread(target=self._publish_changes, daemon=True)
+        self._publishing.start()
 
     # -- the scene ----------------------------------------------------------------------------------------------
 
@@ -93,8 +100,8 @@ class SceneMonitor:
 
     def change(self, function, request):
         """Put ``function(scene)`` in the scene's place. Raises PlanningError and leaves the scene as it is."""
-        with self._lock:
-            self._scene = function(self._scene)
+        with self._changing:
+            self._replace(function(self._scene))
         self._tell()
 
     def on_change(self, listener):
@@ -102,15 +109,20 @@ class SceneMonitor:
         self._listeners.append(listener)
 
     def _change(self, function, request):
-        with self._lock:
+        with self._changing:
             try:
-                self._scene, errors = function(self._scene)
+                scene, errors = function(self._scene)
+                self._replace(scene)
             except PlanningError as error:
                 errors = [str(error)]
         for error in errors:
             self._say_failure(request, error)
         self._tell()
         return errors
+
+    def _replace(self, scene):
+        with self._lock:
+            self._scene = scene
 
     def _tell(self):
         for listener in self._listeners:
@@ -178,6 +190,8 @@ class SceneMonitor:
 
     def _on_joint_state(self, message):
         if len(message.name) != len(message.position):
+            rospy.logwarn_throttle(30.0, "a joint state on %s has %d names but %d positions; it is left out"
+                                   % (self.joint_state_topic, len(message.name), len(message.position)))
             return
         stamp = message.header.stamp
         with self._lock:
@@ -221,15 +235,19 @@ class SceneMonitor:
                     return found if known == self.model.frame else self.scene().frame(known) @ found
                 except tf2_ros.TransformException as error:
                     reason = str(error)
-            if time.monotonic() > deadline or rospy.is_shutdown():
+            now = time.monotonic()
+            if now > deadline:
+                self._patient_from = now + _IMPATIENT_S
+            if now < self._patient_from or rospy.is_shutdown():
                 raise MessageError("'%s' is no frame: neither of the robot, nor an object or subframe of the scene, "
                                    "nor does tf lead from it to '%s' (%s)" % (name, self.model.frame, reason))
             time.sleep(0.02)
 
     def _listen_to_tf(self):
-        if self._buffer is None:
-            self._buffer = tf2_ros.Buffer(debug=False)
-            self._listener = tf2_ros.TransformListener(self._buffer)
+        with self._lock:
+            if self._buffer is None:
+                self._buffer = tf2_ros.Buffer(debug=False)
+                self._listener = tf2_ros.TransformListener(self._buffer)
 
     # -- what is published ---------------------------------------------------------------------------------------
 
@@ -241,8 +259,10 @@ class SceneMonitor:
                 continue
             try:
                 published = self._publish_change(published)
-            except rospy.ROSException:
-                return
+            except Exception as error:  # the next scene may be one that can be published
+                if not rospy.is_shutdown():
+                    rospy.logerr_throttle(30.0, "the scene could not be published: %s: %s"
+                                          % (type(error).__name__, error))
 
     def _publish_change(self, published):
         scene, stamp = self.scene(), self.state_stamp()

@@ -15,6 +15,7 @@ from moveit_ros_move_group.capabilities import cartesian, kinematics, motion, pl
 from moveit_ros_move_group.context import Context
 from moveit_ros_move_group.execution import Executor
 from moveit_ros_move_group.failures import Failures
+from moveit_ros_move_group.handles import Handles
 from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_ros_move_group.planning import Planner
 from rospy_limits.node import limit_ports
@@ -52,7 +53,8 @@ def _executor(monitor):
     for text in complaints:
         rospy.logwarn("%s", text)
     rospy.loginfo("controllers: %s", ", ".join(map(str, controllers)) or "none; plans cannot be executed")
-    return Executor(controllers, settings.execution_settings(), monitor, settings.initial_positions(monitor.model))
+    handles = Handles(controllers, settings.initial_positions(monitor.model))
+    return Executor(controllers, settings.execution_settings(), monitor, handles.of)
 
 
 def _capabilities(context, wanted, description, may_execute):

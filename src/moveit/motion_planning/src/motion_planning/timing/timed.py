@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A trajectory of joints as points, and what controllers make of it between them."""
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +48,17 @@ class Timed:
         time = (durations[:, None] * _INSIDE)[:, :, None]
         _, velocity, acceleration = _evaluated(polynomials[:, None], time)
         return np.abs(velocity).max(axis=1), np.abs(acceleration).max(axis=1)
+
+    def spaced(self, step):
+        """Times (n,) [s] between which no joint moves by more than ``step`` [rad or m], those of the points among
+        them."""
+        if len(self.times) == 1:
+            return self.times
+        speeds, _ = self.peaks()
+        counts = np.maximum(1, np.ceil(speeds.max(axis=1) * np.diff(self.times) / step)).astype(int)
+        pieces = (np.linspace(a, b, count, endpoint=False)
+                  for (a, b), count in zip(itertools.pairwise(self.times), counts, strict=True))
+        return np.concatenate([*pieces, self.times[-1:]])
 
     def _polynomials(self):
         return splines(self.times, self.positions, self.velocities, self.accelerations,

@@ -4,7 +4,6 @@ import threading
 import time
 
 import actionlib
-import numpy as np
 import rospy
 from moveit_msgs.msg import (
     ExecuteTrajectoryAction,
@@ -20,17 +19,16 @@ from moveit_msgs.srv import ExecuteKnownTrajectory, ExecuteKnownTrajectoryRespon
 from std_msgs.msg import String
 
 from motion_planning.errors import PlanningError
-from moveit_ros_move_group.context import RequestError, tell
+from moveit_ros_move_group.context import RequestError, answered, tell
 from moveit_ros_move_group.convert.scene_out import state_message, trajectory_message
 from moveit_ros_move_group.planning import scene_with_diff
+from moveit_ros_move_group.rest_of_the_way import RestOfTheWay
 from moveit_ros_move_group.texts import result_text
 
 # How long [s] a joint state newer than the goal is waited for.
 _STATE_TIMEOUT_S = 1.0
 # Replanning, where neither the goal nor a parameter says how often.
 _REPLAN_ATTEMPTS = 5
-# The rest of a running trajectory is checked at states at most so far apart [rad or m, in any joint].
-_LOOK_AHEAD = 0.05
 
 
 class PlanService:
@@ -132,7 +130,7 @@ class MoveAction:
                 result.error_code.val = MoveItErrorCodes.SUCCESS
                 return ""
             self._feedback("MONITOR")
-            watch = _RestOfTheWay(context, group, plan.timed, self._changed, options.planning_scene_diff)
+            watch = RestOfTheWay(context.exact, group, plan.timed, self._scene_after_change(options))
             outcome = context.executor.execute(result.planned_trajectory, self._server.is_preempt_requested, watch.hit)
             result.executed_trajectory = result.planned_trajectory
             result.error_code.val = outcome.code
@@ -147,6 +145,17 @@ class MoveAction:
                                   outcome.joints)
         return outcome.text
 
+    def _scene_after_change(self, options):
+        """A function that returns the scene if it has changed since the last call, else None."""
+        def changed():
+            if not self._changed.is_set():
+                return None
+            self._changed.clear()
+            scene = self.context.monitor.scene()
+            return scene_with_diff(self.context, scene, options.planning_scene_diff, "move_group", keep_robot=True)
+
+        return changed
+
     def _pause(self, seconds):
         end = time.monotonic() + max(0.0, min(seconds, 60.0))
         while time.monotonic() < end and not self._server.is_preempt_requested() and not rospy.is_shutdown():
@@ -155,35 +164,6 @@ class MoveAction:
     def _feedback(self, state):
         if self._server.is_active():
             self._server.publish_feedback(MoveGroupFeedback(state))
-
-
-class _RestOfTheWay:
-    """Looks whether a change of the scene stands in what is left of a trajectory. contacts: of the last look."""
-
-    def __init__(self, context, group, timed, changed, diff):
-        self._context, self._group, self._timed = context, group, timed
-        self._changed, self._diff = changed, diff
-        self._begin = rospy.get_time()
-        self.contacts = []
-
-    def hit(self):
-        """None, or the sentence what is in the way. Looks only after a change."""
-        if not self._changed.is_set():
-            return None
-        self._changed.clear()
-        scene = scene_with_diff(self._context, self._context.monitor.scene(), self._diff, "move_group", keep_robot=True)
-        now = min(max(0.0, rospy.get_time() - self._begin), self._timed.duration)
-        times = np.linspace(now, self._timed.duration, 200)
-        before = None
-        for q in self._timed.sampled(times)[0]:
-            if before is not None and np.abs(q - before).max() < _LOOK_AHEAD:
-                continue
-            before = q
-            state = scene.state.with_q(q, self._group.indices)
-            if not self._context.exact.free(scene, state, self._group.name):
-                self.contacts = self._context.exact.contacts(scene, state, self._group.name)
-                return "in the way of what is left: %s" % self.contacts[0]
-        return None
 
 
 class ExecuteAction:
@@ -218,17 +198,20 @@ class ExecuteService:
         self.context = context
         self._service = rospy.Service("execute_kinematic_path", ExecuteKnownTrajectory, self._serve)
 
-    def _serve(self, request):
-        response = ExecuteKnownTrajectoryResponse()
-        if not request.wait_for_execution:
+    @answered("execute_kinematic_path", ExecuteKnownTrajectoryResponse)
+    def _serve(self, request, response):
+        if self.context.executor is None:
+            raise RequestError(MoveItErrorCodes.CONTROL_FAILED, "~allow_trajectory_execution is false")
+        if request.wait_for_execution:
+            response.error_code.val = self._execute(request.trajectory)
+        else:
             threading.Thread(target=self._execute, args=(request.trajectory,), daemon=True).start()
-            response.error_code.val = MoveItErrorCodes.SUCCESS
-            return response
-        response.error_code.val = self._execute(request.trajectory)
-        return response
 
     def _execute(self, trajectory):
-        outcome = self.context.executor.execute(trajectory)
+        try:
+            outcome = self.context.executor.execute(trajectory)
+        except Exception as error:  # the caller may be gone: nobody else would say so
+            return failed(self.context, "execute_kinematic_path", error)[0]
         if outcome.code != MoveItErrorCodes.SUCCESS:
             self.context.failures.tell("execute_kinematic_path", outcome.code, outcome.text, joints=outcome.joints)
         return outcome.code

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What controllers are spoken to by: an action each, or nothing where they are fake."""
+import threading
+import time
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryGoal,
+    FollowJointTrajectoryResult,
+    GripperCommandAction,
+    GripperCommandGoal,
+    JointTolerance,
+)
+from sensor_msgs.msg import JointState
+
+from moveit_ros_move_group.controllers import FAKE, FOLLOW
+
+# How often [s] something that gives no sign is looked at.
+TICK_S = 0.01
+# Between two joint states of a fake controller that interpolates, where its ``rate`` does not say [s].
+_FAKE_STEP_S = 0.1
+
+_FOLLOW_ERRORS = {value: name for name, value in vars(FollowJointTrajectoryResult).items()
+                  if isinstance(value, int) and name.isupper()}
+_STATUS_NAMES = {value: name for name, value in vars(GoalStatus).items() if isinstance(value, int) and name.isupper()}
+
+
+class Handles:
+    """A handle for each controller, made when it is first asked for; controllers of one action share it."""
+
+    def __init__(self, controllers, initial=None):
+        """controllers: list of controllers.Controller. initial: {joint: value}, where fake controllers begin."""
+        self._made, self._fake_states = {}, None
+        if any(controller.kind == FAKE for controller in controllers):
+            # Latched: who shows the joints may come later than they are said to be somewhere.
+            self._fake_states = rospy.Publisher("~fake_controller_joint_states", JointState, queue_size=100, latch=True)
+            if initial:
+                self._fake_states.publish(_joint_state(initial.keys(), initial.values()))
+        for controller in controllers:
+            self.of(controller)
+
+    def of(self, controller):
+        key = controller.action or controller.name
+        if key not in self._made:
+            if controller.kind == FAKE:
+                self._made[key] = FakeHandle(controller, self._fake_states)
+            else:
+                self._made[key] = (FollowHandle if controller.kind == FOLLOW else GripperHandle)(controller)
+        return self._made[key]
+
+
+class _Goal:
+    """One goal. handle: actionlib's once it is over."""
+
+    def __init__(self):
+        self.over, self.handle = threading.Event(), None
+
+    def moved(self, handle):
+        """The goal's state has changed; may come before send_goal returns, and again after the goal is over."""
+        if handle.get_comm_state() == actionlib.CommState.DONE:
+            self.handle = handle
+            self.over.set()
+
+
+class _ActionHandle:
+    """A controller that serves an action. Each goal has its own record: the late end of an older one ends no other."""
+
+    def __init__(self, controller, action_type):
+        self.controller = controller
+        self._client = actionlib.ActionClient(controller.action, action_type)
+        self._sent, self._goal = None, _Goal()
+
+    @property
+    def done(self):
+        """The Event that is set once the newest goal has ended."""
+        return self._goal.over
+
+    def connected(self, timeout_s, given_up=lambda: False):
+        """Whether the action's server is there; waited for so long in wall time, or until ``given_up()``."""
+        deadline = time.monotonic() + timeout_s
+        client = self._client
+        # actionlib's own waiting sleeps in ROS time, which may stand still.
+        while not all(end.get_num_connections() for end in (client.pub_goal, client.pub_cancel, client.status_sub,
+                                                            client.result_sub)):
+            if time.monotonic() >= deadline or rospy.is_shutdown() or given_up():
+                return False
+            time.sleep(TICK_S)
+        return True
+
+    def send(self, trajectory):
+        self._sent, self._goal = None, _Goal()
+        self._sent = self._client.send_goal(self._goal_of(trajectory), self._goal.moved)
+
+    def cancel(self):
+        if self._sent is not None:
+            self._sent.cancel()
+
+    def was_preempted(self):
+        return self._status() in (GoalStatus.PREEMPTED, GoalStatus.RECALLED)
+
+    def error(self):
+        """The sentence what went wrong, empty where nothing has."""
+        status = self._status()
+        if status in (None, GoalStatus.SUCCEEDED):
+            return ""
+        return "controller %s ended with %s%s" % (self.controller, _STATUS_NAMES.get(status, status), self._detail())
+
+    def _status(self):
+        return self._goal.handle.get_terminal_state() if self._goal.handle is not None else None
+
+    def _goal_of(self, trajectory):
+        raise NotImplementedError
+
+    def _detail(self):
+        text = self._goal.handle.get_goal_status_text()
+        return ": %s" % text if text else ""
+
+
+class FollowHandle(_ActionHandle):
+    """FollowJointTrajectory."""
+
+    def __init__(self, controller):
+        super().__init__(controller, FollowJointTrajectoryAction)
+
+    def _goal_of(self, trajectory):
+        goal, options = FollowJointTrajectoryGoal(trajectory=trajectory), self.controller.options
+        goal.path_tolerance = tolerances_of(options.get("path_tolerance"), self.controller.joints)
+        goal.goal_tolerance = tolerances_of(options.get("goal_tolerance"), self.controller.joints)
+        if isinstance(options.get("goal_time_tolerance"), (int, float)):
+            goal.goal_time_tolerance = rospy.Duration(options["goal_time_tolerance"])
+        return goal
+
+    def _detail(self):
+        result = self._goal.handle.get_result()
+        if result is None:
+            return super()._detail()
+        name = _FOLLOW_ERRORS.get(result.error_code, str(result.error_code))
+        text = result.error_string or self._goal.handle.get_goal_status_text()
+        return ", %s%s" % (name, ": %s" % text if text else "")
+
+
+class GripperHandle(_ActionHandle):
+    """GripperCommand: the last point's position is the command."""
+
+    def __init__(self, controller):
+        super().__init__(controller, GripperCommandAction)
+
+    def _goal_of(self, trajectory):
+        goal, options = GripperCommandGoal(), self.controller.options
+        point = trajectory.points[-1]
+        if options.get("parallel"):
+            goal.command.position = sum(point.positions)
+        else:
+            name = options.get("command_joint", trajectory.joint_names[0])
+            index = trajectory.joint_names.index(name) if name in trajectory.joint_names else 0
+            goal.command.position = point.positions[index]
+        effort = point.effort[0] if point.effort else options.get("max_effort", 0.0)
+        goal.command.max_effort = float(effort)
+        return goal
+
+    def error(self):
+        allowed = self.controller.options.get("allow_failure") and self._status() == GoalStatus.ABORTED
+        return "" if allowed else super().error()
+
+
+class FakeHandle:
+    """A controller that moves nothing and says where the joints would be."""
+
+    def __init__(self, controller, publisher):
+        self.controller, self.done = controller, threading.Event()
+        self._publisher = publisher
+        self._cancelled = threading.Event()
+        rate = controller.options.get("rate")
+        self._step = 1.0 / rate if isinstance(rate, (int, float)) and rate > 0.0 else _FAKE_STEP_S
+
+    def connected(self, timeout_s, given_up=None):
+        return True
+
+    def send(self, trajectory):
+        # New events: what played before may still sleep, and must neither go on nor end this one.
+        self.done, self._cancelled = threading.Event(), threading.Event()
+        threading.Thread(target=self._play, args=(trajectory, self.done, self._cancelled), daemon=True).start()
+
+    def cancel(self):
+        self._cancelled.set()
+
+    def was_preempted(self):
+        return self._cancelled.is_set()
+
+    def error(self):
+        return ""
+
+    def _play(self, trajectory, done, cancelled):
+        def over():
+            return cancelled.is_set() or rospy.is_shutdown()
+
+        kind = self.controller.options["type"]
+        if kind == "interpolate":
+            self._interpolate(trajectory, over)
+        else:
+            begin = rospy.get_time()
+            for point in trajectory.points[-1:] if kind == "last point" else trajectory.points:
+                wait = point.time_from_start.to_sec() if kind == "via points" else 0.0
+                while rospy.get_time() - begin < wait and not over():
+                    time.sleep(TICK_S)
+                if over():
+                    break
+                self._say(trajectory.joint_names, point.positions)
+        done.set()
+
+    def _interpolate(self, trajectory, over):
+        points, begin = trajectory.points, rospy.get_time()
+        while not over():
+            now = rospy.get_time() - begin
+            after = next((i for i, point in enumerate(points) if point.time_from_start.to_sec() > now), len(points))
+            if after == len(points):
+                self._say(trajectory.joint_names, points[-1].positions)
+                return
+            if after == 0:
+                self._say(trajectory.joint_names, points[0].positions)
+            else:
+                a, b = points[after - 1], points[after]
+                share = (now - a.time_from_start.to_sec()) / (b.time_from_start - a.time_from_start).to_sec()
+                self._say(trajectory.joint_names, [p + share * (q - p)
+                                                   for p, q in zip(a.positions, b.positions, strict=True)])
+            time.sleep(self._step)
+
+    def _say(self, names, positions):
+        self._publisher.publish(_joint_state(names, positions))
+
+
+def _joint_state(names, positions):
+    message = JointState(name=list(names), position=list(positions))
+    message.header.stamp = rospy.Time.now()
+    return message
+
+
+def tolerances_of(value, joints):
+    """Return the JointTolerances of a controller_list's path_tolerance or goal_tolerance.
+
+    A map {position|velocity|acceleration: number, list or {joint: number}}, or a list of {name, position, ...}.
+    """
+    fields = ("position", "velocity", "acceleration")
+    tolerances = {joint: JointTolerance(name=joint) for joint in joints}
+    if isinstance(value, dict):
+        for key in fields:
+            given = value.get(key)
+            for i, joint in enumerate(joints):
+                number = given.get(joint) if isinstance(given, dict) else given
+                if isinstance(given, list):
+                    number = given[i] if i < len(given) else None
+                if isinstance(number, (int, float)):
+                    setattr(tolerances[joint], key, float(number))
+    elif isinstance(value, list):
+        for entry in value:
+            if isinstance(entry, dict) and entry.get("name") in tolerances:
+                for key in fields:
+                    if isinstance(entry.get(key), (int, float)):
+                        setattr(tolerances[entry["name"]], key, float(entry[key]))
+    else:
+        return []
+    return list(tolerances.values())

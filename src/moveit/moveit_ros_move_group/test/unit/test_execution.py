@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Trajectories are followed to their end, or everything that moves is stopped."""
+import threading
+import time
+
+import actionlib
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryResult
+from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from moveit_ros_move_group import handles
+from moveit_ros_move_group.controllers import read_list
+from moveit_ros_move_group.execution import ExecutionSettings, Executor
+
+# As long as a slow machine may need: what is tested is the answer.
+PATIENCE_S = 30.0
+JOINTS = ["turn", "reach"]
+LONG_S = 1000.0
+
+
+@pytest.fixture(autouse=True)
+def wall_time(monkeypatch):
+    """ROS time without a node."""
+    monkeypatch.setattr(rospy.rostime, "_rostime_initialized", True)
+
+
+def trajectory(seconds, **changes):
+    points = [JointTrajectoryPoint(positions=[0.0, 0.0], time_from_start=rospy.Duration(0.0)),
+              JointTrajectoryPoint(positions=[1.0, 0.5], time_from_start=rospy.Duration(seconds))]
+    for name, value in changes.items():
+        setattr(points[1], name, value)
+    return RobotTrajectory(joint_trajectory=JointTrajectory(joint_names=JOINTS, points=points))
+
+
+class Joints:
+    """The monitor's part: joints that rest at 0."""
+
+    continuous = ()
+
+    def __init__(self):
+        self._updates = 0
+
+    def joint_values(self):
+        return dict.fromkeys(JOINTS, 0.0)
+
+    def joint_update(self):
+        self._updates += 1
+        return self._updates, self.joint_values()
+
+
+class Handle:
+    """A controller as the executor sees it: ends when it is told to."""
+
+    def __init__(self, there=True):
+        self.there, self.done, self.sent, self.cancelled = there, threading.Event(), [], False
+        self.text, self.preempted = "", False
+
+    def connected(self, timeout_s, given_up=lambda: False):
+        end = time.monotonic() + timeout_s
+        while not self.there and time.monotonic() < end and not given_up():
+            time.sleep(0.001)
+        return self.there
+
+    def send(self, part):
+        self.done = threading.Event()
+        self.sent.append(part)
+
+    def end(self, text=""):
+        self.text = text
+        self.done.set()
+
+    def cancel(self):
+        self.cancelled = True
+        self.done.set()
+
+    def was_preempted(self):
+        return self.preempted
+
+    def error(self):
+        return self.text
+
+
+class Lab:
+    """Two controllers, a joint each, and who executes on them. run(...) returns the Outcome that comes in the end."""
+
+    def __init__(self, **settings):
+        entries = [{"name": joint, "action_ns": "follow", "type": "FollowJointTrajectory", "joints": [joint]}
+                   for joint in JOINTS]
+        controllers, _ = read_list(entries)
+        self.handles = {joint: Handle() for joint in JOINTS}
+        self.executor = Executor(controllers, ExecutionSettings(**settings), Joints(),
+                                 lambda controller: self.handles[controller.name])
+
+    def start(self, seconds=LONG_S, **hooks):
+        self.outcomes = []
+
+        def run():
+            try:
+                self.outcomes.append(self.executor.execute(trajectory(seconds), **hooks))
+            except Exception as error:
+                self.outcomes.append(error)
+
+        self.thread = threading.Thread(target=run, daemon=True)
+        self.thread.start()
+        return self
+
+    def outcome(self):
+        self.thread.join(PATIENCE_S)
+        return self.outcomes[0]
+
+    def wait_until_sent(self):
+        until(lambda: all(handle.sent for handle in self.handles.values()))
+
+
+def until(condition):
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come to be"
+        time.sleep(0.001)
+
+
+def test_each_controller_gets_its_joints():
+    lab = Lab().start()
+    lab.wait_until_sent()
+    for joint in JOINTS:
+        assert lab.handles[joint].sent[0].joint_names == [joint]
+        assert len(lab.handles[joint].sent[0].points[1].positions) == 1
+        lab.handles[joint].end()
+    assert lab.outcome().code == MoveItErrorCodes.SUCCESS
+
+
+def test_one_that_fails_stops_the_others():
+    lab = Lab().start()
+    lab.wait_until_sent()
+    lab.handles["turn"].end("controller 'turn' ended with ABORTED")
+    outcome = lab.outcome()
+    assert outcome.code == MoveItErrorCodes.CONTROL_FAILED and "'turn'" in outcome.text
+    assert lab.handles["reach"].cancelled
+
+
+def test_one_that_somebody_else_cancels_counts_as_preempted():
+    lab = Lab().start()
+    lab.wait_until_sent()
+    lab.handles["turn"].preempted = True
+    lab.handles["turn"].end("controller 'turn' ended with PREEMPTED")
+    assert lab.outcome().code == MoveItErrorCodes.PREEMPTED and lab.handles["reach"].cancelled
+
+
+def test_a_look_that_raises_leaves_nothing_moving():
+    def look():
+        raise ValueError("broken")
+
+    lab = Lab().start(invalidated=look)
+    assert isinstance(lab.outcome(), ValueError)
+    assert all(handle.cancelled for handle in lab.handles.values())
+    assert not lab.executor._busy.locked()
+
+
+@pytest.mark.parametrize("hooks, code", [
+    ({"preempted": lambda: True}, MoveItErrorCodes.PREEMPTED),
+    ({"invalidated": lambda: "a box"}, MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE)])
+def test_executions_end_early(hooks, code):
+    lab = Lab().start(**hooks)
+    assert lab.outcome().code == code and all(handle.cancelled for handle in lab.handles.values())
+
+
+def test_stop_ends_the_wait_for_a_controller():
+    lab = Lab(connection_timeout=LONG_S)
+    lab.handles["reach"].there = False
+    lab.start()
+    until(lab.executor._busy.locked)
+    while not lab.outcomes:  # a stop before it has begun does not count
+        lab.executor.stop()
+        lab.thread.join(0.01)
+    assert lab.outcome().code == MoveItErrorCodes.PREEMPTED and not lab.handles["turn"].sent
+
+
+def test_a_controller_that_is_not_there_is_named():
+    lab = Lab(connection_timeout=0.0)
+    lab.handles["reach"].there = False
+    outcome = lab.start().outcome()
+    assert outcome.code == MoveItErrorCodes.CONTROL_FAILED and "'reach/follow' does not answer" in outcome.text
+
+
+def test_one_that_never_ends_is_stopped():
+    lab = Lab(scaling=1.0, margin=0.01).start(seconds=0.01)
+    outcome = lab.outcome()
+    assert outcome.code == MoveItErrorCodes.TIMED_OUT and "'turn/follow', 'reach/follow'" in outcome.text
+
+
+@pytest.mark.parametrize("change, sentence", [
+    ({"velocities": [1.0]}, "1 velocities for 2 joints"), ({"positions": [1.0]}, "1 positions for 2 joints"),
+    ({"accelerations": [1.0, float("nan")]}, "not finite"), ({"time_from_start": rospy.Duration(0)}, "have to grow")])
+def test_flaws_of_trajectories_are_named(change, sentence):
+    outcome = Lab().executor.execute(trajectory(1.0, **change))
+    assert outcome.code == MoveItErrorCodes.INVALID_MOTION_PLAN and sentence in outcome.text
+
+
+# -- handles ----------------------------------------------------------------------------------------------------
+
+class Sent:
+    """actionlib's handle of a goal."""
+
+    def __init__(self, moved):
+        self.moved, self.state, self.status, self.cancelled = moved, actionlib.CommState.ACTIVE, None, False
+
+    def get_comm_state(self):
+        return self.state
+
+    def get_terminal_state(self):
+        return self.status
+
+    def get_goal_status_text(self):
+        return ""
+
+    def get_result(self):
+        return FollowJointTrajectoryResult(error_code=FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED)
+
+    def cancel(self):
+        self.cancelled = True
+
+    def end(self, status):
+        self.state, self.status = actionlib.CommState.DONE, status
+        self.moved(self)
+
+
+class Client:
+    """actionlib's client."""
+
+    def __init__(self, *_):
+        self.sent = []
+
+    def send_goal(self, goal, moved):
+        self.sent.append(Sent(moved))
+        return self.sent[-1]
+
+
+@pytest.fixture
+def follow(monkeypatch):
+    monkeypatch.setattr(handles.actionlib, "ActionClient", Client)
+    controllers, _ = read_list([{"name": "a", "action_ns": "f", "type": "FollowJointTrajectory", "joints": JOINTS}])
+    return handles.Handles(controllers).of(controllers[0])
+
+
+def test_the_late_end_of_an_older_goal_ends_no_other(follow):
+    follow.send(trajectory(1.0).joint_trajectory)
+    follow.send(trajectory(1.0).joint_trajectory)
+    older, newer = follow._client.sent
+    older.end(GoalStatus.PREEMPTED)
+    assert not follow.done.is_set() and not follow.error() and not follow.was_preempted()
+    newer.end(GoalStatus.ABORTED)
+    assert follow.done.is_set() and "'a/f' ended with ABORTED, PATH_TOLERANCE_VIOLATED" in follow.error()
+
+
+class Heard(list):
+    """A publisher that keeps what it is given."""
+
+    publish = list.append
+
+
+def fake(kind, **options):
+    controllers, _ = read_list([{"name": "a", "joints": JOINTS, "type": kind, **options}], fake=True)
+    return handles.FakeHandle(controllers[0], Heard())
+
+
+@pytest.mark.parametrize("kind", ["interpolate", "via points", "last point"])
+def test_fake_controllers_come_to_the_end(kind):
+    one = fake(kind, rate=1000)
+    one.send(trajectory(0.05).joint_trajectory)
+    assert one.done.wait(PATIENCE_S) and not one.error()
+    assert list(one._publisher[-1].position) == [1.0, 0.5] and one._publisher[-1].name == JOINTS
+
+
+def test_a_fake_controller_that_was_cancelled_plays_what_comes_next():
+    one = fake("interpolate", rate=0.001)  # sleeps for longer than the test
+    one.send(trajectory(LONG_S).joint_trajectory)
+    one.cancel()
+    assert one.was_preempted()
+    one._step = 0.001
+    one.send(trajectory(0.01).joint_trajectory)
+    assert one.done.wait(PATIENCE_S) and not one.was_preempted()
+
+
+@pytest.mark.parametrize("rate", [0, -1.0, "fast", None])
+def test_a_rate_that_is_none_counts_as_ten_times_a_second(rate):
+    assert fake("interpolate", rate=rate)._step == pytest.approx(0.1)
