@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The links of what is in the world: where they are, what pushes them, what they weigh, what they touch."""
+"""The links of a model in the world: poses, applied wrenches, masses, contacts."""
 
 import math
 
@@ -16,15 +16,15 @@ BASE = -1  # PyBullet's index of the root link
 
 
 class Body:
-    """What ``Model`` is without its joints. SI units, radians, world coordinates."""
+    """A ``Model`` without its joints. SI units, radians, world coordinates."""
 
-    #: For how many looks of ``StateWatch`` the base has stood still.
+    #: For how many checks of ``StateWatch`` the base has not moved.
     still_for = 0
 
     def __init__(self, client, world, blueprint, body, root_offset):
         """``client``: PyBullet's; ``blueprint``: :class:`bullet_sim.builder.Blueprint`; ``body``, ``root_offset``: what
-        ``builder.build`` has made of it."""
-        #: What the body is made from; which links can collide may change.
+        ``builder.build`` returned for it."""
+        #: The blueprint that the body is made from; its collision pairs may change.
         self.blueprint = blueprint
         self.name = blueprint.name
         self.robot = blueprint.robot
@@ -36,7 +36,7 @@ class Body:
         self._root_offset = root_offset
         self._root_offset_inverse = inverse(root_offset)
         self._root_is_centre = bool(np.array_equal(root_offset, np.eye(4)))
-        # Of a fixed root; known here so that a tick need not ask for it.
+        # Pose of a fixed root, cached so that a tick need not ask for it.
         self._base_quaternion = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)[1]
         self._link_index = {merged.root: BASE, **{joint.child: i for i, joint in enumerate(merged.joints.values())}}
         self._link_names = {index: link for link, index in self._link_index.items()}
@@ -44,7 +44,7 @@ class Body:
         self._late_pushes = []
         self._pushes, self._pushed_at = [], -1  # of the step after `_pushed_at` steps
         self._pairs = ()
-        self._firm = set()  # indices of links that hold by friction without creeping
+        self._firm = set()  # indices of links with friction that does not creep
         if blueprint.self_collision:
             self.set_self_collision_pairs(())
         self._weightless = {}  # body's name -> its mass
@@ -56,7 +56,7 @@ class Body:
 
     @property
     def link_names(self):
-        """The links of the description, those that were merged included."""
+        """The links of the description, including merged ones."""
         return tuple(self.merged.frames)
 
     def link_pose(self, link):
@@ -119,11 +119,12 @@ class Body:
         self._push(*push)
 
     def pushes(self):
-        """Return what :meth:`apply_wrench` did in the last step: a list of (body, force, torque, position or None)."""
+        """Return the wrenches of :meth:`apply_wrench` in the last step: a list of (body, force, torque, position or
+        None)."""
         return self._pushes if self._pushed_at == self._world.steps - 1 else []
 
     def wake(self):
-        """Have the model simulated again if it has come to rest and fallen asleep."""
+        """Wake the model up if Bullet has put it to sleep."""
         if not self.static:
             pybullet.changeDynamics(
                 self.body, BASE, activationState=pybullet.ACTIVATION_STATE_WAKE_UP, physicsClientId=self._client
@@ -131,10 +132,8 @@ class Body:
             self._world.note_touched(self)
 
     def feel_again(self):
-        """For World, after a step: repeat what was done to the model while it slept.
-
-        Bullet wakes a body at the end of a step, so the first one after the touch passes without it: its velocity is
-        exactly zero then, whatever was done.
+        """For World, after a step: apply again what was applied to the model while it slept. Bullet wakes a body at the
+        end of a step, so the body ignores forces in that step: its velocity is then exactly zero.
         """
         twist, self._late_twist = self._late_twist, None
         pushes, self._late_pushes = self._late_pushes, []
@@ -161,19 +160,18 @@ class Body:
         return total
 
     def grip_firmly(self, link):
-        """Have friction at a link's body hold without creeping: Bullet's otherwise gives way by 0.3 mm/s under load."""
+        """Make friction at a link's body hold without creeping: by default it creeps by 0.3 mm/s under load."""
         index = self._link_index[self._frame(link).link]
         pybullet.changeDynamics(self.body, index, frictionAnchor=1, physicsClientId=self._client)
         self._firm.add(index)
 
     def renew_contacts(self, link):
-        """Forget the contacts of a link's body; the next step finds those that there are.
-
-        Bullet keeps contacts from step to step, and once in a while one that is none: with a normal that two nearly
-        parallel edges made up, it can hold a body that should come free.
+        """Forget the contacts of a link's body; the next step detects them again. Bullet keeps contacts from step to
+        step, and sometimes a false one: its normal comes from two nearly parallel edges, and it can hold a body that
+        should come free.
         """
         index = self._link_index[self._frame(link).link]
-        # Every body is in group 1 and collides with all; saying so again has Bullet begin anew with it.
+        # Every body is in group 1 and collides with all; setting this again makes Bullet drop the body's contacts.
         pybullet.setCollisionFilterGroupMask(self.body, index, 1, -1, physicsClientId=self._client)
 
     # -- mass properties, of bodies: links with what is fixed to them ---------------------------------------------
@@ -192,8 +190,8 @@ class Body:
     def set_inertial(self, body, mass, inertia):
         """Set mass [kg] and inertia (3, 3) about the centre of mass [kg m^2, axes of the link's frame] of a body.
 
-        Raises BulletSimError for a root that is fixed, for what no body can have, and for an inertia whose principal
-        axes are others than before: PyBullet sets those when it makes the body.
+        Raises BulletSimError for a fixed root, for impossible values, and for an inertia with other principal axes than
+        before: PyBullet sets the axes when it makes the body.
         """
         link = self._body(body)
         index = self._link_index[body]
@@ -238,7 +236,7 @@ class Body:
         return body not in self._weightless
 
     def set_weight(self, body, wanted):
-        """Have gravity act on the body ``body``, or not."""
+        """Switch gravity on the body ``body`` on or off."""
         mass = self._body(body).inertial.mass
         self._weightless.pop(body, None)
         if not wanted and not (self.static and body == self.merged.root):
@@ -247,7 +245,7 @@ class Body:
         self.wake()
 
     def cancel_weight(self):
-        """For World: take the weight off those bodies that have none, for the next step."""
+        """For World: cancel gravity on the weightless bodies in the next step."""
         gravity = np.array(self._world.gravity)
         for body, mass in self._weightless.items():
             self._push(self._link_index[body], -mass * gravity)
@@ -257,7 +255,7 @@ class Body:
     def set_self_collision_pairs(self, pairs):
         """Let exactly these ``pairs`` of links collide with each other; at the start none do, as in Gazebo.
 
-        Two links with one joint between them never collide, whatever is asked."""
+        Two links with one joint between them never collide."""
         wanted = set()
         for pair in pairs:
             a, b = (self._link_index[self._frame(link).link] for link in pair)
@@ -285,7 +283,7 @@ class Body:
         return Pose.from_matrix(Pose(*motion[0]).matrix() @ self._root_offset_inverse)
 
     def _restore_collisions(self):
-        """For Model: tell a body that has been made anew which links collide, and which hold firmly."""
+        """For Model: set the collision pairs and the firm friction again on a rebuilt body."""
         pairs = {frozenset((self._link_names[a], self._link_names[b])) for a, b in self._pairs}
         if self.blueprint.self_collision:
             self.set_self_collision_pairs([tuple(pair) for pair in pairs])
@@ -303,7 +301,7 @@ class Body:
             ) from None
 
     def _body(self, body):
-        """Return the MergedLink ``body``; raises BulletSimError, with where it went for a link that was merged."""
+        """Return the MergedLink ``body``; raises BulletSimError, which names the body for a link that was merged."""
         if body not in self.merged.links:
             frame = self._frame(body)
             raise BulletSimError(

@@ -21,9 +21,9 @@ _JOINT_TYPES = {
     "continuous": pybullet.JOINT_REVOLUTE,
     "prismatic": pybullet.JOINT_PRISMATIC,
 }
-# What a body that moves gets where its description gives it no mass: a gram.
+# Mass of a moving body whose description gives none: a gram.
 _ASSUMED_MASS_KG = 1e-3
-# What Gazebo assumes of a collision without <surface>: friction, and the damping of a contact [N s/m].
+# Gazebo's defaults of a collision without <surface>: friction, and the damping of a contact [N s/m].
 _DEFAULT_FRICTION = 1.0
 _DEFAULT_DAMPING = 1.0
 # Stiffer contacts than this are left rigid; 1 kg then sinks in by 0.1 um.
@@ -31,7 +31,7 @@ _RIGID_N_PER_M = 1e8
 
 
 class Blueprint(NamedTuple):
-    """What a model is made from, and made anew from.
+    """The data that a model is built from, and rebuilt from.
 
     ``merged``: the urdf_model.MergedRobot of ``robot``; ``static`` fixes its root in the world; ``mesh_cuts``: as for
     ``World.spawn``; ``self_collision``: whether any two of its links can collide with each other.
@@ -48,7 +48,7 @@ class Blueprint(NamedTuple):
 def build(client, blueprint, pose, shapes, warn):
     """Create the multibody of a :class:`Blueprint` with its root body at ``pose``, its shapes from a ShapeStore.
 
-    Returns (body id, inertial offset (4, 4) of the root link). ``warn(text)`` is told of masses that are missing.
+    Returns (body id, inertial offset (4, 4) of the root link). ``warn(text)`` is called for missing masses.
     """
     merged, static, mesh_cuts = blueprint.merged, blueprint.static, blueprint.mesh_cuts
     root = merged.links[merged.root]
@@ -85,13 +85,13 @@ def build(client, blueprint, pose, shapes, warn):
         baseOrientation=start.quaternion,
         baseInertialFramePosition=root_offset[:3, 3].tolist(),
         baseInertialFrameOrientation=quaternion_from_matrix(root_offset).tolist(),
-        # Self-collision has to be asked for at creation; Model then leaves only the pairs that were wanted.
+        # Self-collision must be enabled at creation; Model then keeps only the requested pairs.
         flags=(pybullet.URDF_USE_SELF_COLLISION if blueprint.self_collision else 0)
         | (0 if static else pybullet.URDF_ENABLE_SLEEPING),
         physicsClientId=client,
         **columns,
     )
-    # Air drag is a default of PyBullet; a URDF says nothing of it. The inertia goes in a call of its own: given
+    # PyBullet has air drag by default; a URDF has none. The inertia goes in a call of its own: given
     # together with a drag, PyBullet 3.2.7 ignores it.
     calm = {"linearDamping": 0.0, "angularDamping": 0.0, "physicsClientId": client}
     pybullet.changeDynamics(body, -1, **calm)
@@ -115,10 +115,10 @@ def build(client, blueprint, pose, shapes, warn):
 
 
 def _contact(surface):
-    """Return changeDynamics' arguments for a urdf_model.Surface, or for a link that says nothing of its own."""
+    """Return changeDynamics' arguments for a urdf_model.Surface, or for a link without one."""
     surface = surface or Surface()
-    # Bullet multiplies the two friction coefficients of a contact; Gazebo (ODE) takes the smaller one, and 1 where
-    # nothing is said. Cut at 1 the product is the smaller one whenever either link is as rough as that.
+    # Bullet multiplies the two friction coefficients of a contact; Gazebo (ODE) takes the smaller one, and 1 by
+    # default. With coefficients clamped to 1, the product equals the smaller one whenever one of them is 1.
     arguments = {"lateralFriction": _DEFAULT_FRICTION if surface.friction is None else min(surface.friction, 1.0)}
     if surface.restitution is not None:
         arguments["restitution"] = min(surface.restitution, 1.0)  # beyond 1 it would gain energy at each bounce

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Cut a mesh along planes: the convex hulls of its parts approximate it better than one hull.
 
-Bullet collides convex shapes quickly and robustly, but not moving or thin-walled triangle meshes. Where a shape is
-hollow is known in advance; so the planes are given, nothing is searched for.
+Bullet collides convex shapes quickly and robustly, but not moving or thin-walled triangle meshes. The caller knows
+where a shape is hollow and gives the planes; nothing is searched.
 """
 
 AXES = "xyz"
@@ -35,9 +35,9 @@ def _lies_between(polygons, low, high):
 
 
 def _clip(polygon, axis, offset, sign):
-    """Return what of a convex polygon lies on one side of a plane; empty where that is no more than an edge.
+    """Return the part of a convex polygon on one side of a plane; empty if that is only an edge.
 
-    A polygon in the plane itself belongs to neither side: it would give the hull of the side that is hollow a lid.
+    A polygon in the plane itself belongs to neither side: it would close the hollow side's hull with a lid.
     """
     heights = [sign * (point[axis] - offset) for point in polygon]
     if max(heights) <= 0.0:

@@ -7,7 +7,7 @@ import numpy as np
 
 from .quiet_pybullet import pybullet
 
-# Bullet applies joint damping explicitly: beyond inertia / time step it pumps energy in. Half of that stays clear.
+# Bullet applies joint damping explicitly: beyond inertia / time step it adds energy. Half of that is safe.
 _MARGIN = 0.5
 
 
@@ -33,13 +33,13 @@ class JointDamping:
         self._tell(index)
 
     def step_changed(self, time_step_s):
-        """Ticks have another length [s], and the damping other bounds."""
+        """Adapt the bounds to a new length of a tick [s]."""
         self._time_step_s, self._bounds = time_step_s, None
         for index, damping in self._wanted.items():
             self.set(index, damping)
 
     def restore(self):
-        """Set it all again, for a multibody that has been made anew."""
+        """Set all damping again, on a rebuilt multibody."""
         for index in range(len(self.values)):
             self._tell(index)
 
@@ -47,7 +47,7 @@ class JointDamping:
         pybullet.changeDynamics(self._model.body, index, jointDamping=self.values[index], physicsClientId=self._client)
 
     def _stable(self):
-        """(n,) The greatest damping of each joint that is still sure to be stable, at the present position."""
+        """(n,) The largest damping of each joint that is certainly stable at the present position."""
         model = self._model
         if self._bounds is None:
             felt = np.full(len(self.values), math.inf)

@@ -5,11 +5,11 @@ from urdf_model import OutOfBounds
 
 
 class BulletSimError(Exception):
-    """A request that the world cannot serve. Its text says what was found and what would have been right."""
+    """The world cannot serve a request. The text says what was found and what would have been right."""
 
 
 def within(bound, values, what):
-    """Return ``values`` as ``urdf_model.bounds.Bound.check`` does; raises BulletSimError where they are out of it."""
+    """Return ``values`` as ``urdf_model.bounds.Bound.check`` does; raises BulletSimError if they are out of bounds."""
     try:
         return bound.check(values, what)
     except OutOfBounds as error:

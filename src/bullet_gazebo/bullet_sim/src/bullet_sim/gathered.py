@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Links with more shapes than PyBullet accepts: the surplus is gathered in files.
-
-PyBullet has room for 16 shapes of a body and writes beyond it, which ends the process. A file holds any number: of
-convex bodies, one object each, or of triangles. Meshes lose nothing by that, boxes their sharp edges (by a millimetre),
-and cylinders and balls, of which as many as possible stay what they are, become bodies with flat faces, inside of the
-round ones by at most half a per cent of the radius.
+"""Links with more shapes than PyBullet accepts: the surplus goes into files. PyBullet has room for 16 shapes per body
+and writes beyond its buffer, which crashes the process. A file holds any number: of convex bodies, one object each, or
+of triangles. Meshes stay exact; boxes lose their sharp edges (by a millimetre); cylinders and balls become bodies with
+flat faces, inside the round ones by at most half a per cent of the radius. As many of them as possible stay primitives.
 """
 
 import itertools
@@ -16,19 +14,19 @@ from urdf_model import Box, Cylinder, Mesh, Sphere
 
 from .mesh_loading import even_directions, parts_as_wavefront
 
-#: What PyBullet takes for one body (MAX_COMPOUND_COLLISION_SHAPES).
+#: PyBullet's limit for one body (MAX_COMPOUND_COLLISION_SHAPES).
 MOST_SHAPES = 16
 # Bullet keeps this distance around convex bodies that come from a file [m]; bodies that have none are made smaller.
 _MARGIN_M = 0.001
 # Of a cylinder's ends, and of a ball: 1 - cos(pi / 32) = 0.5 %, and no direction is more than 0.1 rad from a point.
 _CORNERS = 32
 _BALL_POINTS = 800
-# Those that lose most by being gathered come first.
+# Kinds of shapes, those that lose most accuracy in a file first.
 _ORDER = (Sphere, Cylinder, Box, Mesh)
 
 
 class Part(NamedTuple):
-    """A shape as PyBullet takes it."""
+    """A shape in PyBullet's terms."""
 
     geometry: Any  # of urdf_model; of a mesh only the scale counts here
     file: str | None  # Wavefront file of a mesh, [m] before the scale
@@ -37,9 +35,8 @@ class Part(NamedTuple):
 
 
 def gathered(parts, keep):
-    """Return a list of at most MOST_SHAPES Parts that is to collide with as ``parts`` are.
-
-    ``keep(key, lines)`` returns the path of a file with what ``lines()`` returns, or has returned for the same ``key``.
+    """Return a list of at most MOST_SHAPES Parts with the same collision geometry as ``parts``. ``keep(key, lines)``
+    returns the path of a file that holds the result of ``lines()``, cached under ``key``.
     """
     if len(parts) <= MOST_SHAPES:
         return parts
@@ -48,7 +45,8 @@ def gathered(parts, keep):
     for hollow, lines in ((True, _triangles), (False, _bodies)):
         chosen = [part for part in many if part.hollow == hollow]
         if chosen:
-            # In the loop, too, where the file is there already: a thousand matrices in words would take it 20 ms.
+            # The loop computes the key, too, when the file exists already: a thousand matrices as text would take 20
+            # ms.
             key = repr([(part.geometry, part.file) for part in chosen] + [hollow]).encode()
             key += b"".join(part.origin.tobytes() for part in chosen)
             file = keep(key, lambda lines=lines, chosen=chosen: lines(chosen))
@@ -84,7 +82,7 @@ def _convex(part):
 
 
 def _less(half_m):
-    """Return half a size without the margin that Bullet adds; what is thinner than that stays as it is."""
+    """Return half a size less the margin that Bullet adds; a thinner size stays as it is."""
     return half_m - _MARGIN_M if half_m > 2.0 * _MARGIN_M else half_m
 
 

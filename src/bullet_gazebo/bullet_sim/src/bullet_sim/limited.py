@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Work on files from anybody, in a process of its own that has limits: a library that never ends, or takes all memory,
-ends there and nowhere else, and the interpreter's lock stays free for the physics.
-
-The limit is processor time, not time: a busy machine comes to the same answer later.
+"""Work on untrusted files, in a separate process with limits. A library that hangs or takes all memory only ends that
+process, and the interpreter lock stays free for the physics. The limit is processor time, not wall time: a busy machine
+gets the same result later.
 """
 
 import importlib
@@ -16,7 +15,7 @@ import sys
 import threading
 import time
 
-#: What a call may take: processor time [s], memory beyond what the process has [bytes], and time where it does nothing.
+#: Limits of a call: processor time [s], additional memory [bytes], and wall time, for a call that does nothing.
 PROCESSOR_S = 4
 MEMORY_BYTES = 1_500_000_000
 WAITING_S = 60.0
@@ -25,13 +24,12 @@ _START = "from bullet_sim.limited import serve; serve()"
 
 
 class LimitError(Exception):
-    """The work failed, or came to a limit; the text says which."""
+    """The work failed, or exceeded a limit; the text says which."""
 
 
 class LimitedProcess:
-    """Calls functions in a process that is started when it is needed and ends when it has not been for a while.
-
-    Any thread may call; one call at a time is worked on.
+    """Calls functions in a process that starts on demand and ends after some idle time. Any thread may call; calls run
+    one at a time.
     """
 
     def __init__(self, processor_s=PROCESSOR_S, memory_bytes=MEMORY_BYTES, waiting_s=WAITING_S):
@@ -43,7 +41,7 @@ class LimitedProcess:
     def call(self, function, *arguments):
         """Return ``function(*arguments)``: a function of a module, arguments and result as JSON has them.
 
-        Raises LimitError with the text of what it raises, or with the limit that it came to.
+        Raises LimitError with the text of the function's error, or with the limit that it exceeded.
         """
         request = {"function": [function.__module__, function.__name__], "arguments": arguments}
         with self._lock:
@@ -68,7 +66,7 @@ class LimitedProcess:
         raise LimitError("the process for it cannot be started")
 
     def _exchange(self, request):
-        """Return the answer's line, or None from a process that had ended, since nothing was asked for a while."""
+        """Return the answer's line, or None if the process had ended after its idle time."""
         process, line, gives_up_at = self._process, b"", time.monotonic() + self._waiting_s
         try:
             process.stdin.write(request)
@@ -116,12 +114,12 @@ def _start(processor_s, memory_bytes):
 
 
 def serve():
-    """The process: answer requests until there are no more, or none for a while."""
+    """Main function of the process: answer requests until the input ends, or until the idle time is over."""
     processor_s, memory_bytes = int(sys.argv[1]), int(sys.argv[2])
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # at Ctrl-C it ends with the one that asks
     os.nice(5)  # physics comes first
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what libraries print is no answer
+    os.dup2(2, 1)  # keep output of libraries out of the answers
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
     pending = b""
@@ -147,7 +145,7 @@ def _answer(request, processor_s, memory_bytes):
         return json.dumps({"result": result}).encode()
     except MemoryError:
         return json.dumps({"error": "it took more than %d MB of memory" % (memory_bytes // 1_000_000)}).encode()
-    except Exception as error:  # noqa: BLE001  (whatever it is, it belongs to the caller)
+    except Exception as error:  # noqa: BLE001  (every error is passed on to the caller)
         return json.dumps({"error": str(error) or type(error).__name__}).encode()
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Load untrusted mesh files: common formats, nothing fetched, no entities, a bounded number of triangles.
 
-To be called in a process with limits (``limited``): libraries for formats do what a file tells them to.
+Call it in a process with limits (``limited``): a hostile file can make a format's library do much work.
 """
 
 import io
@@ -13,17 +13,17 @@ from urdf_model import bounds, read_file, refuse_entities
 
 from .thinning import outermost, thin_out
 
-#: What of a mesh is read.
+#: Limits of what is read.
 MOST_BYTES = 100_000_000
 MOST_TRIANGLES = 2_000_000
 _MOST_BYTES_BESIDE = 10_000_000
-# What Gazebo and rviz read, and a little more. Archives are not among them: what they hold may be without end.
+# The formats of Gazebo and rviz, and some more. No archives: their content may be endless.
 _FORMATS = ("dae", "stl", "obj", "ply", "off", "glb", "gltf")
-# Materials and buffers that a mesh names. Pictures are not drawn.
+# Materials and buffers that a mesh may name. Textures are not drawn.
 _BESIDE = (".mtl", ".bin")
 
-#: What collides: with more triangles a shape of a fixed body costs its loop more than 20 ms when it is made, and with
-#: more points a convex one does.
+#: Limits of collision shapes: with more triangles, making the shape of a fixed body takes the loop more than 20 ms; so
+#: does a convex shape with more points.
 MOST_HOLLOW_TRIANGLES = 12_000
 MOST_HULL_POINTS = 6_000
 # Directions in which a hull with more points keeps its outermost one: neighbours are 0.09 rad apart, so that at most
@@ -32,11 +32,11 @@ _HULL_DIRECTIONS = 1_500
 
 
 class MeshError(ValueError):
-    """A mesh that cannot be used; the text goes on from its name: "… holds no triangles"."""
+    """A mesh that cannot be used; the text continues after the mesh's name: "… holds no triangles"."""
 
 
 class _Beside:
-    """For trimesh: files in the mesh's own folder, and of those only materials and buffers."""
+    """Resolver for trimesh: only files in the mesh's own folder, and only materials and buffers."""
 
     def __init__(self, folder):
         self._folder = folder
@@ -78,7 +78,7 @@ def load_scene(path):
         if len(vertices) and not np.abs(vertices).max() <= bounds.POSITION.high:
             raise MeshError("a corner is at %g; expected at most %g" % (np.abs(vertices).max(), bounds.POSITION.high))
     if triangles <= MOST_HOLLOW_TRIANGLES:
-        # Merges corners that are one, which takes as long as all the rest: what is thinned out need not have it.
+        # Merging equal corners takes as long as all the rest; a mesh that is decimated does not need it.
         for mesh in scene.geometry.values():
             if len(getattr(mesh, "faces", ())):
                 mesh.process()
@@ -95,9 +95,8 @@ def _refuse_entities(content):
 def to_wavefront(path, target, planes):
     """Write the mesh at ``path`` to the Wavefront file ``target``, as bodies collide with it, in metres, z up.
 
-    ``planes``: as for ``convex_parts.cut``; given, there is one object for each part. Where the hull has more points
-    than pays, ``target`` + ".hull" holds one that is as good. Raises MeshError. Returns a remark, "" where there is
-    none.
+    ``planes``: as for ``convex_parts.cut``; given, there is one object for each part. If the hull has very many points,
+    ``target`` + ".hull" holds one that is as good. Raises MeshError. Returns a remark, "" where there is none.
     """
     from .convex_parts import cut
 
@@ -129,7 +128,7 @@ def to_wavefront(path, target, planes):
 
 
 def hull_points(points):
-    """Return those of ``points`` (n, 3) that matter for their convex hull, all where there are few."""
+    """Return a subset of ``points`` (n, 3) with nearly the same convex hull; all if there are few."""
     points = np.asarray(points, dtype=float)
     if len(points) <= MOST_HULL_POINTS:
         return points
@@ -158,7 +157,7 @@ def parts_as_wavefront(parts):
     for number, points in enumerate(parts):
         lines.append("o part%d" % number)
         lines += ["v %.9g %.9g %.9g" % tuple(point) for point in points]
-        # Only which points belong together counts for a hull; faces say so, three points at a time.
+        # For a hull, only the grouping of points counts; the faces give it, three points each.
         last = first + len(points) - 1
         lines += ["f %d %d %d" % (i, min(i + 1, last), min(i + 2, last)) for i in range(first, last + 1, 3)]
         first = last + 1

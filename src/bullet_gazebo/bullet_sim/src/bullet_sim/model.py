@@ -22,23 +22,23 @@ POSITION_GAIN = 0.5
 # Stands for "as strong as need be" [N m, N].
 _RIGID_EFFORT = 1e9
 
-# Where the squares of all numbers add up to no more than this, none is anywhere near its bound.
+# If the sum of the squares of all numbers is at most this, each number is far within its bound.
 _SURELY_FINE = 1e10
-_LIGHT = 1e-20  # of efforts, which may be as large as they like
+_LIGHT = 1e-20  # of efforts, which have no bound
 
-# A joint faster than this [rad/s, m/s] may get through its limit between two steps: Bullet notices a limit when the
-# joint is beyond it. At 100 a limit is left by 0.2, of which Bullet brings back only a part at each step; slower ones
-# leave it by 0.01 at most.
+# A joint faster than this [rad/s, m/s] may pass its limit between two steps: Bullet notices a limit only when the joint
+# is beyond it. At 100 the joint gets 0.2 beyond, and Bullet corrects only a part at each step; slower joints get at
+# most 0.01 beyond.
 _QUICK = 5.0
 
-# Of what Model.read_joints returns. Efforts follow from others' bounds and need only be numbers.
+# Bounds of what Model.read_joints returns. Efforts only need to be finite.
 _OF_JOINTS = (
     bounds.JOINT_POSITION,
     bounds.TURN_RATE,
     bounds.Bound(-1e100, 1e100, "N or N m", "what a drive has given, which is bounded by itself"),
 )
 
-# What keeps coupled joints together at most [N, Nm]: more than any drive of a finger.
+# Largest force of the gear between coupled joints [N, Nm]: more than any drive of a finger.
 _GEAR_FORCE = 1000.0
 
 
@@ -57,9 +57,9 @@ class Contact(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A state that cannot be."""
+    """An impossible state."""
 
-    text: str  # what is out of its bound
+    text: str  # which value is out of its bound
     is_finite: bool
 
 
@@ -83,7 +83,7 @@ class Model(Body):
         count = len(joints)
         self._all = list(range(count))
         self._packing = struct.Struct("%dd" % count)
-        self._reading, self._read_at = None, -1  # what `read_joints` said last, and after how many steps
+        self._reading, self._read_at = None, -1  # the last result of `read_joints`, and the number of steps then
         self._effort_driven, self._any_effort_driven = np.zeros(count, dtype=bool), False
         self._commanded_effort = np.zeros(count)
         self._zeros = [0.0] * count
@@ -113,7 +113,7 @@ class Model(Body):
 
         The effort is what the drive applied during the last step.
         """
-        # Asked more than once a tick: by what controls, what publishes and what draws.
+        # Cached, because control, publishers and the snapshot all call it in a tick.
         if self._reading is None or self._read_at != self._world.steps:
             self._reading, self._read_at = self._read(), self._world.steps
         return self._reading
@@ -125,7 +125,7 @@ class Model(Body):
         position, velocity, _, effort = zip(*states, strict=True)
         effort = self._array(effort)
         if self._any_effort_driven:
-            # Bullet's reading does not know of explicit torques.
+            # Bullet's reading does not include explicit torques.
             effort = np.where(self._effort_driven, self._commanded_effort, effort)
             effort.setflags(write=False)
         return self._array(position), self._array(velocity), effort
@@ -133,10 +133,9 @@ class Model(Body):
     def drive_position(self, index, position, max_effort, velocity=None):
         """Pull joints ``index`` (k,) to ``position`` (k,) with at most ``max_effort`` (k,).
 
-        Bullet solves the motor with the other constraints (implicitly), so that stiff is stable.
-
-        ``position`` is where the joint shall be after the step. ``velocity`` (k,) is the set-point's own velocity:
-        given, a moving set-point is followed without lag.
+        Bullet solves the motor with the other constraints (implicitly), so a stiff drive is stable. ``position`` is the
+        set-point at the end of the step. With ``velocity`` (k,), the set-point's own velocity, a moving set-point is
+        followed without lag.
         """
         self._drive_otherwise(index)
         self._stay_awake()
@@ -173,10 +172,9 @@ class Model(Body):
         )
 
     def carry(self, index, position):
-        """Put joints ``index`` (k,) at ``position`` (k,), and hold them there during the next step, whatever it takes.
-
-        They move without inertia: what carries them does not feel it, as with Gazebo's ``Joint::SetPosition``. What
-        they carry, and what they lean on, it does feel.
+        """Put joints ``index`` (k,) at ``position`` (k,) and hold them there during the next step, with unlimited
+        force. They move without inertia: links before the joint feel no reaction, as with Gazebo's
+        ``Joint::SetPosition``. Links behind it, and touched bodies, do.
         """
         self._refuse_nan(index, position, "position")
         self._stay_awake()
@@ -189,9 +187,8 @@ class Model(Body):
         self.drive_velocity(index, np.zeros(len(index)), np.full(len(index), _RIGID_EFFORT))
 
     def drive_effort(self, index, effort):
-        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; say it again for every step.
-
-        What is beyond ``bounds.EFFORT`` is cut off there, as a drive would; raises BulletSimError for no number.
+        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; call it again for every step. Efforts
+        are clamped to ``bounds.EFFORT``; raises BulletSimError for NaN.
         """
         self._refuse_nan(index, effort, "effort")
         effort = np.clip(effort, bounds.EFFORT.low, bounds.EFFORT.high)
@@ -206,7 +203,7 @@ class Model(Body):
         )
 
     def add_effort(self, index, effort):
-        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step, on top of what drives them.
+        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step, in addition to their drives.
 
         Raises BulletSimError out of bounds.
         """
@@ -230,11 +227,11 @@ class Model(Body):
         return self._damping.values
 
     def step_changed(self):
-        """For World: ticks have another length."""
+        """For World: the length of a tick has changed."""
         self._damping.step_changed(self._world.time_step_s)
 
     def set_limits(self, index, lower, upper):
-        """Set how far joint ``index`` goes [rad or m]. Raises BulletSimError where ``lower`` is not below ``upper``."""
+        """Set the limits of joint ``index`` [rad or m]. Raises BulletSimError if ``lower`` is not below ``upper``."""
         if not lower < upper:
             raise BulletSimError("a lower limit of %g is not below the upper limit %g" % (lower, upper))
         for limit, what in ((lower, "lower"), (upper, "upper")):
@@ -246,9 +243,8 @@ class Model(Body):
         self.lower[index], self.upper[index] = lower, upper
 
     def couple(self, joint, other, ratio):
-        """Have the joint with index ``other`` move ``ratio`` times as far as ``joint``, as a gear does, for good.
-
-        Both carry each other's load: what drives one drives both. Asked again, it is the same gear.
+        """Couple two joints by a permanent gear: ``other`` moves ``ratio`` times as far as ``joint``. A drive on one of
+        them drives both. Another call for the same joints changes nothing.
         """
         pair = int(joint), int(other)
         if pair not in self._gears:
@@ -278,7 +274,7 @@ class Model(Body):
             for i, value in zip(index, position, strict=True):
                 within(bounds.JOINT_POSITION, value, "the position of joint '%s'" % self.joint_names[i])
         if len(index):
-            # In one call, since each works out anew where every link is.
+            # In one call, since each call computes all link poses.
             pybullet.resetJointStatesMultiDof(
                 self.body,
                 index.tolist(),
@@ -332,7 +328,7 @@ class Model(Body):
     def set_base_pose(self, pose):
         super().set_base_pose(pose)
         if self.static:
-            # Not asked for again: what a NaN touches has no place any more, though nothing moves it.
+            # From the cache: a body that touched a NaN has no valid pose any more.
             base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
             self._good = (base, self._good[1])
 
@@ -342,7 +338,7 @@ class Model(Body):
         """Remember base pose and joint positions as what ``reset`` returns to."""
         self._start = (self.base_pose(), self.read_joints()[0])
         base = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)
-        self._good = (base, self._start[1])  # where it was well, as PyBullet has the base
+        self._good = (base, self._start[1])  # the last good pose, in PyBullet's frame of the base
 
     def reset(self):
         """Return to the marked start, at rest. Drives stay as they are."""
@@ -355,9 +351,8 @@ class Model(Body):
     # -- for World: when the physics has failed -----------------------------------------------------------------
 
     def fault(self):
-        """Return the Fault of the present state, or None where all is well, which then is kept for the next time.
-
-        Called after every step: one sum stands for all numbers.
+        """Return the Fault of the present state, or None if it is good; then it is kept as the last good one. Called
+        after every step, so one sum checks all numbers.
         """
         if self.static:
             base, total = self._good[0], 0.0
@@ -381,9 +376,8 @@ class Model(Body):
         return None
 
     def _stop_at_limits(self, position, velocity):
-        """Put quick joints that got through their limits to these; return the positions (n,).
-
-        In the next step Bullet finds them there and stops them, and what hangs on them gets its part of the blow.
+        """Put fast joints that passed their limits back to them; return the positions (n,). In the next step Bullet
+        stops them there, and the links on them feel the impact.
         """
         through, = np.nonzero(((position < self.lower) | (position > self.upper)) & (np.abs(velocity) > _QUICK))
         if not len(through):
@@ -408,7 +402,7 @@ class Model(Body):
         return ""
 
     def motion(self):
-        """Return what :meth:`take_body` needs to have the model go on as it is."""
+        """Return the state that :meth:`take_body` needs to continue the present motion."""
         twist = None if self.static else pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
         base = self._good[0]
         if not self.static:
@@ -417,11 +411,11 @@ class Model(Body):
         return (base, position, twist, velocity)
 
     def last_good(self):
-        """Return what :meth:`take_body` needs to have the model stand where it last was well, at rest."""
+        """Return the state that :meth:`take_body` needs to put the model at its last good state, at rest."""
         return (*self._good, None, np.zeros(len(self._all)))
 
     def put_back(self):
-        """Stand where the model last was well, at rest."""
+        """Restore the last good state, at rest."""
         (position, quaternion), joints = self._good
         if not self.static:
             pybullet.resetBasePositionAndOrientation(self.body, position, quaternion, physicsClientId=self._client)
@@ -429,7 +423,7 @@ class Model(Body):
         self.set_joint_positions(np.arange(len(self._all)), joints)
 
     def take_body(self, body, motion):
-        """Go on with PyBullet's multibody ``body``, like the one before and just made in its place."""
+        """Continue with PyBullet's multibody ``body``, the rebuilt copy of the previous one."""
         base, joints, twist, velocity = motion
         client = {"physicsClientId": self._client}
         self.body, self._reading, self._gears = body, None, {}
@@ -480,7 +474,7 @@ class Model(Body):
         return self._turned_gravity
 
     def _stay_awake(self):
-        """Once a free model's joints have been driven it does not fall asleep: Bullet's drives would not wake it."""
+        """Disable sleeping of a free model once its joints are driven: Bullet's drives would not wake it."""
         if not self._never_sleeps:
             self._never_sleeps = True
             pybullet.changeDynamics(

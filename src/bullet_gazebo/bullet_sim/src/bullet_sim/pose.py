@@ -11,7 +11,7 @@ from urdf_model.transforms import matrix_from_quaternion, quaternion_from_matrix
 
 from .errors import BulletSimError, within
 
-# Longer ones are no rounding of a unit quaternion; their squares would have no number.
+# A larger norm is no rounding of a unit quaternion, and its square may overflow.
 _LONGEST_QUATERNION = 1e6
 
 
@@ -41,6 +41,6 @@ class Pose(NamedTuple):
         if norm > _LONGEST_QUATERNION:
             raise BulletSimError("quaternion %s has a norm of %g; expected 1" % (list(self.quaternion), norm))
         if norm < 1e-6:
-            # Messages start out with a quaternion of zeros; Gazebo takes that for "no rotation", and so do we.
+            # The default quaternion of a message is all zeros; Gazebo takes that as "no rotation", and so do we.
             return Pose(tuple(self.position), (0.0, 0.0, 0.0, 1.0))
         return Pose(tuple(map(float, self.position)), tuple(v / norm for v in self.quaternion))

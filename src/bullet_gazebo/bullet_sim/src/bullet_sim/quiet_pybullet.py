@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""PyBullet, imported without the line that it prints each time, which every launch and every tool would show."""
+"""Imports PyBullet without the line that it prints, which every launch and every tool would show."""
 
 import importlib
 import os

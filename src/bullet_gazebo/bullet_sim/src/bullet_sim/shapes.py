@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collision shapes, made once and shared: PyBullet leaks a quarter of a megabyte for a mesh that is loaded again."""
+"""Collision shapes, made once and shared: PyBullet leaks a quarter of a megabyte each time that it loads a mesh
+again."""
 
 import contextlib
 import hashlib
@@ -22,22 +23,23 @@ from .mesh_loading import MOST_BYTES, to_wavefront
 from .quiet_pybullet import pybullet
 
 NO_SHAPE = -1
-# Part of what cached files are named by: raise it when the same mesh would come out differently.
+# Part of the names of cached files: increase it when the result for the same mesh changes.
 _VERSION = b"3"
-#: Of one body; with more, making it takes the loop more than 50 ms.
+#: Largest number for one body; with more, making it takes the loop more than 50 ms.
 _MOST_SHAPES_OF_BODY = 1000
-# A plane that is tilted, or one of several shapes, becomes a slab of this size [m]: Bullet's own plane goes alone.
+# A plane that is tilted, or one of several shapes, becomes a slab of this size [m]: Bullet's own plane must be the only
+# shape of its body.
 _SLAB_M = (200.0, 200.0, 1.0)
 
 
 class MeshCache:
     """Meshes in any format that trimesh reads, kept on disk as the Wavefront files that PyBullet reads.
 
-    The file name is a hash of the mesh's content, so a mesh that changes is converted again and copies cost nothing.
+    The file name is a hash of the mesh's content, so a changed mesh is converted again and copies share a file.
     """
 
     def __init__(self, folder=None, warn=lambda text: None):
-        """``warn(text)`` is told of meshes that are made simpler."""
+        """``warn(text)`` is called for meshes that are simplified."""
         self._warn = warn
         base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
         self.folder = Path(folder or os.path.join(base, "bullet_sim", "meshes"))
@@ -46,9 +48,8 @@ class MeshCache:
     def wavefront(self, path, planes=(), hollow=True):
         """Return the path of a Wavefront copy of the mesh at ``path``, in metres, z up.
 
-        ``planes``: as for ``convex_parts.cut``; given, the copy holds one object for each part. ``hollow``: whether its
-        triangles matter, or only their convex hull, of which the points may do.
-        Raises BulletSimError when the mesh cannot be read.
+        ``planes``: as for ``convex_parts.cut``; given, the copy holds one object for each part. ``hollow``: True to
+        keep the triangles; False if the convex hull is enough. Raises BulletSimError when the mesh cannot be read.
         """
         try:
             status = os.stat(path)
@@ -63,7 +64,7 @@ class MeshCache:
         return str(hull if not hollow and hull.exists() else self._known[key])
 
     def keep(self, key, lines):
-        """Return the path of a file with what ``lines()`` returns; one made for the same ``key`` (bytes) is kept."""
+        """Return the path of a file that holds the result of ``lines()``, cached under ``key`` (bytes)."""
         name = hashlib.sha256(key + _VERSION).hexdigest()[:32] + ".obj"
         target = self.folder / name
         if not target.exists():
@@ -82,7 +83,7 @@ class MeshCache:
             self.folder = Path(tempfile.mkdtemp(prefix="bullet_sim_meshes_"))
 
     def _draft_folder(self):
-        """Return where to write beside and rename from, which is atomic: another simulator may make the same file."""
+        """Return a folder for drafts, which are renamed atomically: another simulator may make the same file."""
         return tempfile.TemporaryDirectory(dir=str(self.folder), prefix="part_")
 
     def _convert(self, path, target, planes):
@@ -105,8 +106,8 @@ class MeshCache:
 
 @contextlib.contextmanager
 def _points_in_numbers():
-    """For as long as Bullet reads a file: where a library has put a comma-decimal locale in force, its reader of files
-    with several objects takes "0.8" for 0."""
+    """Use the C locale while Bullet reads a file: under a locale with decimal commas, its reader of files with several
+    objects reads "0.8" as 0."""
     in_force = locale.setlocale(locale.LC_NUMERIC)
     locale.setlocale(locale.LC_NUMERIC, "C")
     try:
@@ -130,7 +131,7 @@ class MeshFiles:
         self._cache = cache or MeshCache()
 
     def path(self, mesh):
-        """Return where the file is; raises BulletSimError when there is none, or what is there is no file."""
+        """Return the path of the file; raises BulletSimError if it does not exist or is no regular file."""
         path = self._find_mesh(mesh.filename)
         if path is None:
             raise BulletSimError("mesh %s cannot be found%s" % (mesh.filename, _reason(mesh.filename)))
@@ -180,7 +181,7 @@ class ShapeStore:
 
         ``concave`` keeps meshes as triangles (only for bodies that never move); otherwise they are their convex hull.
         ``mesh_cuts``: as for ``World.spawn``; such a mesh becomes the convex hulls of its parts in either case.
-        Raises BulletSimError as ``MeshFiles.parts`` does, which may have been asked before: that takes the time.
+        Raises BulletSimError as ``MeshFiles.parts`` does, Call that before, in another thread: it is the slow part.
         """
         parts = self._mesh_files.parts(shapes, concave, mesh_cuts)
         if not parts:

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Links that collide otherwise than their description says.
-
-Descriptions put shapes around what a controller shall keep away from, which nothing bumps into, and leave out the shape
-of what is thereby guarded.
+"""Changes the collision shapes of some links. Descriptions contain shapes that only keep a controller at a distance,
+and then leave out the shape of the link inside.
 """
 
 from __future__ import annotations
@@ -11,15 +9,14 @@ import dataclasses
 
 from .errors import BulletSimError
 
-#: What a link can be: what it is drawn as, or nothing that can be touched.
+#: Choices: the link collides as it is drawn, or not at all.
 AS_DRAWN, HOLLOW = "as drawn", "hollow"
 
 
 def with_solids(robot, solids):
     """Return ``robot`` (urdf_model.Robot) with the collision shapes that ``solids`` asks for; without any, itself.
 
-    ``solids``: {link: AS_DRAWN or HOLLOW}, or None. Raises BulletSimError for a link that the robot has not, and for
-    another word.
+    ``solids``: {link: AS_DRAWN or HOLLOW}, or None. Raises BulletSimError for an unknown link, and for another choice.
     """
     links = {}
     for name, kind in (solids or {}).items():

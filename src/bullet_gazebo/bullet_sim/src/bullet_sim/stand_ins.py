@@ -13,21 +13,20 @@ from urdf_model.transforms import rigid
 from .errors import BulletSimError
 from .shapes import principal_axes
 
-# A link's inertia is believed when the homogeneous box that has it is this large [m] and this dense [kg/m^3], from
-# balsa to platinum. Descriptions with masses of 1e-5 kg and inertias of 10 kg m^2 are about.
+# A link's inertia is trusted if the homogeneous box with that inertia has a size [m] and density [kg/m^3] within these
+# ranges, from balsa to platinum. Some descriptions have masses of 1e-5 kg and inertias of 10 kg m^2.
 _SIDES_M = (0.002, 1.5)
 _DENSITIES = (20.0, 22000.0)
-# Of the rod between two joints: radius to length, and what a radius may be [m].
+# Rod between two joints: ratio of radius to length, and range of the radius [m].
 _SLENDERNESS = 0.15
 _RADII_M = (0.008, 0.06)
 _UNKNOWN_RADIUS_M = 0.03
 
 
 def with_stand_ins(robot, mesh_files):
-    """Return ``robot`` with a primitive for each mesh that is missing, and one line that says so.
-
-    Itself, and "", where nothing is missing. A link's own other shapes are taken first, then a box with its inertia,
-    then a rod or ball that fits between the joints. ``mesh_files``: MeshFiles.
+    """Return ``robot`` with a primitive for each missing mesh, and one line for the log; the same robot and "" if no
+    mesh is missing. A link's own other shapes are taken first, then a box with its inertia, then a rod or ball that
+    fits between the joints. ``mesh_files``: MeshFiles.
     """
     told, links = [], {}
     for link in robot.links.values():
@@ -35,7 +34,7 @@ def with_stand_ins(robot, mesh_files):
         visuals, unseen = _sift(link.visuals, mesh_files.path)
         if not lost and not unseen:
             continue
-        # A mesh that is there to be looked at is not borrowed: it may be too fine to collide with.
+        # A visual mesh is not used: it may be too fine for collisions.
         spare = collisions or [shape for shape in visuals if not isinstance(shape.geometry, Mesh)]
         spare = spare or [_fitted(robot, link)]
         if lost and not collisions:
@@ -73,8 +72,8 @@ def _fitted(robot, link):
 def equivalent_box(inertial):
     """Return the Shape of the homogeneous box with the mass and the principal moments of ``inertial``, or None.
 
-    From I_x = m (b^2 + c^2) / 12 and its like: a^2 = 6 (I_y + I_z - I_x) / m. None where no thing of that size and
-    density could be a robot's link.
+    From I_x = m (b^2 + c^2) / 12 and its like: a^2 = 6 (I_y + I_z - I_x) / m. None if a link cannot have that size or
+    density.
     """
     if inertial is None or inertial.mass <= 0.0:
         return None

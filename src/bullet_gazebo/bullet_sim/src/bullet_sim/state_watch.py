@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""After each step, put models with an impossible state back to where they were, before anything reads it."""
+"""After each step, restores models with an impossible state, before anything reads it."""
 
-# Of one model at most one line in so many steps: what keeps failing would fill the log.
+# Fewest steps between two log lines about one model.
 _QUIET_STEPS = 5000
-# A body without joints that has not moved at all for so many steps has fallen asleep, and then is looked at in every
-# fiftieth step only: what a NaN touches it touches in the step in which it is found, and then all are looked at.
+# A body without joints that has not moved for this many steps is asleep and is checked only in every fiftieth step.
+# That is enough: when a NaN is found, all bodies are checked in the same step.
 _ASLEEP_STEPS = 50
 _TURNS = 50
 
 
 class StateWatch:
-    """Looks at the models of a World after each step.
+    """Checks the models of a World after each step.
 
-    A force, mass or inertia that Bullet cannot compute with gives NaN, which spreads to what is touched. And one NaN in
-    Bullet's search tree of boxes has nothing in the world collide with anything any more, however well all states are
-    made again: so all bodies are then made anew. It takes some ms a robot, once.
+    A force, mass or inertia that Bullet cannot compute with gives NaN, which spreads to what is touched. One NaN in
+    Bullet's search tree of boxes also stops all collisions in the world, even after all states are restored; so all
+    bodies are then rebuilt. This takes some ms per robot.
     """
 
     def __init__(self, world, error):
@@ -26,17 +26,17 @@ class StateWatch:
         self._turn = 0
 
     def models_changed(self):
-        """A model has come or gone."""
+        """A model was added or removed."""
         self._sorted = False
 
     def note_touched(self, model):
-        """Something was done to ``model``."""
+        """A force or a new state was applied to ``model``."""
         if model.still_for >= _ASLEEP_STEPS:
             model.still_for = 0
             self._sorted = False
 
     def look(self):
-        """Put every model whose state cannot be back to where it was before the step, at rest, and say so."""
+        """Restore every model with an impossible state to its state before the step, at rest, and log it."""
         if not self._sorted:
             self._sort()
         faulty = False

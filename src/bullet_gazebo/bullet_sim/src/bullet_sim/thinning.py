@@ -4,16 +4,16 @@
 import numpy as np
 
 _COARSEST_GRID, _FINEST_GRID = 2, 512
-# With more triangles than this a mesh is first brought onto these, so that the search for the grid stays cheap.
+# A mesh with more triangles is first reduced to this number, so that the search for the grid stays cheap.
 _MANY = 100_000
 _HALVED_GRIDS = (256, 128, 64)
 
 
 def thin_out(vertices, faces, target):
-    """Return (vertices, faces) of about the same shape, at most ``target`` triangles where that is possible at all.
+    """Return (vertices, faces) of about the same shape, at most ``target`` triangles, if possible.
 
-    Vertices (n, 3) that share a cell of a cubic grid become their mean; triangles (m, 3) that lose a corner go, and of
-    those that have become the same one stays. The finest grid that meets the target is taken.
+    Vertices (n, 3) that share a cell of a cubic grid become their mean; triangles (m, 3) that lose a corner are
+    removed, and equal ones are merged. Uses the finest grid that meets the target.
     """
     if len(faces) <= target:
         return vertices, faces
@@ -40,7 +40,7 @@ def thin_out(vertices, faces, target):
 def outermost(vertices, grid=128):
     """Return of the vertices (n, 3) in each cell of a cubic grid, ``grid`` cells across, the one that is farthest out.
 
-    Farthest from the mean of all: what is left has about the same convex hull.
+    Farthest from the mean of all vertices: the result has about the same convex hull.
     """
     low, size = _extent(vertices)
     cluster = _clusters(vertices, low, grid / size)

@@ -27,12 +27,12 @@ def plain_path(uri):
 
 
 def is_fixed(root, static=None):
-    """Whether a robot with this root link stands fast in the world; ``static``: as for ``World.spawn``."""
+    """Whether a robot with this root link is fixed in the world; ``static``: as for ``World.spawn``."""
     return root == "world" if static is None else static
 
 
 def _has_mesh(link):
-    """Whether a link is missing altogether, or has a mesh to collide with."""
+    """Whether a link does not exist, or has a collision mesh."""
     return link is None or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)
 
 
@@ -44,13 +44,12 @@ class World:
 
     :param time_step_s: length of a tick [s]
     :param gravity: (3,) [m/s^2]
-    :param contact_ahead_m: how far apart bodies may be to count as a contact, which is solved before they touch [m].
-        The default is what 2 m/s travel in a tick of 2 ms; Bullet's own 0.02 m has an arm that is folded beside its
-        body pay for contacts that never come. For small bodies it is less in any case, a fiftieth of their size.
-    :param seed: of ``World.random``, for noise
-    :param find_mesh: function from a mesh URI to a file path, or None when there is no such file
-    :param warn: function that is told what was mended, in one line
-    :param error: function that is told, in one line, of which model Bullet gave no state that could be
+    :param contact_ahead_m: distance below which two bodies get a contact, before they touch [m]. The default is the
+    distance that 2 m/s travel in a tick of 2 ms; with Bullet's default of 0.02 m, a folded arm beside its body costs
+    time for contacts that never happen. For small bodies it is at most a fiftieth of their size. :param seed: of
+    ``World.random``, for noise :param find_mesh: function from a mesh URI to a file path, or None when there is no such
+    file :param warn: function of one line of text, called after a repair :param error: function of one line of text,
+    called for a model that got an impossible state
     """
 
     _contact_ahead_in_force_m = None
@@ -69,7 +68,7 @@ class World:
         self._step_since = 0, 0.0  # the tick and the time [s] that the present length of a tick counts from
         self.solver_iterations = SOLVER_ITERATIONS
         self.tick = 0
-        #: How many steps there have been, which a reset of the time does not take back.
+        #: Number of steps since the start; a reset of the time does not reset it.
         self.steps = 0
         self.models = {}
         self.random = np.random.default_rng(seed)
@@ -82,7 +81,7 @@ class World:
         self._shapes = ShapeStore(self._client, self.mesh_files)
         self._weightless = []  # models of which some link has no weight
         self._watch = StateWatch(self, error)
-        self._touched = []  # models that something was done to since the last step, perhaps in their sleep
+        self._touched = []  # models that were touched since the last step, perhaps asleep
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step_s,
             numSolverIterations=self.solver_iterations,
@@ -96,7 +95,7 @@ class World:
 
     @property
     def time_s(self):
-        """Simulated time since the world began [s]."""
+        """Simulation time [s]."""
         tick, time_s = self._step_since
         return time_s + (self.tick - tick) * self.time_step_s
 
@@ -122,9 +121,7 @@ class World:
         self.solver_iterations = iterations
 
     def set_time_step(self, time_step_s):
-        """Have ticks last ``time_step_s`` [s] from the next one on; time goes on.
-
-        Raises BulletSimError out of bounds.
+        """Set the length of a tick from the next one on [s]; the time is kept. Raises BulletSimError out of bounds.
         """
         within(bounds.TIME_STEP, time_step_s, "the time step")
         self._step_since = self.tick, self.time_s
@@ -134,23 +131,21 @@ class World:
             model.step_changed()
 
     def wake_all(self):
-        """Have every resting body looked at again: Bullet does not notice what is changed from outside."""
+        """Wake all sleeping bodies: Bullet does not notice changes from outside."""
         for model in self.models.values():
             model.wake()
 
     def spawn(self, robot, name, pose=None, static=None, self_collision_pairs=(), mesh_cuts=None, merged=None):
         """Put ``robot`` (urdf_model.Robot) into the world as ``name``, its frame at ``pose``; return its Model.
 
-        The frame of a robot from a URDF is that of its root link. What stands in for meshes that are missing is told
-        to ``warn``.
-        ``static`` fixes the root; by default only a robot whose root link is called "world" is fixed, as in Gazebo.
-        ``self_collision_pairs``: as for ``Model.set_self_collision_pairs``.
-        ``mesh_cuts``: {link: planes}, as for ``convex_parts.cut``, in the mesh's axes [m], has the collision meshes of
-        those links cut and stood in for by the convex hulls of the parts. Where such a mesh is missing, the pairs of
-        its body are left out: what stands in for it is too rough to fold an arm around.
-        ``merged``: the MergedRobot of ``robot``, which then has been checked and has no mesh that is missing: what
-        takes its time has been done, in another thread perhaps.
-        Raises BulletSimError when the name is taken or empty, and for numbers out of bounds.
+        The frame of a robot from a URDF is that of its root link. ``warn`` is called with the replacements of missing
+        meshes. ``static`` fixes the root; by default only a robot whose root link is called "world" is fixed, as in
+        Gazebo. ``self_collision_pairs``: as for ``Model.set_self_collision_pairs``. ``mesh_cuts``: {link: planes}, as
+        for ``convex_parts.cut``, in the mesh's axes [m], cuts the collision meshes of those links and replaces them by
+        the convex hulls of the parts. If such a mesh is missing, the pairs of its body are left out: its replacement is
+        too rough for a folded arm. ``merged``: the MergedRobot of ``robot``, which must be checked and have no missing
+        mesh; so the slow work can be done before, in another thread. Raises BulletSimError when the name is taken or
+        empty, and for numbers out of bounds.
         """
         if not name:
             raise BulletSimError("a model needs a name")
@@ -182,7 +177,7 @@ class World:
     def make_shape(self, merged, link, static=None, mesh_cuts=None):
         """Make the collision shape of a body of ``merged`` (urdf_model.MergedRobot) beforehand.
 
-        One costs up to 20 ms: a robot with many need not bring them all in one tick. ``static``, ``mesh_cuts``: as for
+        A shape takes up to 20 ms; this spreads a robot's shapes over several ticks. ``static``, ``mesh_cuts``: as for
         :meth:`spawn`.
         """
         static = is_fixed(merged.root, static)
@@ -201,7 +196,7 @@ class World:
         self._watch.models_changed()
         self.note_weightless(model, False)
         self._touched = [other for other in self._touched if other is not model]
-        # What stood on it shall fall.
+        # Bodies that stood on it must fall.
         self.wake_all()
 
     def note_weightless(self, model, wanted):
@@ -215,7 +210,7 @@ class World:
         self._watch.note_touched(model)
 
     def _put_contact_ahead(self):
-        """PyBullet keeps one figure for all worlds of a process: put ours there, if another world's is."""
+        """PyBullet has one value for all worlds of a process: set ours again if another world changed it."""
         if World._contact_ahead_in_force_m != self._contact_ahead_m:
             World._contact_ahead_in_force_m = self._contact_ahead_m
             pybullet.setPhysicsEngineParameter(
@@ -237,10 +232,9 @@ class World:
         self._watch.look()
 
     def make_anew(self, models, motions=None):
-        """Replace the multibodies of ``models`` by new ones like them, which go on as the old ones did.
-
-        ``motions``: {model: what ``Model.motion`` or ``Model.last_good`` returned}. All are removed before the first is
-        made: only then Bullet's search tree is empty, and whatever stood in it is forgotten.
+        """Rebuild the multibodies of ``models``. ``motions``: {model: result of ``Model.motion`` or
+        ``Model.last_good``}. All bodies are removed before the first one is built, so that Bullet's search tree is
+        empty in between.
         """
         motions = {model: (motions or {}).get(model) or model.motion() for model in models}
         for model in models:
@@ -261,7 +255,7 @@ class World:
         self._step_since = 0, 0.0
 
     def detect_contacts(self):
-        """Find the contacts where everything stands now, without a step; ``contacts`` then returns them."""
+        """Find the contacts at the present poses, without a step; ``contacts`` then returns them."""
         self._put_contact_ahead()
         pybullet.performCollisionDetection(physicsClientId=self._client)
 
@@ -283,24 +277,22 @@ class World:
         return found
 
     def touching(self, model):
-        """Return the contacts of ``model`` where everything is now, as :meth:`contacts` does; no time passes."""
+        """Return the contacts of ``model`` at the present poses, as :meth:`contacts` does; no time passes."""
         self.detect_contacts()
         return self.contacts(model)
 
     def ray_test_batch(self, starts, ends):
         """Cast rays from ``starts`` (k, 3) to ``ends`` (k, 3) [m, world]; return the fractions (k,) at which they hit.
 
-        1.0 where a ray meets nothing.
+        1.0 if a ray hits nothing.
         """
         starts, ends = np.asarray(starts, dtype=float), np.asarray(ends, dtype=float)
         hits = pybullet.rayTestBatch(starts.tolist(), ends.tolist(), physicsClientId=self._client)
         return np.array([hit[2] if hit[0] >= 0 else 1.0 for hit in hits])
 
     def first_hits(self, starts, ends):
-        """Cast rays as ``ray_test_batch`` does; return for each what it meets first: ``(model's name, link's merged
-        name)``, or None.
-
-        A ray that starts inside a convex shape passes out of it unhindered.
+        """Cast rays as ``ray_test_batch`` does; return for each its first hit: ``(model's name, link's merged name)``,
+        or None. A ray that starts inside a convex shape does not hit that shape.
         """
         models = {model.body: model for model in self.models.values()}
         hits = pybullet.rayTestBatch(list(starts), list(ends), physicsClientId=self._client)
@@ -308,7 +300,7 @@ class World:
         return [None if model is None else (model.name, model.link_name(link)) for model, link in found]
 
     def close(self):
-        """Give the physics client back. The world cannot be used afterwards."""
+        """Disconnect the physics client. The world cannot be used afterwards."""
         if self._client is not None:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = None

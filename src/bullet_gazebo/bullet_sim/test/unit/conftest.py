@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What most tests of the world begin with."""
+"""Fixtures of most tests of the world."""
 
 import pytest
 

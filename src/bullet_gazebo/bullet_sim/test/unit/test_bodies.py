@@ -52,7 +52,7 @@ def test_a_sleeping_body_wakes_up_when_it_is_touched(world, sleeping_box, touch,
 
 
 def bullet_passes_it_over(world, box):
-    """Whether Bullet leaves a push out, as it does for a body that sleeps: World wakes what it pushes itself."""
+    """Whether Bullet ignores a push, as it does for a sleeping body: World itself wakes the bodies that it pushes."""
     before = box.base_pose()
     pybullet.applyExternalForce(
         box.body, -1, (0, 0, 2000), before.position, pybullet.WORLD_FRAME, physicsClientId=world._client)
@@ -105,7 +105,7 @@ def test_a_sleeping_body_falls_when_its_support_goes(world, take_away):
 
 @pytest.mark.parametrize("friction, slides", [(None, False), (0.7, False), (0.3, True), (1000.0, False)])
 def test_friction_holds_a_box_up_to_its_coefficient(world, friction, slides):
-    """Pushed with half of its weight, on a floor that says nothing."""
+    """Pushed with half of its weight, on a floor without friction values."""
     world.add_ground_plane()
     robot = parse_urdf(BOX % "")
     robot.links["box"].surface = Surface(friction=friction)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The world against mechanics done by hand, on a small arm."""
+"""The world against mechanics computed by hand, on a small arm."""
 
 import hashlib
 import math

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Scenes with an answer on paper, at steps of 1 and 2 ms. The README's table says the tolerances; they live here."""
+"""Scenes with an analytical solution, at steps of 1 and 2 ms. The README's table repeats these tolerances."""
 import math
 
 import numpy as np
@@ -127,7 +127,7 @@ def test_a_block_stays_on_a_slope_below_its_friction(world):
     run(world, 1.0)
     before = np.dot(box.base_pose().position, along)
     run(world, 5.0)
-    # tan 25 degrees is 0.47. Bullet's friction gives way by 0.3 mm/s at most.
+    # tan 25 degrees is 0.47. Bullet's friction creeps by 0.3 mm/s at most.
     assert np.dot(box.base_pose().position, along) == pytest.approx(before, abs=0.0015)
 
 

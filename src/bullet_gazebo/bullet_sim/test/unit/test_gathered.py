@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Links with more shapes than PyBullet takes: every one of them counts."""
+"""Links with more shapes than PyBullet takes: every one of them collides."""
 import struct
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a gripper needs of the physics: coupled joints, contact forces, firm friction, rays that say whom they meet."""
+"""The physics of a gripper: coupled joints, contact forces, firm friction, rays that return the hit link."""
 
 import numpy as np
 import pytest

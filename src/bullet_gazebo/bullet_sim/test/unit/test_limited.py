@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Work in a process of its own comes to an end, and says which limit it came to."""
+"""Work in a process of its own ends, and its error names the limit."""
 
 import os
 import re

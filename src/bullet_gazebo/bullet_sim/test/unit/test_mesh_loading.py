@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Meshes from anybody: what is hostile is refused by a limit that the error names, what is large is made simpler."""
+"""Untrusted meshes: a hostile one is refused with an error that names the limit, a large one is simplified."""
 
 import os
 import struct

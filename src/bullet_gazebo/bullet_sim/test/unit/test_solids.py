@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Links that collide otherwise than their description says."""
+"""Links with other collision shapes than their description gives."""
 import pytest
 
 from bullet_sim import BulletSimError, Pose, World

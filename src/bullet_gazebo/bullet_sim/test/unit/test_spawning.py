@@ -85,7 +85,7 @@ def test_a_name_can_be_spawned_and_deleted_again_and_again_without_growing(robot
     gc.collect()
     grown = resident_bytes() - before
     print("%d times: %+.1f MB" % (times, grown / 1e6))
-    # A thousand may cost LEAK_BYTES; of fewer, a megabyte is the allocator's own noise.
+    # A thousand may cost LEAK_BYTES; with fewer, a megabyte is noise of the allocator.
     assert grown < max(LEAK_BYTES * times / 1000, 1e6)
     world.close()
 
@@ -115,7 +115,7 @@ def test_a_believable_inertia_gives_the_box_that_has_it():
 
 @pytest.mark.parametrize("mass, inertia", [(1e-5, 10), (1e3, 1e-6), (1, 1e-9), (0, 0)])
 def test_an_inertia_that_nothing_has_is_not_believed(mass, inertia):
-    """The chain's own lengths are: a rod to the next joint, a ball at the end."""
+    """Shapes from the chain's lengths: a rod to the next joint, a ball at the end."""
     inertial = INERTIAL % (mass, inertia, inertia, inertia)
     links = [LINK % (name, inertial, name, name) for name in "abc"]
     shapes, told = fitted(robot_of(*links, JOINT % ("j", "a", "b", "0 0 0.3"), JOINT % ("k", "b", "c", "0.4 0 0")))

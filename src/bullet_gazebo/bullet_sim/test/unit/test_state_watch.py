@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Numbers that Bullet cannot compute with are refused; a state that becomes impossible is put back unread."""
+"""Numbers that Bullet cannot compute with are refused; an impossible state is restored before it is read."""
 
 import math
 
@@ -59,14 +59,14 @@ def height(model):
 
 
 def break_world(model):
-    """Past all checks: the push that makes NaN of everything that it touches."""
+    """Bypass all checks: this push turns every touched body's state into NaN."""
     for force, place in (([1e308] * 3, [0, 0, 0]), ([-1e308] * 3, [0, 0, 1]), ([1e308] * 3, [0, 1, 0])):
         pybullet.applyExternalForce(model.body, -1, force, place, pybullet.WORLD_FRAME, physicsClientId=model._client)
     model.wake()
 
 
 def test_pybullet_itself_breaks(world, boxes, monkeypatch):
-    """Or the tests below would test nothing."""
+    """Otherwise the tests below would test nothing."""
     monkeypatch.setattr(world._watch, "look", lambda: None)
     break_world(boxes[0])
     step(world, 2)
