@@ -15,7 +15,7 @@ from ros_controllers.wheel_odometry import WheelOdometry
 from sim_time.pace import Pace
 from sim_time.stamps import stamp
 
-# Variances of x, y, z [m2], roll, pitch, yaw [rad2]: what the plane does not tell is as good as unknown.
+# Variances of x, y, z [m2], roll, pitch, yaw [rad2]: large for the directions that plane odometry does not measure.
 _UNKNOWN = 1e12
 _VARIANCES = (1e-5, 1e-5, _UNKNOWN, _UNKNOWN, _UNKNOWN, 1e-3)
 
@@ -23,7 +23,7 @@ _VARIANCES = (1e-5, 1e-5, _UNKNOWN, _UNKNOWN, _UNKNOWN, 1e-3)
 class Drive(ModelPlugin):
     """Base of the classes below. Elements, with their defaults: ``commandTopic`` (cmd_vel), ``odometryTopic`` (odom),
     ``odometryFrame`` (odom), ``robotBaseFrame`` (base_footprint), ``updateRate`` or ``odometryRate`` [Hz] (``rate``).
-    A command counts until the next one.
+    A command holds until the next one.
     """
 
     rate = 100.0
@@ -51,11 +51,11 @@ class Drive(ModelPlugin):
         """Read the elements of this kind. Raises ``PluginError``."""
 
     def drive(self, x, y, turn, dt):
-        """Before a step: go at ``x``, ``y`` [m/s] in the model's axes, and turn [rad/s]."""
+        """Before a step: drive at ``x``, ``y`` [m/s] in the model's axes, and turn [rad/s]."""
         raise NotImplementedError
 
     def moved(self, time_s, dt):
-        """After a step, for a kind that counts."""
+        """After a step, for a kind that integrates its odometry."""
 
     def where(self):
         """(pose (4, 4), linear velocity (3,), angular velocity (3,)), the velocities in the model's axes."""
@@ -98,7 +98,7 @@ class Drive(ModelPlugin):
         self.also_publish(time_s)
 
     def also_publish(self, time_s):
-        """At the same rate, for a kind that has more to say."""
+        """Called at the same rate, for a kind with further topics."""
 
     def reset(self):
         self._wanted = (0.0, 0.0, 0.0)
@@ -170,7 +170,7 @@ class _Wheels(Drive):
         self._speeds = np.zeros(2)  # of the left and the right rims, as they are commanded [m/s]
 
     def rims(self, x, turn):
-        """What the rims (2,) shall do [m/s], left and right."""
+        """Target speeds of the rims (2,) [m/s], left and right."""
         half = turn * self._separation / 2.0
         return np.array([x - half, x + half])
 
@@ -281,7 +281,7 @@ class SkidSteer(_Wheels):
 
 
 class PlanarMove(Drive):
-    """``libgazebo_ros_planar_move.so``: the model moves as commanded, whatever it stands on.
+    """``libgazebo_ros_planar_move.so``: the model moves as commanded on any ground.
 
     ``odometryRate`` (20 Hz) takes the place of ``updateRate``.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is wrong with a measurement: an offset, a drift, noise, a scale. ROS-free."""
+"""Errors of a measurement: offset, drift, noise, scale. ROS-free."""
 import numpy as np
 
 _ONE_HOUR_HZ = 1.0 / 3600.0
@@ -11,9 +11,9 @@ class ErrorModel:
     :param size: how many numbers
     :param random: numpy.random.Generator
     :param offset: constant error [as the measurement]
-    :param drift: standard deviation of a slow wandering (Gauss and Markov's process) [as the measurement]
-    :param frequency: how quickly that forgets [1/s]
-    :param noise: standard deviation of what is new each time [as the measurement]
+    :param drift: standard deviation of a slow drift (Gauss-Markov process) [as the measurement]
+    :param frequency: inverse of the drift's correlation time [1/s]
+    :param noise: standard deviation of the white noise [as the measurement]
     :param scale: factor on the measurement
     """
 
@@ -25,22 +25,22 @@ class ErrorModel:
         self.reset()
 
     def reset(self):
-        """Drift begins anew, somewhere."""
+        """Restart the drift at a random value."""
         self._drifted = self._random.normal(0.0, 1.0, self.drift.shape) * self.drift
 
     @property
     def bias(self):
-        """What is wrong for longer than one measurement (size,): offset and drift."""
+        """The slow part of the error (size,): offset and drift."""
         return self._offset + self._drifted
 
     def add_drift(self, change):
-        """Have the drift be ``change`` (size,) more."""
+        """Add ``change`` (size,) to the drift."""
         self._drifted = self._drifted + change
 
     def measure(self, value, dt):
-        """What is measured (size,) where ``value`` (size,) is true, ``dt`` [s] after the time before."""
+        """The measurement (size,) of the true ``value`` (size,), ``dt`` [s] after the previous one."""
         if self.drift.any():
-            # The process keeps its deviation whatever dt is: what is forgotten is made up for by what is new.
+            # The process keeps its standard deviation for any dt: new noise replaces the decayed part.
             kept = np.exp(-dt * self._frequency)
             new = self._random.normal(0.0, 1.0, self.drift.shape) * self.drift * np.sqrt(1.0 - kept * kept)
             self._drifted = kept * self._drifted + new

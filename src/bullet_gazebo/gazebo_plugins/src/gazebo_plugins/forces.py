@@ -12,8 +12,8 @@ from urdf_model import OutOfBounds, bounds
 
 
 class ForceTorqueSensor(PacedSensor):
-    """``libgazebo_ros_ft_sensor.so``: what goes through the joint ``jointName``, movable or fixed, on ``topicName``, in
-    the axes of the child link and about the joint: what the child exerts on the parent."""
+    """``libgazebo_ros_ft_sensor.so``: publishes the wrench through the joint ``jointName``, movable or fixed, on
+    ``topicName``, in the axes of the child link and about the joint: the wrench of the child on the parent."""
 
     message_class = WrenchStamped
 
@@ -46,8 +46,8 @@ class ForceTorqueSensor(PacedSensor):
 
 
 class LinkForce(PacedSensor):
-    """``libgazebo_ros_f3d.so``: what contacts and pushes do to the link ``bodyName``, in world axes, about its origin;
-    without weight."""
+    """``libgazebo_ros_f3d.so``: publishes the wrench of contacts and applied forces on the link ``bodyName``, in world
+    axes, about its origin; without weight."""
 
     message_class = WrenchStamped
 

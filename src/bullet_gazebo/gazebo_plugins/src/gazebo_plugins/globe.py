@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A world's metres as degrees on the globe, and the magnetic field there. ROS-free."""
+"""Converts world coordinates to latitude and longitude; the magnetic field. ROS-free."""
 import math
 
 import numpy as np
@@ -11,8 +11,8 @@ _ECCENTRICITY_SQUARED = _FLATTENING * (2.0 - _FLATTENING)
 
 
 class Reference:
-    """Where on the globe the world's origin is: latitude and longitude [deg], altitude [m], and which way x looks
-    [rad], clockwise from north."""
+    """Place of the world's origin on the globe: latitude and longitude [deg], altitude [m], and the heading of x [rad],
+    clockwise from north."""
 
     def __init__(self, latitude, longitude, altitude=0.0, heading=0.0):
         self._latitude, self._longitude, self._altitude = latitude, longitude, altitude

@@ -48,7 +48,7 @@ class _LinkSensor(PacedSensor):
     default_frame = None
 
     def elapsed(self, time_s):
-        """Seconds since it was asked last, 0 at first."""
+        """Seconds since the last call, 0 at first."""
         last, self._last_s = self._last_s, time_s
         return 0.0 if last is None or time_s < last else time_s - last
 
@@ -62,10 +62,10 @@ class _LinkSensor(PacedSensor):
 
 
 class HectorImu(_LinkSensor):
-    """``libhector_gazebo_ros_imu.so``: sensor_msgs/Imu on ``topicName`` (imu), what is wrong with it on
-    ``biasTopicName`` (imu/bias). ``rpyOffset`` turns it on its link; errors of ``accel``, ``rate`` and ``yaw``.
+    """``libhector_gazebo_ros_imu.so``: sensor_msgs/Imu on ``topicName`` (imu), its errors on ``biasTopicName``
+    (imu/bias). ``rpyOffset`` turns it on its link; errors of ``accel``, ``rate`` and ``yaw``.
 
-    The service ``serviceName`` (imu/calibrate) has the drift of the rates begin at none.
+    The service ``serviceName`` (imu/calibrate) resets the drift of the rates to zero.
     """
 
     message_class = Imu
@@ -78,7 +78,7 @@ class HectorImu(_LinkSensor):
         self._yaw = error_model(self, "yaw", 1)
         both = self.number("gaussianNoise", 0.0)
         if both:
-            # The common figure goes before those of each.
+            # The common value comes before those of each axis.
             self._accel.noise = self._rate.noise = np.full(3, both)
         self._turn = pose_matrix((0.0, 0.0, 0.0), self.numbers(context.element, "rpyOffset", (0.0,) * 3))[:3, :3]
         self._velocity = None
@@ -91,7 +91,7 @@ class HectorImu(_LinkSensor):
             self._velocity = None
             return
         linear, angular = (np.asarray(part) for part in self.context.model.link_twist(self._link))
-        # The change over the last step, as the IMU of gazebo_ros has it, and not over a period.
+        # The change over the last step, as in the IMU of gazebo_ros, and not over a period.
         last, self._velocity = self._velocity, (time_s, linear)
         if last is None or time_s <= last[0] or not self._pace.take(time_s):
             return
@@ -154,7 +154,7 @@ class HectorGps(_LinkSensor):
         model, elapsed = self.context.model, self.elapsed(time_s)
         velocity = self._speed.measure(model.link_twist(self._link)[0], elapsed)
         position = self._position.measure(model.link_pose(self._link).position, elapsed)
-        # What drifts as a velocity adds up as a position.
+        # Drift of the velocity integrates to drift of the position.
         self._position.add_drift(elapsed * self._speed.bias)
         if wanted[0]:
             latitude, longitude, altitude = self._reference.place(position)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``libgazebo_ros_joint_pose_trajectory.so``: puts joints through a list of positions, without any physics."""
+"""``libgazebo_ros_joint_pose_trajectory.so``: moves joints through a list of positions, without physics."""
 import numpy as np
 from gazebo_msgs.srv import SetJointTrajectory, SetJointTrajectoryResponse
 from trajectory_msgs.msg import JointTrajectory
@@ -14,7 +14,7 @@ _WORLD = ("", "world", "map")
 
 
 class Playback:
-    """Which of a trajectory's points is next, and when.
+    """Decides which point of a trajectory is next, and when.
 
     :param points: list of (positions (n,), seconds until the point after it)
     :param start_s: when the first is due [s]
@@ -41,7 +41,7 @@ class JointPoseTrajectory(ModelPlugin):
     """Listens to trajectory_msgs/JointTrajectory on ``topicName``, serves gazebo_msgs/SetJointTrajectory on
     ``serviceName`` (both set_joint_trajectory).
 
-    Each point's ``time_from_start`` is how long it stands before the next one, as in Gazebo. Joints that the model
+    Each point's ``time_from_start`` is its duration until the next one, as in Gazebo. Joints that the model
     does not have are left out with a warning. The link that ``header.frame_id`` names stays where it is.
     """
 
@@ -96,7 +96,7 @@ class JointPoseTrajectory(ModelPlugin):
         return SetJointTrajectoryResponse(not why, why or "the trajectory begins")
 
     def _begin(self, trajectory):
-        """Start on a trajectory; returns why not, or ""."""
+        """Start a trajectory; returns the reason of a refusal, or ""."""
         model = self.context.model
         frame = unscoped(model.name, trajectory.header.frame_id.strip("/"))
         if frame not in _WORLD and frame not in model.link_names:

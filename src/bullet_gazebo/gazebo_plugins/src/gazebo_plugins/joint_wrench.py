@@ -9,12 +9,12 @@ from urdf_model.transforms import inverse
 
 
 class JointWrench:
-    """What the links behind a joint exert on those before it, in the last step of the world.
+    """The wrench of the links behind a joint on those before it, in the last step of the world.
 
-    Newton and Euler: the change of the momentum of all links behind the joint is due to their weight, to contacts, to
-    what ``Model.apply_wrench`` did, and to the joint. Fixed joints have no counterpart in the physics, since the links
-    that they hold are one body there, and need none this way. Of a body that the joint divides, a contact belongs to
-    the link whose shape is nearest; a mesh counts as its link's origin.
+    Newton and Euler: the change of the momentum of all links behind the joint equals the sum of their weight, contacts,
+    the wrenches of ``Model.apply_wrench``, and the joint's wrench. This also works for fixed joints, which do not exist
+    in the physics. In a body that the joint divides, a contact belongs to the link with the nearest shape; a mesh
+    counts as its link's origin.
 
     :param world: bullet_sim.World
     :param model: bullet_sim.Model, which has a joint of this name in its description
@@ -30,10 +30,10 @@ class JointWrench:
         found = robot.joints[joint]
         #: The link behind the joint.
         self.child = found.child
-        #: Where the joint is in that link's frame (4, 4).
+        #: Pose of the joint in that link's frame (4, 4).
         self.offset = inverse(found.child_offset)
         behind = _links_behind(robot, found.child)
-        #: {body: Inertial of what of it is behind the joint, in the frame of the link it is named after}.
+        #: {body: Inertial of its part behind the joint, in the frame of the link it is named after}.
         self._parts = {}
         #: {body that the joint divides: all its links}.
         self._divided = {}
@@ -48,13 +48,14 @@ class JointWrench:
         self._before = None
 
     def note(self):
-        """Before the step that shall be measured."""
+        """Call before the step that is to be measured."""
         self._before = self._momentum()
 
     def measure(self):
-        """After that step: (force (3,) [N], torque (3,) [Nm] about the joint's origin), in the axes of the child link.
+        """Call after that step. Returns (force (3,) [N], torque (3,) [Nm] about the joint's origin), in the axes of the
+        child link.
 
-        Of a weight that hangs on the joint the force points down.
+        For a weight that hangs on the joint, the force points down.
         """
         frame = self._model.link_pose(self.child).matrix() @ self.offset
         origin = frame[:3, 3]
@@ -62,14 +63,14 @@ class JointWrench:
         dt = self._world.time_step_s
         change = [(now - then) / dt for now, then in zip(after, before, strict=True)]
         force, torque = self._outside(origin)
-        # The joint gives what the others do not; what is told is the reaction to it.
+        # The joint supplies the missing wrench; the result is the reaction to it.
         force = force - change[0]
         torque = torque - (change[1] - np.cross(origin, change[0]))
         axes = self._model.link_pose(self.child).matrix()[:3, :3]
         return axes.T @ force, axes.T @ torque
 
     def _momentum(self):
-        """Momentum (3,) and angular momentum (3,) about the world's origin of what is behind the joint."""
+        """Momentum (3,) and angular momentum (3,) about the world's origin of the links behind the joint."""
         total, turning = np.zeros(3), np.zeros(3)
         for centre, inertial, axes, (linear, angular) in self._moving():
             momentum = inertial.mass * linear
@@ -86,7 +87,8 @@ class JointWrench:
             yield pose[:3, 3] + arm, inertial, pose[:3, :3], (linear + np.cross(angular, arm), angular)
 
     def _outside(self, origin):
-        """Force and torque about ``origin`` (3,) of weight, contacts and pushes on what is behind the joint."""
+        """Force and torque about ``origin`` (3,) of weight, contacts and applied wrenches on the links behind the
+        joint."""
         force, torque = np.zeros(3), np.zeros(3)
 
         def add(push, where, turn=(0.0, 0.0, 0.0)):
@@ -112,7 +114,7 @@ class JointWrench:
         return force, torque
 
     def _is_behind(self, body, where):
-        """Whether what happens to ``body`` at ``where`` (3,) happens to a link behind the joint."""
+        """Whether the point ``where`` (3,) of ``body`` belongs to a link behind the joint."""
         if body not in self._divided:
             return True
         away = {link: _distance(self._model, link, where) for link in self._divided[body]}
@@ -122,7 +124,7 @@ class JointWrench:
 def contact_forces(world, model, bodies):
     """List of (body, force (3,) on it [N], where (3,) [m]) of the last step's contacts on ``bodies`` of ``model``.
 
-    In world axes, friction included. What two of the bodies do to each other is left out.
+    In world axes, friction included. Contacts between two of the bodies are left out.
     """
     found = []
     for contact in world.contacts(model):

@@ -6,14 +6,14 @@ from gazebo_ros.model_plugin import ModelPlugin
 
 
 class Nothing(ModelPlugin):
-    """A plugin that does nothing in Gazebo, or what the simulator does by itself here: ``libgazebo_ros_template.so``,
-    ``libgazebo_ros_api_plugin.so``, ``libgazebo_ros_paths_plugin.so``."""
+    """A plugin that does nothing in Gazebo, or whose function the simulator has built in:
+    ``libgazebo_ros_template.so``, ``libgazebo_ros_api_plugin.so``, ``libgazebo_ros_paths_plugin.so``."""
 
     required = False
 
 
 class Projector(ModelPlugin):
-    """``libgazebo_ros_projector.so``: its topics are there (``projectorTopicName``, std_msgs/Int32, and
+    """``libgazebo_ros_projector.so``: its topics exist (``projectorTopicName``, std_msgs/Int32, and
     ``textureTopicName``, std_msgs/String), but no light is thrown: cameras see the world without its pattern."""
 
     required = False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``libgazebo_ros_vacuum_gripper.so``: draws what is near to a link, and carries it along."""
+"""``libgazebo_ros_vacuum_gripper.so``: attracts bodies near a link, and carries them along."""
 import numpy as np
 from std_msgs.msg import Bool
 from std_srvs.srv import Empty, EmptyResponse
@@ -7,9 +7,9 @@ from std_srvs.srv import Empty, EmptyResponse
 from bullet_sim import Pose
 from gazebo_ros.sensor_plugins import PacedSensor
 
-#: From link frame to link frame [m]: what is drawn, and what sticks.
+#: Distances between link frames [m] within which a body is attracted, and sticks.
 REACH_M, STICKS_M = 0.05, 0.01
-#: The pull at most [N]; it is 1 N m / distance.
+#: Largest pull [N]; it is 1 N m / distance.
 MOST_N = 20.0
 
 
@@ -20,8 +20,8 @@ def pull(away):
 
 
 class VacuumGripper(PacedSensor):
-    """Draws links of other models within 5 cm of the link ``bodyName`` while it is on: services ``on`` and ``off``,
-    std_msgs/Bool on ``topicName`` says whether it has something.
+    """Attracts links of other models within 5 cm of the link ``bodyName`` while it is on: services ``on`` and ``off``,
+    std_msgs/Bool on ``topicName`` says whether it holds a body.
 
     Models that stand free move with the gripper, and within 1 cm they stick to it.
     """
@@ -42,7 +42,7 @@ class VacuumGripper(PacedSensor):
             self.publisher.publish(Bool(self._holds))
 
     def _draw(self):
-        """Pull at what is near; returns whether something is."""
+        """Pull at near links; returns whether there are any."""
         own = self.context.model
         place = np.asarray(own.link_pose(self._link).position)
         twist = own.link_twist(self._link)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Vehicles on a floor follow their commands, and say where they are."""
+"""Vehicles on a floor follow their commands and publish their odometry."""
 import math
 
 import numpy as np

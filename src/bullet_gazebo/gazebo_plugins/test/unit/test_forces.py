@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plugins of forces in small worlds whose forces are known on paper."""
+"""Plugins of forces in small worlds with analytically known forces."""
 import math
 
 import numpy as np
@@ -128,7 +128,7 @@ def test_a_box_on_the_floor_feels_the_floor(make):
     force, torque = said(lab)
     np.testing.assert_allclose(force, (0, 0, 2 * G), atol=0.4)
     np.testing.assert_allclose(torque, 0.0, atol=0.1)
-    # Below what friction holds, the floor takes up a push: what is felt is the weight again.
+    # A push below the friction limit is balanced by the floor: the sensor measures the weight again.
     lab.run(0.5, lambda: lab.model.apply_wrench("link", (3.0, 0.0, 0.0)))
     np.testing.assert_allclose(said(lab)[0], (0, 0, 2 * G), atol=0.4)
 

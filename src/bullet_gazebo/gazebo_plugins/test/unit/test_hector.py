@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sensors of hector_gazebo_plugins: what they say is known."""
+"""Sensors of hector_gazebo_plugins, with known measurements."""
 import math
 
 import numpy as np
@@ -58,7 +58,7 @@ def test_an_imus_bias_is_told_and_calibration_ends_that_of_the_rates(make):
     felt = np.array([vector(message.linear_acceleration) for message in lab.sent("imu")[200:]])
     np.testing.assert_allclose(felt.mean(axis=0), (0.5, 0.5, 10.31), atol=0.06)
     assert lab.sent("imu")[-1].linear_acceleration_covariance[0] == pytest.approx(0.04)
-    # An accelerometer that is wrong sideways takes the vertical for tilted.
+    # An accelerometer with a sideways error measures a tilted vertical.
     assert abs(lab.sent("imu")[-1].orientation.x) == pytest.approx(0.5 * 0.5 / 9.81, rel=0.05)
     lab.ros.services["/ns/imu/calibrate"](EmptyRequest())
     np.testing.assert_allclose(vector(lab.run(0.01).sent("imu")[-1].angular_velocity), 0.0, atol=1e-4)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joints that are put through positions, a suction cup, and plugins without effect."""
+"""Joints moved through positions, a suction cup, and plugins without effect."""
 import numpy as np
 import pytest
 import rospy
