@@ -36,7 +36,8 @@ _REFUSALS = (UnknownEntity, BulletSimError, ValueError)
 _JOINT_TYPES = {"revolute": GetJointPropertiesResponse.REVOLUTE, "continuous": GetJointPropertiesResponse.CONTINUOUS,
                 "prismatic": GetJointPropertiesResponse.PRISMATIC}
 # Fields of ODEJointProperties that are about ODE's solver and have no counterpart in Bullet.
-# More wrenches and efforts at a time than this come from a program that never ends one, and each costs in every tick.
+# Largest number of wrenches and efforts at a time. Only a program that never ends one reaches it, and each one costs
+# time in every tick.
 _MOST_JOBS = 1000
 _ODE_ONLY = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor", "fmax", "vel")
 
@@ -46,7 +47,7 @@ class BodyServices:
 
     def __init__(self, simulation, entities, changes, ros, log, notice):
         """``entities``: :class:`gazebo_ros.entities.Entities`; ``changes``: :class:`gazebo_ros.changes.Changes`;
-        ``notice()`` is called when there is something for :meth:`take_commands`."""
+        ``notice()`` is called when :meth:`take_commands` has something to do."""
         self._simulation = simulation
         self._world = simulation.world
         self._entities = entities
@@ -70,7 +71,7 @@ class BodyServices:
             ros.service("/gazebo/" + name, srv_class, handler)
 
     def take_commands(self):
-        """Do what came in on /gazebo/set_link_state."""
+        """Execute the messages of /gazebo/set_link_state."""
         self._link_state_commands.handle(self._take_link_state)
 
     def _take_link_state(self, command):
@@ -198,7 +199,7 @@ class BodyServices:
         linear, angular = twist_from_msg(state.twist)
         rotation = self._entities.frame(state.reference_frame)[0][:3, :3]
         linear, angular = rotation @ linear, rotation @ angular
-        # The model goes along, so that this link is there.
+        # The whole model moves, so that this link is at the given pose.
         base = pose @ np.linalg.inv(frame.offset)
         linear = bounds.SPEED.check(linear + np.cross(angular, base[:3, 3] - pose[:3, 3]),
                                     "the linear velocity of the model's frame")
@@ -295,7 +296,7 @@ _INERTIA = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 
 
 
 def _single(config, name):
-    """The first value of a field of ODEJointProperties, or None where it is empty; one axis is all that joints have."""
+    """The first value of a field of ODEJointProperties, or None if it is empty; joints have one axis."""
     values = list(getattr(config, name))
     if values and not np.isfinite(values[0]):
         raise ValueError("%s is %s, expected a finite number" % (name, values[0]))

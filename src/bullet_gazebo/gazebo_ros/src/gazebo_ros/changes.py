@@ -3,7 +3,7 @@
 
 
 class Changes:
-    """One entry for each thing that was changed, with how to take it back."""
+    """One entry for each change, with a function that undoes it."""
 
     def __init__(self):
         self._undo = {}
@@ -13,17 +13,17 @@ class Changes:
         self._undo.setdefault(key, undo)
 
     def take_back(self):
-        """Undo every change, the last one first. What cannot be undone raises, after the rest."""
+        """Undo every change, the last one first. If one cannot be undone, raises after the others are undone."""
         undo, self._undo = list(self._undo.values()), {}
         failed = None
         for step in reversed(undo):
             try:
                 step()
-            except Exception as error:  # noqa: BLE001  (raised below: the others are taken back first)
+            except Exception as error:  # noqa: BLE001  (raised below: the others are undone first)
                 failed = error
         if failed is not None:
             raise failed
 
     def forget(self, model_name):
-        """Drop what concerns a model that is gone."""
+        """Drop the changes of a deleted model."""
         self._undo = {key: undo for key, undo in self._undo.items() if key[0] != model_name}

@@ -2,7 +2,7 @@
 """The command line of gzserver, as people's launch files write it into ``args``. ROS-free."""
 import argparse
 
-# What Gazebo's own takes a value for, or a switch that needs no word here because nothing is lost.
+# Options of Gazebo's gzserver: those with a value, and switches that can be ignored without a warning.
 _WITHOUT_EFFECT = (
     (("-s", "--server-plugin"), True), (("-g", "--gui-plugin"), True), (("-e", "--physics"), True),
     (("-p", "--play"), True), (("--record_path",), True), (("--record_encoding",), True), (("--record_filter",), True),
@@ -11,7 +11,7 @@ _WITHOUT_EFFECT = (
 
 
 class CommandLine:
-    """What the command line says: ``world_name`` and ``seed`` or None, ``paused``, and ``ignored``, a list of words."""
+    """The parsed command line: ``world_name`` and ``seed`` or None, ``paused``, and ``ignored``, a list of words."""
 
     def __init__(self, arguments):
         """``arguments``: list of words without the program's name and without ROS's remappings.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where geometry_msgs and the world's own types meet."""
+"""Conversions between geometry_msgs and the world's own types."""
 import numpy as np
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
 from geometry_msgs.msg import Pose as PoseMsg

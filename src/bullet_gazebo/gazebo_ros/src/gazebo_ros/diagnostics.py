@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What /gazebo says of itself on /diagnostics: messages and requests that it could not digest, plugins that failed."""
+"""The status of /gazebo on /diagnostics: messages and requests that failed, plugins that failed."""
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from gazebo_ros.pacing import ticks_between
 from sim_time.stamps import stamp_ns
 
 RATE_HZ = 1.0
-#: What the names of the statuses begin with.
+#: Prefix of the names of the statuses.
 PREFIX = "gazebo: "
 MESSAGES = PREFIX + "messages and requests"
-# In place of a status's hardware_id.
+# The hardware_id of all statuses.
 _HARDWARE = "simulator"
 
 
@@ -24,7 +24,7 @@ class Diagnostics:
         self._publisher = ros.publisher("/diagnostics", DiagnosticArray)
 
     def step_changed(self):
-        """Ticks have another length than before."""
+        """The length of a tick has changed."""
         self._divisor = ticks_between(RATE_HZ, 1.0 / self._simulation.step_s)
 
     def on_tick(self):
@@ -36,7 +36,8 @@ class Diagnostics:
             self._publisher.publish(message)
 
     def statuses(self):
-        """List of ``DiagnosticStatus``: one of all that was dropped, one of each plugin that has ever raised."""
+        """List of ``DiagnosticStatus``: one for all dropped messages and requests, one for each plugin that has ever
+        raised."""
         return [self._dropped(), *(_status_of(hosted) for hosted in self._simulation.plugins if hosted.failures)]
 
     def _dropped(self):

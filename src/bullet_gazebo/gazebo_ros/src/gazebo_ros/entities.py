@@ -51,7 +51,7 @@ class Entities:
         return model, link_name
 
     def joint(self, name):
-        """A joint's name -> (the first model that has such a joint, joint name); also ``model::joint``.
+        """A joint's name -> (the first model with such a joint, joint name); also ``model::joint``.
 
         Raises :class:`UnknownEntity`.
         """
@@ -64,7 +64,7 @@ class Entities:
         raise UnknownEntity("joint '%s' not found; joints that move: %s" % (name, _known(known)))
 
     def frame(self, name):
-        """Where the reference frame ``name`` is: (4x4 matrix in the world, linear, angular velocity).
+        """Pose and velocity of the reference frame ``name``: (4x4 matrix in the world, linear, angular velocity).
 
         The world, a model, or a link as ``model::link``; raises :class:`UnknownEntity`.
         """
@@ -81,7 +81,7 @@ class Entities:
         return (model.base_pose().matrix(), *map(np.asarray, model.base_twist()))
 
     def pose_in_world(self, pose, reference):
-        """A :class:`Pose` given in the frame ``reference``, in the world."""
+        """Transform a :class:`Pose` from the frame ``reference`` to the world."""
         if reference in WORLD_FRAMES:
             return pose
         return Pose.from_matrix(self.frame(reference)[0] @ pose.matrix())

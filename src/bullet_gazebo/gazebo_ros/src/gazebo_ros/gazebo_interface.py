@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calls to a simulator's services, for scripts. Every wait has a deadline in wall time and says what it waits for."""
+"""Calls to a simulator's services, for scripts. Every wait has a deadline in wall time and names what it waits for."""
 import sys
 import time
 
@@ -15,7 +15,7 @@ _POLL_S = 0.05
 
 
 class GazeboInterfaceError(Exception):
-    """The simulator did not do what was asked; the text says what was wanted and what is there."""
+    """The simulator did not do what was asked; the text says what was expected and what was found."""
 
 
 def wait_until(condition, what, timeout_s=WAIT_S):

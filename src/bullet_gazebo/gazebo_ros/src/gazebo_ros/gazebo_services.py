@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The services under /gazebo. Each answer says in its status_message what was found and, if need be, what is right."""
+"""The services under /gazebo. The status_message of each response says what was found and, after an error, what would
+be right."""
 import re
 
 import numpy as np
@@ -56,13 +57,13 @@ def root_element(xml):
 
 
 def _parameters():
-    """The whole tree of the parameter server, of the master itself: rospy answers for "/" from a cache which, once the
-    node has logged a line, holds next to nothing."""
+    """The whole parameter tree, read from the master itself: rospy answers "/" from a cache which, once the node has
+    logged a line, is nearly empty."""
     return rosgraph.Master(rospy.get_name()).getParam("/")
 
 
 class GazeboServices:
-    """Advertises the services; the loop's work runs in the loop, what is slow in the thread of the request."""
+    """Advertises the services; fast work runs in the loop, slow work in the thread of the request."""
 
     def __init__(self, simulation, spawner, lights, ros, log):
         """Advertises everything at once; requests wait until the loop runs. ``lights``: :class:`WorldLights`."""
@@ -103,10 +104,10 @@ class GazeboServices:
             ros.service_in_thread("/gazebo/" + name, srv_class, handler)
 
     def take_commands(self):
-        """Loop thread: do what came in on /gazebo/set_model_state and /gazebo/set_link_state."""
+        """Loop thread: execute the messages of /gazebo/set_model_state and /gazebo/set_link_state."""
         if not self._has_commands:
             return
-        # Before the queues are read: what comes in from here on is told again.
+        # Cleared before the queues are read: a message that arrives from here on sets it again.
         self._has_commands = False
         self._bodies.take_commands()
         self._model_state_commands.handle(self._take_model_state)
@@ -132,7 +133,7 @@ class GazeboServices:
             self._simulation.requests.call(self._spawn_prepared, prepared, request)
         except (SpawnRefused, BulletSimError, LoopEnded) as error:
             return SpawnModelResponse(False, "SpawnModel: Failure - %s" % error)
-        except SURVIVED as error:  # a plugin's constructor is anybody's code
+        except SURVIVED as error:  # a plugin's constructor is user code
             self._log.error("spawning '%s' failed: %s" % (request.model_name, described(error)))
             return SpawnModelResponse(False, "SpawnModel: Failure - %s: %s" % (type(error).__name__, error))
         self._ros.flush()
@@ -177,8 +178,8 @@ class GazeboServices:
         return EmptyResponse()
 
     def _reset(self, time_too):
-        # What pushes was asked for in the world that was; after a reset nothing moves without a new command. Gazebo
-        # goes on pushing.
+        # Wrenches belong to the world before the reset; after it, nothing moves without a new command. In Gazebo they
+        # go on.
         self._bodies.forget()
         self._changes.take_back()
         self._settings.show(**self._physics())
@@ -290,7 +291,7 @@ class GazeboServices:
     def _set_physics(self, time_step, max_update_rate, gravity, iterations):
         """Raises ``ValueError`` or ``BulletSimError``."""
         simulation = self._simulation
-        # All of it before any of it is set.
+        # Check everything before anything is set.
         bounds.TIME_STEP.check(time_step, "time_step")
         bounds.UPDATE_RATE.check(max_update_rate, "max_update_rate")
         bounds.SOLVER_ITERATIONS.check(iterations, "sor_pgs_iters")
@@ -298,7 +299,7 @@ class GazeboServices:
         before = (self._world.gravity, self._world.solver_iterations, simulation.step_s,
                   simulation.real_time_factor / simulation.step_s)
         if not abs(time_step - simulation.step_s) <= 1e-9:
-            simulation.set_step(time_step)  # first, since a plugin may be in the way
+            simulation.set_step(time_step)  # first, since a plugin may refuse it
         self._changes.note(("", "physics"), lambda: self._put_physics(*before))
         if iterations != self._world.solver_iterations:
             self._world.set_solver_iterations(iterations)
@@ -339,7 +340,7 @@ class GazeboServices:
                     "length of a step [s]"),
             Setting("max_update_rate", now["max_update_rate"], 0.0, bounds.UPDATE_RATE.high,
                     "steps per second [Hz]; 0: as many as can be"),
-            # A slider shall be of use: Gazebo's own range, where the service takes more.
+            # A useful range for a slider: Gazebo's own, although the service accepts more.
             *(Setting("gravity_" + axis, now["gravity_" + axis], -100.0, 100.0, "along %s [m/s^2]" % axis)
               for axis in "xyz"),
             Setting("sor_pgs_iters", now["sor_pgs_iters"], bounds.SOLVER_ITERATIONS.low,

@@ -14,11 +14,9 @@ class _Job:
 
 
 class TimedJobs:
-    """What is to be applied at each tick, by target.
-
-    A job acts in every tick that begins within its duration, counted from the first tick at or after its start: so
-    0.5 s are exactly 250 ticks of 2 ms, and anything between nothing and one tick is one tick. A duration of zero is
-    nothing, a negative one has no end.
+    """Payloads to apply at each tick, by target. A job acts in every tick that begins within its duration, counted from
+    the first tick at or after its start: 0.5 s are exactly 250 ticks of 2 ms, and a duration between zero and one tick
+    is one tick. A duration of zero does nothing, a negative one never ends.
     """
 
     def __init__(self):
@@ -28,7 +26,7 @@ class TimedJobs:
         return len(self._jobs)
 
     def add(self, target, payload, start_ns, duration_ns):
-        """Have ``payload`` applied to ``target`` (anything that can be compared). A start in the past means now."""
+        """Apply ``payload`` to ``target`` (anything that can be compared). A start in the past means now."""
         if duration_ns != 0:
             self._jobs.append(_Job(target, payload, start_ns, duration_ns))
 
@@ -49,5 +47,5 @@ class TimedJobs:
         return found
 
     def remove(self, concerns):
-        """Drop the jobs for whose target ``concerns(target)`` is true."""
+        """Drop the jobs with ``concerns(target)`` true."""
         self._jobs = [job for job in self._jobs if not concerns(job.target)]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The services under /gazebo that are about lights. Cameras see by them; the window follows the sun."""
+"""The services under /gazebo about lights. Cameras render with all lights; the window follows the direction of the
+sun."""
 import numpy as np
 from gazebo_msgs.srv import (
     DeleteLight,
@@ -16,7 +17,7 @@ from urdf_model.transforms import matrix_from_quaternion, rigid
 
 
 class LightServices:
-    """Tells of the world's lights, and changes them."""
+    """Reads and changes the world's lights."""
 
     def __init__(self, lights, ros):
         """``lights``: :class:`gazebo_ros.world_lights.WorldLights`."""

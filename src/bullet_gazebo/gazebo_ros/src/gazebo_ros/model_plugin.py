@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a model plugin is: the piece of Python that a URDF's ``<plugin filename="...">`` brings into the world.
+"""The base class of model plugins. A URDF's ``<plugin filename="...">`` loads one into the world.
 
-A plugin lives in the loop thread. Everything it is given here may be called from there and from nowhere else; the only
-things other threads touch are the subscriptions that the context hands out. Nothing it can call blocks: topics
-and services are registered with the ROS master by a thread of their own, messages are sent without waiting.
+A plugin lives in the loop thread. It may use the context and the world in that thread only; other threads touch only
+the subscriptions of the context. No call blocks: topics and services are registered with the ROS master by a thread of
+their own, messages are sent without waiting.
 """
 import contextlib
 from collections.abc import Callable
@@ -23,25 +23,26 @@ class ModelPlugin:
 
     Per tick the loop calls ``update`` of every plugin, makes one physics step, and calls ``publish`` of every plugin.
     Times are simulation seconds since the start of the world; ``dt`` is the length of a tick [s].
-    A plugin that raises is begun anew (``restarted``); at the third time within 10 s it counts as failed, and gets
-    ``hold`` and then ``while_failed`` in place of ``update`` and ``publish``, until a reset revives it. Messages that
-    are taken with ``handle`` (see :meth:`PluginContext.queue`) do not get that far: the one that cannot be digested is
+    A plugin that raises is restarted (``restarted``). The third time within 10 s it counts as failed: the loop calls
+    ``hold``, and then ``while_failed`` in place of ``update`` and ``publish``, until a reset revives it. Messages that
+    are taken with ``handle`` (see :meth:`PluginContext.queue`) do not cause this: a message whose handler raises is
     dropped.
     """
 
-    #: Whether it works with the length of a tick alone that it was made with; the length stays then.
+    #: Whether it only works with the tick length that it was made with; then the length cannot be changed.
     keeps_step = False
-    #: Whether a model whose plugin refuses it is not spawned. A sensor is left out instead, with a warning.
+    #: Whether a model is not spawned when this plugin refuses it. If False, as for sensors, the plugin is left out,
+    #: with a warning.
     required = True
 
     @classmethod
     def spawn_options(cls, robot, element):
-        """Keyword arguments that ``bullet_sim.World.spawn`` shall get for a model with this plugin.
+        """Keyword arguments for ``bullet_sim.World.spawn`` of a model with this plugin.
 
         Called before the model exists, with the ``urdf_model.Robot`` and the ``<plugin>`` element. A robot that is
         bolted to the floor answers ``{"static": True}``; one with its own self-collision table adds
-        ``self_collision_pairs``, one with links that nothing bumps into ``solids``, as for
-        ``bullet_sim.solids.with_solids``, which the robot gets before it is spawned.
+        ``self_collision_pairs``, one with links that collide with nothing adds ``solids``, the argument of
+        ``bullet_sim.solids.with_solids``, which is applied to the robot before it is spawned.
 
         Runs in a service thread (not in the loop), so slow work such as computing tables belongs here.
         """
@@ -61,16 +62,15 @@ class ModelPlugin:
         """After the physics step: publish what is due. ``time_s`` is the time that the step reached."""
 
     def step_changed(self, step_s):
-        """A tick lasts ``step_s`` [s] from the next one on, which ``update`` is told as ``dt``, too."""
+        """From the next tick on, a tick lasts ``step_s`` [s]; ``update`` gets it as ``dt``."""
 
     def joints_set(self):
-        """A service has put the model's joints elsewhere (set_model_configuration); targets may want to follow.
-
-        Nothing may move then until a new command comes. What is in the queues by now came before.
+        """A service has moved the model's joints (set_model_configuration); targets should follow, so that nothing
+        moves until a new command comes. Messages that are in the queues now came before.
         """
 
     def reset(self):
-        """The world was put back to its start. After ``reset_simulation`` the next ``time_s`` is smaller."""
+        """The world was reset. After ``reset_simulation`` the next ``time_s`` is smaller."""
 
     def close(self):
         """The model is being deleted or the node ends. Topics and services of the context are closed after this."""
@@ -78,17 +78,16 @@ class ModelPlugin:
     # -- when it has raised ---------------------------------------------------------------------------------------
 
     def restarted(self):
-        """Returns the plugin that goes on in the place of this one. Nothing may move by it; what moves comes to rest.
-
-        As it stands here: a new one of the same class, see :meth:`successor`.
+        """Return the plugin that replaces this one after it raised. It must start no motion, and moving joints come to
+        rest. By default: a new one of the same class, see :meth:`successor`.
         """
         return self.successor()
 
     def successor(self, *arguments):
         """Close this plugin; returns a new one of its class, made with the context and ``arguments``.
 
-        What it opens of the same name and type is what this one had opened, so that nobody has to connect anew; the
-        rest is closed.
+        It takes over topics and services of the same name and type, so that clients stay connected; the others are
+        closed.
         """
         with contextlib.suppress(Exception):
             self.close()
@@ -98,16 +97,15 @@ class ModelPlugin:
         return plugin
 
     def hold(self):
-        """It counts as failed: have the joints that it drives stay where they are, by the simplest means there is."""
+        """The plugin counts as failed: keep the joints that it drives where they are, by the simplest means."""
 
     def while_failed(self, time_s):
-        """In place of ``update`` and ``publish`` while it counts as failed; True asks to be revived."""
+        """Called in place of ``update`` and ``publish`` while it counts as failed; return True to be revived."""
         return False
 
 
 class PluginSource(NamedTuple):
-    """Where in which description a plugin stands; the fields are attributes of :class:`PluginContext`, which says what
-    they are."""
+    """The place of a plugin in a description; :class:`PluginContext` documents the fields."""
 
     robot: object = None
     element: object = None
@@ -116,7 +114,7 @@ class PluginSource(NamedTuple):
 
 
 class PluginHost(NamedTuple):
-    """What :meth:`PluginContext.screen` and :meth:`PluginContext.plugins` call."""
+    """The functions that :meth:`PluginContext.screen` and :meth:`PluginContext.plugins` call."""
 
     add_screen: Callable = None
     plugins: Callable = tuple
@@ -126,7 +124,7 @@ _NO_HOST = PluginHost()
 
 
 class PluginContext(NodeHandle):
-    """What one plugin of one model is given: a :class:`loop_ros.node_handle.NodeHandle`, and its model.
+    """The context of one plugin of one model: a :class:`loop_ros.node_handle.NodeHandle`, and its model.
 
     Attributes
     ----------
@@ -160,9 +158,8 @@ class PluginContext(NodeHandle):
         return tuple(self._host.plugins())
 
     def screen(self, link, place, size_m, pixels):
-        """A screen: a rectangle of the model that shows pictures; for a plugin's constructor.
-
-        It hangs on ``link`` at ``place`` (4, 4): in its middle, x to the right and y up for a viewer in front of it.
+        """Make a screen, a rectangle of the model that shows pictures; call it in the constructor. It is fixed to
+        ``link`` at ``place`` (4, 4): the frame of its centre, with x to the right and y up for a viewer in front of it.
         ``size_m``: width and height; ``pixels``: columns and rows. Returns a
         :class:`world_picture.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """

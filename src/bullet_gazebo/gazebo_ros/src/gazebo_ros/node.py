@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The /gazebo node: reads its parameters, builds the loop and what hangs on it, runs it, cleans up."""
+"""The /gazebo node: reads its parameters, builds the loop and its parts, runs it, cleans up."""
 import contextlib
 import gc
 import logging
@@ -38,8 +38,8 @@ from sdf_model import ModelFolders
 from world_picture import snapshot
 from world_picture.snapshot import SnapshotError
 
-# How long threads may hold the interpreter [s]. PyBullet keeps it during a step, and with the default of 5 ms one busy
-# thread would cost the loop more than half of its time.
+# How long threads may hold the interpreter [s]. PyBullet holds it during a step. With the default of 5 ms, one busy
+# thread would take more than half of the loop's time.
 _SWITCH_INTERVAL_S = 0.0005
 # How long the threads of rospy get to end after the loop has [s].
 _THREADS_END_S = 0.3
@@ -93,9 +93,8 @@ def main(argv=None):
 
 
 def _build(log, cleanup, line):
-    """Everything from the parameters to a simulation that is ready to run; what must be undone goes on ``cleanup``.
-
-    ``line``: :class:`CommandLine`, which goes before the parameters.
+    """Build everything, from the parameters to a simulation that is ready to run; clean-up functions go on ``cleanup``.
+    ``line``: :class:`CommandLine`, which overrides the parameters.
     """
     if line.ignored:
         log.warn("these words of the command line have no effect here: %s" % " ".join(line.ignored))
@@ -154,7 +153,7 @@ def _build(log, cleanup, line):
 
     def on_turn():
         for what, part in parts:
-            # One by one: where one of them fails, the others are still served.
+            # One by one: if one fails, the others are still served.
             faults.guarded(what, part)
 
     def on_tick():
@@ -176,7 +175,7 @@ def _build(log, cleanup, line):
 
 
 def _snapshot_writer(log):
-    """A new snapshot; where there is no room for one, the lab goes on without pictures."""
+    """A new snapshot; if there is no space for it, the lab goes on without pictures."""
     snapshot.remove_stale()
     try:
         return snapshot.SnapshotWriter()
@@ -186,7 +185,7 @@ def _snapshot_writer(log):
 
 
 def _end(log, code):
-    """Leave the ROS graph and the process, whatever rospy's threads are waiting for."""
+    """Leave the ROS graph and end the process, even if threads of rospy still wait."""
     rospy.signal_shutdown("the simulator ends")
     log.close()
     deadline = time.monotonic() + _THREADS_END_S
@@ -196,5 +195,6 @@ def _end(log, code):
     logging.shutdown()
     sys.stdout.flush()
     sys.stderr.flush()
-    # A subscription that is still connecting to a node which does not answer would keep the process for a minute.
+    # Otherwise, a subscription that still connects to a node that does not answer would keep the process alive for a
+    # minute.
     os._exit(code)

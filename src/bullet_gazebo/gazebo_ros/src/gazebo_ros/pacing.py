@@ -4,22 +4,20 @@ import contextlib
 import ctypes
 import time
 
-# A stall longer than this is not made up for: simulation time then stays behind for good [s].
+# A longer stall is not caught up: simulation time then stays behind [s].
 MAX_DEBT_S = 0.2
-# While it makes up for a stall the world runs at most this many times as fast as asked.
+# While it catches up, the world runs at most this many times as fast as requested.
 MAX_CATCH_UP = 2.0
-# Flat out, the loop lets other threads have the interpreter this often [s, wall time].
+# At full speed, the loop releases the interpreter lock with this period [s, wall time].
 YIELD_PERIOD_S = 0.004
-# prctl(2): how late Linux may wake a thread that sleeps, so as to wake several at once. 0.05 ms unless told otherwise.
+# prctl(2): how late Linux may wake a sleeping thread, to wake several at once. Its default is 0.05 ms.
 _PR_SET_TIMERSLACK = 29
 _LEAST_SLACK_NS = 1
 
 
 def ticks_between(rate, tick_rate):
-    """After how many ticks something is due again that shall happen ``rate`` times a second [Hz, simulation time].
-
-    At every tick where that is more often than ticks come (``tick_rate`` [Hz]: a world may have long ones), at the
-    nearest rate where it is no divisor. Raises ``ValueError`` for a rate that is not positive.
+    """Number of ticks between two events at ``rate`` [Hz, simulation time]. 1 if the rate is above ``tick_rate`` [Hz];
+    rounded if the rate does not divide it. Raises ``ValueError`` for a rate that is not positive.
     """
     if not rate > 0.0:
         raise ValueError("the rate is %g Hz, expected a positive number, at most the tick rate of %g Hz"
@@ -28,7 +26,8 @@ def ticks_between(rate, tick_rate):
 
 
 def wake_on_time():
-    """Have the kernel wake the calling thread when it asked for, not up to 0.05 ms later. Does nothing off Linux."""
+    """Make the kernel wake the calling thread on time, not up to 0.05 ms later. Does nothing on systems other than
+    Linux."""
     with contextlib.suppress(AttributeError, OSError):
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, _LEAST_SLACK_NS, 0, 0, 0)
 
@@ -36,8 +35,8 @@ def wake_on_time():
 class Pacer:
     """Lets one tick after another happen at the right wall time.
 
-    ``step_s`` is the simulated length of a tick [s], ``real_time_factor`` how many of them fit into their own length
-    (0: as many as the machine manages). ``clock`` and ``sleep`` are replaceable for tests.
+    ``step_s`` is the simulated length of a tick [s], ``real_time_factor`` the ratio of simulated to wall time (0: as
+    fast as possible). ``clock`` and ``sleep`` are replaceable for tests.
     """
 
     def __init__(self, step_s, real_time_factor=1.0, clock=time.perf_counter, sleep=time.sleep):
@@ -54,7 +53,7 @@ class Pacer:
         self.restart()
 
     def restart(self):
-        """Forget what is owed: time counts from now on. For the start and after a pause."""
+        """Forget the delay: time counts from now on. For the start and after a pause."""
         self._due = self._last = self._clock()
 
     def wait(self):
@@ -85,7 +84,8 @@ class RateMeter:
         self.restart(0.0)
 
     def restart(self, time_s):
-        """Start a window at simulation time ``time_s`` [s]: after a pause, which is no slowness, or a reset."""
+        """Start a window at simulation time ``time_s`` [s], after a pause or a reset: a pause does not count as
+        slow."""
         self._wall_start = self._clock()
         self._sim_start = time_s
 
@@ -100,11 +100,11 @@ class RateMeter:
 
 
 class SlownessWatch:
-    """Decides when a low real-time factor is worth a line, and what it says: once, then at most every five minutes."""
+    """Decides when a low real-time factor is logged: once, then at most every five minutes."""
 
     def __init__(self, threshold=0.95, windows=3, quiet_s=300.0, clock=time.monotonic):
-        """Slow is a window below ``threshold`` times the factor that was asked for; worth a line are ``windows`` of
-        them in a row, but not within ``quiet_s`` [s, wall time] of the line before."""
+        """A window is slow below ``threshold`` times the requested factor; ``windows`` slow ones in a row are logged,
+        but not within ``quiet_s`` [s, wall time] of the previous line."""
         self._threshold = threshold
         self._windows = windows
         self._quiet_s = quiet_s
@@ -114,8 +114,8 @@ class SlownessWatch:
         self._sum, self._count = 0.0, 0
 
     def news(self, factor, wanted):
-        """Take in one window's factor and the one asked for; returns (present factor, its mean since the last line,
-        how long ago that was [s]; both None at the first), or None where there is nothing to say."""
+        """Add one window's factor and the requested one. Returns (present factor, its mean since the last line, time
+        since then [s]; the last two None at first), or None if there is nothing to log."""
         self._sum += factor
         self._count += 1
         if factor >= self._threshold * wanted:
@@ -133,7 +133,7 @@ class SlownessWatch:
 
 
 def slowness_line(wanted, factor, mean, ago_s):
-    """What to say of a low real-time factor; the arguments after ``wanted`` as from :meth:`SlownessWatch.news`."""
+    """The log line about a low real-time factor; the arguments after ``wanted`` as from :meth:`SlownessWatch.news`."""
     if mean is None:
         return ("the simulation runs at %.2f of real time instead of %g: this machine is too busy; close windows "
                 "(gui:=false), or publish /clock less often (clock_rate:=250). Said again every five minutes at most."

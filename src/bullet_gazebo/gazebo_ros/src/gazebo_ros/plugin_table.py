@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which Python class stands behind the file name of a model plugin."""
+"""Maps the file name of a model plugin to its Python class."""
 import importlib
 import os
 

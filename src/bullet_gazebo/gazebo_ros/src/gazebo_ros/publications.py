@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What /gazebo itself publishes, tick by tick: the clock, the states of models and links, how fast it runs, and the
-snapshot for viewers."""
+"""The publications of /gazebo itself at each tick: the clock, the states of models and links, the real-time factor, and
+the snapshot for viewers."""
 import struct
 import time
 
@@ -14,13 +14,13 @@ from sim_time.stamps import stamp_ns
 
 _CLOCK_MESSAGE = struct.Struct("<III")
 _CLOCK_BYTES = 8
-# Faster than real time the clock is not published at every tick, nor is the snapshot written as often as in real time:
-# at most this often per wall second [Hz]. No viewer draws more often than that.
+# Faster than real time, the clock and the snapshot go out at most this often per wall second [Hz]. No viewer draws more
+# often.
 MAX_WALL_CLOCK_RATE = 500.0
 MAX_WALL_SNAPSHOT_RATE = 100.0
 # Model and link states and the snapshot go out at this rate, in simulation time [Hz].
 STATES_RATE = 100.0
-# How often the snapshot is written in a paused world, where services still move things [Hz, wall time].
+# Rate of the snapshot in a paused world, where services can still move models [Hz, wall time].
 PAUSED_SNAPSHOT_RATE = 20.0
 
 
@@ -28,7 +28,7 @@ class Publications:
     """Call :meth:`on_tick` after each tick, :meth:`on_turn` at each turn of the loop."""
 
     def __init__(self, simulation, ros, snapshot, log, clock_rate):
-        """``clock_rate`` [Hz]: of /clock, as near as ticks come; raises ``ValueError`` where it is not positive.
+        """``clock_rate`` [Hz]: of /clock, rounded to whole ticks; raises ``ValueError`` if it is not positive.
 
         ``snapshot``: :class:`SnapshotWriter`.
         """
@@ -50,13 +50,13 @@ class Publications:
         self.publish_clock()
 
     def step_changed(self):
-        """Ticks have another length than before."""
+        """The length of a tick has changed."""
         tick_rate = 1.0 / self._simulation.step_s
         self._clock_divisor = ticks_between(self._clock_rate, tick_rate)
         self._states_divisor = ticks_between(STATES_RATE, tick_rate)
 
     def on_turn(self):
-        """While the world stands still: keep that time out of the measured rate, and show what services change."""
+        """While the world is paused: exclude that time from the measured rate, and show what services change."""
         if self._simulation.is_stepping:
             return
         self._meter.restart(self._simulation.time_s)
@@ -89,7 +89,7 @@ class Publications:
             self._report(factor)
 
     def publish_clock(self):
-        """Send the time to everybody, now."""
+        """Publish the time now."""
         seconds, nanoseconds = divmod(self._simulation.time_ns, 10**9)
         self._clock.publish_serialized(_CLOCK_MESSAGE.pack(_CLOCK_BYTES, seconds, nanoseconds))
 
@@ -102,7 +102,7 @@ class Publications:
         self.write_snapshot()
 
     def write_snapshot(self):
-        """Put the present state where viewers read it."""
+        """Write the present state to the snapshot."""
         parts = []
         for model in self._simulation.world.models.values():
             pose = model.base_pose()
@@ -117,7 +117,7 @@ class Publications:
             self._snapshot_too_small = True
 
     def _set_rospy_time(self):
-        # What rospy's own subscription to /clock would do, which this node does without.
+        # Replaces rospy's own subscription to /clock, which this node does not have.
         rospy.rostime._rostime_current = rospy.Time(*divmod(self._simulation.time_ns, 10**9))
         with self._rospy_time_changed:
             self._rospy_time_changed.notify_all()

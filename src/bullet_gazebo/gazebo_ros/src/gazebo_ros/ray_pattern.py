@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a ``<ray>`` element says of a laser or range finder, and a scan taken a few rays at a time. ROS-free."""
+"""The ``<ray>`` element of a laser or range finder, and a scan that is cast a few rays at a time. ROS-free."""
 import math
 
 import numpy as np
 
-#: Rays that one tick casts at most [some 5 us each]: a scan of more is swept over several ticks, as a scanner's is.
+#: Largest number of rays per tick [about 5 us each]: a larger scan takes several ticks, as a real scanner's sweep does.
 RAYS_PER_TICK = 32
 _MOST_RAYS = 100000
-_ONCE_ROUND = 2.0 * math.pi + 0.01  # [rad]; people round it up
+_ONCE_ROUND = 2.0 * math.pi + 0.01  # [rad]; descriptions round it up
 
 
 class RayPatternError(Exception):
@@ -46,7 +46,7 @@ class RayPattern:
     def _span(self, path, default_samples):
         samples = round(self._number(path + "/samples", default_samples) * self._number(path + "/resolution", 1.0))
         low, high = self._number(path + "/min_angle", 0.0), self._number(path + "/max_angle", 0.0)
-        # Scanners that turn on and on are described from 0 to 2 pi as well as from -pi to pi.
+        # Scanners that turn continuously are described either from 0 to 2 pi or from -pi to pi.
         if samples < 1 or not low <= high <= low + _ONCE_ROUND:
             raise RayPatternError("%s: %s has %d samples from %g to %g rad; expected at least one, angles in order and "
                                   "once round at most" % (self._what, path, samples, low, high))
@@ -67,7 +67,7 @@ class Sweep:
     """One scan in the making."""
 
     def __init__(self, pattern, cast, random):
-        """``cast(starts, ends)`` -> fractions (k,) at which rays from (k, 3) to (k, 3) hit, 1.0 for never; ``random``:
+        """``cast(starts, ends)`` -> fractions (k,) at which rays from (k, 3) to (k, 3) hit, 1.0 for no hit; ``random``:
         ``numpy.random.Generator`` for noise."""
         self._pattern = pattern
         self._cast = cast
@@ -76,8 +76,8 @@ class Sweep:
         self._done = 0
 
     def go_on(self, pose):
-        """Cast the next rays from a sensor at ``pose`` (4, 4). Returns the ranges (n,) [m] of a scan that is now
-        complete, infinite where a ray met nothing, else None."""
+        """Cast the next rays from a sensor at ``pose`` (4, 4). Returns the ranges (n,) [m] if the scan is now complete,
+        infinite for rays that hit nothing, else None."""
         pattern = self._pattern
         end = min(self._done + RAYS_PER_TICK, len(self._ranges))
         directions = pattern.directions[self._done:end] @ pose[:3, :3].T

@@ -19,7 +19,7 @@ from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 
 class PacedSensor(ModelPlugin):
-    """Base class: one topic, some times a second, while somebody listens. Names come from the plugin's elements."""
+    """Base class: one topic, published at a rate while it has subscribers. Names come from the plugin's elements."""
 
     message_class = None
     topic_tag, default_topic = "topicName", None
@@ -72,7 +72,7 @@ class PacedSensor(ModelPlugin):
         return found
 
     def is_due(self, time_s):
-        """Whether the next measurement is wanted; reckons that it is taken."""
+        """Whether the next measurement is due; if so, it counts as taken."""
         return self.publisher.has_listeners and self._pace.take(time_s)
 
     def stamped(self, message, time_s, frame):
@@ -115,7 +115,7 @@ class _RaySensor(PacedSensor):
             self.publisher.publish(self.stamped(self.message(ranges), self._began_s, self.frame))
 
     def message(self, ranges):
-        """The message that says ``ranges`` (n,) [m]."""
+        """The message for ``ranges`` (n,) [m]."""
         raise NotImplementedError
 
     def reset(self):
@@ -130,7 +130,7 @@ class _RaySensor(PacedSensor):
 
 class Laser(_RaySensor):
     """``libgazebo_ros_laser.so``, ``libgazebo_ros_gpu_laser.so``. Of several rows the middle one is published. The
-    intensities are 0, as Gazebo's are of surfaces without a ``<laser_retro>``."""
+    intensities are 0, as in Gazebo for surfaces without a ``<laser_retro>``."""
 
     message_class = LaserScan
 
@@ -168,9 +168,9 @@ class RangeFinder(_RaySensor):
 
 class ImuSensor(PacedSensor):
     """``libgazebo_ros_imu.so`` and ``libgazebo_ros_imu_sensor.so``: orientation in the world, rates and accelerations
-    in the link's axes. The acceleration is what a device feels: at rest, gravity upwards. ``rpyOffset`` turns the
-    orientation; ``initialOrientationAsReference`` (false) has it begin at none; ``serviceName`` is there and does
-    nothing."""
+    in the link's axes. The acceleration is the proper one: at rest, gravity upwards. ``rpyOffset`` turns the
+    orientation; with ``initialOrientationAsReference`` (default false) the orientation starts at identity; the service
+    ``serviceName`` exists and does nothing."""
 
     message_class = Imu
     default_topic = "imu"
@@ -220,7 +220,7 @@ class ImuSensor(PacedSensor):
 
 
 class PoseSensor(PacedSensor):
-    """``libgazebo_ros_p3d.so``: where a link is and how fast, in the world's axes or another link's."""
+    """``libgazebo_ros_p3d.so``: pose and velocity of a link, in the world's axes or another link's."""
 
     message_class = Odometry
 

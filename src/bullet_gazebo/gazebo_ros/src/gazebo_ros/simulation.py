@@ -15,7 +15,7 @@ from loop_ros.faults import SURVIVED, described
 # waits for its topics [s].
 IDLE_S = 0.005
 AWAIT_S = 0.0002
-# A plugin that has raised so often within so long [s, simulated time] is not begun anew once more.
+# A plugin that raises this many times within this time [s, simulated time] is not restarted again.
 FAILURES, FAILURES_WITHIN_S = 3, 10.0
 
 
@@ -24,7 +24,7 @@ class AdvanceRefused(Exception):
 
 
 class HostedPlugin:
-    """A model plugin, what must be closed with it, and how it does.
+    """A model plugin with its resources and its failures.
 
     ``failures``: how often it has raised; ``last_error``: the newest one as text; ``has_failed``: whether it counts as
     failed, so that it is not ticked until a reset revives it.
@@ -56,10 +56,10 @@ class Simulation:
         """Ready to :meth:`run`.
 
         ``requests``: :class:`loop_ros.request_queue.RequestQueue`; ``faults``: :class:`loop_ros.faults.Faults`.
-        ``deliveries()`` -> how many messages have come in on each topic that something in this world listens to.
+        ``deliveries()`` -> {topic: number of messages received} for the topics that this world subscribes to.
         """
-        #: Called once per turn of the loop, also while paused; before each physics step; after each tick; after time
-        #: went back to zero; before models are put elsewhere, to read what has come in by then.
+        #: Hooks: once per turn of the loop, also while paused; before each physics step; after each tick; after time
+        #: went back to zero; before models are moved, to read the messages that came before.
         self.on_turn = self.before_step = self.on_tick = self.on_time_reset = self.read_messages = lambda: None
         #: Called after the length of a tick has changed.
         self.on_step_change = lambda: None
@@ -74,7 +74,7 @@ class Simulation:
         self._deliveries = deliveries
         self._step_s = world.time_step_s
         self._step_ns = round(world.time_step_s * 1e9)
-        self._step_since = 0, 0  # the tick and the time [ns] that the present length of a tick counts from
+        self._step_since = 0, 0  # tick and time [ns] since which a tick has its present length
         self._pacer = Pacer(self._step_s, real_time_factor)
         self._advance = None
         self._delivered_before = {}
@@ -96,9 +96,8 @@ class Simulation:
         return self._step_s
 
     def set_step(self, step_s):
-        """Have ticks last ``step_s`` [s] from the next one on; time goes on, at the same real-time factor.
-
-        Raises ``BulletSimError`` out of bounds, and ``ValueError`` where a plugin keeps the step that it was made for.
+        """Set the length of a tick from the next one on [s]; time and the real-time factor stay. Raises
+        ``BulletSimError`` if it is out of bounds, and ``ValueError`` if a plugin only works with the present step.
         """
         keeping = [hosted for hosted in self.plugins if hosted.plugin.keeps_step]
         if keeping:
@@ -114,7 +113,7 @@ class Simulation:
 
     @property
     def real_time_factor(self):
-        """What was asked for; 0 is as fast as possible."""
+        """The requested factor; 0 is as fast as possible."""
         return self._pacer.real_time_factor
 
     @real_time_factor.setter
@@ -150,7 +149,7 @@ class Simulation:
         for hosted in self._working:
             try:
                 hosted.plugin.update(time_s, step_s)
-            except SURVIVED as error:  # a plugin is anybody's code
+            except SURVIVED as error:  # a plugin is user code
                 self._has_raised(hosted, "update", error)
         self._faults.guarded("before a step", self.before_step)
         self.world.step()
@@ -186,7 +185,7 @@ class Simulation:
         return self._advance.future
 
     def reset(self, time_too):
-        """Put every model back to its start, and with ``time_too`` the time back to zero. Revives failed plugins."""
+        """Reset every model to its start, and with ``time_too`` the time to zero. Revives failed plugins."""
         self.read_messages()
         self.world.reset_models()
         if time_too:
@@ -206,7 +205,7 @@ class Simulation:
         self._pacer.restart()
 
     def joints_were_set(self, model_name):
-        """Tell the model's plugins that its joints were put elsewhere."""
+        """Tell the model's plugins that its joints were moved by a service."""
         self.read_messages()
         for hosted in [hosted for hosted in self._working if hosted.model_name == model_name]:
             try:
@@ -259,7 +258,7 @@ class Simulation:
         self._failed = [hosted for hosted in self.plugins if hosted.has_failed]
 
     def _has_raised(self, hosted, where, error):
-        """A plugin has raised: begin it anew, or give it up for now where that has not helped."""
+        """A plugin has raised: restart it, or stop it if restarting has not helped."""
         hosted.failures += 1
         hosted.last_error = "%s() raised %s" % (where, described(error))
         now = self.time_s

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Models come and go: from a description to a model in the world with its plugins, and back.
-
-What is slow (parsing, importing plugins, looking for files) happens in the thread of the request; the loop only makes
-the bodies.
+"""Spawning and deleting of models: from a description to a model in the world with its plugins. Slow work (parsing,
+importing plugins, finding files) happens in the thread of the request; the loop only makes the bodies.
 """
 import gc
 import itertools
@@ -39,29 +37,29 @@ class Prepared:
     """A description that the loop can turn into a model."""
 
     name: str
-    #: The description as it came; :mod:`urdf_model`'s reading of it; the same with its fixed links merged.
+    #: The description as text; the :mod:`urdf_model` robot of it; the same with its fixed links merged.
     xml: str
     robot: object
     merged: object
     #: URDF text for viewers, or None for a floor.
     drawing: str | None
-    #: Joint name to where it starts [rad, m].
+    #: Joint name to start position [rad, m].
     start: dict
-    #: (class, element, namespace) of each plugin; what viewers are told of the sensors that need pictures.
+    #: (class, element, namespace) of each plugin; the data for the renderer about sensors that need pictures.
     plugins: list
     sensors: list
     #: The tree of the parameter server, {} where no plugin needs it.
     parameters: dict
-    #: What else ``World.spawn`` is told.
+    #: Further arguments of ``World.spawn``.
     options: dict
-    #: What stands in for meshes that cannot be had, in one line; "" where nothing does.
+    #: Which shapes replace meshes that could not be loaded, in one line; "" for none.
     mended: str
-    #: Where the model stands in the frame it is spawned in (4x4), which an SDF may say itself. None: there.
+    #: Pose of the model in the frame that it is spawned in (4x4); an SDF may give one. None: identity.
     origin: object = None
 
 
 class Library(NamedTuple):
-    """Where a :class:`Spawner` looks things up: plugin classes, files, models of SDF."""
+    """The look-ups of a :class:`Spawner`: plugin classes, files, models of SDF."""
 
     plugins: PluginTable
     files: ResourceFinder
@@ -69,7 +67,7 @@ class Library(NamedTuple):
 
 
 class Spawner:
-    """Makes models and their plugins, and keeps the list that viewers are told."""
+    """Makes models and their plugins, and keeps the list for viewers."""
 
     def __init__(self, simulation, library, ros, log, on_change, folder=None):
         """``library``: :class:`Library`; ``on_change()``: models changed.
@@ -82,7 +80,7 @@ class Spawner:
         self._log = log
         self._on_change = on_change
         self._mesh_files = simulation.world.mesh_files
-        #: What viewers draw of the models that were spawned here: {model name: URDF text, or None for a floor}.
+        #: What viewers draw for the models that were spawned here: {model name: URDF text, or None for a floor}.
         self.drawings = {}
         #: The sensors that need pictures, for the renderer: {model name: list of dictionaries}.
         self.sensors = {}
@@ -92,7 +90,7 @@ class Spawner:
         self._number = itertools.count()
 
     def listed(self):
-        """What the scene says of each model of the world."""
+        """The scene's entry of each model of the world."""
         return [{"name": model.name, "joints": list(model.joint_names), "urdf": self.drawings.get(model.name),
                  "sensors": self.sensors.get(model.name, []),
                  "screens": [entry for entry, _ in self._screens.get(model.name, [])]}
@@ -136,7 +134,7 @@ class Spawner:
             raise SpawnRefused(str(error)) from error
         for warning in robot.warnings:
             self._log.warn(warning)
-        # Reads every mesh, so that the loop finds it in the form that loads quickly.
+        # Reads every mesh, so that the loop finds its converted form, which loads quickly.
         self._library.files.forget_missing()
         robot, mended = with_stand_ins(robot, self._mesh_files)
         if mended:
@@ -157,7 +155,7 @@ class Spawner:
                         sensors=sensors, parameters=parameters() if plugins else {}, options=options, mended=mended)
 
     def make_shapes(self, prepared):
-        """Any thread but the loop's, once that runs: have the loop make what takes long of a model, one at a turn.
+        """Any thread but the loop's, while that runs: let the loop make a model's slow shapes, one per turn.
 
         Raises ``BulletSimError``.
         """
@@ -187,11 +185,11 @@ class Spawner:
             self._remove(prepared.name)
             raise
         self._on_change()
-        # What a model brought stays as long as the model: no use in walking through it at every collection.
+        # Keep the model's objects out of garbage collections: they live as long as the model.
         gc.freeze()
 
     def spawn_world(self, models):
-        """Loop thread, before it runs: make the models of a world (``sdf_model.SdfModel``); logs what cannot be."""
+        """Loop thread, before it runs: make the models of a world (``sdf_model.SdfModel``); logs those that fail."""
         for found in models:
             try:
                 prepared = self.prepare_robot(found.name, "", found.robot, "", dict)
@@ -301,13 +299,14 @@ class Spawner:
 
 
 def _that_take_time(merged):
-    """The names of the bodies that collide by a file: a mesh, or what shapes too many for PyBullet are gathered in."""
+    """The names of the bodies whose collision shape is a file: a mesh, or the file that gathers more shapes than
+    PyBullet takes."""
     return [link.name for link in merged.links.values() if len(link.collisions) > MOST_SHAPES
             or any(isinstance(shape.geometry, Mesh) for shape in link.collisions)]
 
 
 def _drawn(robot, plugin, namespace):
-    """What the scene says of a sensor that needs pictures."""
+    """The scene's entry of a sensor that needs pictures."""
     sensor, link = urdf_extras.sensor_of(plugin)
     if sensor is None:
         raise PluginError("plugin '%s' of '%s' stands outside of a <sensor>; expected <gazebo reference=\"LINK\">"
@@ -319,6 +318,6 @@ def _drawn(robot, plugin, namespace):
 
 
 def is_floor(robot):
-    """Whether a ``urdf_model.Robot`` is nothing but a plane to stand on."""
+    """Whether a ``urdf_model.Robot`` is only a ground plane."""
     shapes = [shape for link in robot.links.values() for shape in (*link.visuals, *link.collisions)]
     return bool(shapes) and all(isinstance(shape.geometry, Plane) for shape in shapes)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What this node reads in the ``<gazebo>`` elements of a URDF, or of an SDF, where only we write them. ROS-free."""
+"""Reads the ``<gazebo>`` elements of a URDF. In an SDF they are our own extension. ROS-free."""
 import math
 import re
 
@@ -19,7 +19,7 @@ def plugins(robot):
 def sensor_plugins(robot, warn):
     """The ``<plugin>`` elements of the ``<sensor>`` elements of links.
 
-    A sensor elsewhere is told to ``warn(text)`` and left out, its plugins with it.
+    A sensor elsewhere is left out with its plugins, and ``warn(text)`` is called.
     """
     found = []
     for gazebo in robot.gazebo:
@@ -77,7 +77,7 @@ def start_configuration(robot):
 
 
 def unscoped(model_name, name):
-    """A joint or link of a model by its own name, also where it is given as Gazebo scopes it, ``model::name``."""
+    """The plain name of a joint or link, also if it is given as Gazebo scopes it, ``model::name``."""
     scope = model_name + "::"
     return name[len(scope):] if name.startswith(scope) else name
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""PyBullet's window as a mirror of the world: it draws what the snapshot says and computes no physics. ROS-free."""
+"""PyBullet's window as a mirror of the world: it draws the snapshot and computes no physics. ROS-free."""
 import subprocess
 import sys
 
@@ -12,7 +12,7 @@ from urdf_model.transforms import quaternion_from_matrix
 from world_picture.drawing import DrawingError
 from world_picture.snapshot import SnapshotError
 
-# Where the camera stands at the start: in front of a robot that looks along x, a little to its left.
+# The camera's first pose: in front of a robot that looks along x, a little to its left.
 _CAMERA = {"cameraDistance": 1.9, "cameraYaw": 55.0, "cameraPitch": -15.0, "cameraTargetPosition": [0.25, 0.0, 0.85]}
 _DEFAULT_COLOUR = (0.7, 0.7, 0.7, 1.0)
 _LAMP_DISTANCE_M = 10.0
@@ -25,7 +25,8 @@ _SHAPE_TYPES = {Box: pybullet.GEOM_BOX, Cylinder: pybullet.GEOM_CYLINDER, Sphere
 
 
 def can_open():
-    """Whether a window with OpenGL can be had. Tried in a child, since PyBullet ends its process where it cannot."""
+    """Whether a window with OpenGL can be opened. A child process tries it, since PyBullet ends its process if it
+    cannot."""
     try:
         probe = subprocess.run([sys.executable, "-c", _PROBE], timeout=_PROBE_TIMEOUT_S, check=False,
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -60,9 +61,8 @@ class Window:
         return pybullet.isConnected(self._client)
 
     def set_scene(self, bodies, values):
-        """Draw these ``bodies``, as :meth:`SnapshotWriter.write_scene` lists them; what is drawn already stays.
-
-        ``values`` say where they are, so that nothing is ever seen anywhere else.
+        """Draw these ``bodies``, as :meth:`SnapshotWriter.write_scene` lists them; bodies that exist already stay.
+        ``values`` gives their poses, so that no body ever appears at another place.
         """
         wanted = {body["name"]: body for body in bodies}
         pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_RENDERING, 0, physicsClientId=self._client)
@@ -79,7 +79,8 @@ class Window:
         pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_RENDERING, 1, physicsClientId=self._client)
 
     def set_lights(self, lights):
-        """Light comes from where the first directional one of ``lights`` does, as :meth:`WorldLights.listed` lists."""
+        """Light the window from the direction of the first directional light of ``lights``, listed as by
+        :meth:`WorldLights.listed`."""
         for light in lights or ():
             if light["type"] == "directional":
                 position = (-_LAMP_DISTANCE_M * np.asarray(light["direction"])).tolist()
@@ -87,14 +88,14 @@ class Window:
                 return
 
     def set_state(self, values):
-        """Move everything to where the snapshot's ``values`` say it is."""
+        """Move all bodies to the poses in the snapshot's ``values``."""
         start = 0
         for body, numbers in self._order:
             joints = start + 7
             end = joints + len(body["joints"])
             pose, position = values[start:joints].tolist(), values[joints:end].tolist()
             for number in numbers:
-                # Each command waits for the window's thread, actively: what stands still gets none.
+                # Each command busy-waits for the window's thread: bodies that did not move get none.
                 if self._shown.get((number, "pose")) != pose:
                     self._shown[number, "pose"] = pose
                     pybullet.resetBasePositionAndOrientation(number, pose[:3], pose[3:], physicsClientId=self._client)
@@ -135,7 +136,7 @@ class Window:
             linkJointAxis=[joint.axis.tolist() for joint in joints] + [[0.0, 0.0, 1.0]] * extra,
             flags=pybullet.URDF_MAINTAIN_LINK_ORDER, physicsClientId=self._client)
         for link, of_link in enumerate(parts, -1):
-            # Of several mesh files in a link each has to be told.
+            # If a link has several mesh files, each needs its own call.
             for index, (_, _, colour, _) in enumerate(of_link):
                 pybullet.changeVisualShape(number, link, shapeIndex=index, rgbaColor=list(colour),
                                            physicsClientId=self._client)
@@ -154,7 +155,7 @@ class Window:
         return found
 
     def _by_colour(self, link):
-        """What is drawn of a link: a list of lists, each of one colour."""
+        """The visual shapes of a link, grouped by colour: a list of lists."""
         groups = {}
         for shape in link.visuals or link.collisions:
             for part in self._parts(shape):
@@ -183,7 +184,7 @@ class Window:
             return [(shape.geometry, "", colour, shape.origin)]
         path = self._find_mesh(shape.geometry.filename)
         if path is None:
-            return []  # /gazebo has said so
+            return []  # /gazebo has logged it
         try:
             return [(shape.geometry, part.path, part.colour or colour, shape.origin)
                     for part in self._drawings.parts(path)]

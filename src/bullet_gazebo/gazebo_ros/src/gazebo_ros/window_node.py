@@ -12,7 +12,7 @@ import rospy
 from rospy_limits.node import limit_ports
 from world_picture.snapshot import SnapshotError, SnapshotReader
 
-# Pictures a second; a robot that is watched needs no more, and without a graphics card each costs tens of ms.
+# Frame rate [Hz]; watching a robot needs no more, and without a graphics card each frame costs tens of ms.
 _FRAME_RATE = 20.0
 _WAIT_S = 60.0
 
@@ -20,9 +20,9 @@ _WAIT_S = 60.0
 def main():
     """Show the world until the simulator ends or the user closes the window; returns the exit code.
 
-    Without a display or without OpenGL says so in a line and returns 0: the lab goes on without a window.
+    Without a display or OpenGL it prints one line and returns 0: the lab goes on without a window.
     """
-    # Physics comes first: the window takes what the processors have left, and software OpenGL one thread.
+    # Physics comes first: the window runs at the lowest priority, and software OpenGL uses one thread.
     os.nice(19)
     os.environ.setdefault("LP_NUM_THREADS", "1")
     if not os.environ.get("DISPLAY"):
@@ -46,12 +46,12 @@ def main():
         print("gazebo_gui: %s" % error, file=sys.stderr)
     rospy.signal_shutdown("the window is closed")
     sys.stdout.flush()
-    # PyBullet's window thread is not always willing to end.
+    # PyBullet's window thread does not always end.
     os._exit(0)
 
 
 def _keep_the_output_for_python():
-    """Let what C prints to the standard output go nowhere: PyBullet lists its threads, and who made the OpenGL."""
+    """Discard what C code prints to the standard output: PyBullet lists its threads and the vendor of OpenGL."""
     sys.stdout.flush()
     sys.stdout = os.fdopen(os.dup(1), "w", buffering=1)
     nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -9,9 +9,9 @@ import numpy as np
 from bullet_sim.quiet_pybullet import pybullet
 from world_picture.shared_picture import PictureReader
 
-# PyBullet takes a texture number by number: more columns than this would cost more time than a picture of the window.
+# PyBullet reads a texture as a Python list: more columns than this would take longer than a frame of the window.
 _MOST_COLUMNS = 256
-# A texture comes from a file, of kinds that PyBullet reads; the header of a Targa file is the simplest.
+# PyBullet loads a texture from a file first; Targa has the simplest header.
 _TARGA = struct.Struct("<2xB9xHHBx")
 _TRUE_COLOUR, _BITS = 2, 24
 

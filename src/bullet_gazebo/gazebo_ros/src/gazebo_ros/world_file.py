@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which file a world name means, and what a world that does not say more has. ROS-free."""
+"""Finds and reads world files, and holds the defaults of worlds. ROS-free."""
 from pathlib import Path
 
 from sdf_model import SdfError, parse_sdf_world
 
-#: What holds in a world that says nothing else: gravity [m/s^2], length of a tick [s].
+#: Defaults of a world: gravity [m/s^2], length of a tick [s].
 GRAVITY = (0.0, 0.0, -9.81)
 TIME_STEP_S = 0.002
 
@@ -16,7 +16,7 @@ class WorldFileError(Exception):
 def find_world(name, folders):
     """Path of the world file ``name``: itself if it is there, else below one of ``folders``.
 
-    Raises :class:`WorldFileError` that says where it was looked for.
+    Raises :class:`WorldFileError`, which lists the searched folders.
     """
     candidates = [Path(name), *(Path(folder) / name for folder in folders)]
     for path in candidates:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lights of the world: what the world file says, what services make of it, what viewers are told. ROS-free."""
+"""The lights of the world: read from the world file, changed by services, listed for viewers. ROS-free."""
 import dataclasses
 
 import numpy as np
@@ -15,9 +15,9 @@ class WorldLights:
         """``lights``: list of ``sdf_model.Light``; ``scene``: ``sdf_model.Scene``."""
         self._lights = {light.name: light for light in lights}
         self._scene = scene or Scene()
-        # A world without any is not a dark one: viewers choose. One whose lights were deleted is.
+        # A world file without lights is not dark: viewers choose the light. A world whose lights were deleted is dark.
         self._unlit = not lights
-        #: Called when viewers have to be told.
+        #: Called when the list for viewers has changed.
         self.on_change = lambda: None
 
     def get(self, name):
@@ -29,7 +29,8 @@ class WorldLights:
                                 % (name, ", ".join(self._lights) or "none")) from None
 
     def change(self, name, **values):
-        """Change some fields of a light; raises :class:`UnknownEntity`, and ``ValueError`` for what is no number."""
+        """Change some fields of a light; raises :class:`UnknownEntity`, and ``ValueError`` for values that are not
+        finite."""
         light = self.get(name)
         for key, value in values.items():
             if not np.isfinite(np.asarray(value, dtype=float)).all():
@@ -44,10 +45,10 @@ class WorldLights:
         self.on_change()
 
     def listed(self):
-        """What the scene says of light: plain data.
+        """The scene's entry of light: plain data.
 
-        ``ambient``, ``background``: red, green, blue or None where the viewer may choose; ``shadows``; ``lights``: a
-        list of dictionaries, or None where the viewer may choose. Places and directions are the world's.
+        ``ambient``, ``background``: red, green, blue, or None to let the viewer choose; ``shadows``; ``lights``: a list
+        of dictionaries, or None to let the viewer choose. Places and directions are the world's.
         """
         return {"ambient": self._scene.ambient, "background": self._scene.background, "shadows": self._scene.shadows,
                 "lights": None if self._unlit else [_listed(light) for light in self._lights.values()]}

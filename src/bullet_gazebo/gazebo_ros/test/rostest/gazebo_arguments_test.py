@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the arguments of empty_world.launch do: paused, another world, twice as fast, a slower clock, no window."""
+"""The arguments of empty_world.launch: paused, another world, twice as fast, a slower clock, no window."""
 import subprocess
 import unittest
 
@@ -41,7 +41,7 @@ class GazeboArguments(unittest.TestCase):
         subscriber.unregister()
         moving = [stamp for stamp in stamps if stamp > 0]
         self.assertGreater(len(moving), 50, "clock messages in a second of simulation")
-        # A busy machine leaves some out when it catches up.
+        # A busy machine skips some when it catches up.
         self.assertEqual({stamp % 10_000_000 for stamp in moving}, {0})
 
 

@@ -214,7 +214,7 @@ class GazeboBodies(unittest.TestCase):
         self.accepted(self.apply_body_wrench("box::body", "", Point(), wrench, NOW, rospy.Duration(0.5)))
         self.advance(ticks=400)
         twist = self.get_link_state("box::body", "").link_state.twist
-        # F t / m and M t / I, to the tick
+        # F t / m and M t / I, exact to the tick
         self.assertAlmostEqual(twist.linear.x, 0.75, places=4)
         self.assertAlmostEqual(twist.angular.z, 0.5, places=4)
 

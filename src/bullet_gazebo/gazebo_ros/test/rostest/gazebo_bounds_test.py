@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Numbers that no world holds are refused by every service with their bound, and resets take back what was set."""
+"""Every service refuses numbers out of bounds and names the bound; resets undo what was set."""
 import math
 import unittest
 
@@ -145,7 +145,7 @@ class GazeboBounds(unittest.TestCase):
         try:
             for topic in topics:
                 wait_for_publishers(topic, "/gazebo")
-            # Each is within its bound, all of them together are far beyond what any body stands.
+            # Each is within its bound; their sum is far beyond what a body can take.
             for _ in range(500):
                 wrench = Wrench(Vector3(1e7, -1e7, 1e7), Vector3(1e7, 1e7, -1e7))
                 self.assertTrue(self.apply_body_wrench("box::body", "", Point(), wrench, NOW, ALWAYS).success)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Large and hostile descriptions are answered, with the limit that they came to, and the world goes on meanwhile."""
+"""The response to a large or hostile description names the limit that it exceeds, and the world goes on meanwhile."""
 import os
 import shutil
 import tempfile
@@ -89,7 +89,7 @@ class GazeboHostile(unittest.TestCase):
         wait_until(lambda: answers or self.sim_time() > before + 0.002 * TICKS, "ticks", DEADLINE_S)
         self.assertEqual(answers, [], "the answer came before %d ticks had passed" % TICKS)
         thread.join(DEADLINE_S)
-        # A slow processor comes to the limit, where a sphere stands in for it.
+        # On a slow processor it exceeds the time limit, and a sphere replaces it.
         self.assertTrue(answers and answers[0].success, answers)
 
     def test_afterwards_all_is_as_before(self):

@@ -54,7 +54,7 @@ class GazeboRespawn(unittest.TestCase):
 
     def come_and_go(self, xml, times):
         for turn in range(times):
-            # Without ground below, so that it has moved by no more than its fall until it is asked.
+            # Without ground below, so that until the query it has only fallen.
             pose = Pose(Point(0.5 * turn, -3.0, 100.0), Quaternion(0, 0, 0.6, 0.8))
             spawned = self.spawn_urdf_model("again", xml, "", pose, "")
             self.assertTrue(spawned.success, spawned.status_message)

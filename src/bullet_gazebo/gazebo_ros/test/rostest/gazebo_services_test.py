@@ -108,7 +108,7 @@ class GazeboServices(unittest.TestCase):
             clock.wait(count + 1000)
             lasted = time.monotonic() - start
             stamps = [message.clock.to_nsec() for message in clock.messages]
-        # A busy machine makes it slower, and a pause of half a second is caught up; nothing makes it run away.
+        # A busy machine makes it slower, and a pause of half a second is caught up; it never runs much faster.
         self.assertGreater(lasted, 1.4)
         self.assertEqual({b - a for a, b in zip(stamps, stamps[1:], strict=False)}, {2_000_000})
         self.assertTrue(rospy.get_param("/use_sim_time"))
@@ -136,7 +136,7 @@ class GazeboServices(unittest.TestCase):
             self.assertEqual(self.get_world_properties().sim_time, before)
             self.unpause_physics()
             clock.wait(len(clock.messages) + 100)
-            # And while time goes on, which moves the box before anybody can ask for it.
+            # And while time goes on, which moves the box before a client can ask for it.
             self.reset_world()
             clock.wait(len(clock.messages) + 100)
             stamps = [message.clock.to_nsec() for message in clock.messages]
@@ -286,7 +286,7 @@ class GazeboServices(unittest.TestCase):
         wait_until(lambda: publisher.get_num_connections() > 0, "a connection to /arm/break")
 
         def told(diagnostics):
-            """Of the plugin: (level, failures)."""
+            """The plugin's (level, failures)."""
             return [(status.level, pair.value) for message in diagnostics.messages[-1:] for status in message.status
                     for pair in status.values if "of arm" in status.name and pair.key == "failures"]
 
@@ -339,7 +339,7 @@ class GazeboServices(unittest.TestCase):
 
     def test_the_real_time_factor_is_published(self):
         with Listener("/gazebo/performance_metrics", PerformanceMetrics) as metrics:
-            # A stall at the edge of a window takes from that one what the next one gets.
+            # A stall at the edge of a window shifts time from one window to the next.
             wait_until(lambda: any(abs(message.real_time_factor - 1.0) < 0.05 for message in metrics.messages),
                        lambda: "a second in real time among %s" % [message.real_time_factor
                                                                    for message in metrics.messages], 60.0)

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""A lab that is launched twice on one master: the second touches nothing, and what is dead is in nobody's way."""
+"""A lab that is launched twice on one master: the second launch changes nothing, and a dead simulator does not block a
+new one."""
 import contextlib
 import os
 import shutil
@@ -67,7 +68,7 @@ class SecondLaunch(unittest.TestCase):
         self.assertEqual(self.master.getParam("/mark"), "first")
         self.assertIsNone(first.poll())
 
-        # What brings no simulator is welcome.
+        # A launch file without a simulator may start.
         other = subprocess.Popen([ROSLAUNCH, "-"], env=self.environment, start_new_session=True,
                                  stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
         self.addCleanup(end, other)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When pushes act."""
+"""When wrenches with a duration act."""
 import pytest
 
 from gazebo_ros.jobs import TimedJobs

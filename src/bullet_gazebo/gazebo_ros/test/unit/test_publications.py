@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How often the clock and the snapshot go out: at every tick that asks for it, and no oftener than somebody can use."""
+"""How often the clock and the snapshot go out: at the requested ticks, and no more often than viewers can use."""
 from types import SimpleNamespace
 
 import pytest
@@ -36,7 +36,7 @@ class World:
 
 
 def test_in_real_time_every_tick_that_is_due_counts(monkeypatch):
-    world = World(monkeypatch, factor=1.7, asked=1.0)  # it makes up for a stall
+    world = World(monkeypatch, factor=1.7, asked=1.0)  # it catches up after a stall
     world.run(2.0)
     assert world.clocks == 1000
     assert world.snapshots == list(range(5, 1001, 5))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sensors in a small physics world: what they say is known."""
+"""Sensors in a small physics world with known measurements."""
 import math
 
 import numpy as np

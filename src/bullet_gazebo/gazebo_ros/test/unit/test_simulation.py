@@ -240,7 +240,7 @@ def test_a_plugin_that_cannot_begin_anew_counts_as_failed_at_once(simulation, lo
     simulation.do_tick()
     assert bad.has_failed and "cannot begin" in log.of("error")[-1]
     bad.plugin.fails_in, bad.plugin.restart_fails = "while_failed", False
-    simulation.do_tick()  # what it raises now is only counted
+    simulation.do_tick()  # an error is only counted from now on
     bad.plugin.fails_in = None
     simulation.reset(time_too=True)
     assert not bad.has_failed
@@ -297,7 +297,7 @@ def test_a_world_runs_in_real_time(running):
     running.paused = False
     start, start_tick = time.monotonic(), running.tick
     wait_until(lambda: running.tick - start_tick >= 250, "half a second of simulation")
-    # A busy machine makes it later, nothing makes it earlier.
+    # A busy machine may delay it; it never comes early.
     assert time.monotonic() - start > 0.45
 
 
@@ -310,7 +310,7 @@ def test_an_advance_makes_exactly_so_many_ticks(running):
 
 def test_an_advance_waits_for_its_topics_each_time(running, counts):
     future = advance(running, 2, ["/command"])
-    # The loop has taken the request up and gone round since, and waits.
+    # The loop has accepted the request, has made a turn since, and waits.
     assert running.requests.call(lambda: running.tick) == 0
     assert running.requests.call(lambda: running.tick) == 0
     assert not future.done()

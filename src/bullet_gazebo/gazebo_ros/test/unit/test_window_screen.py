@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a model's screen shows is seen in the window. PyBullet has one window a process: it gets a process."""
+"""The window shows the picture of a model's screen. PyBullet allows one window per process, so the test runs in a child
+process."""
 import json
 import shutil
 import subprocess
