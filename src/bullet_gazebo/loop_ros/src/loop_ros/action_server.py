@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The server's side of actionlib for a loop that must not wait.
 
-It does what ``actionlib.ActionServer`` does on the wire, with other means: goals and cancel requests come in through
-queues and are handled when the loop calls :meth:`ActionServer.spin`; status, feedback and results go out through
-publishers that never wait. One thread; time is an argument. Without rospy.
+On the wire it behaves as ``actionlib.ActionServer``; inside it works differently: goals and cancel requests come in
+through queues and are handled when the loop calls :meth:`ActionServer.spin`; status, feedback and results go out
+through publishers that never wait. One thread; time is an argument. Without rospy.
 """
 import io
 import itertools
@@ -13,7 +13,7 @@ from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
 from sim_time.stamps import stamp
 
-#: How often the status goes out while nothing changes, and how long the status of a goal that has ended is told [s].
+#: Period of the status while nothing changes, and how long a finished goal stays in it [s].
 STATUS_PERIOD_S = 0.2
 REMEMBERED_S = 5.0
 #: Unread goals and cancel requests that are kept.
@@ -21,7 +21,7 @@ QUEUE_DEPTH = 50
 
 _ENDED = (GoalStatus.REJECTED, GoalStatus.RECALLED, GoalStatus.PREEMPTED, GoalStatus.ABORTED, GoalStatus.SUCCEEDED)
 
-# What a step makes of each state that it may be taken from.
+# For each step: {state in which it is allowed: the next state}.
 _STEPS = {
     "accept": {GoalStatus.PENDING: GoalStatus.ACTIVE, GoalStatus.RECALLING: GoalStatus.PREEMPTING},
     "reject": {GoalStatus.PENDING: GoalStatus.REJECTED, GoalStatus.RECALLING: GoalStatus.REJECTED},
@@ -39,7 +39,7 @@ _arrivals = itertools.count()
 
 
 class WrongState(Exception):
-    """A step that the state of the goal does not allow."""
+    """The state of the goal does not allow this step."""
 
 
 class GoalHandle:
@@ -57,27 +57,27 @@ class GoalHandle:
         return self.status.status
 
     def accept(self, text=""):
-        """The goal is being worked on."""
+        """Start work on the goal."""
         self._step("accept", text)
 
     def reject(self, result=None, text=""):
-        """The goal will not be worked on. ``result``: message, default an empty one; the same below."""
+        """Refuse the goal. ``result``: message, default an empty one; the same below."""
         self._step("reject", text, result)
 
     def cancel(self, result=None, text=""):
-        """The work ends early because somebody asked for that, or for something else."""
+        """End the goal early: a client cancelled it, or a new goal replaces it."""
         self._step("cancel", text, result)
 
     def abort(self, result=None, text=""):
-        """The work has failed."""
+        """End the goal: the work has failed."""
         self._step("abort", text, result)
 
     def succeed(self, result=None, text=""):
-        """The work is done."""
+        """End the goal: the work is done."""
         self._step("succeed", text, result)
 
     def publish_feedback(self, feedback):
-        """Tell the client how it goes."""
+        """Publish the progress of the goal."""
         self._server._publish_feedback(self.status, feedback)
 
     def _may(self, step):
@@ -119,7 +119,8 @@ class ActionServer:
         self._count = 0
 
     def spin(self, time_s):
-        """Handle what has come in, and publish the status when it is due. ``time_s``: now, control time [s]."""
+        """Handle new goals and cancel requests, and publish the status when it is due. ``time_s``: now, control time
+        [s]."""
         if time_s < self._time_s:
             self._time_went_back()
         self._time_s = time_s
@@ -137,7 +138,7 @@ class ActionServer:
 
     @property
     def feedback_is_heard(self):
-        """Whether it is worth making feedback."""
+        """Whether the feedback topic has subscribers."""
         return self._feedback.has_listeners
 
     # -- inside -------------------------------------------------------------------------------------------------
@@ -147,7 +148,7 @@ class ActionServer:
         _require_answerable(goal_id)
         for handle in self._handles:
             if handle.status.goal_id.id == goal_id.id:
-                # Sent twice, or cancelled before it came.
+                # The goal was sent twice, or cancelled before it arrived.
                 if handle.state == GoalStatus.RECALLING:
                     handle.cancel()
                 return
@@ -166,7 +167,8 @@ class ActionServer:
             self._answering(handle, self._on_goal)
 
     def _answering(self, handle, callback):
-        """Have the owner's ``callback`` take a goal; one that it fails on ends, so that no client waits for it."""
+        """Call the owner's ``callback`` with a goal. If it raises, the goal is aborted, so that no client waits for
+        it."""
         try:
             callback(handle)
         except Exception as error:
@@ -191,7 +193,7 @@ class ActionServer:
                 handle._step("request cancel of", "")
                 self._answering(handle, self._on_cancel)
         if message.id and not known:
-            # The request has overtaken its goal; the goal is not begun when it comes.
+            # The cancel request arrived before its goal; the goal will not start.
             early = GoalHandle(self, None, GoalID(message.stamp, message.id), GoalStatus.RECALLING)
             early.ended_s = self._time_s
             self._handles.append(early)
@@ -221,8 +223,8 @@ class ActionServer:
 
     def _time_went_back(self):
         self._next_status_s = None
-        # Stamps of the time before would cancel goals for a long while. And actionlib makes ids of the time: a new goal
-        # may come with the id of one that has ended.
+        # After time was reset, old stamps would cancel new goals for a long while. Also, actionlib derives goal ids
+        # from the time: a new goal may have the id of a finished one.
         self._last_cancel = genpy.Time()
         self._handles = [handle for handle in self._handles if handle.ended_s is None]
 
@@ -231,7 +233,8 @@ class ActionServer:
 
 
 def _require_answerable(goal_id):
-    """Raise where an id cannot be sent back: genpy reads stamps that it cannot write, and no status would go out."""
+    """Raise if the id cannot be serialized: genpy can read stamps that it cannot write, and then no status could be
+    published."""
     goal_id.serialize(io.BytesIO())
 
 

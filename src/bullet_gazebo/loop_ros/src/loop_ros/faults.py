@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Faults that the loop survives: counted for /diagnostics, logged now and then. ROS-free."""
+"""Errors that the loop catches and survives: counted for /diagnostics, logged at a limited rate. ROS-free."""
 import contextlib
 import os
 import time
 
-#: What anybody's code may raise without taking the loop with it; ``sys.exit`` in a callback does not end the world.
+#: Exceptions of user code that the loop catches. ``sys.exit`` in a callback does not end the simulator.
 SURVIVED = (Exception, SystemExit)
-#: At most one line about the same place in so long [s, wall time].
+#: Shortest time between two log lines about the same place [s, wall time].
 LINE_PERIOD_S = 5.0
-# Of an error's text, in a line and in /diagnostics [characters].
+# Longest text of an error, in a log line and in /diagnostics [characters].
 _TEXT_CHARACTERS = 300
-# Places that are remembered. Topics and services are few; who opens and closes more loses the oldest.
+# Largest number of places. Topics and services are few; when there are more, the oldest place is dropped.
 _MOST_PLACES = 200
 
 
 class Fault:
-    """What went wrong in one place: how often, and the newest error as text."""
+    """The errors of one place: their count, and the newest one as text."""
 
     __slots__ = ("count", "text", "told_s")
 
@@ -26,7 +26,7 @@ class Fault:
 
 
 class Faults:
-    """Counts faults by place: a topic, a service, a part of the loop. Any thread may note one."""
+    """Counts faults by place: a topic, a service, a part of the loop. Callable from any thread."""
 
     def __init__(self, log, clock=time.monotonic):
         """``log``: ``error(text)``. ``clock`` is replaceable for tests."""
@@ -36,12 +36,12 @@ class Faults:
         self.places = {}
 
     def note(self, place, error, consequence="it is left out"):
-        """Count ``error`` at ``place`` and tell it, unless that place was told of lately."""
+        """Count ``error`` at ``place``, and log it unless that place was logged recently."""
         fault = self.places.get(place)
         if fault is None:
             fault = self.places[place] = Fault()
             if len(self.places) > _MOST_PLACES:
-                with contextlib.suppress(KeyError, StopIteration, RuntimeError):  # another thread was faster
+                with contextlib.suppress(KeyError, StopIteration, RuntimeError):  # another thread has logged it
                     del self.places[next(iter(self.places))]
         fault.count += 1
         fault.text = described(error)
@@ -52,7 +52,7 @@ class Faults:
             self._log.error("%s: %s; %s%s" % (place, fault.text, consequence, again))
 
     def guarded(self, place, function, *arguments):
-        """Call ``function(*arguments)`` and return what it does; note what it raises, and return None then."""
+        """Call ``function(*arguments)`` and return its result. If it raises, count the error and return None."""
         try:
             return function(*arguments)
         except SURVIVED as error:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Log lines from the loop: handed to a thread, because a terminal or /rosout may block and the loop must not."""
+"""The log of the loop. A thread writes the lines, because a terminal or /rosout may block and the loop must not."""
 import collections
 import contextlib
 import sys
 import threading
 import time
 
-# A line is cut there [characters].
+# Longest line; the rest is cut off [characters].
 LONGEST_LINE = 4000
 
 
@@ -52,13 +52,14 @@ class LoopLog:
         self._post_throttled("error", period_s, text)
 
     def close(self):
-        """Write what is left and end the thread."""
+        """Write the pending lines and end the thread."""
         self._ending = True
         self._wake.set()
         self._thread.join(0.3)
 
     def _post(self, level, text):
-        # What clients send is quoted in lines: a megabyte of it helps nobody, half a surrogate pair cannot be written.
+        # Lines quote what clients send. It may be a megabyte long, or contain half a surrogate pair, which cannot be
+        # written.
         if len(text) > LONGEST_LINE:
             text = "%s ... (%d characters more)" % (text[:LONGEST_LINE], len(text) - LONGEST_LINE)
         self._lines.append((level, text.encode("utf-8", "replace").decode("utf-8")))
@@ -78,7 +79,7 @@ class LoopLog:
             self._wake.clear()
             while self._lines:
                 level, text = self._lines.popleft()
-                # A terminal that is gone must not end this thread: lines would heap up for ever.
+                # A closed terminal must not end this thread: pending lines would then pile up.
                 with contextlib.suppress(Exception):
                     self._sinks[level](text)
             if self._ending:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One owner's topics and services: made below a namespace, closed together, handed over when the owner begins anew."""
+"""One owner's topics and services: made below a namespace, closed together, and kept when the owner restarts."""
 
 
 class NodeHandle:
     """Topics and services of one owner, such as a plugin.
 
-    ``loop_ros.protocol.Topics`` says what every owner may use; the rest is for plugins. ``namespace``: absolute,
-    without trailing slash ("" for the root namespace).
+    Every owner may use the methods of ``loop_ros.protocol.Topics``; the others are for plugins. ``namespace``:
+    absolute, without trailing slash ("" for the root namespace).
     """
 
     def __init__(self, ros, namespace=""):
@@ -33,7 +33,7 @@ class NodeHandle:
         """A ``loop_ros.protocol.Subscription``, which keeps the newest ``depth`` unread messages.
 
         ``handle(function)`` calls ``function(message)`` for each of them, oldest first, and drops and counts a message
-        on which that fails. Unguarded: ``drain()`` -> list of them; ``take()`` -> the newest or None.
+        for which it raises. Unguarded: ``drain()`` -> list of them; ``take()`` -> the newest or None.
         """
         name = self.resolve(topic)
 
@@ -46,15 +46,13 @@ class NodeHandle:
         return self._opening(("subscription", name, msg_class, depth), make)
 
     def pending(self):
-        """Loop thread: the subscriptions of this handle that got messages since the last call, in the order they were
-        opened.
-
-        For an owner with so many subscriptions that asking each of them at every tick takes time.
+        """Loop thread: the subscriptions that got messages since the last call, in the order they were opened. For
+        owners with so many subscriptions that polling each one at every tick takes time.
         """
         if not self._noted:
             return ()
         numbers = sorted(self._noted)
-        # Before they are read: what comes in from here on is told again.
+        # Cleared before the queues are read: a message that arrives from here on is reported in the next call.
         self._noted.difference_update(numbers)
         return [self._subscriptions[number] for number in numbers]
 
@@ -63,15 +61,14 @@ class NodeHandle:
         return self._serving(self._ros.service, self.resolve(name), srv_class, handler)
 
     def service_in_thread(self, name, srv_class, handler):
-        """Advertise a service that may take its time; ``handler(request)`` runs in a thread of its own.
-
-        It reaches what belongs to the loop through :meth:`call_in_loop` only.
+        """Advertise a slow service; ``handler(request)`` runs in a thread of its own. It may use the objects of the
+        loop through :meth:`call_in_loop` only.
         """
         return self._serving(self._ros.service_in_thread, self.resolve(name), srv_class, handler)
 
     def call_in_loop(self, function, *arguments):
-        """Any thread but the loop's: have ``function(*arguments)`` called between two ticks; returns or raises what it
-        does. Raises ``rospy.ServiceException`` when the loop ends before."""
+        """Any thread but the loop's: call ``function(*arguments)`` in the loop, between two ticks, and return its
+        result or raise its error. Raises ``rospy.ServiceException`` if the loop ends first."""
         return self._ros.call_in_loop(function, *arguments)
 
     def flush(self):
@@ -79,30 +76,29 @@ class NodeHandle:
         self._ros.flush()
 
     def branch(self):
-        """A handle in the same namespace, for a part of the owner that opens and closes on its own."""
+        """A handle in the same namespace, for a part of the owner that is opened and closed separately."""
         return NodeHandle(self._ros, self.namespace)
 
     def served(self):
-        """Absolute names of the services that the node serves now, this owner's and all others: a list."""
+        """Absolute names of all services that the node serves now, of all owners: a list."""
         return self._ros.served()
 
     def withdraw(self, name):
-        """Loop thread: for good, no longer serve the service ``name`` nor listen to the topic of that name, for all
-        owners; for an owner that guards what others may do.
-
-        Returns the service's handler, for the caller's own requests; None where there is no such service.
+        """Loop thread: close the service ``name`` and all subscriptions to the topic ``name``, of all owners,
+        permanently. For an owner that restricts what clients may do. Returns the service's handler, so that the caller
+        can still use it, or None if there is no such service.
         """
         return self._ros.withdraw(self.resolve(name))
 
     def survived(self, place, error):
-        """Count an error that the owner has dealt with: a line in the log now and then, a figure in /diagnostics.
-
-        ``place``: the topic or service, or in words what was being done.
+        """Count an error that the owner has handled: it appears in /diagnostics and, at a limited rate, in the log.
+        ``place``: the topic or service, or what the owner was doing, in words.
         """
         self._ros.faults.note(place, error)
 
     def begin_anew(self):
-        """From here to :meth:`end_anew`, what is opened again is what was open already."""
+        """Until :meth:`end_anew`, opening a topic or service of the same name and type returns the one that is already
+        open."""
         self._kept, self._opened = [*self._kept, *self._opened], []
 
     def end_anew(self):
@@ -116,7 +112,8 @@ class NodeHandle:
         _close_all(opened)
 
     def _opening(self, what, make, closes=True):
-        """The object that was opened as ``what`` before, or a new one; ``closes``: whether :meth:`close` ends it."""
+        """The object that was opened earlier under the key ``what``, or a new one; ``closes``: whether :meth:`close`
+        closes it."""
         for entry in self._kept:
             if entry[0] == what:
                 self._kept.remove(entry)

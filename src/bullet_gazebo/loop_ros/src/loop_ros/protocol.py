@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What code in the loop may use of ROS.
+"""The ROS interface of code that runs in the loop.
 
-:class:`Topics` and :class:`Log` are for controllers, action servers and settings; plugins have a whole
-:class:`loop_ros.node_handle.NodeHandle`, which stands on :class:`LoopRos`. ``loop_ros.ros_objects.RosObjects`` is the
-simulator's, ``loop_ros.testing.FakeRos`` that of tests. Nothing here waits.
+:class:`Topics` and :class:`Log` are for controllers, action servers and settings; plugins get a
+:class:`loop_ros.node_handle.NodeHandle`, which uses a :class:`LoopRos`. The simulator's implementation is
+``loop_ros.ros_objects.RosObjects``; tests use ``loop_ros.testing.FakeRos``. Nothing here waits.
 """
 from typing import Protocol
 
@@ -11,18 +11,18 @@ from typing import Protocol
 class Publisher(Protocol):
     """One topic that is published."""
 
-    #: Whether a subscriber is connected. A message is not worth making otherwise.
+    #: Whether a subscriber is connected. Callers check it before they make a message.
     has_listeners: bool
 
     def publish(self, message):
-        """Send ``message`` to all subscribers. Raises ``genpy.SerializationError`` for one that cannot be sent."""
+        """Send ``message`` to all subscribers. Raises ``genpy.SerializationError`` if it cannot be serialized."""
 
     def close(self):
         """Stop publishing."""
 
 
 class Subscription(Protocol):
-    """One topic that is subscribed to. What is unread waits for the loop, as many messages as the depth says."""
+    """One topic that is subscribed to. It keeps up to ``depth`` unread messages for the loop."""
 
     def take(self):
         """The newest unread message, or None; older ones are dropped."""
@@ -31,13 +31,14 @@ class Subscription(Protocol):
         """All unread messages, oldest first: a list."""
 
     def handle(self, handler):
-        """Call ``handler(message)`` for each unread message, oldest first; what it raises drops one and is counted."""
+        """Call ``handler(message)`` for each unread message, oldest first; if it raises, the message is dropped and the
+        error is counted."""
 
     def guarded(self, handler, *arguments):
-        """Call ``handler(*arguments)``; what it raises is counted as the fault of a message."""
+        """Call ``handler(*arguments)``; an error is counted as the fault of a message."""
 
     def close(self):
-        """End the subscription and drop what is unread."""
+        """Unsubscribe and drop the unread messages."""
 
 
 class Service(Protocol):
@@ -70,7 +71,8 @@ class Log(Protocol):
 
 
 class Topics(Protocol):
-    """Makes what one owner publishes, hears and serves. Names are absolute or relative to the owner's namespace."""
+    """Makes the publishers, subscriptions and services of one owner. Names are absolute or relative to the owner's
+    namespace."""
 
     def publisher(self, topic, msg_class, latch=False) -> Publisher:
         """Publish ``topic``; ``latch``: a late subscriber gets the last message."""
@@ -82,11 +84,11 @@ class Topics(Protocol):
         """Serve ``name``; ``handler(request)`` runs in the loop between two ticks and returns the response."""
 
     def close(self):
-        """Close all of it."""
+        """Close all of them."""
 
 
 class Faults(Protocol):
-    """What the loop survives, counted by place."""
+    """Errors that the loop survives, counted by place."""
 
     def note(self, place, error, consequence=""):
         """Count ``error`` at ``place``: a topic, a service, a part of the loop."""
@@ -98,7 +100,8 @@ class LoopRos(Protocol):
     faults: Faults
 
     def publisher(self, topic, msg_class, latch=False, greet=False) -> Publisher:
-        """Publish ``topic``; ``latch``: a late subscriber gets the last message; ``greet``: the same, unannounced."""
+        """Publish ``topic``; ``latch``: a late subscriber gets the last message; ``greet``: the same, but without the
+        latched flag."""
 
     def subscription(self, topic, msg_class, depth=1, notice=lambda: None) -> Subscription:
         """As :meth:`Topics.subscription`; ``notice()`` is called after each message, in any thread."""
@@ -117,11 +120,11 @@ class LoopRos(Protocol):
         is no such service."""
 
     def call_in_loop(self, function, *arguments):
-        """Any thread but the loop's: have ``function(*arguments)`` called between two ticks, return or raise what it
-        does."""
+        """Any thread but the loop's: call ``function(*arguments)`` in the loop between two ticks; return its result or
+        raise its error."""
 
     def deliveries(self):
         """How many messages the subscriptions have received: {topic: count}."""
 
     def flush(self, timeout_s=10.0):
-        """Any thread but the loop's: wait until all that was opened is registered; returns whether it is."""
+        """Any thread but the loop's: wait until everything that was opened is registered; returns whether it is."""

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publishing from the loop without ever waiting for a subscriber.
 
-rospy registers topics and shakes hands with subscribers; from there on the sockets belong to the loop thread. A message
-is serialised once and handed to each connection with a non-blocking send. What a socket takes only in part is kept and
-goes first the next time; a connection that is still full loses the newest message. Nothing here imports rospy, so the
-sockets can be tested with plain pairs.
+rospy registers topics and handshakes with subscribers; from then on the loop thread owns the sockets. A message
+is serialised once and handed to each connection with a non-blocking send. If a socket takes only a part, the rest is
+kept and sent first the next time; while a rest is pending, new messages for that connection are dropped. Nothing here
+imports rospy, so the sockets can be tested with plain pairs.
 """
 import collections
 import contextlib
@@ -26,13 +26,13 @@ _send.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_size_t, ctypes.c_int]
 _send.restype = ctypes.c_ssize_t
 _FULL = (errno.EAGAIN, errno.EWOULDBLOCK, errno.EINTR)
 
-# Send buffer of a connection [bytes]. The kernel's own would let a subscriber that stopped reading find minutes of old
-# messages when it comes back; larger messages go out in parts, one part a tick.
+# Send buffer of a connection [bytes]. With the kernel's default, a subscriber that stopped reading would find minutes
+# of old messages when it resumes. Larger messages are sent in parts, one part per tick.
 SEND_BUFFER_BYTES = 128 * 1024
 
 
-# A subscriber that has taken nothing for so long has stopped [s]; from then on it is asked that often [s]. Hundreds of
-# them, asked at every tick, would take the loop more time than the world does.
+# A subscriber that has read nothing for this long counts as stopped [s]; then it is tried with this period [s]. Trying
+# hundreds of stopped subscribers at every tick would take longer than the physics.
 STOPPED_S = 0.05
 STOPPED_RETRY_S = 0.05
 
@@ -60,7 +60,8 @@ class Peer:
 
     @classmethod
     def of(cls, transport):
-        """The one of a connection: several publishers of one topic must not write into each other's messages."""
+        """The peer of a connection. Publishers of the same topic share it, so that they do not write into each other's
+        messages."""
         peer = getattr(transport, "loop_peer", None)
         if peer is None:
             peer = transport.loop_peer = cls(transport)
@@ -87,7 +88,7 @@ class Peer:
         self.transport.stat_num_msg += 1
 
     def flush(self):
-        """Send what is left of a message, as far as the socket takes it. Raises ``OSError`` when it is dead."""
+        """Send the rest of a message, as far as the socket takes it. Raises ``OSError`` when the connection is dead."""
         if self._rest is not None:
             self._rest = self._rest[self._send(self._rest):] or None
 
@@ -119,17 +120,17 @@ class Peer:
 class LoopPublisher:
     """One topic, published from the loop thread.
 
-    Until :meth:`attach` gave it rospy's side of the topic it has no listeners and publishing only fills the latch.
+    Before :meth:`attach` it has no listeners, and publishing only stores the latched message.
     """
 
     def __init__(self, hub, topic, msg_class, latch=False, greet=False, release=lambda: None):
-        """``latch`` as in ROS; ``greet`` gives late joiners the last message, unannounced; ``release()`` ends the
-        registration, also one that is still under way."""
+        """``latch`` as in ROS; ``greet`` sends the last message to late subscribers without the latched flag;
+        ``release()`` ends the registration, also while it is still in progress."""
         self.topic = topic
         self.msg_class = msg_class
         self.latch = latch
-        #: True while somebody is connected, as of the hub's last turn; after the last has gone, until the next message.
-        #: A robot asks a hundred topics, so that this is no property.
+        #: True while a subscriber is connected, as of the hub's last turn. After the last one has gone, it stays True
+        #: until the next message. A plain attribute for speed: a robot checks a hundred topics per tick.
         self.has_listeners = False
         self._hub = hub
         self._keep_last = latch or greet
@@ -145,12 +146,12 @@ class LoopPublisher:
         self.is_closed = False
 
     def attach(self, impl):
-        """Begin to serve rospy's publisher ``impl`` (its ``connections``)."""
+        """Start to serve the ``connections`` of rospy's publisher ``impl``."""
         self._impl = impl
         self._hub.attention.append(self)
 
     def publish(self, message):
-        """Send ``message`` to everybody who is connected; costs next to nothing when nobody is."""
+        """Send ``message`` to all connected subscribers; very cheap when there are none."""
         impl = self._impl
         if self._keep_last or (impl is not None and impl.connections):
             self.publish_serialized(self._serialize(message))
@@ -162,7 +163,7 @@ class LoopPublisher:
         impl = self._impl
         if impl is not None:
             connections = impl.connections
-            # Before the latch changes: a new subscriber gets this message once, not the one before as well.
+            # Done before the latch changes: a new subscriber gets this message once, and not the previous one.
             if connections is not self._known:
                 self._adopt(connections)
             dead = None
@@ -180,7 +181,7 @@ class LoopPublisher:
             self._last = data
 
     def greet(self):
-        """Send the last message to connections that came after it."""
+        """Send the last message to connections made after it."""
         impl = self._impl
         if impl is None or impl.connections is self._known:
             return
@@ -197,7 +198,7 @@ class LoopPublisher:
         self._bury(dead)
 
     def flush(self):
-        """Send what is left of earlier messages. Returns True while something still is."""
+        """Send the rests of earlier messages. Returns True while a rest is still pending."""
         dead = []
         for peer in self._peers:
             try:
@@ -208,7 +209,7 @@ class LoopPublisher:
         return any(peer.has_rest for peer in self._peers)
 
     def close(self):
-        """Stop publishing and give the registration back."""
+        """Stop publishing and unregister."""
         if self.is_closed:
             return
         self.is_closed = True
@@ -229,7 +230,7 @@ class LoopPublisher:
     def _bury(self, dead):
         for peer in dead:
             self._peers.remove(peer)
-            with contextlib.suppress(Exception):  # rospy logs what goes wrong in closing a broken connection
+            with contextlib.suppress(Exception):  # rospy logs errors of closing a broken connection
                 peer.transport.close()
 
     def _serialize(self, message):
@@ -247,17 +248,17 @@ class LoopPublisher:
 
 
 class PublisherHub:
-    """What the loop does for all its publishers, once per turn."""
+    """Serves all publishers of the loop, once per turn."""
 
     def __init__(self):
         """No publishers yet."""
-        #: Publishers with a new connection; other threads append, the loop takes.
+        #: Publishers with a new connection; other threads append, the loop removes.
         self.attention = collections.deque()
         #: Publishers with parts of messages still to send; loop thread only.
         self.backlog = set()
 
     def service(self):
-        """Greet new listeners and go on with messages that were sent in part."""
+        """Send latched messages to new subscribers, and continue messages that were sent in part."""
         while self.attention:
             self.attention.popleft().greet()
         if self.backlog:

@@ -22,16 +22,16 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 __all__ = ["Setting", "SettingsServer"]
 
-# Type of a value -> name of the type, its list in Config, its message.
+# Type of a value -> the type's name, its field in Config, its message class.
 _KINDS = {bool: ("bool", "bools", BoolParameter), int: ("int", "ints", IntParameter),
           float: ("double", "doubles", DoubleParameter)}
-# All settings stand in one group.
+# All settings are in one group.
 _GROUP = "Default"
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One number or switch: its ``value`` at the start decides which (bool, int or float).
+    """One number or switch: the type of its initial ``value`` decides which (bool, int or float).
 
     ``low``, ``high``: the range of a number. ``meaning``: in words, with the unit.
     """
@@ -47,7 +47,7 @@ class Setting:
         return type(self.value)
 
     def checked(self, value):
-        """``value`` within the range; raises ``ValueError`` where it is not finite."""
+        """``value`` clamped to the range; raises ``ValueError`` if it is not finite."""
         if not math.isfinite(value):
             raise ValueError("%s is %s, expected a finite number" % (self.name, value))
         return value if self.kind is bool else min(max(value, self.low), self.high)
@@ -60,8 +60,8 @@ class SettingsServer:
         """Open ``<name>/set_parameters``, ``<name>/parameter_descriptions`` and ``<name>/parameter_updates``.
 
         ``topics`` makes them: a ``loop_ros.protocol.Topics``, of which ``publisher`` and ``service`` are called.
-        ``settings``: list of :class:`Setting`. ``apply(values)`` gets {name: value} of all of
-        them when a client changes some; ``ValueError`` refuses.
+        ``settings``: list of :class:`Setting`. ``apply(values)`` gets {name: value} of all of them when a client
+        changes some; it may raise ``ValueError`` to refuse.
         """
         self._name = name
         self._settings = {setting.name: setting for setting in settings}
@@ -73,7 +73,7 @@ class SettingsServer:
         self._updates.publish(self._config(self.values))
 
     def show(self, **values):
-        """Tell clients of values that have changed for another reason."""
+        """Publish values that did not change through the service."""
         if any(self.values[name] != value for name, value in values.items()):
             self.values.update(values)
             self._updates.publish(self._config(self.values))

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calls that other threads want made in the loop's thread. ROS-free."""
+"""Functions that other threads have called in the loop's thread. ROS-free."""
 import collections
 import threading
 from concurrent.futures import CancelledError, Future
 
 
 class RequestQueue:
-    """Any thread submits a call; the loop makes it and answers with a ``Future``, one for each call."""
+    """Any thread submits a call and gets a ``Future``; the loop makes the call and sets the result."""
 
     def __init__(self):
         """Open, no requests."""
@@ -16,7 +16,7 @@ class RequestQueue:
         self._closed = False
 
     def submit(self, function, *arguments):
-        """Any thread: have ``function(*arguments)`` called between two ticks; returns a ``Future``."""
+        """Any thread: queue a call of ``function(*arguments)`` in the loop, between two ticks; returns a ``Future``."""
         future = Future()
         with self._lock:
             if self._closed:
@@ -27,9 +27,8 @@ class RequestQueue:
         return future
 
     def call(self, function, *arguments):
-        """Any other thread: submit and wait; returns or raises what the function does.
-
-        Raises :class:`LoopEnded` when the loop stops before it answers.
+        """Any other thread: submit and wait; returns the function's result or raises its error. Raises
+        :class:`LoopEnded` if the loop stops first.
         """
         try:
             return self.submit(function, *arguments).result()
@@ -37,7 +36,7 @@ class RequestQueue:
             raise LoopEnded("the simulator is shutting down") from None
 
     def run_pending(self):
-        """Loop thread: answer every request that is there by now. Returns how many there were."""
+        """Loop thread: answer all pending requests. Returns how many there were."""
         if not self._requests:
             return 0
         count = len(self._requests)
@@ -48,19 +47,20 @@ class RequestQueue:
             try:
                 future.set_result(function(*arguments))
             except SystemExit as error:
-                # A thread that gets it ends without a word, and its client waits for ever.
+                # If SystemExit reached the waiting thread, the thread would end silently and its client would wait for
+                # ever.
                 future.set_exception(RuntimeError("it called sys.exit(%r)" % (error.code,)))
-            except Exception as error:  # noqa: BLE001  (whatever it is, it belongs to the caller)
+            except Exception as error:  # noqa: BLE001  (every error is passed on to the caller)
                 future.set_exception(error)
         return count
 
     def wait(self, timeout_s):
-        """Loop thread, while nothing moves: sleep until a request comes or the time [s] is over."""
+        """Loop thread, while the world is paused: sleep until a request comes or the time [s] is over."""
         if self._wake.wait(timeout_s):
             self._wake.clear()
 
     def close(self):
-        """Cancel what is pending and refuse what comes later."""
+        """Cancel pending requests and refuse later ones."""
         with self._lock:
             self._closed = True
             pending, self._requests = self._requests, collections.deque()

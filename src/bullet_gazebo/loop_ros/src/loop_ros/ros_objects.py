@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Topics and services of the loop, registered with the ROS master by a thread of their own.
 
-A registration is a round trip to the master (1 to 2 ms); a robot brings about a hundred. The objects are handed out at
-once and come alive when their turn comes, so the loop never waits; :meth:`RosObjects.flush` waits for all of them.
+A registration is a round trip to the master (1 to 2 ms); a robot brings about a hundred. The objects are returned at
+once and become active when they are registered, so the loop never waits; :meth:`RosObjects.flush` waits for all of
+them.
 """
 import queue
 import threading
@@ -28,7 +29,7 @@ class RosObjects:
         self._subscribers = subscribers
         self._requests = requests
         self._log = log
-        #: Others may count theirs here too.
+        #: Public: other parts count their errors here too.
         self.faults = faults
         self._jobs = queue.SimpleQueue()
         self._subscriptions = {}
@@ -68,7 +69,7 @@ class RosObjects:
         def register():
             registration = rospy.Subscriber(topic, msg_class, subscription.put, tcp_nodelay=True)
             registered.append(registration)
-            # A connection that rospy made before this line is read by rospy, in a thread of its own.
+            # If rospy made a connection before this line, rospy reads it in a thread of its own.
             _read_in_loop(registration.impl, self._subscribers, self._log, self.faults)
 
         def unregister():
@@ -96,9 +97,8 @@ class RosObjects:
         return list(self._services)
 
     def withdraw(self, name):
-        """Loop thread: no longer serve the service ``name``, nor listen to the topic of that name, for all owners.
-
-        Returns the service's handler, which only the caller reaches from then on; None where there is no such service.
+        """Loop thread: close the service ``name`` and all subscriptions to the topic ``name``, of all owners. Returns
+        the service's handler, which from then on only the caller can use, or None if there is no such service.
         """
         for subscription in self._subscriptions.get(name, ()):
             subscription.close()
@@ -109,9 +109,8 @@ class RosObjects:
         return service.handler
 
     def call_in_loop(self, function, *arguments):
-        """Any thread but the loop's: have ``function(*arguments)`` called between two ticks and wait for it.
-
-        Raises ``rospy.ServiceException``, the right end for a service request, when the loop ends before.
+        """Any thread but the loop's: call ``function(*arguments)`` in the loop between two ticks and wait for it.
+        Raises ``rospy.ServiceException`` if the loop ends first, which makes a service request fail cleanly.
         """
         try:
             return self._requests.call(function, *arguments)
@@ -119,8 +118,8 @@ class RosObjects:
             raise rospy.ServiceException(str(error)) from None
 
     def deliveries(self):
-        """How many messages the loop's subscriptions have received: {topic: count}. Those that have been closed count
-        on, so that it never becomes less."""
+        """How many messages the loop's subscriptions have received: {topic: count}. Closed subscriptions still count,
+        so that a number never decreases."""
         return {topic: self._delivered_before.get(topic, 0) + sum(one.delivered for one in subscriptions)
                 for topic, subscriptions in list(self._subscriptions.items())}
 
@@ -131,7 +130,7 @@ class RosObjects:
         return done.wait(timeout_s)
 
     def later(self, function):
-        """Have ``function()`` called in the registration thread."""
+        """Call ``function()`` in the registration thread."""
         self._jobs.put(function)
 
     def _serve(self, name, srv_class, answer_in_thread, handler):
@@ -165,7 +164,7 @@ class RosObjects:
 
 
 def answering(name, handler, faults):
-    """``handler`` as rospy is to call it: what it raises is counted and an error to the client, whatever it is."""
+    """``handler`` as rospy calls it: any exception is counted and returned to the client as an error."""
 
     def answer(request):
         try:
@@ -180,11 +179,11 @@ def answering(name, handler, faults):
 
 
 def _read_in_loop(impl, subscribers, log, faults):
-    """Have the loop read the connections of rospy's subscription ``impl``, as soon as they are made."""
+    """Let the loop read the connections of rospy's subscription ``impl``, as soon as they are made."""
     add = impl.add_connection
 
     def add_connection(connection):
-        # Held weakly: a connection that rospy drops while it is being made leaves its socket to be closed with the last
+        # A weak reference: if rospy drops a connection during its set-up, the socket closes only with the last
         # reference, and the publisher serves nobody else before that.
         held = weakref.ref(connection)
         connection.receive_loop = lambda _: _receive(held(), impl, subscribers, log, faults)
@@ -194,7 +193,7 @@ def _read_in_loop(impl, subscribers, log, faults):
 
 
 def _receive(transport, impl, subscribers, log, faults):
-    """What rospy's thread for a connection, the ``transport``, does from then on: wait for its end."""
+    """Run in rospy's thread of the connection ``transport``: hand it to the loop and wait for its end."""
 
     def deliver(data):
         transport.stat_bytes += len(data)
@@ -205,13 +204,13 @@ def _receive(transport, impl, subscribers, log, faults):
             if transport.is_latched:
                 transport.latch = message
             impl.receive_callback([message], transport)
-        except Exception as error:  # noqa: BLE001  (anything may be sent; the world goes on)
+        except Exception as error:  # noqa: BLE001  (a peer may send anything; the simulator goes on)
             if not impl.closed:
                 faults.note(impl.resolved_name, error,
                             "a message from %s cannot be read and is dropped" % transport.callerid_pub)
 
     try:
-        # With the end of its header a publisher may have sent its first message, the one that it latches.
+        # The publisher may have sent its first, latched message together with the header.
         connection = Connection(transport.socket, deliver, largest_message_bytes(), held=transport.read_buff.getvalue())
     except (AttributeError, OSError):  # it has been closed already
         transport.close()
@@ -225,7 +224,7 @@ def _receive(transport, impl, subscribers, log, faults):
 
 
 class _Attention(rospy.SubscribeListener):
-    """Tells the loop that a publisher has a new listener."""
+    """Notifies the loop of a publisher's new connection."""
 
     def __init__(self, hub, publisher):
         self._hub = hub

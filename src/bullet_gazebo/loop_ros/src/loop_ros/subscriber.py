@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Read the connections of subscriptions in the loop, between two ticks.
 
-rospy connects and shakes hands; from there on the loop reads the sockets itself. A thread for each connection, as rospy
-has it, must take the interpreter from the loop twice for each message (docs/decisions/0006). Nothing here imports
-rospy, so that it can be tested with plain pairs of sockets.
+rospy connects and handshakes; from then on the loop reads the sockets itself. rospy's own thread per connection would
+take the interpreter lock from the loop twice per message (docs/decisions/0006). Nothing here imports rospy, so that it
+can be tested with plain pairs of sockets.
 """
 import collections
 import ctypes
@@ -18,15 +18,16 @@ import time
 from rospy_limits.limits import size_fault
 
 _LENGTH = struct.Struct("<I")
-# How much is read at once [bytes]: a few commands; of a message that is larger, what is missing of it.
+# Smallest and largest portion of one read [bytes]: a few commands; for a larger message, its missing part.
 PORTION_BYTES = 4096
 LARGEST_PORTION_BYTES = 256 * 1024
-# Receive buffer of a connection [bytes]: a publisher that sends more than the loop can take is held up, instead of
-# being obeyed seconds later.
+# Receive buffer of a connection [bytes]: a publisher that sends faster than the loop reads is held up, so that its
+# commands are not executed seconds late.
 RECEIVE_BUFFER_BYTES = 128 * 1024
-# How long the loop goes on reading in one turn [s], where there is more than a portion on some connection.
+# Time limit of reading in one turn [s], when a connection holds more than one portion.
 BUDGET_S = 0.001
-# Sockets are looked at no more often than this [s]: flat out, a turn takes less, and looking takes 4 us.
+# Shortest time between two polls of the sockets [s]. As fast as possible, a turn takes less than this, and a poll takes
+# 4 us.
 LOOK_PERIOD_S = 0.0005
 
 
@@ -36,7 +37,7 @@ class _PollEntry(ctypes.Structure):
     _fields_ = (("fd", ctypes.c_int), ("events", ctypes.c_short), ("revents", ctypes.c_short))
 
 
-# Called without giving up the interpreter, as in `loop_ros.publisher`: neither waits for anything.
+# Called without releasing the interpreter lock, as in `loop_ros.publisher`: neither call blocks.
 _libc = ctypes.PyDLL(None, use_errno=True)
 _recv, _poll = _libc.recv, _libc.poll
 _recv.argtypes = [ctypes.c_int, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int]
@@ -50,26 +51,25 @@ class Connection:
     """The receiving end of one publisher's connection. The loop reads; any thread may wait for ``ended``."""
 
     def __init__(self, connected, deliver, largest_bytes, held=b""):
-        """``connected``: a connected stream socket, of which a duplicate is read: it may be closed elsewhere at any
-        time. ``deliver(data)`` takes the bytes of each message, in the loop. A message that announces more than
-        ``largest_bytes`` ends the connection. ``held``: bytes that have been read already, as far as they are not
-        delivered."""
+        """``connected``: a connected stream socket. A duplicate of it is read, because rospy may close it at any time.
+        ``deliver(data)`` takes the bytes of each message, in the loop. A message longer than ``largest_bytes`` ends the
+        connection. ``held``: bytes that were read already and are not delivered yet."""
         self._socket = connected.dup()
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         self._deliver = deliver
         self._largest_bytes = largest_bytes
         self._held = bytearray(held)
-        #: Set when nothing more will come.
+        #: Set when the connection has ended.
         self.ended = threading.Event()
-        #: Why it ended, where the publisher did not just go; else "".
+        #: Reason of the end; "" if the publisher simply closed the connection.
         self.fault = ""
 
     def fileno(self):
-        """The descriptor that is read; -1 when it has ended."""
+        """The file descriptor; -1 when the connection has ended."""
         return self._socket.fileno()
 
     def read(self, buffer):
-        """Take a portion and deliver what is complete; returns whether there may be more.
+        """Read one portion and deliver the complete messages; returns whether there may be more.
 
         ``buffer``: a ctypes array to read into, of LARGEST_PORTION_BYTES.
         """
@@ -85,7 +85,8 @@ class Connection:
         return count == portion and not self.ended.is_set()
 
     def deliver_complete(self):
-        """Deliver the messages that are complete; in the loop, as ``read`` does, and once before it."""
+        """Deliver the complete messages, in the loop. ``read`` calls it; it is also called once before the first
+        read."""
         held, start = self._held, 0
         while len(held) - start >= _LENGTH.size:
             length, = _LENGTH.unpack_from(held, start)
@@ -113,7 +114,7 @@ class Connection:
 
 
 class SubscriberHub:
-    """What the loop does for all its subscriptions, once per turn."""
+    """Reads all connections of the loop's subscriptions, once per turn."""
 
     def __init__(self, clock=time.perf_counter):
         """No connections yet. ``clock`` is replaceable for tests."""
@@ -126,13 +127,13 @@ class SubscriberHub:
         self._buffer = (ctypes.c_char * LARGEST_PORTION_BYTES)()
 
     def add(self, connection):
-        """Any thread: have a :class:`Connection` read from the next turn on."""
+        """Any thread: add a :class:`Connection`, to be read from the next turn on."""
         self._new.append(connection)
         if self._closed:
             connection.end()
 
     def service(self):
-        """Loop thread: deliver what has come in. Never waits."""
+        """Loop thread: deliver the messages that have arrived. Never waits."""
         if self._new:
             self._take_new()
         now = self._clock()
@@ -152,7 +153,7 @@ class SubscriberHub:
             self._follow([connection for connection in self._connections if not connection.ended.is_set()])
 
     def close(self):
-        """When the loop has ended: nothing more will be read."""
+        """Call when the loop has ended: end all connections."""
         self._closed = True
         self._take_new()
         for connection in self._connections:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Unread messages of a topic, which wait for the loop. ROS-free."""
+"""The queue of a topic's unread messages. ROS-free."""
 import collections
 
 from loop_ros.faults import SURVIVED
@@ -10,16 +10,15 @@ def _raise(error):
 
 
 class Subscription:
-    """Unread messages of a topic: any thread puts them in, the loop takes them out.
-
-    It keeps the newest ``depth`` messages. With the depth of 1 only the newest message counts.
+    """Unread messages of a topic: any thread puts them in, the loop takes them out. Keeps the newest ``depth``
+    messages.
     """
 
     #: Called once, when the subscription is closed.
     on_close = None
 
     def __init__(self, depth=1, notice=lambda: None, on_fault=_raise):
-        """``notice()`` is called for each message that comes in, in the thread that brings it; ``on_fault(error)`` for
+        """``notice()`` is called for each new message, in the thread that puts it in; ``on_fault(error)`` for
         each that :meth:`guarded` drops. Raises ValueError for a depth below 1."""
         if depth < 1:
             raise ValueError("the depth of a subscription is %r, expected at least 1" % (depth,))
@@ -33,7 +32,7 @@ class Subscription:
     def put(self, message):
         """Any thread: add a message; beyond the depth, the oldest is dropped."""
         self._unread.append(message)
-        # Before it counts as delivered: a lock-step request that waited for it goes on from there.
+        # Called before the message counts as delivered: the count lets a waiting lock-step request proceed.
         self._notice()
         self.delivered += 1
 
@@ -57,7 +56,7 @@ class Subscription:
             self.guarded(handler, message)
 
     def guarded(self, handler, *arguments):
-        """Loop thread: call ``handler(*arguments)`` for one message; what it raises is counted and not passed on."""
+        """Loop thread: call ``handler(*arguments)`` for one message; an error is counted and not passed on."""
         try:
             handler(*arguments)
         except SURVIVED as error:

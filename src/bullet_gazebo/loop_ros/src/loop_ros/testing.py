@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""ROS for tests, without a master: what is published is kept, messages are put in by hand.
-
-``test_fake_ros.py`` asks the same of this and of the simulator's own. Subscriptions, faults and the answers of services
-are the real code.
+"""ROS for tests, without a master: publishers keep their messages, and tests put messages into subscriptions.
+``test_fake_ros.py`` runs the same cases against this and the simulator's own code. Subscriptions, faults and the
+answers of services are the real code.
 """
 import io
 
@@ -12,7 +11,7 @@ from loop_ros.subscription import Subscription
 
 
 class FakeLog:
-    """``lines``: the texts of all levels, in their order. The throttled variants leave nothing out."""
+    """``lines``: the texts of all levels, in their order. The throttled variants keep every line."""
 
     def __init__(self):
         self.lines, self._levels = [], []
@@ -60,12 +59,13 @@ class FakeRos:
     """A ``loop_ros.protocol.LoopRos`` that keeps what is open now, by absolute name; also a ``Topics``.
 
     ``publishers``: {topic: the first open :class:`FakePublisher`}; ``subscriptions``: {topic: :class:`FakeTopic`};
-    ``services``: {name: function of one request, which answers as a client is answered}; ``faults``:
+    ``services``: {name: function that takes a request and returns or raises what a client would get}; ``faults``:
     :class:`FakeFaults`.
     """
 
     def __init__(self, heard=lambda topic: True, clock=lambda: 0.0):
-        """``heard(topic)``: whether somebody listens from the start; ``clock()``: see :attr:`FakePublisher.timed`."""
+        """``heard(topic)``: whether the topic has a subscriber from the start; ``clock()``: see
+        :attr:`FakePublisher.timed`."""
         self.publishers, self.subscriptions, self.services = {}, {}, {}
         self.faults = FakeFaults()
         self._heard, self._clock = heard, clock
@@ -133,7 +133,7 @@ class FakeRos:
 
 
 class _Sent:
-    """What all publishers of a topic have sent while somebody listened."""
+    """What all publishers of a topic have sent while it had a subscriber."""
 
     def __init__(self, heard, clock):
         self.heard, self.clock = heard, clock
@@ -146,10 +146,9 @@ class _Sent:
 
 
 class FakePublisher:
-    """``messages``: what a subscriber has got, each read back from its bytes; one that cannot be sent raises.
-
-    ``has_listeners`` may be set: whether somebody is connected. Several publishers of a topic share both.
-    ``keeps_last``: whether a late subscriber gets the last message.
+    """``messages``: the messages that a subscriber received, each deserialized from its bytes; one that cannot be
+    serialized raises. ``has_listeners`` may be set. Several publishers of a topic share both. ``keeps_last``: whether a
+    late subscriber gets the last message.
     """
 
     def __init__(self, sent, msg_class, keeps_last, publishers, topic):

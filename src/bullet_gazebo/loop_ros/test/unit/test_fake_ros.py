@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The fake of all packages' tests answers as the simulator's own code does: the same cases for both."""
+"""The fake behaves as the simulator's own code: the same cases run against both."""
 import contextlib
 import inspect
 import threading
@@ -36,7 +36,7 @@ TOPIC, SERVICE = "/topic", "/service"
 
 
 class Fake:
-    """What the tests do with the fake."""
+    """The operations of the tests, on the fake."""
 
     def __init__(self, _monkeypatch):
         self.ros = FakeRos(heard=lambda topic: False)
@@ -44,7 +44,7 @@ class Fake:
         self.log = FakeLog()
 
     def listen(self, topic):
-        """Somebody begins to listen; returns a function: the messages that came to it."""
+        """Add a subscriber; returns a function that returns its messages."""
         publisher = self.ros.publishers[topic]
         publisher.has_listeners = True
         return lambda: list(publisher.messages)
@@ -85,7 +85,7 @@ class _Peer:
 
 
 class Real:
-    """The same with the simulator's own, on a rospy without a master."""
+    """The same on the simulator's own code, with a rospy without a master."""
 
     def __init__(self, monkeypatch):
         self._subscribed, self._served, self._published, self._lines = {}, {}, {}, []
@@ -180,7 +180,7 @@ def test_both_have_the_declared_methods(declared, made):
     assert methods_of(declared)
     for method in methods_of(declared):
         found, wanted = parameters_of(made, method), parameters_of(declared, method)
-        if declared is protocol.Faults:  # each of them has its own words
+        if declared is protocol.Faults:  # each has its own wording
             found, wanted = [name for name, _ in found], [name for name, _ in wanted]
         assert found == wanted, method
 
@@ -365,7 +365,7 @@ def test_the_log_has_every_level_and_its_throttled_variant(side):
     side.log.info("a")
     side.log.warn("b")
     side.log.error("c")
-    # From places of their own: what comes again from one within the time is left out in the simulator.
+    # Each from a line of its own: the simulator drops throttled lines that repeat from one place.
     side.log.info_throttle(5.0, "d")
     side.log.warn_throttle(5.0, "e")
     side.log.error_throttle(5.0, "f")

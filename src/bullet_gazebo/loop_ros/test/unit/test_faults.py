@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the loop survives: counted by place, told in the log now and then."""
+"""Errors that the loop survives: counted by place, logged at a limited rate."""
 import sys
 from types import SimpleNamespace
 

@@ -18,7 +18,7 @@ from loop_ros.testing import FakeRos
 
 
 class Served:
-    """A server whose owner accepts every goal (unless ``accepts`` is false) and leaves it at that."""
+    """A server whose owner only accepts every goal (unless ``accepts`` is false)."""
 
     def __init__(self, accepts=True):
         self.ros = FakeRos()
@@ -273,7 +273,7 @@ def test_time_that_goes_back_does_not_cancel_or_silence_anything(served):
 
 
 def test_a_new_goal_may_have_the_id_of_one_that_ended_before_the_time_went_back(served):
-    """actionlib makes ids of the time, and a client that was started anew counts anew."""
+    """actionlib derives ids from the time, and a restarted client starts its count again."""
     for _ in range(2):
         served.send("client-1-1.000", 1.0)
         served.server.spin(1.0)

@@ -166,7 +166,7 @@ def test_a_full_peer_loses_the_newest_messages_and_stays_in_frame(hub, impl):
     assert slow.rest == b"" and 0 < len(slow_got) < 3000
     assert slow_got == [struct.pack("<I", number) * 500 for number in range(len(slow_got))]
     assert not hub.backlog
-    # It had stopped for longer than a moment, and is not asked at once.
+    # It counts as stopped, so it is not tried at once.
     wait_until(lambda: publisher.publish(FakeMessage(b"alive")) or slow.received() == [b"alive"], "the slow one")
 
 
@@ -291,7 +291,7 @@ def test_a_peer_that_has_stopped_is_asked_now_and_then_and_served_when_it_reads_
     message = struct.pack("<I", size) + bytes(size)
     while not peer.dropped:
         peer.send(message)
-    # A queue that is full for a moment costs nobody anything.
+    # A queue that is full for a moment loses no message.
     now[0] += 0.9 * STOPPED_S
     before = len(asked)
     for _ in range(10):

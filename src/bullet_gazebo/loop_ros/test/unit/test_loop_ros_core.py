@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What of the package must import where there is no rospy."""
+"""Which modules of the package import without rospy."""
 import subprocess
 import sys
 

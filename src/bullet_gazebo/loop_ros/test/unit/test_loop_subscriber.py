@@ -15,7 +15,7 @@ LARGEST_BYTES = 10_000_000
 
 
 class Clock:
-    """Goes on by a look's period whenever it is read."""
+    """Advances by one poll period whenever it is read."""
 
     now = 0.0
 
@@ -112,7 +112,7 @@ def test_who_sends_more_than_a_turn_takes_neither_holds_up_the_loop_nor_others(h
     assert sent > 20 * subscribing.PORTION_BYTES
     other.far.sendall(framed(b"me too"))
     serve_until(hub, lambda: other.got, "the other one's message")
-    # By the clock of these tests a turn reads two portions of a connection.
+    # With the clock of these tests, a turn reads two portions of a connection.
     most = 2 * subscribing.PORTION_BYTES / len(message) + 1
     assert 0 < len(line.got) <= 2 * most
     before = len(line.got)

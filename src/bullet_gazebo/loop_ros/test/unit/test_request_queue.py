@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calls of other threads on their way into the loop."""
+"""Calls that other threads queue for the loop."""
 import sys
 import threading
 import time

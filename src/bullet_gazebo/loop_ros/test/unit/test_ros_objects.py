@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""rospy's subscriptions, read by the loop: what rospy's thread of a connection does meanwhile."""
+"""rospy's subscriptions, read by the loop, and what rospy's thread of a connection does meanwhile."""
 import contextlib
 import gc
 import socket
@@ -126,15 +126,16 @@ def test_what_is_no_message_at_all_closes_the_connection_and_is_told(scene):
 
 
 def test_a_connection_that_rospy_gave_up_halfway_does_not_keep_the_publisher_waiting(monkeypatch):
-    """Two updates from the master make rospy connect twice; it drops the first while that connects, and with it a
-    socket that only the transport's end closes. A publisher serves one handshake after the other, and would wait."""
+    """Two updates from the master make rospy connect twice. It drops the first connection during its set-up, with a
+    socket that closes only when the transport ends. A publisher handshakes with one subscriber at a time and would
+    wait."""
     listening = socket.create_server(("localhost", 0))
     listening.settimeout(10.0)
     transport = TCPROSTransport(TCPROSSub("/chatter", String), "/chatter")
     impl = SimpleNamespace(add_connection=lambda _: True)
     _read_in_loop(impl, SubscriberHub(), None, None)
     impl.add_connection(transport)
-    # What connect() asks for just before it has a socket.
+    # connect() reads this just before it has a socket.
     monkeypatch.setattr("rospy.impl.tcpros_base._is_use_tcp_keepalive", lambda close=transport.close: close())
     gc.disable()
     try:
@@ -161,7 +162,7 @@ def test_a_connection_that_is_gone_before_it_was_read_is_closed():
 
 
 class Registrations:
-    """As rospy: registers a topic by making an object, until that is told to unregister."""
+    """As rospy: making the object registers the topic, until unregister is called."""
 
     def __init__(self, monkeypatch):
         self.open, self.made, self.on_make = [], [], lambda: None
@@ -218,7 +219,7 @@ def test_a_publisher_that_is_closed_while_it_is_registered_does_not_stay(objects
 
 
 def test_deliveries_never_become_less(objects, registrations):
-    """A caller that waits for the next message of a topic need not know that one model went and another came."""
+    """The count of a topic goes on when one model is replaced by another."""
     first, second = (objects.subscription("/commands", String, depth=10) for _ in range(2))
     for box in (first, first, second):
         box.put(String("go"))
@@ -314,7 +315,7 @@ def test_an_owner_that_begins_anew_keeps_its_topics_and_services(scene_of_faults
     wait_until(lambda: (scene_of_faults.requests.run_pending(), answers)[1], "the answer", 10.0)
     client.join()
     assert answers == ["new"]
-    # A beginning that got halfway loses nothing either.
+    # A restart that fails halfway loses nothing either.
     handle.begin_anew()
     handle.publisher("out", String)
     handle.begin_anew()

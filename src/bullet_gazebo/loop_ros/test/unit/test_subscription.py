@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Unread messages of a topic, and the owner's notice of them."""
+"""The queue of unread messages, and the notification of its owner."""
 from types import SimpleNamespace
 
 import pytest
@@ -37,7 +37,7 @@ def test_an_owner_is_told_once_which_of_its_subscriptions_have_messages():
     second.put("a")
     second.put("b")
     assert handle.pending() == [second] and not handle.pending()
-    # What comes in before they are read is told again: better twice than not at all.
+    # A message that arrives before they are read is reported again: better twice than not at all.
     first.put("c")
     assert (first.drain(), second.drain(), handle.pending()) == (["c"], ["b"], [first])
     second.put("d")
