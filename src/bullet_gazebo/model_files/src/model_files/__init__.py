@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the files are that robot descriptions and worlds speak of, and the models that come along."""
+"""Finds the files that robot descriptions and worlds name; holds the models that this workspace brings."""

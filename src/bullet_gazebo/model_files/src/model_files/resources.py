@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the files are that URDF and world files speak of: package://, model://, file:// and plain paths."""
+"""Finds the files that URDF and world files name: package://, model://, file:// and plain paths."""
 import os
 from pathlib import Path
 from urllib.parse import unquote, urlparse
@@ -11,7 +11,7 @@ from urdf_model import XmlRefused, parse_xml
 
 
 def model_folders(packages=None, environ=os.environ):
-    """Folders that ``model://NAME`` is looked for in, the user's own first, ours last. ``packages``: RosPack."""
+    """Search path of ``model://NAME``: the user's folders first, ours last. ``packages``: RosPack."""
     packages = packages or rospkg.RosPack()
     ours = Path(packages.get_path("model_files")) / "models"
     return [*_listed(environ, "GAZEBO_MODEL_PATH"), *exported_folders("gazebo_model_path", packages),
@@ -19,13 +19,13 @@ def model_folders(packages=None, environ=os.environ):
 
 
 def resource_folders(packages=None, environ=os.environ):
-    """Folders that world files and ``file://media/...`` are looked for in, besides the present one: those of
-    ``GAZEBO_RESOURCE_PATH``, and what packages export. ``packages``: RosPack."""
+    """Search path of world files and ``file://media/...``, after the current folder: ``GAZEBO_RESOURCE_PATH``, then
+    what packages export. ``packages``: RosPack."""
     return [*_listed(environ, "GAZEBO_RESOURCE_PATH"), *exported_folders("gazebo_media_path", packages)]
 
 
 def model_sizes(packages):
-    """What stands in for models of Gazebo's library, as :class:`sdf_model.ModelFolders` wants it."""
+    """Shapes that replace models of Gazebo's library, in the form that :class:`sdf_model.ModelFolders` takes."""
     path = Path(packages.get_path("model_files")) / "config" / "model_sizes.yaml"
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
@@ -33,7 +33,7 @@ def model_sizes(packages):
 def exported_folders(attribute, packages=None):
     """The folders (Paths) that packages name in ``<export><gazebo_ros attribute="${prefix}/models:..."/></export>``.
 
-    ``attribute``: gazebo_model_path or gazebo_media_path. A manifest that cannot be read names none.
+    ``attribute``: gazebo_model_path or gazebo_media_path. An unreadable manifest is skipped.
     """
     packages = packages or rospkg.RosPack()
     found = []
@@ -41,7 +41,7 @@ def exported_folders(attribute, packages=None):
         folder = Path(packages.get_path(name))
         try:
             text = (folder / "package.xml").read_bytes()
-            # Most of some hundred packages have nothing to say, and reading XML takes longer.
+            # Most of the hundred packages export nothing, and parsing XML is slower than this search.
             if attribute.encode() not in text:
                 continue
             exports = parse_xml(text).findall("export/gazebo_ros")
@@ -60,7 +60,7 @@ class ResourceFinder:
     """Turns resource names into paths. Callable; remembers what it found, so later calls cost a dictionary look-up."""
 
     def __init__(self, packages=None):
-        """``packages``: a ``rospkg.RosPack`` that has looked around already, which saves doing it again."""
+        """``packages``: a ``rospkg.RosPack`` that has crawled already, which saves a second crawl."""
         self._packages = packages or rospkg.RosPack()
         self._model_folders = model_folders(self._packages)
         self._resource_folders = resource_folders(self._packages)
@@ -68,13 +68,14 @@ class ResourceFinder:
         self._may_look_anew = True
 
     def __call__(self, name):
-        """The path of what exists and is no folder, or None. It need not be a file: who opens it looks."""
+        """The path if it exists and is no folder, else None. It need not be a regular file: the caller checks when it
+        opens it."""
         if name not in self._found:
             self._found[name] = next((str(path) for path in self._candidates(name) if _is_there(path)), None)
         return self._found[name]
 
     def forget_missing(self):
-        """Look again for what was not there: files and packages appear while a lab is being written."""
+        """Search again for names that were not found: files and packages appear while a user works on a lab."""
         self._found = {name: path for name, path in self._found.items() if path is not None}
         self._may_look_anew = True
 
@@ -101,8 +102,7 @@ class ResourceFinder:
         except rospkg.ResourceNotFound:
             if not self._may_look_anew:
                 return None
-        # A RosPack keeps what it saw when it was first asked. Walking through all folders takes its time: not for each
-        # mesh of a package that there is not.
+        # A RosPack caches its first crawl. A crawl is slow, so a missing package causes one, and not one per mesh.
         self._may_look_anew = False
         self._packages = rospkg.RosPack()
         return self._package_folder(name)

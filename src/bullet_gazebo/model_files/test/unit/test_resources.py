@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files that descriptions name, also those that come while the simulator runs."""
+"""Files that descriptions name, also those that appear while the simulator runs."""
 import os
 
 import pytest
