@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where what numba compiles is kept between runs. Free of ROS."""
+"""Keeps code compiled by numba between runs. Free of ROS."""
 import hashlib
 import os
 import shutil
@@ -7,18 +7,18 @@ import stat
 import tempfile
 from pathlib import Path
 
-# Folders of other states of the sources that are left in place: a second checkout may use the same cache.
+# Number of folders of other states of the sources that are kept: a second checkout may use the same cache.
 _KEPT = 3
 
 
 def compiler(name, sources, **options):
     """Return a decorator that compiles functions with ``numba.njit(cache=True, **options)`` and keeps the result.
 
-    name: what the folder's name begins with, the package's; sources: the files whose functions call each other. numba
-    itself looks for a change of the file that a function is in, but not of the functions that it calls; here a change
-    of any of them leads to another folder. Raises ImportError where numba is missing.
+    name: first part of the folder's name, usually the package's name; sources: the files whose functions call each
+    other. numba itself checks the function's own file for changes, but not the files of the functions that it calls;
+    here a change in any of them leads to another folder. Raises ImportError if numba is missing.
     """
-    import numba  # a caller that only asks for a folder need not have it
+    import numba  # callers of folder() need no numba
 
     place = folder(name, sources)
 
@@ -35,9 +35,9 @@ def compiler(name, sources, **options):
 def folder(name, sources, environment=os.environ):
     """Return the folder for what is compiled from ``sources``, paths of files.
 
-    It lies in the first of these that can be written: ``NUMBA_CACHE_DIR``, ``__pycache__`` beside the first source, the
-    user's cache, a folder of this user's own among the temporary ones. Its name holds what the files hold, so that a
-    change of any of them leads to another, empty folder. Those of older states beside it go but for the newest.
+    It lies in the first of these that is writable: ``NUMBA_CACHE_DIR``, ``__pycache__`` beside the first source, the
+    user's cache, a private folder in the temporary directory. Its name holds a hash of the files' content, so that a
+    change in any of them leads to a new, empty folder. Older folders beside it are deleted, but for the newest ones.
     """
     sources = sorted(map(Path, sources))
     digest = hashlib.sha256()
@@ -61,7 +61,7 @@ def _places(source, environment):
 
 
 def _age(path):
-    """Sorts the newest first; what another process deletes meanwhile comes last."""
+    """Sort key: newest first; a folder that another process has just deleted comes last."""
     try:
         return -path.stat().st_mtime
     except OSError:
@@ -78,7 +78,7 @@ def _writable(directory):
 
 
 def _private_temporary_directory(name):
-    """A directory that only this user can write: what lies in it is executed."""
+    """A directory that only this user can write: the files in it are executed."""
     path = os.path.join(tempfile.gettempdir(), "%s-%d" % (name, os.getuid()))
     try:
         os.mkdir(path, 0o700)
