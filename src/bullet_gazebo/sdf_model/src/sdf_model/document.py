@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One SDF file or text: its XML, its numbers, and what in it is wrong or not understood, by file and line."""
+"""One SDF file or text: its XML, its numbers, and its errors and unknown elements, by file and line."""
 
 import math
 
@@ -19,21 +19,21 @@ class SdfError(ValueError):
 
 
 class Notes:
-    """What was not understood, from one file or several."""
+    """Elements that were not understood, from one or several files."""
 
     def __init__(self):
         self._left_out, self._mended = {}, {}  # what -> file -> lines
 
     def add(self, what, source, line):
-        """Note that ``what`` stands in ``line`` of ``source`` and is left out."""
+        """Note that ``what`` in ``line`` of ``source`` is ignored."""
         self._left_out.setdefault(what, {}).setdefault(source, []).append(line)
 
     def mend(self, what, source, line):
-        """Note that ``what`` stands in ``line`` of ``source`` and is not as SDF wants it, but is understood."""
+        """Note that ``what`` in ``line`` of ``source`` is not valid SDF, but is understood."""
         self._mended.setdefault(what, {}).setdefault(source, []).append(line)
 
     def warning(self):
-        """Return one line that names everything noted, or "" where nothing was."""
+        """Return one line that names all notes, or "" without notes."""
         said = (("not understood and left out", self._left_out), ("not as SDF has it, but read", self._mended))
         return "; ".join("%s: %s" % (text, _listed(noted)) for text, noted in said if noted)
 
@@ -90,7 +90,7 @@ class Document:
         self.notes.add(what or element.tag, self.source, element.sourceline)
 
     def mend(self, element, what):
-        """Note that an element is not as SDF wants it, but is understood: ``what`` says how."""
+        """Note that an element is not valid SDF, but is understood; ``what`` describes it."""
         self.notes.mend(what, self.source, element.sourceline)
 
     def children(self, element):
@@ -98,7 +98,7 @@ class Document:
         return [child for child in element if isinstance(child.tag, str)]
 
     def note_unknown(self, element, known):
-        """Note each child whose tag is not in ``known``. Elements of other name spaces are nobody's business here."""
+        """Note each child whose tag is not in ``known``. Elements of other name spaces are ignored."""
         for child in self.children(element):
             if child.tag not in known and ":" not in child.tag and "}" not in child.tag:
                 self.note(child)
@@ -162,7 +162,7 @@ class Document:
 
     @staticmethod
     def relative_to(element):
-        """Return the name of the frame that the child <pose> is given in, "" where it does not say."""
+        """Return the name of the frame that the child <pose> is given in, "" if it names none."""
         child = element.find("pose")
         # Up to SDF 1.6 the attribute was called frame.
         return "" if child is None else child.get("relative_to") or child.get("frame") or ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the models are that ``model://NAME`` speaks of."""
+"""Finds the models that ``model://NAME`` names."""
 
 import re
 from pathlib import Path
@@ -10,7 +10,7 @@ from urdf_model import XmlRefused, bounds, parse_xml, read_file
 class ModelFolders:
     """A path of folders, each with a folder per model; the first that has a model wins.
 
-    ``sizes``: {model name: what stands in for it where no folder has it}, a dictionary with "box" (x, y, z), "cylinder"
+    ``sizes``: {model name: its replacement if no folder has it}, a dictionary with "box" (x, y, z), "cylinder"
     (radius, length) or "sphere" (radius,) [m], "centre" (3,) [m] of that in the model, and "mass" [kg]; without a mass
     it stands fast.
     """
@@ -20,7 +20,7 @@ class ModelFolders:
         self._sizes = sizes or {}
 
     def stand_in(self, uri):
-        """Return the text of an SDF that stands in for the model that ``uri`` (model://NAME) names, or None."""
+        """Return the SDF text of the replacement of the model ``uri`` (model://NAME), or None."""
         scheme, _, rest = uri.partition("://")
         name = rest.partition("/")[0]
         return _of_size(name, self._sizes[name]) if scheme == "model" and name in self._sizes else None

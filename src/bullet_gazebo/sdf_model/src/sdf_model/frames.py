@@ -8,7 +8,7 @@ OWN = ("", "__model__", "world", "__root__")
 
 
 class Frames:
-    """Collects named frames, then says where they are in the frame of the scope."""
+    """Collects named frames, then computes their poses in the frame of the scope."""
 
     def __init__(self, document):
         self._document = document

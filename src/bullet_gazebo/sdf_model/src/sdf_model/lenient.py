@@ -24,7 +24,7 @@ _RENAMED = {"filename": "uri"}
 
 
 def attributes_to_elements(root):
-    """Add to the elements of ``root``, in place, what stands as an attribute; return a list of (what, line)."""
+    """Convert attributes of ``root``'s elements to elements, in place; return a list of (what, line)."""
     mended = []
     for element in list(root.iter(*_INSIDE, "origin", "gravity")):
         if any(True for _ in element.iterancestors("plugin", "sensor")):

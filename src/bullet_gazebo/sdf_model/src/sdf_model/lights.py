@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The <light> element, and what <scene> says of light."""
+"""The <light> element, and the light settings of <scene>."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ class Light:
 
 @dataclass
 class Scene:
-    """What a world says of light that is everywhere. Colours red, green, blue from 0 to 1; None: it does not say."""
+    """Ambient light, background and shadows of a world. Colours red, green, blue from 0 to 1; None: not given."""
 
     ambient: tuple | None = None
     background: tuple | None = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What stands in a <link>: inertia, shapes, surfaces, materials."""
+"""The content of a <link>: inertia, shapes, surfaces, materials."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from urdf_model.transforms import pose_matrix
 
 from .lights import colour
 
-# Elements that say nothing about how a lab's world moves or looks here.
+# Elements without an effect on motion or looks here.
 _QUIET = ("enable_wind", "must_be_base_link", "laser_retro", "max_contacts", "cast_shadows", "meta", "velocity_decay")
 _INERTIA = (("ixx", 0, 0, 1.0), ("ixy", 0, 1, 0.0), ("ixz", 0, 2, 0.0), ("iyy", 1, 1, 1.0), ("iyz", 1, 2, 0.0))
 _INERTIA += (("izz", 2, 2, 1.0),)
@@ -47,7 +47,7 @@ def read_link(document, element, name):
 
 
 def _inertial(document, link):
-    """Return the Inertial; where nothing is said SDF's defaults, 1 kg and 1 kg m^2."""
+    """Return the Inertial; by default SDF's, 1 kg and 1 kg m^2."""
     element = link.find("inertial")
     if element is None:
         return Inertial(1.0, np.zeros(3), np.eye(3))
@@ -108,7 +108,7 @@ def _turned_to(document, plane):
 
 
 def _file(document, uri):
-    """Return a mesh's name so that it can be looked for without knowing which file spoke of it."""
+    """Return a mesh's name in a form that does not depend on the file that names it."""
     if "://" in uri or document.folder is None:
         return uri
     return str(Path(document.folder) / uri)

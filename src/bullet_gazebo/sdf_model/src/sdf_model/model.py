@@ -25,7 +25,7 @@ _DEEPEST_INCLUDE = 8
 
 @dataclass
 class SdfModel:
-    """A model: the Robot that it is, where it stands (4x4) in what it is part of, and what was not understood."""
+    """A model: its Robot, its pose (4x4) in its parent, and a warning about what was not understood."""
 
     name: str
     robot: Robot
@@ -60,7 +60,7 @@ def parse_sdf_model(xml, source, folders=None, folder=None):
 
 @dataclass
 class Included:
-    """What a file that was included holds beside or instead of a model."""
+    """The content of an included file besides or instead of a model."""
 
     lights: list[Light] = field(default_factory=list)
 
@@ -73,7 +73,7 @@ class ModelReader:
         self._opened = 0
 
     def model(self, document, element, depth=0, static=None):
-        """Return the SdfModel of a <model>. ``static`` overrides what it says itself."""
+        """Return the SdfModel of a <model>. ``static`` overrides its own element."""
         name = document.name(element)
         parts = self._parts(document, element, "", np.eye(4), depth)
         return self._finish(document, name, parts, document.pose(element), static)
@@ -174,7 +174,7 @@ class ModelReader:
         return _moved(parts, prefix, origin)
 
     def _hold_kinematic(self, document, element, parts):
-        """A model of kinematic links stands fast: nothing in the world moves it, but who puts it elsewhere does."""
+        """Make a model of kinematic links fixed: only services move it, no force does."""
         links = list(element.iterchildren("link"))
         kinematic = [link for link in links if document.flag(link, "kinematic")]
         if kinematic and len(kinematic) == len(links):
@@ -209,7 +209,7 @@ class ModelReader:
 
 
 def _moved(parts, prefix, origin):
-    """Return ``parts`` as they are seen from outside of their model."""
+    """Return ``parts`` with names and frames of the enclosing scope."""
     if not prefix:
         return parts
     links = {}
@@ -305,7 +305,7 @@ def _limit(document, given, name, kind):
     upper = document.number(element, "upper", math.inf)
     if lower > upper:
         raise document.error(element, "joint '%s' has lower limit %g above its upper limit %g" % (name, lower, upper))
-    # Below zero is SDF's way to say: unlimited.
+    # In SDF, a negative limit means unlimited.
     values = (document.number(element, tag, -1.0) for tag in ("effort", "velocity"))
     effort, velocity = (value if 0.0 <= value <= bounds.NO_LIMIT else None for value in values)
     if lower <= -bounds.NO_LIMIT and upper >= bounds.NO_LIMIT or kind == "continuous":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From links and joints anywhere in a model to the tree that a urdf_model.Robot is."""
+"""Builds the tree of a urdf_model.Robot from links and joints anywhere in a model."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -42,9 +42,9 @@ class Parts:
 def build_robot(document, name, parts):
     """Return the Robot of ``parts``.
 
-    A joint may be written from the child's end: it is turned round, so that its position means the same. What a tree
-    cannot have is noted: joints that close a loop are left out, links that nothing joins are held by the root. A model
-    that is welded to the world becomes static.
+    A joint may be written from the child's end: it is reversed, and its position keeps its meaning. Deviations from a
+    tree are noted: joints that close a loop are left out, links without a joint are fixed to the root. A model that is
+    welded to the world becomes static.
     """
     links = dict(parts.links)
     free = not parts.static
@@ -66,7 +66,7 @@ def build_robot(document, name, parts):
     joints, reached, used = {}, {root}, set()
 
     def hang(start):
-        """Add what is joined to link ``start``, and what is joined to that."""
+        """Add all links that are joined to link ``start``, directly or through others."""
         branch = deque([start])
         while branch:
             here = branch.popleft()
@@ -118,7 +118,7 @@ def _without_welds(parts):
 
 
 def _root(links, joints):
-    """Return the link that the others hang on: the world, or the first one that is nobody's child."""
+    """Return the root link: the world, or the first link that is no joint's child."""
     if WORLD in links:
         return WORLD
     children = {joint.child for joint in joints}

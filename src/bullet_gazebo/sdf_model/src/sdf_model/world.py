@@ -16,9 +16,9 @@ from .frames import Frames
 from .lights import Light, Scene, read_light, read_scene
 from .model import ModelReader, SdfModel
 
-# What a world says about windows, sound and weather, and about solvers that are not here.
+# Elements about windows, sound, weather and other solvers: ignored.
 _QUIET = ("gui", "audio", "wind", "atmosphere", "magnetic_field", "spherical_coordinates")
-# What is left out by name.
+# Left out, with a note.
 _NAMED = ("actor", "plugin")
 _ROAD_HEIGHT_M = 0.002
 _ASPHALT = (0.25, 0.25, 0.25, 1.0)
@@ -26,10 +26,8 @@ _ASPHALT = (0.25, 0.25, 0.25, 1.0)
 
 @dataclass
 class SdfWorld:
-    """What a world file asks for. None: it does not say.
-
-    ``problems`` are parts that cannot be had, one line each; the world goes on without them. ``warning`` names what
-    was not understood.
+    """The content of a world file. None: not given. ``problems`` are parts that cannot be used, one line each; the
+    world is made without them. ``warning`` names what was not understood.
     """
 
     name: str
@@ -135,7 +133,7 @@ class _WorldReader:
         world.models.append(model)
 
     def _state(self, element):
-        """A world that Gazebo has saved says twice where its models are; this is where they were in the end."""
+        """A world saved by Gazebo has two poses of each model; <state> has the last one."""
         poses = {child.get("name"): child for child in element.iterchildren("model")}
         for model in self._world.models:
             child = poses.get(model.name)
@@ -144,7 +142,7 @@ class _WorldReader:
 
 
 def _road(document, element):
-    """Return the SdfModel of a <road>: something to be seen, which nothing collides with."""
+    """Return the SdfModel of a <road>: visible, without collisions."""
     width = document.number(element, "width", 1.0)
     points = [np.array(document.numbers(point, 3)) for point in element.iterchildren("point")]
     if len(points) < 2 or not width > 0.0:

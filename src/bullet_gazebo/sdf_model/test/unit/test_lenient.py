@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Gazebo's reader took is taken here, with a warning that says what and where."""
+"""Deviations that Gazebo's reader accepts are accepted here, with a warning that names them and their place."""
 import numpy as np
 import pytest
 
