@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Camera drivers: the topics that stand behind a sensor plugin's file name.
-
-A driver is made from a :class:`SensorEntry`. The node asks whether it is due and has it publish; both
-happen in the thread that draws. ``config/camera_drivers.yaml`` says which driver a file name means.
+"""Camera drivers: the topics of a sensor plugin. A driver is made from a :class:`SensorEntry`. The drawing thread asks
+whether it is due and makes it publish. ``config/camera_drivers.yaml`` maps plugin file names to drivers.
 """
 import threading
 
@@ -20,16 +18,16 @@ _FASTEST_HZ = 1000.0
 
 
 class Topic:
-    """A publisher that knows whether somebody listens. A service's thread may close it at any time."""
+    """A publisher that knows whether it has subscribers. A service's thread may close it at any time."""
 
     def __init__(self, name, message_class):
-        # A queue of one: a subscriber that has stopped reading loses pictures and holds nobody up.
+        # A queue of one: a subscriber that has stopped reading loses pictures and delays nobody.
         self._publisher = rospy.Publisher(name, message_class, queue_size=1)
         self._lock = threading.Lock()
 
     @property
     def has_listeners(self):
-        """True while somebody is connected."""
+        """True while a subscriber is connected."""
         with self._lock:
             return self._publisher is not None and self._publisher.get_num_connections() > 0
 
@@ -40,7 +38,7 @@ class Topic:
                 self._publisher.publish(message)
 
     def close(self):
-        """Take the topic back."""
+        """Unregister the topic."""
         with self._lock:
             publisher, self._publisher = self._publisher, None
         if publisher is not None:
@@ -48,9 +46,9 @@ class Topic:
 
 
 class ReconfigureServer:
-    """Numbers that dynamic_reconfigure's clients read and change; closed like a topic."""
+    """Settings for clients of dynamic_reconfigure; closed like a topic."""
 
-    #: Nothing of this asks for a picture.
+    #: These topics need no picture.
     has_listeners = False
 
     def __init__(self, name, settings, apply):
@@ -79,7 +77,7 @@ class ReconfigureServer:
         self._opened.append(lambda: service.shutdown("the sensor is gone"))
 
     def close(self):
-        """Take topics and service back."""
+        """Unregister topics and service."""
         while self._opened:
             self._opened.pop()()
 
@@ -101,11 +99,11 @@ class ColourTopics:
 
     @property
     def want_picture(self):
-        """Whether somebody wants to see."""
+        """Whether a picture topic has subscribers."""
         return self.image.has_listeners or self.compressed.has_listeners
 
     def publish(self, time_s, frame, picture, encoding, info):
-        """``picture`` may be None when nobody wants it."""
+        """``picture`` may be None without subscribers."""
         for topic in self.infos:
             if topic.has_listeners:
                 topic.publish(convert.header(info, time_s, frame))
@@ -125,7 +123,7 @@ class Driver:
         self._pace = Pace(entry.rate)
 
     def name(self, text):
-        """A ROS name: relative ones live in the sensor's namespace. Raises :class:`SensorError` for what is none."""
+        """A ROS name: relative ones live in the sensor's namespace. Raises :class:`SensorError` for an invalid name."""
         name = text if text.startswith("/") else "%s/%s" % (self.entry.namespace, text)
         if not is_legal_name(name):
             raise SensorError("%s: '%s' is no name in ROS; expected letters, digits and _ between slashes"
@@ -133,7 +131,7 @@ class Driver:
         return name
 
     def rate_setting(self, camera_name):
-        """The rate as a client may change it, where Gazebo's cameras have it."""
+        """The setting of the rate, under the name that Gazebo's cameras use."""
         def apply(values):
             self._pace.rate = values["imager_rate"]
 
@@ -147,11 +145,11 @@ class Driver:
 
     @property
     def has_listeners(self):
-        """Whether anybody wants anything of this sensor."""
+        """Whether a topic of this sensor has subscribers."""
         return any(topic.has_listeners for topic in self.topics)
 
     def time_was_reset(self):
-        """What is seen next is another world, whatever its time."""
+        """The next state is new, even if its time is the same."""
         self._pace.restart()
 
     def is_due(self, time_s):
@@ -159,7 +157,7 @@ class Driver:
         return self._pace.is_due(time_s) and self.has_listeners
 
     def take(self, time_s, link_pose, draw):
-        """Publish what is seen at ``time_s`` from a sensor whose link stands at ``link_pose`` (4, 4).
+        """Publish the view at ``time_s`` of a sensor whose link is at ``link_pose`` (4, 4).
 
         ``draw(pinhole, pose, colour, depth)`` -> (picture, depth).
         """
@@ -167,11 +165,11 @@ class Driver:
         self.publish(time_s, link_pose, draw)
 
     def publish(self, time_s, link_pose, draw):
-        """Draw and send what somebody listens to."""
+        """Draw and publish the topics that have subscribers."""
         raise NotImplementedError
 
     def close(self):
-        """The sensor is gone."""
+        """Close the topics: the sensor was deleted."""
         for topic in self.topics:
             topic.close()
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What can go wrong here."""
+"""The errors of this package."""
 
 
 class RenderingError(Exception):
-    """There is nothing to draw with."""
+    """No renderer is available."""
 
 
 class SensorError(Exception):

@@ -12,14 +12,14 @@ import numpy as np
 from sensor_renderer.errors import RenderingError
 from sensor_renderer.light import MOST_LAMPS, Lamp
 
-# The shadow map covers this much around the place where robots work [m], with so many pixels a side: 9 mm each.
+# Size of the shadow map around the robots' workspace [m], and pixels per side: 9 mm each.
 _SHADOW_CENTRE = np.array([0.3, 0.0, 0.7])
 _SHADOW_HALF_M = 2.2
 _SHADOW_PIXELS = 512
 _NO_LAMP = Lamp((0.0,) * 4, (0.0,) * 3, (0.0,) * 4, (0.0,) * 3, (0.0,) * 3)
 
-# Light without shadows, of up to MOST_LAMPS lamps. In software even a loop of no turns costs as much as the rest of a
-# picture: where there are no lamps, the shaders have none.
+# Light without shadows, of up to MOST_LAMPS lamps. In software, even an empty loop costs as much as the rest of a
+# picture: without lamps, the shaders have no such loop.
 _NO_LAMPS = """
 #version 330
 vec3 lamplight(vec3 there, vec3 n) { return vec3(0.0); }
@@ -49,8 +49,8 @@ vec3 lamplight(vec3 there, vec3 n) {
 }
 """ % ((MOST_LAMPS,) * 5)
 
-# Light is reckoned at the vertices and only shadow at each pixel: without a graphics card pixels are what costs. Of the
-# floor, which has no more than four corners, lamps are reckoned at each pixel.
+# Light is computed per vertex and only shadow per pixel: without a graphics card, pixels are expensive. The floor has
+# only four corners, so its lamps are computed per pixel.
 _VERTEX = """
 uniform vec3 ambient;
 uniform vec3 sun;
@@ -143,7 +143,7 @@ void main() { seen = texture(picture, place); }
 
 
 class _Link(NamedTuple):
-    """What is drawn in one call: vertex arrays for colour and for depth alone, and a sphere around them."""
+    """The geometry of one draw call: vertex arrays for colour and for depth only, and a bounding sphere."""
 
     arrays: tuple
     centre: np.ndarray
@@ -155,7 +155,7 @@ class GlRenderer:
     """Draws a :class:`sensor_renderer.mirror.Mirror`."""
 
     def __init__(self):
-        """Raises :class:`RenderingError` where there is no EGL to draw with."""
+        """Raises :class:`RenderingError` if EGL is not available."""
         # In software one thread: physics and the user's own programs need the other processors.
         os.environ.setdefault("LP_NUM_THREADS", "1")
         try:
@@ -165,7 +165,7 @@ class GlRenderer:
         except Exception as error:  # noqa: BLE001  (each layer below raises its own kind)
             raise RenderingError("no OpenGL 3.3 on EGL: %s" % error) from error
         context = self._context
-        #: What draws, in the driver's own words.
+        #: Name of the renderer, as the driver gives it.
         self.name = context.info["GL_RENDERER"]
         self._screen_program = context.program(vertex_shader=_SCREEN_VERTEX, fragment_shader=_SCREEN_FRAGMENT)
         corners = np.array([(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)], dtype=np.float32)
@@ -188,10 +188,10 @@ class GlRenderer:
         context.enable(moderngl.DEPTH_TEST)
 
     def render(self, mirror, pinhole, pose, colour=True, depth=False):
-        """What a camera sees whose optical frame stands at ``pose`` (4, 4) in the world.
+        """Draw the view of a camera whose optical frame is at ``pose`` (4, 4) in the world.
 
         Returns (picture, depth): uint8 (height, width, 3) red, green, blue, and float32 (height, width) metres along
-        the optical z axis, NaN where nothing is; None for what was not asked for. Both are the caller's.
+        the optical z axis, NaN where nothing is; None if not requested. The caller owns both arrays.
         """
         view = np.linalg.inv(pose)
         to_clip = pinhole.clip_matrix() @ view
@@ -229,7 +229,7 @@ class GlRenderer:
         return picture, distance
 
     def close(self):
-        """Give the context back."""
+        """Release the context."""
         self._context.release()
 
     def _light_by(self, light):
@@ -290,7 +290,7 @@ class GlRenderer:
         return texture
 
     def _draw_shadows(self, mirror):
-        # Not by id(): a new world is often put where one that has gone was.
+        # Not by id(): a new object often gets the address of a deleted one.
         now = (weakref.ref(mirror), mirror.version)
         if self._shadow_of == now:
             return
@@ -340,7 +340,7 @@ class GlRenderer:
         return found
 
     def _vertex_array(self, program, rows, layout, *names):
-        """Rows that triangles share are worked on once."""
+        """The GPU processes shared vertices once."""
         unique, index = np.unique(rows, axis=0, return_inverse=True)
         context = self._context
         return context.vertex_array(program, [(context.buffer(np.ascontiguousarray(unique).tobytes()), layout, *names)],
@@ -355,8 +355,8 @@ class GlRenderer:
 
 
 def _visible(listed, pinhole, view):
-    """Those of ``listed``, (:class:`_Link`, matrix, anything), whose spheres reach into the camera's pyramid, near ones
-    first."""
+    """The entries of ``listed``, (:class:`_Link`, matrix, anything), whose spheres intersect the view frustum, near
+    ones first."""
     # Outward normals of the four sides, in the optical frame; all go through the eye.
     left, right = -(pinhole.cx + 0.5) / pinhole.fx, (pinhole.width - 0.5 - pinhole.cx) / pinhole.fx
     top, bottom = -(pinhole.cy + 0.5) / pinhole.fy, (pinhole.height - 0.5 - pinhole.cy) / pinhole.fy
@@ -371,13 +371,14 @@ def _visible(listed, pinhole, view):
     local = world @ view[:3, :3].T + view[:3, 3]
     inside = (local @ sides.T < radii[:, None]).all(axis=1)
     inside &= (local[:, 2] > pinhole.near - radii) & (local[:, 2] < pinhole.far + radii)
-    # Near ones first: what they cover need not be coloured.
+    # Near ones first: hidden pixels are not shaded.
     order = np.argsort(local[:, 2] - radii, kind="stable")
     return [listed[k] for k in order if inside[k]]
 
 
 def _shadow_matrices(away):
-    """From the world to the clip space of the light that comes from ``away``, and to places 0 to 1 in its picture."""
+    """Matrices from the world to the clip space of the light from direction ``away``, and to texture coordinates 0 to 1
+    of its map."""
     right = np.cross((0.0, 1.0, 0.0) if abs(away[1]) < 0.9 else (1.0, 0.0, 0.0), away)
     right /= np.linalg.norm(right)
     rotation = np.array([right, np.cross(away, right), away])

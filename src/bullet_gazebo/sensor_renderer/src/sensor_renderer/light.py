@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The light that everything is seen by, from what a world file says of it. ROS-free."""
+"""The light of the scene, from the world file's description. ROS-free."""
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-#: More lamps than this beside the sun are not looked at.
+#: Largest number of lamps beside the sun; more are ignored.
 MOST_LAMPS = 8
-# A world that names no light has a sun: where its light goes, its colour (those of Gazebo's model "sun").
+# The sun of a world without lights: direction of its light, its colour (from Gazebo's model "sun").
 _SUN_DIRECTION, _SUN_DIFFUSE = (-0.5, 0.1, -0.9), (0.8, 0.8, 0.8)
-# Of a world that does not say: Gazebo's grey ambience, before a sky.
+# Defaults of a world: Gazebo's grey ambient light, and a sky.
 _AMBIENT, _SKY = (0.4, 0.4, 0.4), (0.62, 0.70, 0.80)
-# Gazebo's sun and ambience together are brighter than white; a lamp's colour is taken times this, so that they are not.
+# Gazebo's sun and ambient light together are brighter than white; this factor on a lamp's colour prevents it.
 _EXPOSURE = 0.675
 
 
 class Lamp(NamedTuple):
-    """A light without a shadow. ``place`` (4): where it is [m] and 1, or where its parallel light comes from and 0;
-    ``colour`` (3); ``fade`` (4): constant, linear, quadratic, furthest [m]; ``beam`` (3): where a spot light looks;
-    ``cone`` (3): cosines of half its inner and outer angle, falloff. A light to all sides has a cone of -1, -2."""
+    """A light without a shadow. ``place`` (4): its position [m] and 1, or the direction that its parallel light comes
+    from and 0; ``colour`` (3); ``fade`` (4): constant, linear, quadratic, furthest [m]; ``beam`` (3): direction of a
+    spot light; ``cone`` (3): cosines of half its inner and outer angle, falloff. A light to all sides has a cone of -1,
+    -2."""
 
     place: tuple
     colour: tuple
@@ -41,8 +42,7 @@ class Light(NamedTuple):
 
     @classmethod
     def of_scene(cls, listed):
-        """``listed`` as :meth:`gazebo_ros.world_lights.WorldLights.listed` says it; what is missing is as in a world
-        that does not say."""
+        """``listed`` as from :meth:`gazebo_ros.world_lights.WorldLights.listed`; missing values get the defaults."""
         lights = listed.get("lights")
         if lights is None:
             lights = [{"type": "directional", "direction": _SUN_DIRECTION, "diffuse": _SUN_DIFFUSE,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The world as a picture needs it: what the snapshot lists, posed by our own forward kinematics. ROS-free."""
+"""The world for the renderer: the bodies of the snapshot, posed by our own forward kinematics. ROS-free."""
 from typing import NamedTuple
 
 import numpy as np
@@ -28,8 +28,8 @@ class Part(NamedTuple):
 
 
 class Screen(NamedTuple):
-    """A rectangle that shows a picture. ``offset`` (4, 4) in the frame of ``link``: in its middle, x to the right and y
-    up for a viewer in front of it; ``size``: width, height [m]; ``picture``:
+    """A rectangle that shows a picture. ``offset`` (4, 4) in the frame of ``link``: the frame of its centre, x to the
+    right and y up for a viewer in front of it; ``size``: width, height [m]; ``picture``:
     :class:`world_picture.shared_picture.PictureReader`."""
 
     link: str
@@ -39,7 +39,7 @@ class Screen(NamedTuple):
 
 
 class Body:
-    """A model: its links as parts, its screens, and where they are."""
+    """A model: its links as parts, its screens, and their poses."""
 
     def __init__(self, links, joints, screens=()):
         """``links``: list of (name, parts), parents first; ``joints``: one ``urdf_model.Joint`` per link but the first.
@@ -54,11 +54,11 @@ class Body:
 
     @property
     def size(self):
-        """How many values of a snapshot are this body's."""
+        """Number of this body's values in a snapshot."""
         return 7 + len(self._joints)
 
     def set_state(self, values):
-        """Pose everything: ``values`` as the snapshot has them. Returns whether anything has moved."""
+        """Set the poses of all links from ``values``, in the snapshot's order. Returns whether anything has moved."""
         if self._shown is not None and np.array_equal(values, self._shown):
             return False
         self._shown = values.copy()
@@ -91,13 +91,13 @@ class Mirror:
         self._bodies = {}
         #: Bodies by name, in the scene's order.
         self.bodies = {}
-        #: What everything is seen by: :class:`sensor_renderer.light.Light`.
+        #: The light: :class:`sensor_renderer.light.Light`.
         self.light = Light.of_scene({})
-        #: Counts changes of what is to be seen, but for pictures on screens.
+        #: Counts visible changes, except pictures on screens.
         self.version = 0
 
     def set_scene(self, listed, light=None):
-        """Show what :meth:`world_picture.snapshot.SnapshotWriter.write_scene` lists; what is known already stays."""
+        """Show what :meth:`world_picture.snapshot.SnapshotWriter.write_scene` lists; bodies that exist already stay."""
         self.light = Light.of_scene(light or {})
         known = self._bodies
         self._bodies = {}
@@ -110,7 +110,7 @@ class Mirror:
         self.version += 1
 
     def set_state(self, values):
-        """Move everything to where a snapshot's ``values`` say it is."""
+        """Move all bodies to the poses in a snapshot's ``values``."""
         start, moved = 0, False
         for body in self.bodies.values():
             moved |= body.set_state(values[start:start + body.size])
@@ -141,7 +141,7 @@ class Mirror:
             return [self._placed((geometry,), lambda: triangles.of_primitive(geometry), shape.origin, colour)]
         path = self._find_mesh(geometry.filename)
         if path is None:
-            return []  # /gazebo has said so
+            return []  # /gazebo has logged it
         try:
             found = self._drawings.parts(path)
         except DrawingError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The /sensor_renderer node: follows the simulator's snapshot and draws what somebody listens to."""
+"""The /sensor_renderer node: follows the simulator's snapshot and draws the pictures of topics with subscribers."""
 import importlib
 import os
 import signal
@@ -20,11 +20,10 @@ from sensor_renderer.sensor_element import SensorEntry
 from world_picture.drawing import DrawingCache
 from world_picture.snapshot import SnapshotError, SnapshotReader
 
-# How often the snapshot is looked at while somebody listens, and while nobody does; how often a simulator is looked
-# for [s].
+# Polling periods [s]: of the snapshot with subscribers, of the snapshot without, and of the search for a simulator.
 _LOOK_S, _IDLE_S, _SEEK_S = 0.004, 0.05, 0.25
 
-# A sensor that has failed so often within so long [s, simulated time] is not made anew once more.
+# A sensor that fails this many times within this time [s, simulated time] is not restarted again.
 FAILURES, FAILURES_WITHIN_S = 3, 10.0
 
 
@@ -102,7 +101,7 @@ class SensorRenderer:
             self._begin_anew(driver, time_s, error)
 
     def _begin_anew(self, driver, time_s, error):
-        """A sensor has failed: make it anew, or leave it out until the time is set back where that has not helped."""
+        """A sensor has failed: restart it, or, if restarting has not helped, leave it out until the time is reset."""
         entry, what = driver.entry, "%s: %s" % (type(error).__name__, error)
         keys = [key for key, other in self._sensors.items() if other is driver]
         for key in keys:
@@ -112,7 +111,7 @@ class SensorRenderer:
         driver.close()
         if len(failed_at) < FAILURES:
             rospy.logerr("%s failed and begins anew: %s" % (entry, what))
-            # Its entry comes with the next look at the scene.
+            # It is made again at the next check of the scene.
             self._revision = None
         else:
             rospy.logerr("%s failed %d times within %g s and is left out until reset_simulation: %s"
@@ -120,7 +119,7 @@ class SensorRenderer:
             self._refused.update(keys)
 
     def _revive(self):
-        """The time was set back: sensors that had failed get another chance."""
+        """The time was reset: enable failed sensors again."""
         if self._failed_at:
             self._refused -= self._failed_at.keys()
             self._failed_at.clear()
@@ -174,7 +173,7 @@ def _find_snapshot(stop):
 
 
 def make_renderer():
-    """What this machine can draw with, and says so."""
+    """Return the best renderer of this machine, and log which one it is."""
     try:
         renderer = GlRenderer()
     except RenderingError as error:
@@ -189,7 +188,7 @@ def make_renderer():
 
 def main():
     """Draw until a signal or a shutdown request; returns the exit code."""
-    # Physics comes first: pictures take what the processors have left.
+    # Physics comes first: drawing runs at the lowest priority.
     os.nice(19)
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -204,5 +203,5 @@ def main():
     node.close()
     rospy.signal_shutdown("the renderer ends")
     sys.stdout.flush()
-    # A subscriber that does not read would keep the threads of its connection, and so the process.
+    # A subscriber that does not read would keep its connection's threads, and thereby the process, alive.
     os._exit(0)

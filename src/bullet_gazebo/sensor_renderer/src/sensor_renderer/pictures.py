@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What happens to a picture between the lens and the wire, and points from depth. ROS-free."""
+"""Processing of pictures before they are published, and points from depth. ROS-free."""
 import numpy as np
 
-# Numbers of the noise that is made once and shifted for each picture.
+# Size of the noise table, which is made once and shifted for each picture.
 _NOISE_LENGTH = 1 << 20
 _BYTES = {"rgb8": 3, "bgr8": 3, "mono8": 1, "bgra8": 4}
 
@@ -36,13 +36,13 @@ def encoded(picture, encoding):
 
 
 def within(depth, nearest, furthest):
-    """``depth`` (height, width) with NaN in place of what is nearer or further than that [m]."""
+    """``depth`` (height, width) with NaN for values nearer or further than these limits [m]."""
     with np.errstate(invalid="ignore"):
         return np.where((depth >= nearest) & (depth <= furthest), depth, np.float32(np.nan))
 
 
 def millimetres(depth):
-    """``depth`` [m] as uint16 [mm]; 0 where there is none, or where it is too far to say."""
+    """``depth`` [m] as uint16 [mm]; 0 where there is none, or where it is too large for uint16."""
     with np.errstate(invalid="ignore"):
         rounded = np.round(depth * 1000.0)
         return np.where(rounded < 65536.0, rounded, 0.0).astype(np.uint16)

@@ -20,7 +20,7 @@ OPTICAL = np.array([[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0
 
 
 class Pinhole(NamedTuple):
-    """Size [pixels], focal lengths and principal point [pixels], nearest and furthest depth that is seen [m]."""
+    """Size [pixels], focal lengths and principal point [pixels], nearest and furthest visible depth [m]."""
 
     width: int
     height: int
@@ -35,7 +35,7 @@ class Pinhole(NamedTuple):
     def from_field_of_view(cls, width, height, horizontal_rad, near, far):
         """A camera with square pixels that looks through the middle of its picture.
 
-        Raises :class:`SensorError` for what no camera can have.
+        Raises :class:`SensorError` for impossible values.
         """
         if not (1 <= width <= MAX_PIXELS and 1 <= height <= MAX_PIXELS):
             raise SensorError("a picture of %d x %d pixels is out of range; expected 1 to %d each"
@@ -58,7 +58,7 @@ class Pinhole(NamedTuple):
     def clip_matrix(self):
         """The (4, 4) matrix from the optical frame to OpenGL's clip space, the picture's first row at the bottom.
 
-        With that, memory that OpenGL fills from the bottom holds the picture from the top.
+        OpenGL fills memory from the bottom row, so the memory then holds the picture from its top row.
         """
         near, far = self.near, self.far
         return np.array([

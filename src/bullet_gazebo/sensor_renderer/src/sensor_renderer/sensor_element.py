@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an SDF ``<sensor>`` element says of a camera, and what its ``<plugin>`` says of topics. ROS-free."""
+"""The camera of an SDF ``<sensor>`` element, and the topics of its ``<plugin>``. ROS-free."""
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +35,7 @@ class SensorEntry:
 
     def __init__(self, model, listed):
         """``listed``: ``link`` (a body of the model), ``offset`` (16 numbers, link frame in the body's), ``member``
-        (the link it was written for), ``xml`` (the element), ``plugin`` (which of its plugins), ``namespace``.
+        (the link that the description names), ``xml`` (the element), ``plugin`` (which of its plugins), ``namespace``.
 
         Raises :class:`SensorError`.
         """
@@ -49,7 +49,7 @@ class SensorEntry:
         self.filename = self.plugin.get("filename", "").rsplit("/", 1)[-1]
         self.name = self.element.get("name") or self.plugin.get("name") or "camera"
         rate = self.number(self.plugin, "updateRate", 0.0) or self.number(self.element, "update_rate", 0.0)
-        #: Pictures a second of simulation time; 0: as many as there are states.
+        #: Rate [Hz, simulation time]; 0: one picture per state.
         self.rate = max(rate, 0.0)
 
     def __str__(self):

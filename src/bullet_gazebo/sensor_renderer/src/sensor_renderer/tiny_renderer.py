@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures with PyBullet's TinyRenderer, for machines without EGL: right, and some ten times slower. ROS-free."""
+"""Pictures with PyBullet's TinyRenderer, for machines without EGL: correct, and about ten times slower. ROS-free."""
 import numpy as np
 import pybullet
 
@@ -44,7 +44,7 @@ class TinyRenderer:
         return picture, distance
 
     def close(self):
-        """Give the client back."""
+        """Disconnect the client."""
         pybullet.disconnect(physicsClientId=self._client)
 
     def _follow(self, mirror):

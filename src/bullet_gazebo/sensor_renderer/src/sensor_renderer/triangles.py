@@ -42,7 +42,8 @@ def of_wavefront(path):
 
 
 def of_mesh(vertices, faces):
-    """Triangles of vertices (n, 3) and faces (m, 3). Normals are smooth but for edges sharper than :data:`CREASE_RAD`.
+    """Triangles of vertices (n, 3) and faces (m, 3). Normals are smooth except at edges sharper than
+    :data:`CREASE_RAD`.
 
     Triangles without area are left out.
     """
@@ -55,7 +56,7 @@ def of_mesh(vertices, faces):
     if not len(faces):
         return np.zeros((0, 6), dtype=np.float32)
 
-    # Each corner collects the faces about its vertex that lie about as its own does, weighted by area.
+    # Each corner averages the faces at its vertex with nearly the same orientation, weighted by area.
     vertex = faces.ravel()
     face = np.repeat(np.arange(len(faces)), 3)
     order = np.argsort(vertex, kind="stable")

@@ -43,7 +43,7 @@ def field(cloud, name, kind):
 
 
 def red_box(picture):
-    """Width and height [pixels] of what is red in (height, width, 3), and how much of that is red."""
+    """Width and height [pixels] of the red area in (height, width, 3), and the red fraction of its box."""
     red = (picture[:, :, 0] > 80) & (picture[:, :, 1] < 20) & (picture[:, :, 2] < 20)
     rows, columns = np.nonzero(red)
     return (int(np.ptp(columns)), int(np.ptp(rows)), len(rows)) if len(rows) else (0, 0, 0)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cameras of SDF and URDF models come and go with their models, and with the simulator."""
+"""Cameras of SDF and URDF models appear and disappear with their models, and with the simulator."""
 import functools
 import os
 import signal
@@ -80,7 +80,7 @@ class SensorRendererTest(unittest.TestCase):
             wait_until(lambda text=text: any(text in line for line in said), text)
             self.assertEqual(sum(text in line for line in said), 1, "said once: %s" % text)
 
-        # The renderer is killed without a word; it comes back and goes on.
+        # The renderer is killed; it is restarted and goes on.
         old = api_of("/sensor_renderer")
         os.kill(xmlrpc.client.ServerProxy(old).getPid("/test")[2], signal.SIGKILL)
         wait_until(lambda: api_of("/sensor_renderer") not in (None, old))
@@ -93,7 +93,7 @@ class SensorRendererTest(unittest.TestCase):
 
     def test_2_models_and_simulators_come_and_go(self):
         spawn("sdf", "rig", RIG, 0.0)
-        # One sensor of this model has no <camera>: the others see.
+        # One sensor of this model has no <camera>: the others work.
         first = wait_for_message(LEFT, Image)
         self.assertEqual((first.width, first.height, first.encoding, first.header.frame_id), (160, 120, "rgb8", "eyes"))
         self.assertFalse(is_green(first))
@@ -109,7 +109,7 @@ class SensorRendererTest(unittest.TestCase):
         rospy.ServiceProxy("/gazebo/delete_model", DeleteModel)("wall")
         wait_for_message(LEFT, Image, lambda image: not is_green(image))
 
-        # The simulator dies without a word and comes back empty; a new world is seen by the same renderer.
+        # The simulator is killed and restarts with an empty world; the same renderer draws the new world.
         old = api_of("/gazebo")
         os.kill(xmlrpc.client.ServerProxy(old).getPid("/test")[2], signal.SIGKILL)
         wait_until(lambda: api_of("/gazebo") not in (None, old))
@@ -120,7 +120,7 @@ class SensorRendererTest(unittest.TestCase):
 
 
 def api_of(node):
-    """Where a node listens; None while the master knows none of that name."""
+    """The address of a node; None while the master knows none of that name."""
     try:
         return rosgraph.Master("/test").lookupNode(node)
     except rosgraph.MasterError:

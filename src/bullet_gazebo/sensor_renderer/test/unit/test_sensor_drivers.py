@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Between a description and the wire: what a <sensor> says, when a picture is due, what messages hold."""
+"""From a description to messages: the <sensor> element, when a picture is due, the messages."""
 import numpy as np
 import pytest
 from dynamic_reconfigure.msg import Config, DoubleParameter, IntParameter

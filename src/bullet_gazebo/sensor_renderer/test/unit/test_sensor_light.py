@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""By which light things are seen, and pictures on screens."""
+"""Light, and pictures on screens."""
 import numpy as np
 import pytest
 

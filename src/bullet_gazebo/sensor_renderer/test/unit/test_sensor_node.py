@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The loop of /sensor_renderer: which states of the world a sensor is shown."""
+"""The loop of /sensor_renderer: which states of the world a sensor gets."""
 import os
 import types
 
@@ -16,7 +16,7 @@ AT_ORIGIN = np.array([0.0, 0, 0, 0, 0, 0, 1])
 
 
 class Eye:
-    """A driver that takes note instead of pictures."""
+    """A driver that records calls instead of drawing."""
 
     has_listeners = True
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What must be seen is known: sizes, places, colours."""
+"""Pictures with known sizes, places and colours."""
 import subprocess
 import sys
 
@@ -99,7 +99,7 @@ def test_depth_agrees_with_rays(renderer, tmp_path):
         assert hit[0] >= 0, "every ray of this view ends on the floor or on the cube"
         at_edge = np.ptp(depth[max(v - 1, 0):v + 2, max(u - 1, 0):u + 2]) > 0.02
         if at_edge:
-            continue  # half a pixel decides which of two surfaces is meant
+            continue  # half a pixel decides which of two surfaces is hit
         hits += 1
         assert depth[v, u] == pytest.approx(hit[2] * 50.0, abs=0.005)
     pybullet.disconnect(physicsClientId=client)
@@ -154,7 +154,7 @@ def test_bodies_come_and_go(renderer, tmp_path):
 
 
 def test_a_shadow_falls_on_the_floor(tmp_path):
-    """Every time: of the worlds drawn in turn, each is gone before the next comes, and often to the same address."""
+    """Worlds are drawn in turn. Each is deleted before the next is made, which often gets the same address."""
     renderer = GlRenderer()
     pinhole = Pinhole.from_field_of_view(320, 240, 0.6, 0.05, 20.0)
     pose = pose_matrix((0.3, 0.0, 2.0), (0.0, np.pi / 2, 0.0)) @ OPTICAL
