@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulation time: when what happens at a rate is due, and the time stamps of messages."""
+"""Simulation time: when periodic work is due, and the time stamps of messages."""

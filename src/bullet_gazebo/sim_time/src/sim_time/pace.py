@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When something that happens at a rate is due, in simulation time. Free of ROS."""
+"""When periodic work is due, in simulation time. Free of ROS."""
 import math
 
-# Times of ticks and multiples of a period meet in rounding only [s].
+# Margin for the rounding of tick times and multiples of a period [s].
 _TOLERANCE_S = 1e-6
 
 
 class Pace:
-    """Due every period from the first time on that it is asked; at once where time has gone back.
-
-    rate [Hz]: 0 for every time that it is asked.
+    """Due every period after the first query; due at once when time has gone back. rate [Hz]: 0 means due at every
+    query.
     """
 
     def __init__(self, rate):
@@ -17,7 +16,7 @@ class Pace:
 
     @property
     def rate(self):
-        """How many times a second [Hz]; 0: every time that it is asked. Setting it begins anew."""
+        """Rate [Hz]; 0: due at every query. Setting it restarts the period."""
         return self._rate
 
     @rate.setter
@@ -27,15 +26,15 @@ class Pace:
         self.restart()
 
     def restart(self):
-        """It is due at once, whatever the time."""
+        """Make it due at once, whatever the time."""
         self._last_s, self._next_s = -math.inf, -math.inf
 
     def is_due(self, time_s):
-        """Whether it is due at ``time_s`` [s]. Says so until :meth:`took`."""
+        """Whether it is due at ``time_s`` [s]. It stays due until :meth:`took`."""
         return time_s >= self._next_s - _TOLERANCE_S or time_s < self._last_s
 
     def took(self, time_s):
-        """It was done at ``time_s`` [s]. A late caller does not catch up."""
+        """Note that the work was done at ``time_s`` [s]. A late caller does not catch up."""
         following = self._next_s + self.period_s
         latest = time_s + self.period_s
         self._next_s = following if time_s < following <= latest + _TOLERANCE_S else latest
@@ -65,11 +64,11 @@ class Schedule:
         self.rate_hz = float(rate_hz)
         self._last = None
         self._begin_s = math.inf
-        #: Until when nothing is due [s], if the clock does not go back.
+        #: Nothing is due before this time [s], unless the clock goes back.
         self.next_s = -math.inf
 
     def due(self, time_s):
-        """Whether a new period has begun at time_s [s]; a clock that went back begins anew."""
+        """Whether a new period has begun at time_s [s]; after the clock went back, it is due at once."""
         # Asked at every tick, and nearly always in vain.
         if self._begin_s <= time_s < self.next_s:
             return False
@@ -77,6 +76,6 @@ class Schedule:
         if period == self._last:
             return False
         self._last = period
-        # Twice the margin of the line above, so that rounding cannot make it late.
+        # Twice the margin of the line above, so that rounding never delays it.
         self._begin_s, self.next_s = period / self.rate_hz, (period + 1 - 2e-6) / self.rate_hz
         return True

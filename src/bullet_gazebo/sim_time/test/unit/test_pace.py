@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is due every period, and times of messages."""
+"""Periodic work, and time stamps of messages."""
 import subprocess
 import sys
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is due at a rate is due once per period, on the period's grid, whatever the ticks."""
+"""A schedule is due once per period, on the period's grid, whatever the ticks."""
 import math
 from fractions import Fraction
 
@@ -16,7 +16,7 @@ def due_at(schedule, times_s):
 @pytest.mark.parametrize("tick_s", ["1/500", "1/1000", "1/240"])
 @pytest.mark.parametrize("start_s", [0, 7, 1_000_000])
 def test_once_per_period_at_the_first_tick_in_it(hz, tick_s, start_s):
-    """Told in fractions, which do not round."""
+    """Times are fractions, which do not round."""
     ticks = [start_s + k * Fraction(tick_s) for k in range(2500)]
     expected = [tick for k, tick in enumerate(ticks)
                 if k == 0 or math.floor(tick * Fraction(hz)) != math.floor(ticks[k - 1] * Fraction(hz))]
