@@ -3,7 +3,7 @@
 
 Bullet computes in double precision and checks nothing: 1e308 N makes every position a NaN, and once its search tree of
 boxes holds a NaN nothing in the world collides any more. The bounds are wide: each is beyond what any robot, building
-or vehicle has, and far inside of what the arithmetic stands.
+or vehicle has, and far within the range of the arithmetic.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 
 
 class OutOfBounds(ValueError):
-    """A number that no world holds: the text names it and says its bound."""
+    """A number is out of bounds: the text names it and its bound."""
 
 
 @dataclass(frozen=True)
 class Bound:
-    """From ``low`` to ``high`` [``unit``]; ``reason`` says where the figures come from."""
+    """From ``low`` to ``high`` [``unit``]; ``reason`` says where the numbers come from."""
 
     low: float
     high: float
@@ -27,13 +27,13 @@ class Bound:
     reason: str
 
     def check(self, values, what):
-        """Return ``values`` (a number or a sequence of numbers) where each is finite and within the bound.
+        """Return ``values`` (a number or a sequence of numbers) if each is finite and within the bound.
 
         ``what`` names them in the text of OutOfBounds.
         """
         numbers = values if np.ndim(values) else (values,)
         for number in numbers:
-            # Not a number compares as false.
+            # Also true for NaN, because it compares as false.
             if not self.low <= number <= self.high:
                 found = "%g" % number if number is values else "(%s)" % ", ".join("%g" % value for value in numbers)
                 raise OutOfBounds("%s is %s%s; expected %s" % (what, found, self._unit, self.text))
@@ -64,7 +64,7 @@ EFFORT = _either_way(1e7, "N or N m", "of a joint: as for forces and torques")
 DAMPING = Bound(0.0, 1e12, "N s/m or N m s/rad", "of joints and contacts: holds a joint fast already")
 FRICTION = Bound(0.0, 1e9, "N or N m", "of a joint: more than any effort overcomes")
 MASS = Bound(0.0, 1e7, "kg", "10000 t. Bullet solves ratios of masses up to some 1e10 in doubles")
-#: Less than a microgram is no mass: its inverse, times a force, leaves what doubles hold.
+#: Less than a microgram is no mass: its inverse times a force overflows a double.
 LEAST_MASS_KG = 1e-9
 #: A moving body needs some inertia, or the solver divides by zero: for its mass that of a ball of 1.6 mm radius
 #: (0.4 m r^2), smaller than any part of a robot.
@@ -79,13 +79,13 @@ UPDATE_RATE = Bound(0.0, 1e6, "Hz", "no machine makes a step in a microsecond; 0
 #: A limit of a joint beyond this [rad, m, N, N m and per second] means none; SDF's own default is 1e16.
 NO_LIMIT = 1e12
 
-#: What a description may hold: ten times what the largest robots in use do. It is handed to every viewer.
+#: Limits of a description: ten times the largest robots in use. It is sent to every viewer.
 DESCRIPTION_BYTES = 4_000_000
-#: What a world file may hold, of which each model is read once.
+#: Limits of a world file, of which each model is read once.
 WORLD_BYTES = 40_000_000
-#: Shorter elements than this on the average hold nothing.
+#: Elements that are shorter than this on average hold no data.
 BYTES_PER_ELEMENT = 40
-LINKS = 2_000  # some 0.2 s to read
+LINKS = 2_000  # about 0.2 s to read
 INCLUDES = 2_000
 #: Bullet's buffers hold 128 coordinates for a body (MAX_DEGREE_OF_FREEDOM), of which seven are its base's.
 MOVABLE_JOINTS = 121
@@ -93,7 +93,7 @@ NAME_LETTERS = 500
 
 
 def check_robot(robot):
-    """Check all numbers of a Robot, and how much of it there is. Raises OutOfBounds, with names and line numbers."""
+    """Check all numbers of a Robot, and its size. Raises OutOfBounds, with names and line numbers."""
     if len(robot.links) > LINKS:
         raise OutOfBounds("%d links are more than can be read in time; expected at most %d" % (len(robot.links), LINKS))
     movable = len(robot.movable_joints())
@@ -110,7 +110,7 @@ def check_robot(robot):
 
 
 def check_name(name, what):
-    """Return ``name``; raises OutOfBounds where it is too long to be sent around at every tick."""
+    """Return ``name``; raises OutOfBounds if it is too long to be published at every tick."""
     if len(name) > NAME_LETTERS:
         raise OutOfBounds("%s has %d letters ('%s…'); expected at most %d" % (what, len(name), name[:40], NAME_LETTERS))
     return name

@@ -9,13 +9,13 @@ import stat
 def read_file(path, most_bytes):
     """Return the content (bytes) of a regular file. Raises OSError for anything else, and for a larger one.
 
-    A named pipe has nothing to read until somebody writes, and a device may never end: neither is opened for waiting.
+    Reading a named pipe may block, and a device may never end, so neither is opened.
     """
     with open(path, "rb", opener=_open_at_once) as file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
             raise OSError(errno.EINVAL, "it is %s, not a file" % kind_of(status.st_mode), str(path))
-        # The kernel's own files say that they are empty, and reading some of them waits.
+        # The kernel's own files claim to be empty, and reading some of them blocks.
         if status.st_size == 0:
             raise OSError(errno.EINVAL, "it is empty", str(path))
         content = file.read(most_bytes + 1) if status.st_size <= most_bytes else b""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Merge links that fixed joints hold together into one body each.
 
-PyBullet's own merging drops centres of mass (bulletphysics/bullet3 pull request 4683), which puts gravity torques of a
-Baxter arm wrong by up to 1.7 Nm; so it is done here, by the parallel-axis theorem.
+PyBullet's own merging drops centres of mass (bulletphysics/bullet3 pull request 4683), which makes gravity torques of a
+Baxter arm wrong by up to 1.7 Nm; so we merge here, by the parallel-axis theorem.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .model import Inertial, Joint, Robot, Shape, Surface
 
 
 class MergedFrame(NamedTuple):
-    """Where an original link went: the body it belongs to, and its frame (4x4) in that body's frame."""
+    """The place of an original link: the body that it belongs to, and its frame (4x4) in that body's frame."""
 
     link: str
     offset: np.ndarray
@@ -26,8 +26,8 @@ class MergedFrame(NamedTuple):
 class MergedLink:
     """A body: named after the link that its movable joint moves (or the root), with everything fixed to it.
 
-    Its frame is that of its joint, of the root's body that of the model; in a URDF that is the frame of the link it is
-    named after. Of differing surfaces the first one that a member brings counts.
+    Its frame is that of its joint; the root's body has the model's frame. In a URDF that is the frame of the link that
+    it is named after. If its members have different surfaces, the first one counts.
     """
 
     name: str
@@ -53,8 +53,8 @@ class MergedRobot:
 def merge_fixed(robot: Robot) -> MergedRobot:
     """Return ``robot`` with its fixed joints removed; bodies come parents first, joints in that same order.
 
-    Floating and planar joints cannot be merged nor driven; they are treated as movable by nobody, i.e. as fixed, which
-    ``parse_urdf`` has warned of.
+    Floating and planar joints cannot be merged nor driven; they are treated as fixed; ``parse_urdf`` has warned of
+    them.
     """
     children: dict[str, list[Joint]] = {name: [] for name in robot.links}
     for joint in robot.joints.values():

@@ -41,7 +41,7 @@ class Mesh:
 class Plane:
     """Flat, facing +z of its frame: in collisions the half space below it, in visuals a sheet of ``size``.
 
-    No URDF element; floors and SDF models bring it.
+    No URDF element; floors and SDF models use it.
     """
 
     size: tuple[float, float] = (1.0, 1.0)
@@ -84,7 +84,7 @@ class Mimic:
 
 @dataclass(frozen=True)
 class Surface:
-    """How a link's collisions touch others. None: not said."""
+    """Contact properties of a link. None: not given."""
 
     friction: float | None = None  # Coulomb's mu
     stiffness: float | None = None  # N/m

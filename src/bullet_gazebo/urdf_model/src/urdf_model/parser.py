@@ -34,8 +34,8 @@ JOINT_TYPES = MOVABLE_TYPES + ("fixed", "floating", "planar")
 def parse_urdf(xml, source="robot_description"):
     """Return the Robot that ``xml`` (str or bytes) describes. ``source`` names it in messages.
 
-    Things that can be mended (an inertia that no body can have, a joint that nothing drives) are listed in
-    ``Robot.warnings``. Raises UrdfError for what cannot: malformed XML, another root element, duplicate or unknown
+    Things that can be repaired (an impossible inertia, a joint type that nothing drives) are listed in
+    ``Robot.warnings``. Raises UrdfError for all others: malformed XML, another root element, duplicate or unknown
     names, a tree with no or several roots, numbers that are not finite or out of bounds (``bounds``), more than a
     description may hold.
     """
@@ -256,7 +256,7 @@ class _Reader:
                 )
             return Limit()
         limit = Limit(velocity=self.number(element, "velocity"), effort=self.number(element, "effort"))
-        # Some tools write the largest number there is for "none".
+        # Some tools write the largest float for "none".
         limit.velocity, limit.effort = (
             None if value is not None and value > bounds.NO_LIMIT else value
             for value in (limit.velocity, limit.effort)
@@ -296,7 +296,7 @@ class _Reader:
         return Transmission(name, kind, tuple(found), tuple(reductions), tuple(actuators))
 
     def gazebo_reference(self, element, link):
-        """Take over what a <gazebo reference="link"> says of the link's surface, weight and colour."""
+        """Apply a <gazebo reference="link">: the link's surface, weight and colour."""
         found = {}
         for tag, name in (("mu1", "friction"), ("kp", "stiffness"), ("kd", "damping")):
             # Both spellings of the first one are in use.
@@ -401,7 +401,7 @@ def _words(values):
 
 
 def _reduction(text):
-    # No fault of a transmission makes a body: controller_manager, which uses it, says what is wrong.
+    # A wrong transmission does not affect the bodies: controller_manager, which uses it, reports the error.
     try:
         number = float(text)
     except (TypeError, ValueError):

@@ -7,16 +7,15 @@ from . import bounds
 
 
 class XmlRefused(ValueError):
-    """The text cannot be used; the error goes on from the text's name: "… is not well-formed XML: …"."""
+    """The text cannot be used; the message continues after the text's name: "… is not well-formed XML: …"."""
 
 
 def parse_xml(text, most_bytes=bounds.DESCRIPTION_BYTES, repaired=None):
     """Return the root element of ``text`` (str or bytes), without comments; None where it holds none.
 
-    ``repaired``: function that is told of an element whose end tag is missing, which then ends where its parent does;
-    without it such a text is refused. One that breaks off is refused in any case: half a model is none.
-
-    Raises XmlRefused for what is not well-formed, declares entities, or is larger than a description may be.
+    ``repaired``: function called for an element whose end tag is missing, which then ends where its parent does;
+    without it such a text is refused. A text that breaks off is always refused. Raises XmlRefused for a text that is
+    not well-formed, declares entities, or is too large.
     """
     data = text.encode() if isinstance(text, str) else text
     if len(data) > most_bytes:
@@ -43,8 +42,8 @@ def _parser(recover):
 
 
 def _with_end_tags(data, parser):
-    """Return the root element of ``data`` (bytes), on which ``parser`` failed, with the end tags that are missing; None
-    where that is not all that is wrong with it."""
+    """Return the root element of ``data`` (bytes), on which ``parser`` failed, with the missing end tags added; None if
+    it has other errors."""
     # A mismatch is found again as an element without an end.
     ends = {etree.ErrorTypes.ERR_TAG_NAME_MISMATCH, etree.ErrorTypes.ERR_TAG_NOT_FINISHED}
     if {entry.type for entry in parser.error_log} - ends:
@@ -54,7 +53,7 @@ def _with_end_tags(data, parser):
 
 
 def refuse_entities(root):
-    """Raise XmlRefused where the document of ``root`` declares entities: what they stand for may be without end."""
+    """Raise XmlRefused if the document of ``root`` declares entities: their expansion may be endless."""
     declared = root.getroottree().docinfo.internalDTD
     names = [] if declared is None else [entity.name for entity in declared.iterentities()]
     if names:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Numbers that no world holds and descriptions without end are refused, with the bound in the message."""
+"""Numbers out of bounds and endless descriptions are refused, with the bound in the message."""
 
 import os
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a description says is what comes out, and what is wrong with it is said with its line."""
+"""The parser returns what the description says, and errors name the line."""
 
 import math
 import subprocess
