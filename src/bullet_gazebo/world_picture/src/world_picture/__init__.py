@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What processes that draw the world share: its state, the pictures on its screens, meshes that are light enough."""
+"""Shared by all processes that draw the world: its state, the pictures on its screens, simplified meshes."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Meshes made light enough to draw in software: split by colour, thinned out, kept on disk. ROS-free."""
+"""Meshes simplified for software rendering: split by colour, decimated, cached on disk. ROS-free."""
 import hashlib
 import json
 import os
@@ -15,12 +15,13 @@ from bullet_sim.mesh_loading import MOST_BYTES, load_scene
 from bullet_sim.thinning import thin_out
 from urdf_model import read_file
 
-#: Triangles that a mesh of :data:`USUAL_M` [m, its longest side] keeps; a robot of thirty links then draws in some
-#: 15 ms without a graphics card. Larger and smaller ones keep more and less, within bounds: a finger covers few pixels.
+#: Triangles that a mesh of :data:`USUAL_M` [m, its longest side] keeps; a robot of thirty links then takes about 15 ms
+#: to draw without a graphics card. Larger meshes keep more and smaller ones fewer, within bounds: a finger covers few
+#: pixels.
 TRIANGLES = 800
 USUAL_M = 0.35
 _LEAST, _MOST = 0.5, 2.5
-# Part of the name of cached files: raise it when the same mesh would come out differently.
+# Part of the names of cached files: increase it when the result for the same mesh changes.
 _VERSION = 4
 
 
@@ -36,7 +37,7 @@ class DrawingError(Exception):
 
 
 class DrawingCache:
-    """Thinned meshes on disk, under a hash of the original's content."""
+    """Decimated meshes on disk, under a hash of the original's content."""
 
     def __init__(self, folder=None, triangles=TRIANGLES):
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``."""
@@ -73,14 +74,13 @@ class DrawingCache:
         try:
             draft.rename(target)
         except OSError:
-            target = draft if not (target / "parts.json").exists() else target  # another window was faster
+            target = draft if not (target / "parts.json").exists() else target  # another process has made it
         return target / "parts.json"
 
 
 def write_parts(path, folder, triangles):
-    """Write the mesh at ``path`` into ``folder``, thinned out: ``parts.json`` and what it lists.
-
-    ``triangles``: what a mesh of :data:`USUAL_M` keeps.
+    """Write the mesh at ``path`` into ``folder``, decimated: ``parts.json`` and the files that it lists. ``triangles``:
+    the number that a mesh of :data:`USUAL_M` keeps.
     """
     pieces = _read(path)
     total = sum(len(faces) for _, faces, _ in pieces)
@@ -127,8 +127,8 @@ def _colour(mesh, gamma):
         colour = mesh.visual.main_color
     if colour is None:
         return None
-    # Modelling programs write COLLADA colours as linear light; screens want them with gamma. The fourth number is left
-    # out: exporters do not agree on whether it means opacity or transparency.
+    # Modelling programs write COLLADA colours as linear light; screens want them with gamma. The fourth number is
+    # ignored: for some exporters it means opacity, for others transparency.
     return (*(round((int(value) / 255.0) ** gamma, 3) for value in colour[:3]), 1.0)
 
 

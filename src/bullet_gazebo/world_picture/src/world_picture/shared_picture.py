@@ -2,7 +2,7 @@
 """A picture in shared memory, beside the snapshot: what a screen in the world shows. ROS-free.
 
 The file begins with width, height and a sequence number, odd while the picture is being written; then come the rows of
-red, green, blue. A reader that was overtaken notices, and has the picture next time.
+red, green, blue. A reader that reads during a write notices it and gets the picture at its next call.
 """
 import mmap
 import struct
@@ -20,8 +20,8 @@ class PictureWriter:
     """The simulator's side; the picture is black at first."""
 
     def __init__(self, path, width, height):
-        """``path``: a file that is not there yet; ``width``, ``height`` [pixels]. Raises ``SnapshotError`` for want of
-        room."""
+        """``path``: a file that is not there yet; ``width``, ``height`` [pixels]. Raises ``SnapshotError`` if there is
+        no space left."""
         self.path = path
         self._sequence = 0
         size = _HEADER.size + 3 * width * height
@@ -52,7 +52,7 @@ class PictureWriter:
 
 
 class NoPicture:
-    """In the place of a :class:`PictureWriter` where there is no memory to share: nobody sees it."""
+    """Replaces :class:`PictureWriter` where there is no shared memory: nobody sees the picture."""
 
     def show(self, pixels):
         """Does nothing."""
@@ -77,7 +77,7 @@ class PictureReader:
         self._seen = None
 
     def read(self):
-        """The picture (height, width, 3), a copy, when it is another than the last time; else None."""
+        """The picture (height, width, 3), a copy, if it has changed since the last call; else None."""
         sequence, = _SEQUENCE.unpack_from(self._memory, _SEQUENCE_AT)
         if sequence == self._seen or sequence % 2:
             return None

@@ -3,13 +3,13 @@
 
 One folder per simulator, in memory where the system has ``/dev/shm``: ``state`` (time, and per body base pose and joint
 angles, rewritten many times a second) and ``scene.json`` (which bodies there are, rewritten when that changes). The
-simulator holds a lock on ``state``, so a folder whose lock is free was left by a dead one.
+simulator holds a lock on ``state``, so a folder whose lock is free belonged to a dead simulator.
 
 ``state`` begins with a header (magic, sequence number) and has two slots. The writer fills the one that is not current,
-then raises the sequence number; a slot carries its own number, zero while it is being written, so a reader that was
-overtaken notices and reads again. A slot is: number, scene revision, how many times the time was set back, tick, count
-of values, time [s], then the values.
-Of each body, in the scene's order: position x y z [m], quaternion x y z w, joint angles [rad or m].
+then raises the sequence number; a slot carries its own number, which is zero during a write, so a reader notices an
+interrupted read and tries again. A slot is: number, scene revision, how many times simulation time was reset, tick,
+count of values, time [s], then the values. Of each body, in the scene's order: position x y z [m], quaternion x y z w,
+joint angles [rad or m].
 """
 import contextlib
 import errno
@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 MAGIC = 0x42475332
-#: Values that a slot holds [float64]; pages that are never written cost nothing.
+#: Values that a slot holds [float64]; pages that are never written take no memory.
 CAPACITY = 65536
 _HEADER = struct.Struct("<QQ")
 _SLOT = struct.Struct("<QQQQQd")
@@ -37,7 +37,7 @@ _PREFIX = "bullet_gazebo-"
 
 
 class SnapshotError(Exception):
-    """There is no snapshot to read, or it does not fit."""
+    """There is no snapshot, or it has another version or size."""
 
 
 def _shared_memory_folder():
@@ -47,8 +47,7 @@ def _shared_memory_folder():
 def remove_stale(parent=None):
     """Delete this user's folders of simulators that are gone; returns their paths.
 
-    What bears such a name and is a link, or another user's, is neither followed nor touched: everybody may write where
-    the folders are.
+    A link, or a folder of another user, is neither followed nor touched: every user may write to the parent folder.
     """
     parent = _shared_memory_folder() if parent is None else Path(parent)
     removed = []
@@ -61,7 +60,8 @@ def remove_stale(parent=None):
                         _remove(folder, descriptor)
                         removed.append(folder)
                 except FileNotFoundError:
-                    # Made this moment by another simulator, or half removed: an old one is safe to delete.
+                    # Another simulator has just made this folder, or was removing it; rmdir deletes it only if it is
+                    # empty.
                     folder.rmdir()
         except OSError:
             continue
@@ -78,7 +78,7 @@ def _remove(folder, descriptor):
 
 @contextlib.contextmanager
 def _own_folder(folder):
-    """A descriptor of a folder that is this user's and no link. Raises ``OSError``."""
+    """Open a folder that belongs to this user and is no link; returns the descriptor. Raises ``OSError``."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         _check_owner(os.fstat(descriptor), folder)
@@ -88,7 +88,7 @@ def _own_folder(folder):
 
 
 def _open_in(descriptor, name):
-    """A file of the folder, to read: a plain one of this user. Raises ``OSError``."""
+    """Open a file of the folder for reading: a regular file of this user. Raises ``OSError``."""
     file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=descriptor)
     try:
         status = os.fstat(file)
@@ -108,16 +108,16 @@ def _check_owner(status, path):
 
 
 def open_shared(path):
-    """A file in a simulator's folder, to read: this user's, neither it nor the folder a link. Raises ``OSError``."""
+    """Open a file in a simulator's folder for reading. File and folder must belong to this user and be no links. Raises
+    ``OSError``."""
     path = Path(path)
     with _own_folder(path.parent) as descriptor:
         return _open_in(descriptor, path.name)
 
 
 def reserve(file, size, path):
-    """Make an open file as long as ``size`` [bytes] and have the memory for it; raises :class:`SnapshotError`.
-
-    Without that, writing to it while the memory of the machine is full would end the process.
+    """Reserve ``size`` bytes for an open file; raises :class:`SnapshotError`. Without it, a write while the machine's
+    memory is full would kill the process (SIGBUS).
     """
     try:
         os.posix_fallocate(file.fileno(), 0, size)
@@ -126,14 +126,14 @@ def reserve(file, size, path):
 
 
 def no_room(path, error):
-    """What to tell the user when something cannot be written for viewers."""
+    """The message to the user when the data for viewers cannot be written."""
     return ("cannot write %s: %s; cameras and the window stand still (df -h %s says what is free)"
             % (path, error.strerror or error, Path(path).parent.parent))
 
 
 def _locked(path):
-    """A new file that is open and locked, as long as the simulator lives; None where another simulator has removed it:
-    until it is locked it looks like one that is left over."""
+    """A new file, open and locked for the life of the simulator. None if another simulator has removed it: before it is
+    locked, it looks like a left-over."""
     try:
         file = open(path, "w+b")  # noqa: SIM115
     except FileNotFoundError:
@@ -146,7 +146,7 @@ def _locked(path):
 
 
 class NoSnapshot:
-    """In the place of a :class:`SnapshotWriter` where there is no memory to share: viewers have nothing to draw."""
+    """Replaces :class:`SnapshotWriter` where there is no shared memory: viewers have nothing to draw."""
 
     folder = None
     revision = resets = 0
@@ -165,7 +165,8 @@ class SnapshotWriter:
     """The simulator's side."""
 
     def __init__(self, parent=None):
-        """Makes the folder (private to the user) and takes its lock. Raises :class:`SnapshotError` for want of room."""
+        """Makes the folder (private to the user) and locks it. Raises :class:`SnapshotError` if there is no space
+        left."""
         parent = _shared_memory_folder() if parent is None else Path(parent)
         self._file = None
         while self._file is None:
@@ -176,7 +177,7 @@ class SnapshotWriter:
             except OSError as error:
                 raise SnapshotError(no_room(parent / _PREFIX / "state", error)) from error
         self.revision = 0
-        #: How many times the time was set back: what a viewer saw at the same time before was another world.
+        #: How many times simulation time was reset: the same time then means another state.
         self.resets = 0
         self._sequence = 0
         size = _HEADER.size + 2 * _SLOT_BYTES
@@ -193,11 +194,11 @@ class SnapshotWriter:
         self.write_scene([])
 
     def write_scene(self, bodies, light=None):
-        """Say which bodies there are, and by which light they are seen.
+        """Write the list of bodies and the lights.
 
         ``bodies``: list of dictionaries with ``name``, ``joints`` (names) and whatever a viewer needs to draw it.
-        States written from here on refer to this list. ``light``: as :meth:`WorldLights.listed` says it. Raises
-        :class:`SnapshotError` where it cannot be written; viewers then wait for the next one.
+        States written from here on refer to this list. ``light``: as from :meth:`WorldLights.listed`. Raises
+        :class:`SnapshotError` if it cannot be written; viewers then wait for the next one.
         """
         self.revision += 1
         path = self.folder / "scene.json"
@@ -212,7 +213,7 @@ class SnapshotWriter:
             raise SnapshotError(no_room(path, error)) from error
 
     def write(self, tick, time_s, parts):
-        """Write the state: ``parts`` are arrays that, one after the other, are the slot's values.
+        """Write the state: ``parts`` are arrays; concatenated, they are the slot's values.
 
         Raises ``ValueError`` when they are more than :data:`CAPACITY`.
         """
@@ -244,7 +245,7 @@ class SnapshotWriter:
 
 
 class Scene(NamedTuple):
-    """What :meth:`SnapshotWriter.write_scene` was told, and how many times it was told something."""
+    """The arguments of :meth:`SnapshotWriter.write_scene`, and the count of its calls."""
 
     revision: int
     bodies: list

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Meshes that are light enough to draw; and that nothing of the package needs ROS."""
+"""Simplified meshes; and no module of the package needs ROS."""
 import subprocess
 import sys
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The snapshot: what one process writes, another reads whole or not at all."""
+"""The snapshot: a reader gets a whole state or none."""
 import errno
 import fcntl
 import os
@@ -106,7 +106,7 @@ def test_a_reader_in_another_process_never_sees_half_a_state(tmp_path):
                 assert len(read.values) == 1 + read.tick % 700
                 assert (read.values == read.tick).all()
                 seen.add(read.tick)
-        # It dies without cleaning up: the next simulator does.
+        # It dies without cleaning up; the next simulator cleans up.
         process.kill()
         process.wait()
         assert len(snapshot.remove_stale(tmp_path)) == 1
@@ -124,7 +124,8 @@ def test_the_folder_of_a_living_simulator_stays(writer, tmp_path):
 
 @pytest.mark.parametrize("module, name", [(tempfile, "mkdtemp"), (fcntl, "flock")])
 def test_a_folder_that_another_simulator_takes_for_a_left_over_one_is_made_again(tmp_path, monkeypatch, module, name):
-    """Its clearing up falls between the folder and its file, or between the file and its lock."""
+    """Another simulator cleans up between the making of the folder and of its file, or between the file and its
+    lock."""
     made, called = [], getattr(module, name)
 
     def overtaken(*arguments, **options):
@@ -239,7 +240,8 @@ def test_a_scene_without_room_leaves_the_old_one_and_the_next_is_seen(writer, mo
         with pytest.raises(SnapshotError, match="scene.json: " + NO_ROOM):
             writer.write_scene([{"name": "new", "joints": []}])
     assert [body["name"] for body in reader.scene().bodies] == ["old"]
-    # A state of the scene that could not be written is of another revision, so that nobody takes it for the old one's.
+    # A scene that could not be written still counts as a revision, so that readers do not match its states with the old
+    # scene.
     writer.write(1, 0.002, [[0.0] * 7])
     assert reader.read().revision != reader.scene().revision
     writer.write_scene([{"name": "new", "joints": []}])
@@ -274,7 +276,7 @@ def test_a_picture_that_is_shorter_than_it_says_is_refused(tmp_path):
 
 @pytest.mark.skipif(os.getuid() != 0, reason="mounts a file system of its own")
 def test_a_full_file_system_ends_no_process(tmp_path):
-    """As root: a real tmpfs with 64 kB left, on which writing to reserved memory would be the end (SIGBUS)."""
+    """As root: a real tmpfs with 64 kB left, where a write to unreserved memory would kill the process (SIGBUS)."""
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(tmp_path)], check=False).returncode:
         pytest.skip("may not mount here")
     try:
