@@ -45,7 +45,7 @@ class BaxterWorldTest(unittest.TestCase):
     def setUpClass(cls):
         cls.robot = Robot()
 
-    # Tests run in alphabetical order: a_ sees the robot as it was started.
+    # Tests run in alphabetical order: a_ gets the robot as it was started.
 
     def test_a_starts_disabled_in_the_start_pose(self):
         robot = self.robot

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the end-to-end tests need of a client: no SDK, only topics."""
+"""A client for the end-to-end tests, without the SDK, only with topics."""
 import collections
 
 import rospy
@@ -86,7 +86,7 @@ class Robot:
         return self.history[-1].header.stamp.to_sec()
 
     def wait_sim(self, seconds):
-        """Let so much simulation time pass."""
+        """Wait for this much simulation time."""
         end = self.now() + seconds
         wait_until(lambda: self.now() >= end, "%g s of simulation" % seconds, 10.0 + 5.0 * seconds)
 
@@ -117,7 +117,7 @@ class Robot:
                 self.commands[side].publish(JointCommand(mode, [values[name] for name in chosen], chosen))
 
     def stream(self, mode, values, seconds):
-        """Repeat a command at 100 Hz of wall time for so much simulation time."""
+        """Repeat a command at 100 Hz of wall time for this much simulation time."""
         end = self.now() + seconds
         def step():
             self.command(mode, values() if callable(values) else values)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The interface table row by row: a message on each published topic, an effect of each topic that the robot listens to.
 
-The right arm carries no gripper, so that custom tools can be told to the robot there.
+The right arm carries no gripper, so that tests can describe custom tools to the robot there.
 """
 import unittest
 
@@ -85,7 +85,7 @@ class RobotInterfaceTest(unittest.TestCase):
         self.robot.move(NEUTRAL)
 
     def set_both(self, key, name, value):
-        """Tell both limbs a setting, and wait until the diagnostics show it under `name`."""
+        """Send both limbs a setting, and wait until the diagnostics show it under `name`."""
         for side in SIDES:
             self.table.publish(key, (value,), side)
         self.robot.wait_setting(name, value)
@@ -144,7 +144,7 @@ class RobotInterfaceTest(unittest.TestCase):
         self.see("head_state", None, lambda state: abs(state.pan - 0.4) < 0.01, "head at 0.4")
 
     def effect_joint_command_timeout(self):
-        """One velocity command goes on for as long as it may."""
+        """One velocity command lasts until its time-out."""
         self.neutral()
         self.set_both("joint_command_timeout", "command time-out [s]", 1.5)
         self.robot.command(VELOCITY, {side + "_w1": -0.4 for side in SIDES})
@@ -161,7 +161,7 @@ class RobotInterfaceTest(unittest.TestCase):
         wait_until(lambda: self.robot.error({side + "_w1": 0.5 for side in SIDES}) < 2e-3, "w1 at 0.5", 30.0)
 
     def effect_inverse_dynamics_command(self):
-        """Raw set-points with a velocity are led by as much as the velocity says; senseless ones are refused."""
+        """Raw set-points with a velocity are led by that velocity; invalid ones are refused."""
         for side in SIDES:
             self.table.publish("inverse_dynamics_command", ([], [0.1] * 6, [], [], rospy.Duration()), side)
         self.refused("must have 7 finite numbers")
@@ -378,7 +378,7 @@ class RobotInterfaceTest(unittest.TestCase):
         self.see("updater_status", None, lambda status: status.status == 0, "idle")
 
     def test_every_published_row_has_messages_of_its_type(self):
-        """Name, type, latch; that rates are exact in simulation time has a unit test."""
+        """Name, type, latch; a unit test checks that rates are exact in simulation time."""
         rows = [(resolved(name), row) for row in interface.TOPICS if row.is_published for _, name in row.names()]
         for first in range(0, len(rows), BATCH):
             batch = rows[first:first + BATCH]

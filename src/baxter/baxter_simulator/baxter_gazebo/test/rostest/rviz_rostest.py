@@ -24,7 +24,7 @@ THICKNESS_M = 0.2  # half width of the widest link, and of the axes that rviz dr
 GOAL = dict(zip(joints("left"), (0.3, -0.9, 0.0, 1.3, 0.2, 0.6, 0.4), strict=True))
 # Colour steps of 255 that do not count: the other arm holds to 1e-5 rad, which may tip a pixel at an edge.
 SAME = 8
-# All have to end on Ctrl-C; roslaunch would help with SIGTERM only after the limit.
+# All must end on Ctrl-C; roslaunch would send SIGTERM only after the limit.
 END_LIMIT_S, PATIENCE_S = 40.0, 120.0
 
 
@@ -77,12 +77,12 @@ class RvizTest(unittest.TestCase):
         elsewhere = changed & ~was & ~is_now
         self.assertEqual(np.count_nonzero(elsewhere), 0, "changed elsewhere, at %s" % np.argwhere(elsewhere)[:5])
 
-        # And Ctrl-C takes everything along, rviz included.
+        # And Ctrl-C ends everything, rviz included.
         os.killpg(self.lab.pid, signal.SIGINT)
         self.lab.wait(END_LIMIT_S)
 
     def keep(self, picture, name):
-        """Leave the picture beside the test's other results, for the reader."""
+        """Save the picture beside the test's other results."""
         folder = os.environ.get("ROS_TEST_RESULTS_DIR")
         if folder:
             height, width, _ = picture.shape

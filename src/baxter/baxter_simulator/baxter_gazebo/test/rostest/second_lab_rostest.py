@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The launch file, started a second time on the same master, and with arguments that make no sense."""
+"""The launch file, started a second time on the same master, and with invalid arguments."""
 import subprocess
 import unittest
 import xmlrpc.client
@@ -44,7 +44,8 @@ class SecondLabTest(unittest.TestCase):
         _, output = launch()
         self.assertIn("A simulator is running on this ROS master", output)
         self.assertEqual(process_of("/gazebo"), simulator)
-        # The nodes of the second launch bear the same names and so shut the first one's down; roslaunch restarts them.
+        # The nodes of the second launch have the same names and so shut the first launch's nodes down; roslaunch
+        # restarts them.
         for node in HELPERS:
             wait_until(lambda node=node: process_of(node), node + " is back")
         for topic in ("/tf", "/tf_static"):
