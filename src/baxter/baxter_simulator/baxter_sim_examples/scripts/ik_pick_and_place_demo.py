@@ -15,7 +15,7 @@ from baxter_sim_examples import BlockLost, Trial, pick_and_place
 from baxter_sim_examples.gazebo_scene import GazeboScene
 from gazebo_ros.gazebo_interface import GazeboInterfaceError
 
-MISS_M = 0.01  # of a block that is where it should be
+MISS_M = 0.01  # largest distance of a block that reached its target
 
 
 class SdkArm:

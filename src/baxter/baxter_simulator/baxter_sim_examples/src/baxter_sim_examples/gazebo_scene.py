@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The scene in a running simulator: spawn and delete table and block, tell where the block is."""
+"""The scene in a running simulator: spawn and delete table and block, read the block's pose."""
 import math
 from pathlib import Path
 

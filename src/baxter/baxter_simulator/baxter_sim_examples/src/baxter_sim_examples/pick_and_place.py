@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Take a block from one spot of a table and put it on another: the sequence of steps, for any arm. Free of ROS.
 
-An arm is an object with `name`, `ik(position, orientation, seed)` -> angles by joint name (raises what it likes),
-`move_to(angles)`, `open()`, `close()`, which return when it is done, and `holds()`. Positions [m] are those of the
-frame between the finger tips, in `base`; orientations are quaternions x, y, z, w.
+An arm is an object with `name`, `ik(position, orientation, seed)` -> angles by joint name (may raise anything),
+`move_to(angles)`, `open()`, `close()`, which return when the motion is done, and `holds()`. Positions [m] are those of
+the frame between the finger tips, in `base`; orientations are quaternions x, y, z, w.
 """
 import math
 from dataclasses import dataclass
@@ -21,12 +21,12 @@ _QUARTER = math.pi / 2.0
 
 
 class BlockLost(Exception):
-    """There is nothing between the fingers where the block should be; the text says when that was seen."""
+    """There is no block between the fingers; the text says in which step that was found."""
 
 
 @dataclass(frozen=True)
 class Spot:
-    """Where a block's middle is, or shall be: x, y, z [m] in `base`, turned by yaw [rad] about z."""
+    """Present or desired centre of a block: x, y, z [m] in `base`, turned by yaw [rad] about z."""
 
     x: float
     y: float
@@ -50,10 +50,8 @@ def grip_yaw(yaw):
 
 
 def pick_and_place(arm, source, target):
-    """Carry the block from `source` to `target` (Spot). Raises BlockLost, and whatever the arm raises.
-
-    The fingers stay turned to the block as they were when they took it, so that it arrives turned by the difference of
-    the two spots' yaw, up to quarter turns.
+    """Carry the block from `source` to `target` (Spot). Raises BlockLost, and the arm's errors. The fingers keep their
+    angle to the block, so that it arrives turned by the difference of the two spots' yaw, up to quarter turns.
     """
     arm.open()
     pose = arm.move_to(start_angles(arm.name))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A block on the cafe table, in front of Baxter: what a trial's seed decides. Free of ROS."""
+"""A block on the cafe table, in front of Baxter: made from a trial's seed. Free of ROS."""
 from dataclasses import dataclass
 
 import numpy as np

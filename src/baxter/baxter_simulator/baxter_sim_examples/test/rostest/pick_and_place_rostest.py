@@ -18,7 +18,7 @@ LIFTED_M = TABLE_TOP_M + 0.1
 
 
 class Block:
-    """What happened to the block, and to the hand meanwhile."""
+    """The history of the block and of the hand."""
 
     def __init__(self):
         self._lock = threading.Lock()
@@ -30,7 +30,7 @@ class Block:
 
     @property
     def was_removed(self):
-        """Whether it came and went, as it does when the demo ends."""
+        """Whether it was spawned and deleted, as when the demo ends."""
         with self._lock:
             return bool(self._path) and not self._is_there
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The order of things, and what a seed decides; no physics."""
+"""The order of steps, and the scene of a seed; no physics."""
 import math
 import subprocess
 import sys
@@ -16,7 +16,7 @@ SOURCE, TARGET = Spot(0.6, 0.2, -0.13, 0.3), Spot(0.7, 0.0, -0.13, 2.0)
 
 
 class FakeArm:
-    """Writes down what it is told; `slips_at` counts the questions whether it holds something, from 1."""
+    """Records its calls; `slips_at` is the number of the call of holds(), from 1, that returns False."""
 
     def __init__(self, name="left", slips_at=None):
         self.name, self.did, self._asked, self._slips_at = name, [], 0, slips_at
