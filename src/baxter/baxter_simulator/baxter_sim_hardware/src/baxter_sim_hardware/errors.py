@@ -3,8 +3,8 @@
 
 
 class HardwareError(Exception):
-    """Root of everything this package raises on purpose."""
+    """Base class of this package's errors."""
 
 
 class CommandRefused(HardwareError):
-    """A command that cannot be obeyed as a whole; nothing of it was applied."""
+    """A command is refused as a whole; no part of it was applied."""

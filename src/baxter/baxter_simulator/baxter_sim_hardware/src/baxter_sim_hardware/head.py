@@ -41,8 +41,8 @@ class Head:
 
         A ratio of 0 means full speed: the vendor's simulator turned at its own speed whatever the ratio, and clients
         that leave the field at 0 expect the head to turn. enable: True or False switches panning on or off, None
-        leaves it; while it is off the head stays where it stopped. Raises CommandRefused for what is no number, and
-        for a negative ratio.
+        leaves it; while it is off the head stays where it stopped. Raises CommandRefused for numbers that are not
+        finite, and for a negative ratio.
         """
         if not (math.isfinite(target) and math.isfinite(speed_ratio)) or speed_ratio < 0.0:
             raise CommandRefused("target is %g rad and speed ratio %g; they must be an angle and a number from 0 to 1"
@@ -57,7 +57,7 @@ class Head:
         self._resting = False
 
     def nod(self, time_s):
-        """Begin to nod at time_s [s]; a nod under way is not begun anew."""
+        """Start to nod at time_s [s]; a running nod is not restarted."""
         if not self.is_nodding(time_s):
             self._nod_start = time_s
 
@@ -70,6 +70,6 @@ class Head:
             return None
         self._position, self._rate = approach(
             self._position, self._rate, self._target, self._speed, self._acceleration, self._dt)
-        # The tick after the arrival still tells the joint that the set-point no longer moves.
+        # The tick after the arrival still sends the zero velocity to the joint.
         self._resting = self._position[0] == self._target[0] and self._rate[0] == 0.0
         return self._position, self._rate

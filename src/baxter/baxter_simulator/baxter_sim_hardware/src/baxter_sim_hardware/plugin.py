@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Baxter as a model plugin of /gazebo: wires the robot's parts to the simulated model. No decisions of its own."""
+"""Baxter as a model plugin of /gazebo: connects the robot's parts to the simulated model. It makes no decisions."""
 import math
 from types import MethodType
 
@@ -41,7 +41,7 @@ QUEUE_DEPTH = 200  # messages between two ticks: 2 ms of a client that writes at
 class BaxterPlugin(ModelPlugin):
     """Wires one `Baxter` to one simulated model. Parameters: see launch/baxter_sdk_control.launch."""
 
-    # Its ramps and time-outs are counted in ticks.
+    # The robot's ramps and time-outs are counted in ticks.
     keeps_step = True
 
     @classmethod
@@ -50,7 +50,7 @@ class BaxterPlugin(ModelPlugin):
         return {"static": True, **spawn_options(robot.links)}
 
     def __init__(self, context, before=None):
-        """``before``: the robot_state.State of the plugin that this one takes over from, if there is one."""
+        """``before``: the robot_state.State of the plugin that this one replaces, or None."""
         super().__init__(context)
         self._model = context.model
         try:
@@ -108,7 +108,7 @@ class BaxterPlugin(ModelPlugin):
             ScreenTopics(context), StatusTopics(baxter, limb_index, robot.links, context.urdf_xml, context.log))
 
     def _hold_other_joints(self, robot):
-        """Head straight, fingers open, and nothing left to dangle."""
+        """Hold the head straight, the fingers open, and all other joints."""
         model = self._model
         fingers = finger_openings(robot)
         if fingers:
@@ -121,7 +121,8 @@ class BaxterPlugin(ModelPlugin):
         return self.context.param(PARAMETERS + name, default)
 
     def _switch(self, name, default):
-        """A parameter that is true or false. Another word in a launch file arrives as text, and would count as true."""
+        """A parameter that is true or false. Another word in a launch file arrives as a non-empty string, which Python
+        takes as true."""
         value = self._parameter(name, default)
         if value not in (True, False):
             raise PluginError("%s is %r; it must be true or false" % (name, value))
@@ -187,7 +188,7 @@ class BaxterPlugin(ModelPlugin):
         return self._arms.feel(side, self._snapshot())[0]
 
     def _dynamics(self, velocity):
-        """As for `Measured`."""
+        """The function `dynamics` of `Measured`."""
         model, arm = self._model, self._arm_index
         position, velocities = model.read_joints()[0], np.zeros(len(model.joint_names))
         velocities[arm] = velocity
@@ -197,7 +198,7 @@ class BaxterPlugin(ModelPlugin):
         return Snapshot(self._model, self._before, self._dt)
 
     def _measure(self):
-        """Renew what the arms know of their joints, between two ticks."""
+        """Update the measured state of the arms' joints, between two ticks."""
         position, velocity, _ = self._model.read_joints()
         measured = self._baxter.measured
         measured.time_s = self.context.world.time_s
@@ -216,13 +217,13 @@ class BaxterPlugin(ModelPlugin):
 
     def while_failed(self, time_s):
         self._before = self._model.read_joints()
-        # What comes in now counts no more when the robot is back; but a reset is what it waits for.
+        # Messages that arrive now are dropped; but a reset is what the failed robot waits for.
         keys = self._handling.drop(self.context.pending())
         self._publishing.publish(time_s)
         return "set_super_reset" in keys
 
     def joints_set(self):
-        # What has come in by now was said to the robot where it was.
+        # Messages that have arrived by now are from before the joints were moved.
         self._measure()
         self._handling.handle(self.context.pending(), self.context.world.time_s)
         self._baxter.arms.reset()
@@ -245,7 +246,8 @@ class BaxterPlugin(ModelPlugin):
         return self._baxter.state.enabled
 
     def start_over(self):
-        """Disable; release and clear stops; speeds and time-outs as at the start. The joints stay where they are."""
+        """Disable the robot; release and clear stops; restore the start's speeds and time-outs. The joints stay where
+        they are."""
         for event in (Event.ESTOP_RELEASE, Event.RESET):
             self._robot.apply(event)
         self._baxter.restore_settings()

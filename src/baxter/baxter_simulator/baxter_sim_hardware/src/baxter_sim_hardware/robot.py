@@ -10,11 +10,10 @@ DISABLED_BEHAVIOURS = ("hold", "sink")
 class Baxter:
     """The robot's state and its arms, one tick at a time.
 
-    limbs, limits, measured, dt: as for `Arms`; profile: 'sim' or 'robot' (speed ratio at start); disabled: what arms do
-    without power, 'hold' or 'sink'; state: a robot_state.State to begin in.
-
-    Attributes: `profile`; `state`, a `RobotState`; `arms`, an `Arms`; `measured`, the `Measured` that the caller renews
-    before each tick, and before each event that comes between two ticks.
+    limbs, limits, measured, dt: as for `Arms`; profile: 'sim' or 'robot' (speed ratio at start); disabled: behaviour of
+    the arms without power, 'hold' or 'sink'; state: the first robot_state.State. Attributes: `profile`; `state`, a
+    `RobotState`; `arms`, an `Arms`; `measured`, the `Measured` that the caller updates before each tick, and before
+    each event between two ticks.
     """
 
     def __init__(self, limbs, limits, measured, dt=0.002, profile="sim", disabled="hold", state=None):
@@ -31,16 +30,16 @@ class Baxter:
         self._speed_ratio = SPEED_RATIO[profile]
 
     def take_over(self):
-        """Begin with arms that are moving: forget every command, bring them to rest, and hold them."""
+        """Start with moving arms: forget every command, bring them to rest, and hold them."""
         self.arms.take_over()
         self.arms.stop()
 
     def apply(self, event):
-        """Take an enable, disable, stop, reset ... event. Raises CommandRefused where the state does not allow it."""
+        """Take an enable, disable, stop, reset ... event. Raises CommandRefused if the state does not allow it."""
         was_enabled = self.state.enabled
         self.state.apply(event)
         if self.state.enabled != was_enabled:
-            # Nothing that was commanded before counts any more.
+            # Earlier commands are forgotten.
             self.arms.stop()
 
     def restore_settings(self):
@@ -56,7 +55,7 @@ class Baxter:
 
     @property
     def moves_by_gravity(self):
-        """Whether drives follow from the torque that balances gravity, so that `update` needs it as it is now."""
+        """Whether drives follow from the torque that balances gravity, so that `update` needs its present value."""
         return self.arms.needs_gravity or (self._sinks and not self.state.enabled)
 
     def update(self):

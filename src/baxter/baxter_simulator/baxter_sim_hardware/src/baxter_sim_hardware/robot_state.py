@@ -14,7 +14,7 @@ from .errors import CommandRefused
 
 
 class State(Enum):
-    """What the robot as a whole is doing."""
+    """The state of the whole robot."""
 
     DISABLED = "disabled"
     ENABLED = "enabled"
@@ -25,7 +25,7 @@ class State(Enum):
 
 
 class Event(Enum):
-    """What can happen to it. Listed in the order in which one tick applies them: a stop has the last word."""
+    """What can happen to the robot. Listed in the order in which one tick applies them: a stop comes last."""
 
     RESET = "reset"
     DISABLE = "disable"
@@ -115,7 +115,7 @@ TRANSITIONS = {
     (State.FAILED, Event.ESTOP_RELEASE): State.FAILED,
 }
 
-# Requests that leave the state as it is, and what a person can do then.
+# Requests that a state refuses, with a hint for the user.
 REFUSALS = {
     (State.STOPPED, Event.ENABLE): "the robot is stopped: reset it first (%s)" % RESET,
     (State.ESTOP_PRESSED, Event.ENABLE): "the emergency stop is pressed: release it, then reset, then enable",
@@ -141,7 +141,7 @@ class RobotState:
         return ASSEMBLY[self.state]
 
     def fail(self):
-        """The robot's own program cannot go on."""
+        """The robot's own software has failed."""
         self.state = State.FAILED
 
     def require_enabled(self):
@@ -150,7 +150,7 @@ class RobotState:
             raise CommandRefused(NOT_ENABLED)
 
     def apply(self, event):
-        """Take one event. Raises CommandRefused, which says what to do, where the state does not allow it."""
+        """Take one event. Raises CommandRefused, which says what to do, if the state does not allow it."""
         refusal = REFUSALS.get((self.state, event))
         if refusal is not None:
             raise CommandRefused(refusal)

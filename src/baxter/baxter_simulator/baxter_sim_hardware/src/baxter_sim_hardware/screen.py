@@ -9,16 +9,16 @@ from .errors import CommandRefused
 WIDTH, HEIGHT = 1024, 600
 #: The link whose only shape is the glass, a thin box that looks along its z.
 GLASS_LINK = "display"
-# How far before the glass pictures are, so that nobody sees glass instead [m].
+# Distance of pictures in front of the glass, so that the glass does not hide them [m].
 _BEFORE_M = 0.0005
-# Channels of a pixel, and which of them are red, green and blue; cv_bridge's 8UC3 and 8UC1 say nothing of colours, and
-# clients mean blue first.
+# Channels of a pixel, and which of them are red, green and blue; cv_bridge's 8UC3 and 8UC1 do not define colours;
+# clients use blue first.
 ENCODINGS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "8UC3": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)),
              "bgra8": (4, (2, 1, 0)), "8UC4": (4, (2, 1, 0)), "mono8": (1, (0, 0, 0)), "8UC1": (1, (0, 0, 0))}
 
 
 def on_glass(robot):
-    """Where pictures are on GLASS_LINK of a urdf_model.Robot: (place (4, 4), x to the right and y up for a viewer;
+    """The picture's place on GLASS_LINK of a urdf_model.Robot: (pose (4, 4), x to the right and y up for a viewer;
     width and height [m]), as wide as the glass. None for a robot without one."""
     shapes = robot.links[GLASS_LINK].visuals if GLASS_LINK in robot.links else []
     if len(shapes) != 1 or not isinstance(shapes[0].geometry, Box):
@@ -30,7 +30,7 @@ def on_glass(robot):
 
 
 class Screen:
-    """`pixels`: (600, 1024, 3) uint8, red first: what is shown; `pictures`: how many have been shown."""
+    """`pixels`: (600, 1024, 3) uint8, red first: the present picture; `pictures`: number of pictures shown."""
 
     def __init__(self):
         self.reset()
@@ -41,7 +41,7 @@ class Screen:
         self.pictures = 0
 
     def show(self, width, height, encoding, step, data):
-        """Show a picture, dark around it; `step`: bytes a row. Raises CommandRefused, and shows nothing new then."""
+        """Show a picture, dark around it; `step`: bytes per row. Raises CommandRefused and keeps the last picture."""
         if encoding not in ENCODINGS:
             raise CommandRefused("picture has encoding '%s'; choices are %s" % (encoding, ", ".join(ENCODINGS)))
         channels, colours = ENCODINGS[encoding]
@@ -53,6 +53,6 @@ class Screen:
         rows = np.frombuffer(data, dtype=np.uint8, count=step * height).reshape(height, step)
         picture = rows[:, :width * channels].reshape(height, width, channels)
         self.pixels = np.zeros_like(self.pixels)
-        for k, channel in enumerate(colours):  # at once it would take eight times as long, and the loop waits
+        for k, channel in enumerate(colours):  # in one step it would take eight times as long, and the loop waits
             self.pixels[:height, :width, k] = picture[:, :, channel]
         self.pictures += 1

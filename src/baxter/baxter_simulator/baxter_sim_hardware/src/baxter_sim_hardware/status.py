@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the robot says of itself: levels of its diagnostics, checks of its description."""
+"""The robot's status: levels of its diagnostics, checks of its description."""
 from xml.etree import ElementTree
 
 from .errors import CommandRefused
@@ -9,7 +9,7 @@ OK, WARN, ERROR = 0, 1, 2  # levels of a DiagnosticStatus
 
 
 def level_of(state):
-    """(level, text) of a robot_state.State: a stopped robot needs somebody."""
+    """(level, text) of a robot_state.State: a stopped robot needs a person."""
     return (OK if state in (State.ENABLED, State.DISABLED) else ERROR), state.value
 
 

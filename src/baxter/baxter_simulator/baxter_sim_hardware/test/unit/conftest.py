@@ -35,7 +35,7 @@ class _Drawn:
 
 
 def _own(by_name):
-    """{absolute name: ...} with the names as the plugin says them."""
+    """{absolute name: ...} with the names as the plugin uses them."""
     return {name.removeprefix(NAMESPACE + "/"): value for name, value in by_name.items()}
 
 
@@ -43,12 +43,12 @@ class Lab:
     """A world with Baxter in it, whose plugin has the simulator's own PluginContext.
 
     Arrays over the 14 arm joints are in the order of NAMES.
-    ``ros``: its ``loop_ros.testing.FakeRos``. Nobody listens to the screen, whose pictures would fill the memory.
-    ``subscriptions``, ``publishers``, ``services``: by the name that the plugin gives them.
+    ``ros``: its ``loop_ros.testing.FakeRos``. The screen has no subscriber, because its pictures would fill the memory.
+    ``subscriptions``, ``publishers``, ``services``: by the plugin's names.
     """
 
     def __init__(self, robot, pose="neutral", parameters=None, angles=None, meshes=False):
-        """meshes: whether the body collides as it looks; without, it is passed through, which loads faster."""
+        """meshes: whether the body has its collision meshes; without them it has no contacts, and loads faster."""
         self.world = World(time_step_s=TICK_S, **({"find_mesh": ResourceFinder()} if meshes else {}))
         element = ElementTree.fromstring("<plugin/>")
         options = BaxterPlugin.spawn_options(robot, element)
@@ -171,7 +171,7 @@ def make_lab(robot):
 
 @pytest.fixture(scope="module")
 def one_lab(robot):
-    """One Lab for all tests of a file, which leave it as they please; a robot costs more than what they do with it."""
+    """One Lab for all tests of a file, which may leave it in any state; making a robot takes longer than the tests."""
     made = Lab(robot)
     yield made
     made.close()

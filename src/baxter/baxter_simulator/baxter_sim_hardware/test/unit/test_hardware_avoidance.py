@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The field around the head: nothing bumps into it; it slows and stops arms that come near, unless suppressed."""
+"""The field around the head: nothing collides with it; it slows and stops approaching arms, unless suppressed."""
 import numpy as np
 import pytest
 from std_msgs.msg import Empty
@@ -56,7 +56,7 @@ def gap(lab, side):
 
 @pytest.mark.parametrize("side", SIDES)
 def test_distance_and_closing_speed_are_those_of_the_geometry(robot, side):
-    """Against differences: a step along the rates changes the gap as the field says that it does."""
+    """Against finite differences: a step along the rates changes the gap as the field computes."""
     guards, chain = guards_of(robot), Chain.from_robot(robot, tip=tip_of(side))
     rng, step, checked = np.random.default_rng(5), 1e-6, 0
     for q in rng.uniform(chain.lower, chain.upper, (300, 7)):
@@ -73,7 +73,7 @@ def test_distance_and_closing_speed_are_those_of_the_geometry(robot, side):
             closing = (distance - look(q + step * rates)[0]) / step
             allowed = max(distance, 0.0) / avoidance.CLOSING_S
             if closing > 1.05 * allowed:
-                # Another capsule, farther away and faster, may have more to say.
+                # Another capsule, farther away and faster, may limit the speed more.
                 assert slowing <= 1.001 * allowed / closing
                 checked += 1
             near = avoidance.field(one, *chain.joint_frames(q), rates).near
@@ -97,12 +97,12 @@ def test_arms_stop_at_the_field_unless_it_is_suppressed(make_lab, kinds):
     assert touches == set()
     if kinds:
         assert names == set() and np.abs(lab.position - FOLDED).max() < 0.01
-        assert min(gaps) < -3e-3  # through what holds nobody up
+        assert min(gaps) < -3e-3  # through the field, which must not block it
         return
     assert names and names <= set(HEAD_GUARDS)
     assert min(gaps) > -2e-3 and np.abs(lab.position - FOLDED).max() > 0.3
     assert np.abs(lab.velocity).max() < 0.02
-    # What leads away is free.
+    # Motion away is free.
     lab.command(POSITION, UNFOLDED)
     lab.run(3.5)
     assert np.abs(lab.position - UNFOLDED).max() < 1e-3 and listed(lab) == set()
@@ -148,7 +148,7 @@ def test_arms_fold_and_unfold_as_the_vendors_program_has_them(make_lab, start):
 
 
 def test_the_head_itself_is_solid(make_lab):
-    """Random postures: where an arm stands in the head it touches it, and the guards touch nothing."""
+    """Random postures: an arm inside the head touches it, and the guards touch nothing."""
     lab = make_lab(meshes=True)
     rng, touched = np.random.default_rng(3), set()
     for q in rng.uniform(lab.model.lower[lab.arm], lab.model.upper[lab.arm], (1500, 14)):
@@ -181,7 +181,7 @@ def test_folded_arms_keep_the_robots_profile_disabled(make_lab, profile, at_star
     lab.enable()
     lab.run(1.0)
     assert lab.last("state").enabled
-    # And it is enabled as often as one likes elsewhere.
+    # Elsewhere it can always be enabled.
     lab.run(9.0, before=stream(UNFOLDED, (collision.AVOIDANCE,)))
     lab.enable(False)
     lab.enable()

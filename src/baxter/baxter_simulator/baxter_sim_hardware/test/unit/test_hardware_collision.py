@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What arms do and say when they run into something, and what clients can suppress."""
+"""The arms' behaviour and reports in collisions, and what clients can suppress."""
 import numpy as np
 import pytest
 from bullet_sim_msgs.srv import PressRequest
@@ -114,7 +114,7 @@ def test_a_stop_holds_arms_that_meet_and_arms_that_press_on_each_other(make_lab,
 
 
 def test_an_arm_that_is_pushed_aside_is_a_collision_unless_that_is_suppressed(lab):
-    """By 50 N at the hand, which are not too much for the hand itself but for the joints."""
+    """By 50 N at the hand: within the hand's limit, above that of the joints."""
     def push(lab):
         lab.model.apply_wrench("left_gripper", (0.0, 50.0, 0.0), position=lab.model.link_pose("left_gripper").position)
 
@@ -134,7 +134,7 @@ def test_an_arm_that_is_pushed_aside_is_a_collision_unless_that_is_suppressed(la
 
 @pytest.mark.parametrize("force, found", [(50.0, False), (130.0, True)])
 def test_a_hand_that_feels_too_much_is_a_collision(lab, force, found):
-    """The push is along the line from the shoulder, so that the joints' own bounds say little."""
+    """The push is along the line from the shoulder, so that the joints' torques stay small."""
     def push(lab):
         link = lab.model.link_pose("left_gripper")
         lab.model.apply_wrench("left_gripper", (0.0, 0.0, -force), position=link.position)
@@ -249,7 +249,7 @@ def test_feed_forward_takes_the_lag_out_of_a_raw_stream(lab):
 
 
 def test_feed_forward_of_the_time_before_a_reset_moves_nothing(lab):
-    """With the clock set back its stamp lies ahead, and it is as old as it was before."""
+    """After a reset of the clock its stamp is in the future, and its age is unchanged."""
     lab.enable()
     lab.run(0.5)
     for side in SIDES:

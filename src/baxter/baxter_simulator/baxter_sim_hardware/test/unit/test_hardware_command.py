@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which joint commands are obeyed, clamped or refused, and what refusals say. Both limbs throughout."""
+"""Which joint commands are accepted, clamped or refused, and the texts of refusals. Both limbs throughout."""
 import math
 import time
 
@@ -116,7 +116,7 @@ def test_limits_of_the_wrong_length_are_an_error():
 
 
 def test_a_huge_command_is_refused_at_once():
-    # Two hundred thousand names took the loop, which holds the arms, out of work for minutes.
+    # Two hundred thousand names once blocked the loop, which holds the arms, for minutes.
     names = joints("left") * 30_000
     begin_s = time.process_time()
     with pytest.raises(CommandRefused, match="named more than once"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every topic of the physical robot is served, or somebody says why not; and each row comes at its rate."""
+"""Every topic of the physical robot is served or listed with a reason; each row is published at its rate."""
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Code of the robot that raises where nobody thought it could: at every place where a message or a tick enters."""
+"""Unexpected exceptions in the robot's code, at every place where a message or a tick enters."""
 from types import SimpleNamespace
 
 import numpy as np
@@ -70,7 +70,7 @@ def fail(*arguments, **options):
 
 
 def fail_in(loop, monkeypatch, times):
-    """Have the robot's tick raise so many times."""
+    """Make the robot's tick raise this many times."""
     left, real = [None] * times, type(loop.plugin._baxter).update
 
     def update(self, *arguments):
@@ -143,8 +143,8 @@ def test_a_tick_that_raises_brings_the_arms_to_rest_and_the_robot_goes_on(loop, 
     loop.run(1.0)
     assert loop.plugin is not before and loop.hosted.failures == 1
     path = np.array(loop.path)
-    # Never a jump: the arms slow down from where and as fast as they were. From full speed of all joints at once, those
-    # that brake sooner push the shoulder a little beyond its own.
+    # Never a jump: the arms slow down from where and as fast as they were. From full speed of all joints at once, the
+    # joints that stop first push the shoulder slightly beyond its stopping point.
     limit = lab.model.max_velocity[lab.arm]
     assert (np.abs(np.diff(path, axis=0)) <= 1.25 * limit * TICK_S).all()
     assert np.abs(path[-1] - path[0]).max() < 0.4
@@ -208,7 +208,7 @@ def test_a_robot_that_fails_three_times_shows_it_holds_still_and_comes_back(loop
     path = np.array(loop.path)
     assert np.abs(path - path[0]).max() < 0.05
     assert np.abs(path[-1] - path[len(path) // 2]).max() < 1e-3
-    # It still says where it is, and what is the matter.
+    # It still publishes its joints and its error.
     assert lab.last("joint_states").header.stamp.to_sec() > lab.world.time_s - 0.03
     assert lab.last("/diagnostics").status[0].level == 2 and lab.last("limb/left/state").error
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages of any content on everything that the robot listens to: none ends it, and it obeys after."""
+"""Messages of any content on all topics that the robot subscribes to: none stops it, and it accepts commands
+afterwards."""
 import io
 import random
 
@@ -29,7 +30,7 @@ BITS = {"byte": 8, "char": 8, "int8": 8, "uint8": 8, "int16": 16, "uint16": 16, 
 
 
 def any_value(rng, kind):
-    """A value of a field's type: sensible, at a bound, or beyond sense."""
+    """A value of a field's type: valid, at a bound, or invalid."""
     base, is_array, length = genmsg.msgs.parse_type(kind)
     if is_array:
         count = rng.choice((0, 1, 2, 7, 7, 8, 100)) if length is None else length
@@ -59,7 +60,7 @@ def any_message(rng, message_class):
 
 
 def received(message):
-    """A message as it is after the wire."""
+    """A message after serialization and back."""
     buffer = io.BytesIO()
     message.serialize(buffer)
     return type(message)().deserialize(buffer.getvalue())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The electric gripper: which commands it takes, and what its fingers make of them in a physics world."""
+"""The electric gripper: which commands it takes, and how its fingers move in a physics world."""
 import json
 
 import numpy as np
@@ -143,7 +143,7 @@ def put_box_between_fingers(lab, static=True):
 
 
 def hold_box(lab, static=False):
-    """Put a box between the fingers and close them; it begins to weigh when they have."""
+    """Put a box between the fingers and close them; gravity on it starts then."""
     lab.world.set_gravity((0.0, 0.0, 0.0))
     box = put_box_between_fingers(lab, static)
     tell(lab, "go", '{"position": 0}', seconds=1.0)
@@ -206,7 +206,7 @@ def test_holding_force_is_the_force_on_what_is_held(lab):
 
 
 def test_force_exceeds_the_moving_force_before_it_is_the_holding_force(lab):
-    """Clients that send their goal 20 times a second, and look at force or flags as often, see both."""
+    """Clients that send their goal and check force or flags 20 times a second see both."""
     put_box_between_fingers(lab)
     tell(lab, "configure", json.dumps({"moving_force": 60.0, "holding_force": 20.0}))
     seen = []
@@ -236,7 +236,7 @@ def test_fingers_that_may_use_no_force_give_up(lab):
 
 @pytest.mark.parametrize("target, hooked", [(100.0, True), (0.0, False)])
 def test_fingers_that_rattle_where_they_jam_come_to_rest(target, hooked):
-    """At a speed that would be motion, and to no avail; with less force than would be a grip."""
+    """Slow enough to count as standing still, without progress, and with less force than a grip needs."""
     gripper, seen = ElectricGripper(0.02, 0.6), []
     take(gripper, "go", '{"position": %g}' % target)
     for tick in range(500):
@@ -259,7 +259,7 @@ def test_fingers_move_as_one_even_pushed_from_one_side(lab):
 
 @pytest.mark.parametrize("pause_s", [0.5, 6.0])
 def test_what_is_held_comes_along(lab, pause_s):
-    """Also after a pause in which whatever lies still falls asleep."""
+    """Also after a pause, in which resting bodies fall asleep."""
     box = hold_box(lab)
     before = in_hand(lab, box)
     lab.run(pause_s)

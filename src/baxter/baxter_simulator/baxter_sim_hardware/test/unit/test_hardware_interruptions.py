@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every motion of the robot, interrupted in every way: nothing moves afterwards until a new command comes."""
+"""Every motion of the robot, interrupted in every way: afterwards nothing moves until a new command comes."""
 import random
 
 import numpy as np
@@ -16,9 +16,9 @@ WAY = np.tile([0.4, -0.4, 0.3, 0.4, -0.4, 0.4, 0.5], 2)
 PUSH = np.tile([3.0, -3.0, 2.0, 3.0, -0.3, 0.3, 0.2], 2)  # [Nm]
 # So long a motion goes on before it is interrupted [s].
 UNDER_WAY_S = 0.3
-# What brakes rests after so long, and within so far; a command that is still in force is followed to its end.
+# A braking joint rests within this time and distance; a command that is still valid is followed to its end.
 BRAKING_S, BRAKING_RAD, END_S = 0.5, 0.1, 2.5
-# What holds moves by no more than this [rad; m] in so long.
+# A holding joint moves by no more than this [rad; m] in this time.
 STILL, HOLD_S = 1e-3, 0.3
 
 
@@ -31,7 +31,7 @@ def stream(mode, values):
 
 
 def once(send):
-    """A command that is said once."""
+    """A command that is sent once."""
     def beat(lab, start, time_s):
         if time_s == 0.0:
             send(lab, start)
@@ -113,7 +113,7 @@ def stop_and_enable(lab):
 
 
 def halt(lab):
-    """What action servers say when a goal ends early."""
+    """The command of action servers when a goal ends early."""
     lab.command(VELOCITY, np.zeros(len(WAY)))
 
 
@@ -123,7 +123,8 @@ def other_mode(lab):
     lab.command(TORQUE, [0.0, 0.0], names)
 
 
-# {name: (what happens, whether what moved brakes at once)}. A program that is gone leaves its last position in force.
+# {name: (interruption, whether moving joints brake at once)}. After a program has ended, its last position command
+# stays valid.
 INTERRUPTIONS = {
     "reset_world": (reset_world, True), "reset_simulation": (reset_simulation, True),
     "joints set": (put_joints, True), "disable": (lambda lab: lab.enable(False), True),
@@ -132,7 +133,7 @@ INTERRUPTIONS = {
     "emergency stop and back": (estop_and_back, True), "halt": (halt, False), "other mode": (other_mode, False),
     "lost publisher": (lambda lab: None, False),
 }
-# Commands of the arms say nothing of the head and the gripper.
+# Commands of the arms do not affect the head and the gripper.
 PAIRS = [(motion, interruption) for motion in MOTIONS for interruption in INTERRUPTIONS
          if not (motion in ("head", "gripper") and interruption in ("halt", "other mode"))]
 

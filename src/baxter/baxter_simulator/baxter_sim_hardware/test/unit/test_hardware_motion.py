@@ -16,7 +16,7 @@ SMALL_MOVE = np.tile([0.2, 0.2, -0.2, 0.2, 0.3, -0.3, 0.3], 2)
 
 
 def way_of_a_stop(lab):
-    """How far each joint would get (14,) [rad] if it were to stop now: what the joints' torques need."""
+    """Stopping distance of each joint (14,) [rad] from now, by the joints' torques."""
     return stopping.travel(lab.velocity, lab.plugin._baxter.arms.stopping())
 
 
@@ -38,7 +38,7 @@ def random_poses(lab, count):
 
 def test_holds_random_poses(make_lab):
     lab = make_lab(parameters={"enable": True})
-    lab.model.set_self_collision_pairs(())  # random arms may well stand in one another
+    lab.model.set_self_collision_pairs(())  # random postures of two arms may overlap
     for pose in random_poses(lab, 20):
         lab.model.set_joint_positions(lab.arm, pose)
         lab.plugin.joints_set()
@@ -105,17 +105,17 @@ def test_speed_ratio_scales_position_mode(make_lab, ratio, profile):
         for side in SIDES:
             lab.send("limb/%s/set_speed_ratio" % side, Float64(ratio))
     start = lab.position
-    # As far for each joint as it comes in the same time: joints move in step.
+    # Distances that all joints cover in the same time: joints move in step.
     limits = lab.model.max_velocity[lab.arm]
     lab.command(POSITION, start + 0.7 * limits * np.tile([1, 1, 1, 1, 1, -1, 1], 2))
     _, velocity, _ = lab.record(0.5)
     expected = max(ratio, 0.0) * lab.model.max_velocity[lab.arm]
-    # s0 has not the 50 Nm that the steepest part of the profile asks for, and catches up.
+    # The steepest part of the profile needs more than s0's 50 Nm; it catches up later.
     np.testing.assert_allclose(np.abs(velocity).max(axis=0), expected, rtol=0.1, atol=5e-3)
 
 
 def test_joints_of_one_command_arrive_together_and_return_when_pushed(lab):
-    """Whatever way each has: but for the beginning they are on the straight line, nearly."""
+    """For any distances: except at the beginning, they stay near the straight line."""
     start, way = lab.position, np.tile([0.2, -0.3, 1.5, 0.4, -0.5, 0.3, 2.0], 2)
     lab.command(POSITION, start + way)
     position, _, _ = lab.record(1.3)
@@ -176,7 +176,7 @@ def test_streams_that_stop_expire_into_a_hold(lab, mode, values, timeout):
 
 
 def test_arm_too_heavy_to_brake_in_time_does_not_swing_back(lab):
-    """The stretched-out arm turning at full speed slides on beyond what a stop aims for, and then stays there."""
+    """The stretched-out arm turning at full speed overshoots the target of the stop, and then stays there."""
     lab.run(0.4, before=lambda lab: lab.command(VELOCITY, [1.5, 1.5], names=["left_s0", "right_s0"]))
     position, _, _ = lab.record(1.2)
     travelled = position[:, [0, 7]] - position[0, [0, 7]]
@@ -185,7 +185,7 @@ def test_arm_too_heavy_to_brake_in_time_does_not_swing_back(lab):
 
 @pytest.mark.parametrize("joint", [0, 1, 2, 3, 4, 5, 6])
 def test_a_stop_uses_the_torque_that_there_is_and_no_more(lab, joint):
-    """One joint at full speed, all others at rest: v^2 / 2 a, with what the torques leave for a."""
+    """One joint at full speed, all others at rest: v^2 / 2 a, with the a that the torques allow."""
     lab.model.set_self_collision_pairs(())
     wanted = np.zeros(14)
     wanted[[joint, joint + 7]] = lab.model.max_velocity[lab.arm][joint]
@@ -194,7 +194,7 @@ def test_a_stop_uses_the_torque_that_there_is_and_no_more(lab, joint):
     inertia, bias = lab.plugin._dynamics(lab.velocity)
     limits, arm = lab.effort_limit[:7], np.ix_(range(7), range(7))
     column = inertia[arm][:, joint]
-    # The joint that has least left decides: its own, or one that has to hold against it.
+    # The joint with the least spare torque decides: the moving one, or one that must hold against it.
     hardest = ((stopping.SHARE * limits + np.sign(column) * bias[:7]) / np.abs(column)).min()
     hardest = min(hardest, 16.0 * lab.plugin._baxter.arms._points.acceleration[joint])
     lab.stop()
@@ -207,7 +207,7 @@ def test_a_stop_uses_the_torque_that_there_is_and_no_more(lab, joint):
 
 @pytest.mark.parametrize("mode", [POSITION, VELOCITY, TORQUE, RAW])
 def test_no_drive_exerts_more_than_its_limit(make_lab, mode):
-    """Wild commands, arms that meet, enabling and disabling in motion: what is applied is what is reported."""
+    """Wild commands, arms that meet, enabling and disabling in motion: the applied effort equals the reported one."""
     lab = make_lab(parameters={"enable": True})
     rng, lower, upper = np.random.default_rng(11), lab.model.lower[lab.arm], lab.model.upper[lab.arm]
     wild = {POSITION: lambda: rng.uniform(lower, upper), RAW: lambda: rng.uniform(lower, upper),
@@ -366,7 +366,7 @@ def test_stop_and_disable_halt_any_motion(lab, mode, values, end):
 
 
 def test_a_far_goal_with_the_physical_robots_speed_ratio(make_lab):
-    """0.3 of the velocity limits until a client asks for more; both times the arms arrive where they shall."""
+    """0.3 of the velocity limits until a client requests more; both times the arms arrive at their targets."""
     lab = make_lab(pose="neutral", parameters={"enable": True, "profile": "robot"})
     start, far = lab.position, np.tile([-0.8, 0.6, 1.5, 0.8, 2.5, -1.5, 2.5], 2)
     limits = lab.model.max_velocity[lab.arm]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What goes out: when it is due, and that prepared messages are the ones that genpy would have written."""
+"""Published messages: when they are due, and that prepared messages equal those of genpy."""
 from io import BytesIO
 
 import numpy as np

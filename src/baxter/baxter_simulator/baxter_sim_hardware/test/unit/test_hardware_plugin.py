@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the plugin publishes: rates, names, fields; and what it makes of messages."""
+"""What the plugin publishes: rates, names, fields; and how it handles messages."""
 import inspect
 import random
 from pathlib import Path
@@ -37,7 +37,7 @@ def test_what_balances_gravity_is_as_new_as_the_drives_need_it(make_lab, monkeyp
         lab.command(mode, lab.position if mode == 1 else np.zeros(14))
     lab.run(0.1)
     assert np.diff(asked).max() == most_ticks
-    # Joints that were put elsewhere are no reason to go by what balanced them where they were.
+    # After joints were moved by a service, the old gravity torques must not be used.
     while asked[-1] == lab.world.tick - 1 and most_ticks > 1:
         lab.run(0.002)
     lab.plugin.joints_set()

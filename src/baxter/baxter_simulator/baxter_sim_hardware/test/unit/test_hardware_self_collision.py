@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arms collide with each other and with the body, and with nothing where they are just folded."""
+"""The arms collide with each other and with the body, and have no contact when they are folded."""
 import numpy as np
 import pytest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Range, sonars, accelerometers on the real physics; the screen; maintenance; what the robot says of itself."""
+"""Range, sonars, accelerometers on the real physics; the screen; maintenance; the robot's status."""
 import numpy as np
 import pytest
 from baxter_core_msgs.msg import URDFConfiguration
@@ -21,7 +21,7 @@ WALL = """<robot name="wall"><link name="wall"><collision><geometry><box size="0
 
 
 def wall_before(lab, link, distance, name="wall"):
-    """A wall across the x axis of a link's frame, its near side so far [m] away."""
+    """A wall across the x axis of a link's frame, its near side at this distance [m]."""
     matrix = lab.model.link_pose(link).matrix()
     centre = matrix.copy()
     centre[:3, 3] += (distance + 0.01) * matrix[:3, 0]
@@ -211,7 +211,7 @@ def test_a_procedure_runs_its_dialogue(lab, name, side):
     lab.run(1.0, before=keep_asking(name, side))
     assert status(lab, name, side).isEnabled and status(lab, name, side).complete == 0
     assert status(lab, name, side).controlUid == "sdk"
-    # The arm goes through its postures, rests in each, and takes its time; the other one stays where it is.
+    # The arm moves through its postures and rests in each; the other arm does not move.
     joints = slice(0, 7) if side == "left" else slice(7, 14)
     start, path, begin = lab.position, [], lab.world.time_s
     while status(lab, name, side).complete == 0 and lab.world.time_s < begin + 100.0:
@@ -297,7 +297,7 @@ def test_updater_has_nothing_to_update_from(make_lab):
     assert lab.last("/updater/status").status == 0
 
 
-# -- what the robot says of itself
+# -- the robot's status
 
 def test_diagnostics_follow_the_robots_state(lab):
     lab.run(1.1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The suction gripper: which commands it takes, and what its cup holds in a physics world."""
+"""The suction gripper: which commands it takes, and which loads its cup holds in a physics world."""
 import json
 
 import numpy as np
@@ -50,7 +50,7 @@ def lab(make_lab, suction_robot):
 
 
 def put_box_on_cup(lab, gap=0.0, aside=0.0, mass=0.3):
-    """A box so far in front of the cup's rim, its middle so far aside of the cup's."""
+    """Put a box at this distance in front of the cup's rim, its centre at this offset from the cup's."""
     rim = lab.model.link_pose("left_gripper").matrix()
     middle = rim[:3, 3] + rim[:3, :3] @ (aside, 0.0, gap + 0.02)
     pose = Pose(tuple(middle), lab.model.link_pose("left_gripper").quaternion)
@@ -58,7 +58,7 @@ def put_box_on_cup(lab, gap=0.0, aside=0.0, mass=0.3):
 
 
 def suck(lab, seconds=5.0):
-    """What is near the cup begins to weigh when the pump has done its work."""
+    """Gravity on the box near the cup starts when the pump has evacuated the cup."""
     lab.world.set_gravity((0.0, 0.0, 0.0))
     tell(lab, "go", json.dumps({"grip_attempt_seconds": seconds}), seconds=1.0)
     lab.world.set_gravity((0.0, 0.0, -9.81))
@@ -139,7 +139,7 @@ def test_what_is_held_comes_along_and_falls_on_release(lab):
     box = put_box_on_cup(lab)
     suck(lab)
     before = lab.model.link_pose("left_gripper").position
-    lab.run(6.0)  # whatever lies still falls asleep meanwhile
+    lab.run(6.0)  # resting bodies fall asleep meanwhile
     swing(lab)
     assert np.linalg.norm(np.array(lab.model.link_pose("left_gripper").position) - before) > 0.1
     assert state(lab).gripping == 1

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The field that keeps the arms away from the head: it slows what comes near and stops it at the guards.
-
-The description puts two balls around the head. They are no bodies: nothing bumps into them. An arm counts as a chain of
-capsules from elbow to tip, as thick as its links; where the motion that is wanted would bring one of them nearer to a
-ball, all joints of the arm go so much slower that the gap closes no faster than in proportion to itself. What leads
-away is free.
+"""The field that keeps the arms away from the head: it slows approaching arms and stops them at the guards. The
+description has two balls around the head. They are no bodies: nothing collides with them. An arm is modelled as a chain
+of capsules from elbow to tip, as thick as its links. When the commanded motion would bring a capsule nearer to a ball,
+all joints of the arm are slowed, so that the approach speed is at most proportional to the gap. Motion away is free.
 """
 import math
 from typing import NamedTuple
@@ -15,11 +13,12 @@ from numba_cache import compiler
 
 _compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
-# [s] A gap is closed no faster than at its own width in this time: an elbow at 1 m/s is slowed from 0.15 m on, by less
+# [s] The approach speed is at most the gap divided by this time: an elbow at 1 m/s is slowed from 0.15 m on, by less
 # than the set-points' own deceleration.
 CLOSING_S = 0.15
 FIELD_M = 0.03  # within this distance of a guard, an arm counts as being in the field
-# The first joint of an arm whose link comes near the head: e0, the elbow's. What hangs on it is a chain of capsules.
+# The first joint of an arm whose link comes near the head: e0, the elbow's. The links from there on are the chain of
+# capsules.
 FIRST_JOINT = 2
 
 
@@ -32,8 +31,8 @@ class Guards(NamedTuple):
 
 
 class Field(NamedTuple):
-    """What the guards have to say of one arm: names of those that it is near to, and the share of its speed, 0 to 1,
-    that it may go on with."""
+    """The guards' result for one arm: names of the near guards, and the share of its speed, 0 to 1, that it may
+    keep."""
 
     near: tuple
     slowing: float

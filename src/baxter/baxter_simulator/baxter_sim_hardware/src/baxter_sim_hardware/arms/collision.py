@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collisions of an arm: detection, the states to report, and what a client has suppressed for the moment.
-
-Avoidance is about the robot itself: an arm that touches the body, the other arm or its own shoulder yields, that is its
-drives push with a fraction of what they have, in the modes in which the physical robot keeps its arms apart (position
-and velocity). Detection is about everything: an arm is in a collision when its joints feel more than its own weight and
-motion explain, or its hand more than it may carry.
+"""Collisions of an arm: detection, the states to report, and what clients suppress at present. Avoidance concerns the
+robot itself: an arm that touches the body, the other arm or its own shoulder yields. Then its drives push with a
+fraction of their effort, in the modes in which the physical robot keeps its arms apart (position and velocity).
+Detection concerns everything: an arm is in a collision when the torques on its joints exceed those of its own weight
+and motion, or the load on its hand exceeds its limit.
 """
 from baxter_model import JOINTS, is_part_of_arm
 from baxter_model.self_collision import BODY
 
-SUPPRESSION_S = 0.6  # [simulated s] the physical robot's: how long one suppress message counts
+SUPPRESSION_S = 0.6  # [simulated s] validity of one suppress message, as on the physical robot
 AVOIDANCE, BODY_AVOIDANCE = "suppress_collision_avoidance", "suppress_body_avoidance"
 CONTACT, OVERWRENCH = "suppress_contact_safety", "suppress_hand_overwrench_safety"
 CUFF, GRAVITY = "suppress_cuff_interaction", "suppress_gravity_compensation"
@@ -21,14 +20,14 @@ SUPPRESSIONS = {
     CUFF: "a squeezed cuff does not make the arm float",
     GRAVITY: "torque mode without the torque that balances gravity: the arm falls",
 }
-# Torque [Nm] by joint from which an arm counts as squeezed, and what a hand may feel [N, Nm]: the physical robot's
-# parameters. It gives no figure for w2; the wrist's others stand in.
+# Torque [Nm] by joint from which an arm counts as squeezed, and largest load on a hand [N, Nm]: the physical robot's
+# parameters. It has no value for w2; we use that of the other wrist joints.
 SQUISH_NM = dict(zip(JOINTS, (16.0, 24.0, 16.0, 16.0, 7.0, 7.0, 7.0), strict=True))
 HAND_FORCE_N, HAND_TORQUE_NM = 100.0, 30.0
 
 
 class Suppressions:
-    """What one arm's clients have switched off; each message counts for SUPPRESSION_S."""
+    """What clients of one arm have suppressed; each message is valid for SUPPRESSION_S."""
 
     def __init__(self):
         self.reset()
@@ -60,10 +59,10 @@ def touched(contacts, side):
 
 
 def is_squeezed(torques):
-    """Whether (7,) torques from outside [Nm], torso to wrist, are more than an arm meets in free motion."""
+    """Whether (7,) torques from outside [Nm], torso to wrist, are more than occur in free motion."""
     return any(abs(torque) > bound for torque, bound in zip(torques, SQUISH_NM.values(), strict=True))
 
 
 def is_overloaded(wrench):
-    """Whether (6,) force [N] and torque [Nm] at the tip are more than a hand may feel."""
+    """Whether (6,) force [N] and torque [Nm] at the tip exceed the limits of a hand."""
     return bool(sum(wrench[:3] ** 2) > HAND_FORCE_N ** 2 or sum(wrench[3:] ** 2) > HAND_TORQUE_NM ** 2)

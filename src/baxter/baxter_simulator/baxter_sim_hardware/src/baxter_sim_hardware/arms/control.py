@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Both arms' command modes, as one array of joints.
 
-Each tick turns the commands that came in and the measured joint state into what the joint drives shall do:
+Each tick turns new commands and the measured joint state into set-points of the joint drives:
 
 - POSITION moves the set-point at no more than speed ratio times the model's velocity limit, with bounded acceleration.
-  Joints that one command names move in step: all arrive when the one with the longest way does. The vendor's tuck_arms
-  ends as soon as the shoulder is folded, and leaves the elbow where it ought to be only if they do.
+  Joints that one command names move in step: all arrive together with the one that takes longest. The vendor's
+  tuck_arms needs this: it ends as soon as the shoulder is folded, and the elbow must have arrived by then.
 - VELOCITY is the same profile towards the joint limit ahead, cruising at the commanded speed; so it brakes in time.
-- RAW_POSITION follows a stream of set-points as it is, without smoothing, braking at its end or a speed ratio: what
-  arrives is passed on, bounded by the velocity limit and by the acceleration that the drives can follow.
+- RAW_POSITION follows a stream of set-points directly, without smoothing, braking at its end or a speed ratio:
+  set-points are passed on, bounded by the velocity limit and by the acceleration that the drives can follow.
 - TORQUE adds the command to the torque that balances gravity.
 
-In every mode, a stop included, a drive exerts no more than the model's effort limit, what carries the arm's weight
-among it.
+In every mode, and in a stop, the effort of a drive stays within the model's limit, including the part that carries the
+arm's weight.
 
-Whatever is streamed (all but POSITION) expires joint by joint when its command is older than the limb's time-out;
-the joint then stops and holds. A command moves only the joints it names. In the mode that the limb is in already, the
-others go on with what they were told; a command in another mode makes them stop and hold.
+Streamed commands (all modes but POSITION) expire joint by joint when they are older than the limb's time-out;
+the joint then stops and holds. A command moves only the joints it names. If the command keeps the limb's mode, the
+other joints continue with their last command; a command in another mode makes them stop and hold.
 
-No set-point runs away from its joint: one that is pushed or blocked keeps its set-point within reach, so the arm comes
-back at the speed its mode allows, never with a snap.
+A set-point never runs away from its joint: while a joint is pushed or blocked, its set-point stays near, so the arm
+returns at the speed of its mode, without a jump.
 """
 from typing import NamedTuple
 
@@ -37,10 +37,10 @@ from .stopping import hardest_stop
 COMMAND_TIMEOUT_S = 0.2  # the robot's own
 SPEED_RATIO = {"sim": 1.0, "robot": 0.3}  # at start, by profile; 0.3 is what the physical robot starts with
 
-# Set-points accelerate by what the arm can follow nearly anywhere in its workspace within the effort limits [rad/s^2].
-# Joints that hold because a command expired or names them no more decelerate harder, and what the drives cannot follow
-# the reach bound catches. Where the whole robot stops (disabled, enabled, stopped), an arm slows down as hard as its
-# torques allow, within these factors: see `stopping`.
+# Acceleration of set-points: the arm can follow it nearly anywhere in its workspace within the effort limits [rad/s^2].
+# Joints that hold because their command expired, or because a new one does not name them, decelerate harder; if the
+# drives cannot follow, the bound on the set-point's lead applies. When the whole robot stops (disabled, enabled,
+# stopped), an arm slows down as hard as its torques allow, within these factors: see `stopping`.
 ACCELERATION = {"s0": 10.0, "s1": 10.0, "e0": 15.0, "e1": 15.0, "w0": 40.0, "w1": 40.0, "w2": 40.0}
 STOP_ACCELERATION_FACTOR = 3.0
 LEAST_STOP_FACTOR, MOST_STOP_FACTOR = 0.1, 16.0
@@ -71,7 +71,7 @@ class Drives(NamedTuple):
 
 
 class _Limb:
-    """What one arm does not share with the other."""
+    """The state of one arm that is separate from the other's."""
 
     def __init__(self, model, limits, speed_ratio):
         self.parser = CommandParser(limits, model.joint_names)
@@ -129,7 +129,7 @@ class Arms:
         self._refresh_speed()
 
     def take_over(self):
-        """Forget every command, and have set-points where the joints are and as fast as they move."""
+        """Forget every command, and put the set-points at the joints' positions and velocities."""
         self.reset()
         self._follow_joint(np.ones(len(self._all), dtype=bool))
         self._is_settled = False
@@ -171,7 +171,7 @@ class Arms:
         """(n,) [Nm] what torque mode adds to gravity; zero for joints in other modes."""
         return np.where(self._modes.in_torque, self._modes.value, 0.0)
 
-    # -- what clients say
+    # -- settings and commands of clients
 
     def set_speed_ratio(self, side, ratio):
         """Scale POSITION mode's speed; clipped to 0..1. Raises CommandRefused for NaN."""
@@ -184,7 +184,7 @@ class Arms:
         return self._limbs[side].speed_ratio
 
     def set_timeout(self, side, seconds):
-        """How old a streamed command may get [s]. Raises CommandRefused for what is no positive number."""
+        """How old a streamed command may get [s]. Raises CommandRefused unless it is a positive number."""
         if not seconds > 0.0:
             raise CommandRefused("joint command time-out is %s s; it must be greater than 0" % seconds)
         self._limbs[side].timeout_s = float(seconds)
@@ -202,7 +202,7 @@ class Arms:
         if limb.floats:
             raise CommandRefused("the arm floats, because its cuff is squeezed; release it first")
         if command.mode is Mode.POSITION is limb.mode and modes.all_in_position and not points.braking.any():
-            # As most commands are: nothing changes but where to.
+            # The usual case: only the target changes.
             points.target[command.index] = command.values
             self._is_settled = False
             self._move_in_step(command)
@@ -241,7 +241,7 @@ class Arms:
     def wanted_rates(self, side):
         """(k,) [rad/s] the speeds at which one limb's joints would move if nothing slowed them.
 
-        0 for those in modes that collision avoidance has no say in.
+        0 for joints in modes without collision avoidance.
         """
         points, index = self._points, self._limbs[side].index
         ahead = points.target[index] - points.position[index]
@@ -250,7 +250,7 @@ class Arms:
         return np.where(governed, np.copysign(speed, ahead), 0.0)
 
     def set_slowing(self, side, share):
-        """Which share of the speed, 0 to 1, a limb's set-points may have in position and velocity mode."""
+        """Set the share of the speed, 0 to 1, that a limb's set-points may have in position and velocity mode."""
         limb = self._limbs[side]
         if share != limb.slowing:
             limb.slowing = share
@@ -264,7 +264,7 @@ class Arms:
             self._efforts.balanced[limb.index] = float(on)
 
     def set_floating(self, side, floats):
-        """Have a limb float without resistance, or hold where it is then. It takes no commands while it floats."""
+        """Make a limb float without resistance, or hold its present position. It takes no commands while it floats."""
         limb = self._limbs[side]
         if floats == limb.floats:
             return
@@ -277,9 +277,9 @@ class Arms:
             self._hold(limb.joints)
 
     def feed_forward(self, side, velocities):
-        """Take the velocities (7,) [rad/s] at which raw set-points move that come in about now.
+        """Take the velocities (7,) [rad/s] that belong to the raw set-points of this moment.
 
-        A stream of set-points is then followed without the lag of one command. Raises CommandRefused for what is not
+        A stream of set-points is then followed without the lag of one command. Raises CommandRefused unless there is
         one finite number for each joint.
         """
         index = self._limbs[side].index
@@ -304,7 +304,7 @@ class Arms:
         self._hold(np.ones(len(self._all), dtype=bool), stopping)
 
     def stopping(self):
-        """(n,) [rad/s^2] with which the set-points, as fast as they are now, slow down in a stop: see `stopping`."""
+        """(n,) [rad/s^2] deceleration of the set-points in a stop from their present velocities: see `stopping`."""
         points = self._points
         found = np.zeros(len(self._all))
         if points.output_rate.any():
@@ -318,7 +318,7 @@ class Arms:
     # -- one tick
 
     def update(self):
-        """Drives for the tick in which the joints are as measured."""
+        """Return the Drives for this tick, from the measured joints."""
         measured, points = self._measured, self._points
         if self._is_settled:
             leads = any_beyond(REACH_RAD, points.output, points.output_rate, measured.position, self._dt)
@@ -341,9 +341,8 @@ class Arms:
                       pushed, *self._torque_drive(pushed))
 
     def sink(self):
-        """Drives for a tick without power: each joint gives way to gravity like a light body in a thick medium.
-
-        The drive pushes with no more than the weight itself.
+        """Return the Drives for a tick without power: each joint sinks slowly, like a light body in a thick medium. The
+        drive pushes with no more than the weight itself.
         """
         self.reset()
         limits, position, gravity = self.limits, self._measured.position, self._measured.gravity
@@ -356,11 +355,12 @@ class Arms:
     # -- inside
 
     def _torque_drive(self, joints):
-        """Command plus what balances gravity, as a (velocity [rad/s], effort [Nm]), both (k,); it never races.
+        """Command plus the torque that balances gravity, as (velocity [rad/s], effort [Nm]), both (k,), with a bounded
+        speed.
 
-        A velocity motor with a far target and a bounded effort exerts exactly that effort, and none beyond the target:
-        the velocity limit comes for free and holds within the tick, also for a wrist that 15 Nm would bring to 15 rad/s
-        in one. Where the joint is at its limit without being braked by the command, the motor holds it there.
+        A velocity motor with a far target and a bounded effort exerts exactly that effort, and none above the target
+        velocity. So the velocity limit also holds within the tick, even for a wrist that 15 Nm would accelerate to 15
+        rad/s in one. Where the joint is at its limit without being braked by the command, the motor holds it there.
         """
         velocity = self._measured.velocity[joints]
         gravity = (self._efforts.balanced * self._measured.gravity)[joints]
@@ -401,7 +401,7 @@ class Arms:
         self._is_settled = False
         points.velocity[far] = measured.velocity[far]
         points.output_rate[far] = measured.velocity[far]
-        # What brakes and slips stays where it stops; going back would be a motion that nobody asked for.
+        # A braking joint that slips stays where it stops; going back would be a motion without a command.
         slipped = far & points.braking
         points.target[slipped] = self._resting_point()[slipped]
 
@@ -427,7 +427,7 @@ class Arms:
         self._refresh_speed()
 
     def _follow_joint(self, joints):
-        """Put the set-points of joints that were driven by torque onto the joints themselves: no jump on return."""
+        """Put the set-points of torque-driven joints at the joints' positions, so that a mode change causes no jump."""
         if joints.any():
             points, measured = self._points, self._measured
             points.position[joints] = points.output[joints] = measured.position[joints]
@@ -435,7 +435,7 @@ class Arms:
             self._smoothing.restart(joints, measured.position[joints])
 
     def _move_in_step(self, command):
-        """Have the joints of a POSITION command arrive together."""
+        """Make the joints of a POSITION command arrive together."""
         index = command.index
         times = np.abs(command.values - self._points.position[index]) / self.limits.velocity[index]
         longest = times.max()

@@ -4,16 +4,17 @@ import numpy as np
 
 from .joint_modes import RAW_POSITION
 
-# A set-point leads its joint by no more than this [rad]. The joint motors answer an error of that size with what they
-# have; a larger one would only make them overshoot. In free motion the joints stay within a tenth of it.
+# A set-point leads its joint by no more than this [rad]. At an error of that size the joint motors already use their
+# full effort; a larger one would only cause overshoot. In free motion the joints stay within a tenth of it.
 REACH_RAD = 1e-3
-# An arm that touches the robot itself pushes with this share of its effort limits in position and velocity mode, beside
-# what carries its weight.
+# An arm that touches the robot itself pushes with this share of its effort limits in position and velocity mode, in
+# addition to the torque that carries its weight.
 YIELD_FACTOR = 0.3
 
 
 class EffortBounds:
-    """limit: (n,) [Nm] the joints' effort limits, for all that a drive exerts, what carries the arm's weight among it.
+    """limit: (n,) [Nm] the joints' effort limits, for the whole effort of a drive, including the part that carries the
+    arm's weight.
 
     Attribute `balanced`: (n,) 1 where torque mode adds the torque that balances gravity, 0 where not.
     """
@@ -30,7 +31,7 @@ class EffortBounds:
         self.any_yields = bool(self._yielding.any())
 
     def bound(self, gravity, mode):
-        """(n,) [Nm] what drives may exert where `gravity` (n,) is what the weight takes of it; mode: (n,)."""
+        """(n,) [Nm] largest effort of the drives; gravity: (n,) [Nm] the part that carries the weight; mode: (n,)."""
         if not self.any_yields:
             return self._limit
         gentle = self._yielding & (mode != RAW_POSITION)

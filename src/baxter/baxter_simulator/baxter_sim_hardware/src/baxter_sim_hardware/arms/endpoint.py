@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an arm feels and does at its end point."""
+"""Velocities and wrench of an arm's end point."""
 import numpy as np
 
 # Added to the diagonal of J J^T: keeps the wrench finite where the arm is singular and changes it by less than 1e-4
-# of its value elsewhere (the smallest eigenvalue of J J^T is about 0.02 in the poses that people work in).
+# of its value elsewhere (the smallest eigenvalue of J J^T is about 0.02 in common poses).
 _DAMPING = 1e-6
-# Of the inverse that turns a twist into joint velocities: the tip loses 1 % of its speed where the least singular value
+# Damping of the inverse from twist to joint velocities: the tip loses 1 % of its speed where the least singular value
 # of J is ten times this.
 _SINGULARITY_DAMPING = 0.02
 
@@ -16,9 +16,8 @@ def twist(jacobian, velocity):
 
 
 def joint_velocities(jacobian, tip_twist):
-    """(k,) [rad/s] that move the tip at (6,) twist [m/s, rad/s], as far as the arm can without racing.
-
-    Damped least squares: J^T (J J^T + d^2 I)^-1, which gives way where the arm is singular.
+    """(k,) [rad/s] that move the tip at (6,) twist [m/s, rad/s], approximately near singularities, so that no joint
+    gets too fast. Damped least squares: J^T (J J^T + d^2 I)^-1.
     """
     gram = jacobian @ jacobian.T
     gram.flat[::7] += _SINGULARITY_DAMPING**2
@@ -26,7 +25,7 @@ def joint_velocities(jacobian, tip_twist):
 
 
 def contact_wrench(jacobian, effort, gravity):
-    """(6,) force [N] and torque [Nm] that the surroundings exert on the tip, in base, at the tip.
+    """(6,) external force [N] and torque [Nm] on the tip, in base, at the tip.
 
     jacobian: (6, k), linear rows first; effort: (k,) [Nm] what the drives apply; gravity: (k,) [Nm] what balances
     gravity. At rest the drives balance gravity and contact, effort = gravity - J^T w; least squares gives w.

@@ -2,8 +2,8 @@
 """Joint commands: modes, limits, and the checks of a message before it moves anything.
 
 A command is one decision: it is refused as a whole (`CommandRefused`) when it is malformed, and clamped, value by
-value, when it asks for more than the joints can do. That is how the physical robot treats both cases; its own tucked
-pose, for one, lies 0.03 rad outside the URDF's limits.
+value, when it exceeds the joints' limits. The physical robot does the same; its own tucked pose, for one, lies 0.03 rad
+outside the URDF's limits.
 """
 import math
 from collections import Counter
@@ -56,7 +56,8 @@ class JointLimits:
         return np.minimum(np.maximum(values, self.lower[index]), self.upper[index])
 
 
-# A joint that rests on its limit is measured a little beyond it, and clients that start from where the arm is say so.
+# A joint at its limit is measured slightly beyond it, and clients that start from the measured position send such
+# values.
 WORTH_TELLING = 1e-3  # [rad, rad/s or Nm]
 
 
@@ -80,13 +81,13 @@ class CommandParser:
         self._limits = limits
         self._names = tuple(names)
         self._index = {name: limits.names.index(name) for name in names}
-        self._last = [], np.zeros(0, dtype=int)  # the names that were found right last, and their indices
+        self._last = [], np.zeros(0, dtype=int)  # the last valid names, and their indices
 
     def parse(self, mode, names, values):
         """Check one command.
 
         mode: int; names: sequence of str; values: sequence of float, one for each name.
-        Raises CommandRefused, naming what was wrong and what this limb accepts.
+        Raises CommandRefused, with the error and what this limb accepts.
         """
         self._check(mode, names, values)
         mode, index = Mode(mode), self._last[1]
@@ -99,7 +100,7 @@ class CommandParser:
         return JointCommand(mode, index, values, clamped)
 
     def _check(self, mode, names, values):
-        """Raises CommandRefused; else `_last` tells the command's joints."""
+        """Raises CommandRefused; else `_last` holds the command's joints."""
         if mode not in Mode._value2member_map_:
             raise self._refusal("unknown mode %d; modes are %s" % (
                 mode, ", ".join("%d %s" % (known, known.name) for known in Mode)))
@@ -108,7 +109,7 @@ class CommandParser:
         if not names:
             raise self._refusal("no joints named")
         names = list(names)
-        # A stream says the same names each time.
+        # A stream repeats the same names.
         if names != self._last[0]:
             unknown = [name for name in names if name not in self._index]
             if unknown:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command mode of each joint, what was commanded in it, and when that expires."""
+"""The command mode of each joint, its commanded value, and the time at which it expires."""
 import numpy as np
 
 from .joint_command import Mode
@@ -33,7 +33,7 @@ class JointModes:
         self._may_expire = True
 
     def expired(self, time_s):
-        """(n,) mask of the joints whose commands have expired by time_s [s], or None where nothing can expire."""
+        """(n,) mask of the joints whose commands have expired by time_s [s], or None if no command can expire."""
         return self._deadline <= time_s + 1e-9 if self._may_expire else None
 
     def settle(self):

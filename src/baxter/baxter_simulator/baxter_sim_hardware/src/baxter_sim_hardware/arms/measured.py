@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is known of the arms' joints when a tick begins."""
+"""The measured state of the arms' joints at the start of a tick."""
 import numpy as np
 
 
@@ -8,7 +8,7 @@ class Measured:
 
     time_s: [s]; position: (n,) [rad]; velocity: (n,) [rad/s]; gravity: (n,) [Nm] the torque that balances gravity.
     dynamics: function (velocity (n,) [rad/s]) -> (inertia (n, n) [kg m^2], torque (n,) [Nm] that keeps the joints at
-    that velocity), where the joints are.
+    that velocity), at the present position.
     """
 
     __slots__ = ("time_s", "position", "velocity", "gravity", "dynamics")

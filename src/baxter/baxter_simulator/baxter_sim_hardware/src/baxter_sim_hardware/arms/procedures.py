@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Maintenance: the procedures that tare an arm and calibrate it, and the updater, as far as a simulated robot has them.
 
-A procedure runs while its client keeps asking for it and the robot is enabled. It takes the arm through a row of
-postures around the neutral one and watches its joints at rest in each: it succeeds when what they exert is, on average,
-what their model says, and fails when something leans on the arm or keeps it from a posture. Which postures the physical
-robot takes is not public.
+A procedure runs while its client repeats the request and the robot is enabled. It moves the arm through postures around
+the neutral one and measures its joints at rest in each. It succeeds when the mean efforts agree with the model, and
+fails when something presses on the arm or keeps it from a posture. The postures of the physical robot are not public.
 """
 from enum import Enum
 from typing import NamedTuple
@@ -20,12 +19,12 @@ KEEP_ALIVE_S = 1.5  # [simulated s] the physical robot wants a message faster th
 REST_S = 2.0  # [simulated s] in each posture, of which the second half counts: what was set in motion has died down
 ARRIVAL_S = 30.0  # [simulated s] in which a posture must be reached: the longest way takes 2 s, 20 s at a ratio of 0.1
 NEAR_RAD = 0.01
-# A joint of an arm on which nothing leans differs from its model by less than this part of what counts as a squeeze.
+# Largest deviation of a free arm's joint from its model, as a share of the squeeze threshold.
 TOLERANCE = 0.1
 NOT_COMPLETE, FAILURE, SUCCESS = 0, 1, 2  # RobustControllerStatus.complete
 
-# By the name of its topics: what it does, and its postures, each by what differs from the neutral one on the left arm
-# [rad]. Taring is about the shoulder's spring, calibrating about every joint: it turns each one to either side.
+# By the name of its topics: its description, and its postures, each as differences to the neutral one on the left arm
+# [rad]. Taring concerns the shoulder's spring; calibration concerns every joint, and turns each one to both sides.
 PROCEDURES = {
     "Tare": ("tares", ({}, {"s1": -0.3}, {"s1": 0.2, "e1": 0.3}, {"s1": -0.2, "e1": 0.5}, {})),
     "CalibrateArm": ("calibrates", ({}, *({joint: turn} for joint, size in zip(
@@ -36,14 +35,14 @@ UPDATER_IDLE, UPDATER_INVALID = 0, 1  # UpdateStatus.status
 
 
 def postures(name, side):
-    """The postures (7,) [rad], shoulder to wrist, that a procedure of PROCEDURES takes one arm through."""
+    """The postures (7,) [rad], shoulder to wrist, of a procedure of PROCEDURES for one arm."""
     neutral = np.array(list(poses().angles("neutral", side).values()))
     signs = np.array([1 if side == SIDES[0] else MIRROR_SIGNS[joint] for joint in JOINTS])
     return [neutral + signs * [turns.get(joint, 0.0) for joint in JOINTS] for turns in PROCEDURES[name][1]]
 
 
 class Arm(NamedTuple):
-    """What a procedure knows of its arm, (7,) each: position [rad], velocity [rad/s], torques from outside [Nm]."""
+    """The state of the arm for a procedure, (7,) each: position [rad], velocity [rad/s], torques from outside [Nm]."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -51,7 +50,7 @@ class Arm(NamedTuple):
 
 
 class Order(Enum):
-    """What a procedure wants of the arm, where it is no posture."""
+    """A request of a procedure to the arm other than a posture."""
 
     NOTHING = "nothing"
     STOP = "stop"
@@ -78,7 +77,7 @@ class Procedure:
         self._sum, self._count = np.zeros(len(SQUISH_NM)), 0
 
     def take(self, wanted, uid, time_s):
-        """A client asks for the procedure, or for its end, at time_s [s]."""
+        """Take a client's request to run or to end the procedure, at time_s [s]."""
         if not wanted:
             self.is_enabled = False
         elif not self.is_enabled:
@@ -88,11 +87,12 @@ class Procedure:
 
     @property
     def is_active(self):
-        """Whether `update` has something to do."""
+        """Whether `update` must be called."""
         return self.is_enabled or self._moves
 
     def update(self, time_s, robot_enabled, arm):
-        """Go on, at time_s [s]; arm: `Arm`. Returns an `Order`, or the posture (7,) [rad] that the arm shall go to."""
+        """Continue the procedure at time_s [s]; arm: `Arm`. Returns an `Order`, or the next posture (7,) [rad] of the
+        arm."""
         if self.is_enabled and time_s - self._last > KEEP_ALIVE_S:
             self.is_enabled, self.timed_out = False, True
         if self.is_enabled and self.complete == NOT_COMPLETE:
@@ -144,7 +144,7 @@ class Procedure:
 
 
 class Updater:
-    """What becomes of a wish to update: there is nothing to update from."""
+    """The updater, which refuses every request: there is no source of updates."""
 
     def __init__(self):
         self.reset()

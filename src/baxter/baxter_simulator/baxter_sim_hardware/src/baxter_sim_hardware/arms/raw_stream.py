@@ -9,7 +9,7 @@ FEED_FORWARD_S = 0.05  # for so long a feed-forward velocity belongs to the raw 
 
 
 class RawStream:
-    """When the last raw set-points came, and the velocities that belong to them, for n joints.
+    """The times of the last raw set-points, and their velocities, for n joints.
 
     limits: JointLimits; dt: length of a tick [s].
     """
@@ -22,7 +22,7 @@ class RawStream:
         self._velocity_stamp = np.full(count, -np.inf)
 
     def reset(self):
-        """Forget what has come: with the clock set back it would seem to have come just now."""
+        """Forget all set-points: after a reset of the clock they would seem recent."""
         self._stamp[:] = self._velocity_stamp[:] = -np.inf
 
     def feed_forward(self, index, velocities, time_s):
@@ -32,14 +32,14 @@ class RawStream:
         self._velocity_stamp[index] = time_s
 
     def take(self, points, mode, command, time_s):
-        """Take a raw command at time_s [s]: its target moves there at the stream's own pace, or is there at once if
-        none runs. points: SetPoints; mode: (n,) of the joints, before the command; command: JointCommand."""
+        """Take a raw command at time_s [s]: its target moves there at the stream's own pace, or jumps there if no
+        stream runs. points: SetPoints; mode: (n,) of the joints, before the command; command: JointCommand."""
         index = command.index
         gap = np.maximum(time_s - self._stamp[index], self._dt)
         goes_on = (mode[index] == RAW_POSITION) & (gap <= STREAM_GAP_S)
         points.target[index] = np.where(goes_on, points.target[index], command.values)
         limit = self._limits.velocity[index]
-        # With a feed-forward velocity the goal is where the next command will be, without the one that has just come.
+        # With a feed-forward velocity, the goal is the predicted next command.
         is_fresh = goes_on & (time_s - self._velocity_stamp[index] <= FEED_FORWARD_S)
         ahead = np.where(is_fresh, self._velocity[index] * np.minimum(gap, STREAM_GAP_S), 0.0)
         goal = np.clip(command.values + ahead, self._limits.lower[index], self._limits.upper[index])

@@ -26,7 +26,7 @@ def _approach(position, velocity, target, speed, acceleration, dt):
 def approach(position, velocity, target, speed, acceleration, dt):
     """One tick of a trapezoidal velocity profile in discrete time, for n joints at once.
 
-    position [rad], velocity [rad/s]: (n,) where the set-point is; target [rad]: (n,) where it is to rest;
+    position [rad], velocity [rad/s]: (n,) state of the set-point; target [rad]: (n,) where it comes to rest;
     speed [rad/s] >= 0 and acceleration [rad/s^2] > 0: (n,) bounds; dt [s]. Returns the new (position, velocity).
 
     The braking speed is that from which the ticks to standstill, each slower by a dt, cover exactly the distance left.
@@ -42,15 +42,13 @@ def approach(position, velocity, target, speed, acceleration, dt):
 
 
 class SetPoints:
-    """What `follow` moves, (n,) each.
+    """The arrays that `follow` updates, (n,) each. position [rad], velocity [rad/s]: state of the set-points. target
+    [rad]: where they go, at most at speed [rad/s] and with acceleration [rad/s^2], or, where `braking`, with stopping
+    [rad/s^2]. Where `streams`, the target itself moves to goal [rad], by at most pace [rad/s] (of either sign). output
+    [rad], output_rate [rad/s]: set-points of the drives, with the position smoothed.
 
-    position [rad], velocity [rad/s]: where the set-points are. target [rad]: where they go, at most at speed [rad/s]
-    and with acceleration [rad/s^2], or, where `braking`, with stopping [rad/s^2]. Where `streams`, the target is itself
-    on the way to goal [rad], by at most pace [rad/s] (of either sign). output [rad], output_rate [rad/s]: what the
-    drives shall follow, position smoothed.
-
-    All are views of two arrays, `numbers` and `flags`: a compiled function takes more time to be handed fifteen arrays
-    than to move fourteen joints.
+    All are views of two arrays, `numbers` and `flags`: passing fifteen arrays to a compiled function takes longer than
+    moving fourteen joints.
     """
 
     def __init__(self, count):
@@ -65,9 +63,9 @@ def follow(numbers, flags, window, oldest, measured, reach, dt):
     """One tick of `approach`, smoothed, for set-points of which some brake and some follow a stream.
 
     numbers, flags: of `SetPoints`, moved in place; window: (k, n), the last k values of position, of which row `oldest`
-    is replaced, and whose mean is the output. measured: (n,) where the joints are [rad], before this tick; reach [rad]:
-    what a set-point may lead by. The profile of one that streams runs in a frame that moves with the target, so that a
-    smooth stream is followed without lag; neither that nor braking is smoothed.
+    is replaced, and whose mean is the output. measured: (n,) joint positions [rad] before this tick; reach [rad]:
+    largest lead of a set-point. In a stream, the profile runs in a frame that moves with the target, so that a smooth
+    stream is followed without lag; streams and braking are not smoothed.
 
     Returns whether every set-point rests on its target; whether some were braking when the tick began; whether some are
     too far from their joints.
@@ -108,7 +106,7 @@ def follow(numbers, flags, window, oldest, measured, reach, dt):
 @_compiled
 def any_beyond(reach, position, velocity, measured, dt):
     """Whether any set-point, `position` (n,) [rad] as it was a tick of `velocity` (n,) ago, is farther than reach [rad]
-    from what is measured there, (n,)."""
+    from the measured position (n,)."""
     for i in range(len(position)):
         if abs(position[i] - velocity[i] * dt - measured[i]) > reach:
             return True
@@ -116,7 +114,7 @@ def any_beyond(reach, position, velocity, measured, dt):
 
 
 def stopping_point(position, velocity, acceleration):
-    """Where set-points that brake now come to rest [rad]; all (n,)."""
+    """Rest positions of set-points that start to brake now [rad]; all (n,)."""
     return position + velocity * np.abs(velocity) / (2.0 * acceleration)
 
 
@@ -134,13 +132,13 @@ class MovingAverage:
         self.oldest = 0
 
     def turn(self):
-        """A tick is over: another row is the oldest now."""
+        """End the tick: advance to the next oldest row."""
         self.oldest = (self.oldest + 1) % len(self.window)
 
     def shift(self, mask, offset):
-        """Move the past of the joints in `mask` by `offset`, so that their mean moves by exactly that."""
+        """Shift the history of the joints in `mask` by `offset`, so that their mean moves by exactly that."""
         self.window[:, mask] += offset
 
     def restart(self, mask, values):
-        """Forget the past of the joints in `mask`."""
+        """Forget the history of the joints in `mask`."""
         self.window[:, mask] = values

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The grippers: what each kind does with a command, and the bodies it moves in the simulated world. Without ROS."""
+"""The grippers: the commands of each kind, and the bodies that they move in the simulated world. Without ROS."""

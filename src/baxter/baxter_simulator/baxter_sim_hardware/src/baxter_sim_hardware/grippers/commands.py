@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What every kind of gripper does with a command message: check it, echo it, hand it on."""
+"""Command handling of all kinds of gripper: check a message, echo it, pass it on."""
 import math
 
 from baxter_model.readiness import NOT_ENABLED
 from baxter_sim_hardware.errors import CommandRefused
 from rospy_limits.json_object import JsonRefused, read_object
 
-#: A sender's name, which goes out with every state of the gripper, is no longer than this [characters].
+#: Longest name of a sender, which is part of every state message [characters].
 LONGEST_SENDER = 1000
 
 
 class Gripper:
-    """One kind of gripper, as its commands and parameters see it. Kinds derive from it and fill the two tables.
+    """Commands and parameters of one kind of gripper. Kinds derive from it and fill the two tables.
 
-    Attributes: command, sender, sequence: of the last command that was understood, which is how it is acknowledged;
+    Attributes: command, sender, sequence: of the last valid command, as its acknowledgement;
     parameters: {name: value}; flags: {flag of the state message: whether it is set}, details: the JSON text in it.
     """
 
@@ -35,10 +35,10 @@ class Gripper:
     def take(self, command, args, sender, sequence, enabled):
         """One command message.
 
-        args: JSON object (see rospy_limits.json_object) or empty. sender, sequence: a client's mark; with the same one,
-        commands of ONCE are one command that is sent again, as the SDK does until it sees the effect. Raises
-        CommandRefused for an unknown command, for senseless arguments, and for what needs power while the robot is not
-        enabled.
+        args: JSON object (see rospy_limits.json_object) or empty. sender, sequence: a client's mark; commands of ONCE
+        with the same mark are repetitions of one command, which the SDK sends until it sees the effect. Raises
+        CommandRefused for an unknown command, for invalid arguments, and for commands that need power while the robot
+        is not enabled.
         """
         if command not in self.COMMANDS:
             raise CommandRefused("unknown gripper command '%.100s'; choices are %s" % (
@@ -59,10 +59,10 @@ class Gripper:
         getattr(self, method)(values)
 
     def no_op(self, values):
-        """Nothing; it is acknowledged all the same."""
+        """Do nothing; the command is still acknowledged."""
 
     def configure(self, values):
-        """Change parameters, all of `values` or, if one is senseless, none. Raises CommandRefused."""
+        """Change all parameters in `values`, or none if one is invalid. Raises CommandRefused."""
         for name, value in values.items():
             if name not in self.PARAMETERS or not (is_number(value) and 0.0 <= value <= self.PARAMETERS[name][1]):
                 raise CommandRefused("%s: %s is %r; parameters are %s" % (self.command, name, value, ", ".join(

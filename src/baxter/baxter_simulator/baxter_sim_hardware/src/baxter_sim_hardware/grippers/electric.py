@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The electric gripper: commands in, set-point of its fingers out; its force is computed from the fingers alone."""
+"""The electric gripper: commands in, set-point of its fingers out; it computes its force from the fingers alone."""
 import json
 from enum import Enum
 
@@ -31,9 +31,9 @@ class Phase(Enum):
 
 
 class ElectricGripper(Gripper):
-    """Positions are shares of the fingers' travel, 0 closed to 1 open, where no percents are named.
+    """Positions are shares of the fingers' travel, 0 closed to 1 open, unless given in percent.
 
-    travel: of one finger [m]; position: where the fingers are now; dt: length of a tick [s].
+    travel: of one finger [m]; position: present position of the fingers; dt: length of a tick [s].
     Attributes: calibrated, error, missed: flags of the state message.
     """
 
@@ -67,9 +67,8 @@ class ElectricGripper(Gripper):
         self._stand_at(position)
 
     def stop(self, position):
-        """Move no further than `position`, where the fingers are; what is held stays held.
-
-        A calibration that was under way is not one.
+        """Move no further than `position`, where the fingers are; a held object stays held. A running calibration is
+        aborted.
         """
         if self._phase is Phase.HOLDING:
             self._stays = True
@@ -88,7 +87,7 @@ class ElectricGripper(Gripper):
 
     @property
     def resting(self):
-        """Whether the fingers are where they were told to go, and held there."""
+        """Whether the fingers are at their target, and held there."""
         return self._phase is Phase.RESTING
 
     @property
@@ -98,7 +97,7 @@ class ElectricGripper(Gripper):
 
     @property
     def gripping(self):
-        """Whether something keeps the fingers, pressing on it, from where they were told to go."""
+        """Whether the fingers press on something that keeps them from their target."""
         return self._phase is Phase.HOLDING
 
     @property
@@ -107,7 +106,8 @@ class ElectricGripper(Gripper):
         return self.moving and self._still_s >= SETTLE_S and self._target > self._position + self._dead
 
     def update(self, position, squeeze):
-        """One tick. Returns (set-point, force [% of the joints'] that may be used), or None: the last one still holds.
+        """One tick. Returns (set-point, force [% of the joints'] that may be used), or None if the last one still
+        applies.
 
         position: of the fingers; squeeze: function that returns the force on them [%].
         """
@@ -146,7 +146,7 @@ class ElectricGripper(Gripper):
 
     @property
     def _allowed(self):
-        """Force [%] that the fingers certainly reach on what they hold."""
+        """Force [%] that the fingers certainly reach on a held object."""
         return min(self.parameters["holding_force"], self.parameters["moving_force"])
 
     def _stand_at(self, position):
@@ -164,13 +164,13 @@ class ElectricGripper(Gripper):
         self._here = self._position  # where they have been, nearly, for so long
 
     def _watch(self):
-        """Count for how long the fingers have stood. Where they are counts, not how fast: what jams may rattle."""
+        """Count how long the fingers have stood still, judged by position, not by speed: jammed fingers may rattle."""
         self._still_s += self._dt
         if abs(self._position - self._here) > min(STILL, 0.5 * self._speed) * SETTLE_S and self._speed:
             self._here, self._still_s = self._position, 0.0
 
     def _arrive(self, squeeze):
-        """The fingers stand: find out why, and what comes next."""
+        """The fingers stand still: find out why, and choose the next phase."""
         is_there = self._is_near(self._target) and self._setpoint == self._target
         presses = squeeze > min(self.parameters["moving_force"], MOST)
         if presses or (self._still_s >= GIVE_UP_S and squeeze >= max(PUSHING * self._allowed, 1.0)):
@@ -202,7 +202,7 @@ class ElectricGripper(Gripper):
         self._phase, self._rest = Phase.RESTING, self._position
 
     def _fail(self):
-        """A calibration that did not find the ends of the travel."""
+        """Fail: the calibration did not find the ends of the travel."""
         self._stand_at(self._position)
         self.error = True
 

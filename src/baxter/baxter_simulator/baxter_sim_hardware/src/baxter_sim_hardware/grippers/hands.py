@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Grippers in the physics world: each brings a gripper's core together with the bodies that it moves and touches."""
+"""Grippers in the physics world: each connects a gripper's core with the bodies that it moves and touches."""
 import numpy as np
 
 from baxter_model import tip_of
@@ -43,7 +43,7 @@ class FingersHand:
         return 100.0 * min(max(self._share(positions), 0.0), 1.0), min(self._squeeze(), 100.0)
 
     def _squeeze(self):
-        """Force on the fingers along their way, the mean of both [% of the joints' largest one]."""
+        """Force on the fingers along their travel, the mean of both [% of the joints' effort limit]."""
         along = self._model.link_pose(self._tip).matrix()[:3, 1]
         forces = [abs(float(self._model.contact_force(link) @ along)) for link in self._links]
         return 100.0 * sum(forces) / float(self._max_effort.sum())
@@ -58,7 +58,8 @@ class FingersHand:
         if drive is None:
             return
         if self.gripper.hooked:
-            # Bullet may keep a contact with a wrong normal where two edges were parallel, which holds what should open.
+            # After two edges were parallel, Bullet may keep a contact with a wrong normal, which keeps the fingers from
+            # opening.
             for link in self._links:
                 self._model.renew_contacts(link)
         setpoint, force = drive
@@ -76,7 +77,7 @@ class FingersHand:
         return self._share(self._model.read_joints()[0])
 
     def _share(self, values):
-        # At every tick: sums of numpy's would take ten times as long.
+        # Runs at every tick: numpy's sum would take ten times as long.
         share = 0.0
         for index, weight in self._weights:
             share += values.item(index) * weight
@@ -84,7 +85,7 @@ class FingersHand:
 
 
 class CupHand:
-    """The suction gripper of one side: a cup that the pressure in it presses against what lies on it.
+    """The suction gripper of one side: a cup that is pressed by its vacuum against the object on it.
 
     world, model: of bullet_sim; cup: (frame at the rim, radius [m]). The frame's z axis points out of the cup.
     Attribute `gripper`: its core.
@@ -105,12 +106,12 @@ class CupHand:
         return 0.0, 0.0
 
     def _covering(self):
-        """(model, link) by name that covers the cup, its rim and its middle, within reach of the lip, or None."""
+        """(model, link), names of the body that covers the whole cup within reach of the lip, or None."""
         pose = self._model.link_pose(self._frame).matrix()
         starts = (self._ring - (0.0, 0.0, INSIDE_M)) @ pose[:3, :3].T + pose[:3, 3]
         ends = starts + (INSIDE_M + LIP_M) * pose[:3, 2]
         met = set(self._world.first_hits(starts.tolist(), ends.tolist()))
-        # Now and then a ray does not get out of the cup's own shape.
+        # Sometimes a ray hits the cup's own shape.
         met -= {met_here for met_here in met if met_here is not None and met_here[0] == self._model.name}
         return met.pop() if len(met) == 1 else None
 
@@ -162,7 +163,7 @@ class NoHand:
 
 
 def hand_of(world, model, side, dt):
-    """What the description puts on one arm, as one of the classes above."""
+    """The hand of one arm in the description, an object of one of the classes above."""
     openings, cup = openings_of(model.robot, side), cup_of(model.robot, side)
     if openings:
         return FingersHand(model, side, openings, dt)

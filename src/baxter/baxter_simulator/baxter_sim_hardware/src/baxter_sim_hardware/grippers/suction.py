@@ -53,7 +53,7 @@ class SuctionGripper(Gripper):
 
     @property
     def idle(self):
-        """Whether the cup is filled with the air around it, and nothing is about to change that."""
+        """Whether the cup is at ambient pressure, and stays so."""
         return not (self.sucking or self.blowing or self._level)
 
     @property
@@ -62,18 +62,18 @@ class SuctionGripper(Gripper):
 
     @property
     def vacuum(self):
-        """Whether there is vacuum enough to hold something."""
+        """Whether there is enough vacuum to hold something."""
         return 100.0 * self._level >= self.parameters["vacuum_sensor_threshold"] and self._level > 2.0 * LEAKING
 
     @property
     def flags(self):
-        # It has nothing to calibrate; clients that ask take that for a yes.
+        # There is nothing to calibrate; clients read this as calibrated.
         return {"calibrated": True, "ready": True, "moving": False, "gripping": self.vacuum, "missed": self.missed,
                 "error": False}
 
     @property
     def sensor(self):
-        """What the vacuum sensor counts, 0 to 255."""
+        """Reading of the vacuum sensor, 0 to 255."""
         return round(SENSOR_MAX * self._level)
 
     @property
@@ -103,19 +103,20 @@ class SuctionGripper(Gripper):
         return BLOW_PA if self.blowing else -FULL_VACUUM_PA * self._level
 
     def end_attempt(self):
-        """Suck on only if something is held, and blow no more: nothing falls because the robot was disabled."""
+        """Continue to suck only if something is held, and stop blowing: a held object does not fall when the robot is
+        disabled."""
         if not self.vacuum:
             self._stop({})
 
     def set_pump(self, on):
-        """Suck for as long as it takes, or end that: what the digital output of the pump's valve does."""
+        """Suck without a time limit, or end that: the function of the pump valve's digital output."""
         if on and not self.sucking:
             self._start(math.inf)
         elif not on and self.sucking:
             self._stop({})
 
     def set_blow(self, on):
-        """Blow until told otherwise, or end that: what the digital output of the blow-off valve does."""
+        """Blow without a time limit, or end that: the function of the blow-off valve's digital output."""
         if on:
             self._stop({})
         self._blow_left_s = math.inf if on else 0.0

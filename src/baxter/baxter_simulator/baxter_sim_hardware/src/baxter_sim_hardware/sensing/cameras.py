@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Baxter's cameras: what may be asked of one, which may be open together, what its controls do to a picture.
-
-A camera is an array of 1280 x 800 sensors. Every mode shows all of it, scaled, unless a window is asked for: then the
-picture is that part of the array, pixel by pixel. Half resolution joins four sensors to one, which halves the array
-that a window is cut from. Without ROS.
+"""Baxter's cameras: valid settings, which may be open together, the effect of controls on a picture. A camera is an
+array of 1280 x 800 sensors. Every mode shows all of it, scaled, unless a window is requested: then the picture is that
+part of the array, pixel by pixel. Half resolution joins four sensors to one, which halves the array that a window is
+cut from. Without ROS.
 """
 import errno
 from typing import NamedTuple
@@ -15,16 +14,16 @@ from sensor_renderer.pinhole import Pinhole
 
 ARRAY = (1280, 800)
 MODES = ((1280, 800), (960, 600), (640, 400), (480, 300), (384, 240), (320, 200))
-#: Fastest rate, and the rate that a request gets which names none [Hz].
+#: Highest rate, and the default rate of a request [Hz].
 FASTEST_HZ, DEFAULT_HZ = 60.0, 25.0
 AUTO = -1
 EXPOSURE, GAIN, WHITE_R, WHITE_G, WHITE_B, WINDOW_X, WINDOW_Y, FLIP, MIRROR, HALF = range(100, 110)
-#: What a control is called and how far its values go; -1 is "automatic" besides.
+#: Name and largest value of each control; -1 also means "automatic".
 CONTROLS = {
     EXPOSURE: ("exposure", 100), GAIN: ("gain", 79), WHITE_R: ("white balance red", 4095),
     WHITE_G: ("white balance green", 4095), WHITE_B: ("white balance blue", 4095), WINDOW_X: ("window x", ARRAY[0]),
     WINDOW_Y: ("window y", ARRAY[1]), FLIP: ("flip", 1), MIRROR: ("mirror", 1), HALF: ("half resolution", 1)}
-# Values that change nothing: the middle of the range, but for gain, where that is none. Full gain doubles.
+# Neutral values: the middle of the range; for gain, zero. Full gain doubles.
 _NEUTRAL_EXPOSURE, _NEUTRAL_WHITE, _DOUBLING_GAIN = 50.0, 2048.0, 79.0
 
 
@@ -37,7 +36,8 @@ class CameraRefused(HardwareError):
 
 
 class CaptureSettings(NamedTuple):
-    """How a camera is open: size [pixels], rate [Hz], and ``controls``, {id: value}; those left out are automatic."""
+    """Settings of an open camera: size [pixels], rate [Hz], and ``controls``, {id: value}; those left out are
+    automatic."""
 
     width: int
     height: int
@@ -45,7 +45,7 @@ class CaptureSettings(NamedTuple):
     controls: dict
 
     def checked(self):
-        """These settings with a rate; raises :class:`CameraRefused` for what no camera can do."""
+        """These settings with a rate; raises :class:`CameraRefused` for impossible settings."""
         if (self.width, self.height) not in MODES:
             raise CameraRefused(errno.EINVAL, "%d x %d is no resolution of this camera; choose from %s"
                                 % (self.width, self.height, ", ".join("%d x %d" % mode for mode in MODES)))
@@ -80,12 +80,12 @@ class CaptureSettings(NamedTuple):
 
     @property
     def window(self):
-        """Where in the array the picture begins (x, y), or None for all of the array."""
+        """Corner of the picture in the array (x, y), or None for the whole array."""
         x, y = self.control(WINDOW_X), self.control(WINDOW_Y)
         return None if x == AUTO and y == AUTO else (max(x, 0), max(y, 0))
 
     def pinhole(self, focal, near, far):
-        """What the lens shows, before :meth:`turned`. ``focal``: focal length of the full array [pixels]."""
+        """The pinhole before :meth:`turned`. ``focal``: focal length of the full array [pixels]."""
         if self.window is None:
             focal, start, size = focal * self.width / ARRAY[0], (0, 0), (self.width, self.height)
         else:
@@ -121,19 +121,19 @@ class Rack:
     """The robot's cameras, and which of them are open."""
 
     def __init__(self, most_open):
-        """``most_open``: how many can have power at a time; the robot's wiring carries two of its three."""
+        """``most_open``: largest number of powered cameras; the robot's wiring carries two of its three."""
         self._most_open = most_open
         self._names = []
         self.open = {}
 
     def add(self, name, settings):
-        """A camera that is there; open from the start with ``settings``, or closed for None."""
+        """Add a camera; open from the start with ``settings``, or closed for None."""
         self._names.append(name)
         if settings is not None and len(self.open) < self._most_open:
             self.open[name] = settings
 
     def remove(self, name):
-        """A camera that is gone."""
+        """Remove a camera."""
         self._names.remove(name)
         self.open.pop(name, None)
 
@@ -143,7 +143,7 @@ class Rack:
         return [name for name in self._names if name in self.open or not full]
 
     def open_camera(self, name, settings):
-        """Open a camera anew; returns the :class:`CaptureSettings` in force. Raises :class:`CameraRefused`."""
+        """Open or reopen a camera; returns the :class:`CaptureSettings` in force. Raises :class:`CameraRefused`."""
         self._known(name)
         if name not in self.available():
             raise CameraRefused(errno.ENODEV, "%s has no power: %s are open, and only %d cameras can be; close one"
@@ -155,7 +155,7 @@ class Rack:
         """Close a camera. Raises :class:`CameraRefused`."""
         self._known(name)
         if name not in self.open:
-            # The one code that clients of the robot take for "it was not open".
+            # Clients of the robot take only this code as "it was not open".
             raise CameraRefused(errno.EINVAL, "%s is closed already; open: %s"
                                 % (name, ", ".join(self.open) or "none"))
         del self.open[name]

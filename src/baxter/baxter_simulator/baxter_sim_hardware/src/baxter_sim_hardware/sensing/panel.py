@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Buttons, lights, wheels and the other single channels of the robot, and what writes to them.
-
-The names are the physical robot's. Documents leave open which of the torso's channels can be written; here what its
-name calls a sensor, an input or a switch is an input. Sensors belong to what they measure, which attaches them.
+"""Buttons, lights, wheels and the other single channels of the robot, with their values. The names are the physical
+robot's. Documents leave open which of the torso's channels can be written; here a channel whose name says sensor, input
+or switch is an input. The part that measures a sensor attaches it.
 """
 from baxter_model import SIDES
 from baxter_sim_hardware.errors import CommandRefused
@@ -52,11 +51,11 @@ class Panel:
         self.reset()
 
     def attach(self, name, read):
-        """Have an analog input show what `read()` returns, an integer from 0."""
+        """Make an analog input show the result of `read()`, an integer from 0."""
         self._sensors[name] = read
 
     def attach_valve(self, name, read, write):
-        """Have a digital output show what `read()` returns, and call `write(value)` when it is switched."""
+        """Make a digital output show the result of `read()`, and call `write(value)` when it is switched."""
         self._valves[name] = read, write
 
     def read_digital(self, name):
@@ -73,7 +72,7 @@ class Panel:
         self.analog = dict.fromkeys(ANALOG, 0)
 
     def set_digital(self, name, value):
-        """Switch an output. Raises CommandRefused for an unknown name and for an input, and where its valve does."""
+        """Switch an output. Raises CommandRefused for an unknown name, for an input, and if its valve refuses."""
         _require(name, DIGITAL, "digital output", is_input=False)
         if name in self._valves:
             self._valves[name][1](bool(value))
@@ -81,7 +80,7 @@ class Panel:
             self.digital[name] = bool(value)
 
     def set_analog(self, name, value):
-        """Set an output to an integer, 0 to 65535. Raises CommandRefused for what is not one, and for an input."""
+        """Set an output to an integer, 0 to 65535. Raises CommandRefused for another value, and for an input."""
         _require(name, ANALOG, "analog output", is_input=False)
         if not 0 <= value <= ANALOG_MAX:
             raise CommandRefused("%s is told %s; it must be from 0 to %d" % (name, value, ANALOG_MAX))
@@ -93,7 +92,7 @@ class Panel:
         self.digital[name] = pressed
 
     def turn(self, name, steps):
-        """Turn a wheel by so many counts. Raises CommandRefused for what is no wheel."""
+        """Turn a wheel by a number of counts. Raises CommandRefused for an unknown wheel."""
         _require(name, dict.fromkeys(WHEELS, True), "wheel", is_input=True)
         self.analog[name] = (self.analog[name] + steps) % WHEEL_COUNTS
 

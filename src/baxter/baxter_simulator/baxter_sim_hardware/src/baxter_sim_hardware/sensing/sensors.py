@@ -1,29 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot's own senses: infrared range at the hands, the ring of sonars at the head, accelerometers in the hands."""
+"""The robot's sensors: infrared range at the hands, the ring of sonars at the head, accelerometers in the hands."""
 import math
 
 import numpy as np
 
 from baxter_sim_hardware.errors import CommandRefused
 
-# Infrared range of a hand: one ray along x of its frame [m, rad]; the physical robot's figures.
+# Infrared range sensor of a hand: one ray along x of its frame [m, rad]; values of the physical robot.
 RANGE_MIN_M, RANGE_MAX_M, RANGE_FIELD_RAD = 0.004, 0.4, 0.0872664600611
-RANGE_NOTHING_M = 65.535  # what it reports where it sees nothing
+RANGE_NOTHING_M = 65.535  # its reading without an echo
 
-# The ring: transducers at equal angles, the first straight ahead. Each one hears what the nearest of its rays hits,
-# half a beam's width above and below the horizon; the beam's width and how far it hears are estimates, as the physical
-# robot's are not public. So the floor, 1.7 m below, is out of its hearing.
+# The ring: transducers at equal angles, the first straight ahead. Each one measures the nearest hit of its rays, half a
+# beam's width above and below the horizon; the beam's width and the range are estimates, as the physical robot's are
+# not public. The floor, 1.7 m below, is out of its range.
 SONAR_COUNT = 12
 SONAR_MIN_M, SONAR_MAX_M = 0.05, 10.0
 SONAR_ELEVATIONS_RAD = (math.radians(-7.5), math.radians(7.5))
 ALL_SONARS = (1 << SONAR_COUNT) - 1
-LIGHTS_OVERRIDE = 0x8000  # of set_lights: the low bits are the lights; without, each one shows that its sonar hears
-LIGHTS_S = 0.2  # [simulated s] one set_lights counts for so long; clients repeat it at about 100 Hz
+LIGHTS_OVERRIDE = 0x8000  # bit of set_lights: low bits set the lights; without it they show echoes
+LIGHTS_S = 0.2  # [simulated s] validity of one set_lights; clients repeat it at about 100 Hz
 MAX_LEVEL = 100.0
 
 
 def range_from_hit(distance):
-    """What a hand's sensor reports [m] for a ray that hit after `distance` [m], or met nothing (None)."""
+    """Reading of a hand's sensor [m] for a ray that hits after `distance` [m], or not at all (None)."""
     return RANGE_NOTHING_M if distance is None else max(distance, RANGE_MIN_M)
 
 
@@ -52,16 +52,16 @@ class SonarRing:
         self.enabled = mask
 
     def set_lights(self, mask, time_s):
-        """Light what `mask` says for LIGHTS_S if it has LIGHTS_OVERRIDE; else show again what the sonars hear."""
+        """Set the lights by `mask` for LIGHTS_S if it has LIGHTS_OVERRIDE; else let them show echoes again."""
         self._lights = mask
         self._lights_until = time_s + LIGHTS_S if mask & LIGHTS_OVERRIDE else 0.0
 
     def overridden(self, time_s):
-        """The mask that clients ask for at time_s [s], or None."""
+        """The mask that a client has set, if still valid at time_s [s], or None."""
         return self._lights if time_s < self._lights_until else None
 
     def set_level(self, colour, level):
-        """Raises CommandRefused for what is not from 0 to 100."""
+        """Raises CommandRefused unless it is from 0 to 100."""
         if not 0.0 <= level <= MAX_LEVEL:
             raise CommandRefused("%s level is %g; it must be from 0 to %g" % (colour, level, MAX_LEVEL))
         self.levels[colour] = level
@@ -73,7 +73,7 @@ class SonarRing:
 
 
 def specific_force(before, after, gravity, rotation, dt):
-    """(3,) [m/s^2] what an accelerometer feels, in its own axes.
+    """(3,) [m/s^2] reading of an accelerometer, in its own axes.
 
     before, after: (3,) velocity [m/s] of its frame in base around a tick of dt [s]; gravity: (3,) in base [m/s^2];
     rotation: (3, 3) from its axes to base.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arms in ROS messages: their commands and settings, where their end points and set-points are, what they feel."""
+"""The arms in ROS messages: their commands and settings, end points, set-points and external loads."""
 import numpy as np
 from baxter_core_msgs.msg import JointCommand
 
@@ -11,8 +11,8 @@ from baxter_sim_hardware.errors import CommandRefused
 from . import convert
 from .row import JOINT_STATE_RATE, STATE_RATE_HZ, Part, Topic
 
-# The vendor's simulator had a controller for each joint and mode, which programs made for it command one by one.
-# {name of a group of controllers: (mode, what a number means)}
+# The vendor's simulator had a controller for each joint and mode, which programs written for it command one by one.
+# {name of a group of controllers: (mode, quantity)}
 CONTROLLERS = {
     "joint_position_controller": (Mode.POSITION, "position [rad]"),
     "joint_velocity_controller": (Mode.VELOCITY, "velocity [rad/s]"),
@@ -32,8 +32,8 @@ class ArmTopics(Part):
     """baxter: `robot.Baxter`; chains: {side: Chain}; limb_index: {side: (7,) indices of its joints in the model's};
     warnings: `warnings.Warnings`.
 
-    Attribute `command_observers`: functions that are called in the loop with (side, message, JointCommand or None where
-    it was refused) for each joint command.
+    Attribute `command_observers`: functions that are called in the loop with (side, message, JointCommand or None if it
+    was refused) for each joint command.
     """
 
     def __init__(self, baxter, chains, limb_index, warnings):
@@ -45,7 +45,7 @@ class ArmTopics(Part):
         self.command_observers = []
 
     def feel(self, side, snapshot):
-        """(torques (7,) [Nm], wrench (6,) [N, Nm]) that the surroundings exert on one arm's joints and on its tip."""
+        """External (torques (7,) [Nm], wrench (6,) [N, Nm]) on one arm's joints and on its tip."""
         index = self._limb_index[side]
         jacobian = self._chains[side].jacobian(snapshot.position[index])
         return (snapshot.own_effort[index] - snapshot.effort[index],
@@ -98,7 +98,7 @@ class ArmTopics(Part):
         pose, jacobian = chain.fk_and_jacobian(self._baxter.measured.position[joints])
         linear, angular = msg.twist.linear, msg.twist.angular
         twist = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
-        # tf's old names begin with a slash; a slash alone names nothing.
+        # Old names of tf begin with a slash; a slash alone is no name.
         frame = msg.header.frame_id.removeprefix("/")
         if frame == tip_of(side):
             twist = np.concatenate([pose[:3, :3] @ twist[:3], pose[:3, :3] @ twist[3:]])

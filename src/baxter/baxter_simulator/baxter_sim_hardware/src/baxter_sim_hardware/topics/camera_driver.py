@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Baxter's cameras as /sensor_renderer serves them: topics per camera, and the services that open and close."""
+"""Baxter's cameras in /sensor_renderer: topics of each camera, and the services that open and close them."""
 import threading
 
 import rospy
@@ -20,10 +20,10 @@ from sim_time.pace import Pace
 
 # Two of the robot's three cameras can have power (baxter_interface 1.1.0).
 _ROBOT_POWERS, _ALL = 2, 3
-# How the robot's cameras are after it has started: both hands' are open.
+# State of the robot's cameras after its start: both hands' are open.
 _ROBOT_MODE = (640, 400, 25.0)
 _HEAD = "head_camera"
-# The head's camera hangs upside down; all clients ask for this.
+# The head's camera is mounted upside down; all clients request this.
 _UPRIGHT = {FLIP: 1, MIRROR: 1}
 
 
@@ -41,7 +41,7 @@ class CameraServices:
 
     def __init__(self, namespace):
         profile = rospy.get_param("/baxter_sim_hardware/profile", "sim")
-        #: Whether the cameras start as the physical robot's, or as the vendor's simulator had them.
+        #: Whether the cameras start as on the physical robot, or as in the vendor's simulator.
         self.as_robot = profile == "robot"
         powered = rospy.get_param("/baxter_sim_hardware/powered_cameras", _ROBOT_POWERS if self.as_robot else _ALL)
         self._rack = Rack(powered)
@@ -53,14 +53,14 @@ class CameraServices:
             ("reset", Empty, self._reset))]
 
     def add(self, driver):
-        """A camera has come."""
+        """Add a camera."""
         with self._lock:
             self._drivers[driver.camera_name] = driver
             self._rack.add(driver.camera_name, driver.first_settings)
             driver.use(self._rack.open.get(driver.camera_name))
 
     def remove(self, driver):
-        """A camera has gone; the last one takes the services along."""
+        """Remove a camera; the services close with the last one."""
         with self._lock:
             self._drivers.pop(driver.camera_name)
             self._rack.remove(driver.camera_name)
@@ -113,7 +113,7 @@ class CameraServices:
 
 
 class BaxterCamera(Driver):
-    """One of the robot's cameras, named as its sensor; ``<robotNamespace>`` is where the services are."""
+    """One of the robot's cameras, named as its sensor; ``<robotNamespace>`` is the namespace of the services."""
 
     def __init__(self, entry):
         super().__init__(entry)
@@ -135,7 +135,7 @@ class BaxterCamera(Driver):
         self._services.add(self)
 
     def use(self, settings):
-        """Be open with ``settings``, or closed with None."""
+        """Open with ``settings``, or close for None."""
         if settings is None:
             old, self.topics, self._use = self.topics, [], None
             for topic in old:

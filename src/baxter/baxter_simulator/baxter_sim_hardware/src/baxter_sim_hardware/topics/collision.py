@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The arms' safety as ROS sees it: states of collision, and the messages that suppress what makes an arm safe."""
+"""ROS interface of the arms' safety: collision states, and the messages that suppress safety functions."""
 import numpy as np
 from baxter_core_msgs.msg import CollisionAvoidanceState, CollisionDetectionState
 from std_msgs.msg import Header
@@ -13,7 +13,7 @@ from sim_time.stamps import stamp
 
 from .row import STATE_RATE_HZ, Part, Topic
 
-CHECK_RATE_HZ = 100.0  # how often the arms look what they touch, and what is suppressed
+CHECK_RATE_HZ = 100.0  # rate of the checks of contacts and suppressions
 
 
 def _suppress(kind):
@@ -50,7 +50,7 @@ class CollisionTopics(Part):
             suppressions.reset()
 
     def update(self, time_s, enabled):
-        """Before a step: have the arms yield, float and fall as contacts, cuffs and messages say."""
+        """Before a step: let the arms yield, float or fall, depending on contacts, cuffs and messages."""
         if not self._schedule.due(time_s):
             return
         contacts = self._contacts()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The one place where ROS messages meet the core's types."""
+"""Conversions between ROS messages and the core's types."""
 import struct
 
 from baxter_core_msgs.msg import AssemblyState, EndpointState, SEAJointState
@@ -15,7 +15,7 @@ _HEADER = struct.Struct("<IIII")  # sequence number, seconds, nanoseconds, lengt
 
 
 class JointStates:
-    """Makes the JointState messages of the same n joints. Their names, most of such a message, become bytes once."""
+    """Makes the JointState messages of the same n joints. The names, most of the message, are serialized only once."""
 
     def __init__(self, names):
         text = [name.encode() for name in names]

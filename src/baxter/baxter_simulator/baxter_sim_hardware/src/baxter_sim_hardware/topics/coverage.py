@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much of the physical robot's interface is here: its topics, counted by group, and why the others are missing."""
+"""Coverage of the physical robot's interface: its topics, counted by group, and the reasons for missing ones."""
 from collections import Counter, defaultdict
 from fnmatch import fnmatchcase
 
@@ -33,7 +33,7 @@ def elsewhere(name, table):
 
 
 def reason_to_leave_out(name, kind, table):
-    """Why a topic is missing, or None where nobody says."""
+    """Why a topic is missing, or None if no reason is listed."""
     for entry in table["left_out"]:
         if any(fnmatchcase(kind, pattern) for pattern in entry.get("types", ())) or any(
                 fnmatchcase(name, pattern) for pattern in entry.get("names", ())):
@@ -42,7 +42,7 @@ def reason_to_leave_out(name, kind, table):
 
 
 def markdown(table):
-    """What docs/interface.md says of coverage: counts by group, then what is left out."""
+    """The coverage section of docs/interface.md: counts by group, then what is left out."""
     here = served()
     counts, left_out = defaultdict(Counter), defaultdict(list)
     for name, kind in physical(table).items():
@@ -73,7 +73,7 @@ def markdown(table):
 
 
 def _both_sides(names):
-    """The names, with one that stands for both where left and right are in the list."""
+    """The names, with left and right of the same topic joined into one."""
     seen = []
     for name in names:
         joint = name

@@ -24,13 +24,14 @@ _PROPERTIES = {
         **_MANUFACTURER),
     SuctionGripper: EndEffectorProperties(
         id=SUCTION.id, ui_type=SUCTION.ui_type, controls_grip=True, senses_grip=True, **_MANUFACTURER),
-    # A bare arm: the robot takes whatever may hang there for a tool that is passive.
+    # A bare arm: the robot reports a passive tool there.
     CustomGripper: EndEffectorProperties(id=CUSTOM.id, ui_type=CUSTOM.ui_type, **_MANUFACTURER),
 }
 _FLAGS = ("enabled", "calibrated", "ready", "moving", "gripping", "missed", "error", "reverse")
 _UNKNOWN = dict.fromkeys(_FLAGS, EndEffectorState.STATE_UNKNOWN)
 
-# Of all texts in what a client says of its tool, which the robot repeats a hundred times a second [characters].
+# Largest total length of the texts in a client's description of its tool, which the robot publishes a hundred times a
+# second [characters].
 _LONGEST = 10000
 
 
@@ -59,7 +60,7 @@ class GripperTopics(Part):
             hand.reset()
 
     def attach_sensors(self, panel):
-        """Have the vacuum sensors, 0 to 255, and the valves of suction grippers among the panel's channels."""
+        """Attach the vacuum sensors, 0 to 255, and the valves of suction grippers to the panel's channels."""
         for side, hand in self._hands.items():
             gripper = hand.gripper
             if isinstance(gripper, SuctionGripper):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which handler gets a message that has come in, and in which order."""
+"""The handlers of incoming messages, and their order."""
 from baxter_model import SIDES
 from baxter_sim_hardware.errors import CommandRefused
 
@@ -13,7 +13,7 @@ class Handling:
         self._topics = {}  # subscription -> (place in the order of handling, key of the row, component, handler)
 
     def add(self, subscription, place, key, component, handler):
-        """Have ``handler(component, message, time_s)`` called; within a tick those of a lower place come first."""
+        """Register ``handler(component, message, time_s)``; within a tick, lower places come first."""
         self._topics[subscription] = place, key, component, handler
 
     def handle(self, pending, time_s):

@@ -27,7 +27,7 @@ class HeadTopics(Part):
         self._head.stop(self._pan())
 
     def reset(self):
-        """The joint was put elsewhere, or the world to its start."""
+        """The joint was moved by a service, or the world was reset."""
         self._head.reset(self._pan())
 
     def update(self):
@@ -38,8 +38,8 @@ class HeadTopics(Part):
 
     def _command_pan(self, component, msg, time_s):
         self._state.require_enabled()
-        # A message of which only the target is set means: turn there. It disables nothing, although the request's
-        # value for that is the 0 of a field that nobody set.
+        # A message with only the target set means: turn there. It does not disable panning, although the unset field's
+        # 0 is the value of that request.
         request = msg.enable_pan_request if msg.speed_ratio else HeadPanCommand.REQUEST_PAN_VOID
         self._head.command_pan(msg.target, msg.speed_ratio, _REQUESTS.get(request))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot's ROS interface as one table: what the plugin opens, what the documentation lists, what tests expect."""
+"""The robot's ROS interface as one table: the plugin opens it, the documentation lists it, tests check it."""
 from .arms import CONTROLLERS, ArmTopics
 from .collision import CollisionTopics
 from .grippers import GripperTopics
@@ -17,8 +17,8 @@ JOINT_STATE_RATE_HZ = 50.0  # what the vendor's simulator publishes and the lab 
 PARTS = (RobotTopics, ArmTopics, PanelTopics, HeadTopics, GripperTopics, CollisionTopics, SensorTopics, StatusTopics,
          ScreenTopics, ProcedureTopics)
 TOPICS = tuple(row for part in PARTS for row in part.TOPICS)
-#: Messages of one tick on these topics are handled after all others, in this order: a stop overrides an enable, and a
-#: joint command meets the robot as they leave it.
+#: Messages of one tick on these topics are handled after all others, in this order: a stop overrides an enable, and
+#: joint commands are handled after both.
 HANDLED_LAST = ("set_super_reset", "set_super_enable", "set_super_stop", "joint_command", *CONTROLLERS)
 
 

@@ -33,7 +33,7 @@ class PanelTopics(Part):
         self._panel.reset()
 
     def cuff_squeezed(self, side):
-        """Whether somebody squeezes the cuff of one hand."""
+        """Whether the cuff of one hand is squeezed."""
         return self._panel.digital["%s_lower_cuff" % side]
 
     def _digital(self, time_s, name, snapshot):

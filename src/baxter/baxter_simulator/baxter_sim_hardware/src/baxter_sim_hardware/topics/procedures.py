@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maintenance procedures and the updater as ROS sees them."""
+"""ROS interface of the maintenance procedures and the updater."""
 from baxter_core_msgs.msg import RobustControllerStatus
 from baxter_maintenance_msgs.msg import UpdateSources, UpdateStatus
 from std_msgs.msg import Bool, Int32
@@ -55,7 +55,8 @@ class ProcedureTopics(Part):
         self._updater.reset()
 
     def update(self, time_s, feel):
-        """After a step: let procedures go on. feel: function(side) -> (7,) torques from outside [Nm], which costs."""
+        """After a step: continue the procedures. feel: function(side) -> (7,) external torques [Nm]; it is
+        expensive."""
         if not self._schedule.due(time_s):
             return
         for (name, side), procedure in self.procedures.items():

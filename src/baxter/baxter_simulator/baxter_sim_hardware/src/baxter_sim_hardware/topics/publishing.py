@@ -25,7 +25,7 @@ class Publishing:
         self._idle_until_s = -math.inf
 
     def publish(self, time_s):
-        """Publish what is due at time_s [s]; a message that cannot be made is left out. Returns whether something was
+        """Publish the messages that are due at time_s [s]; one that cannot be made is left out. Returns whether one was
         due."""
         if self._idle_since_s <= time_s < self._idle_until_s:
             return False

@@ -11,7 +11,7 @@ from baxter_sim_hardware.robot_state import Event
 from . import convert
 from .row import JOINT_STATE_RATE, LATCHED, STATE_RATE_HZ, Part, Topic
 
-# What `sim/resets` says next. One for all robots of this process: another one in the same place says another number.
+# Next number on `sim/resets`. Shared by all robots of this process, so that a replaced robot publishes another number.
 _resets = itertools.count(1)
 
 
@@ -20,7 +20,7 @@ class RobotTopics(Part):
     set_joint_state_rate: function(Hz).
 
     Attributes. `on_disabled`: functions that are called when the robot was disabled. `what_keeps_disabled`: function
-    that returns why it may not be enabled where its arms are, or "".
+    that returns why the robot may not be enabled with its arms where they are, or "".
     """
 
     def __init__(self, baxter, joint_names, measure, set_joint_state_rate, context, warnings):
@@ -53,11 +53,11 @@ class RobotTopics(Part):
         self.apply(Event.ESTOP_PRESS if pressed else Event.ESTOP_RELEASE)
 
     def announce_start(self):
-        """Tell subscribers that the robot publishes and listens."""
+        """Tell subscribers that the robot is ready."""
         self._started.publish(Empty())
 
     def announce_reset(self):
-        """Tell subscribers that the joints were put elsewhere."""
+        """Tell subscribers that the joints were moved by a service or reset."""
         self._resets.publish(UInt32(next(_resets)))
 
     # -- out

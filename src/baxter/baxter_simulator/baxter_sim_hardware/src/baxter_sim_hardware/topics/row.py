@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A row of the interface table, and what has such rows."""
+"""A row of the interface table, and the base class of parts with rows."""
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,15 +21,15 @@ class Topic:
     """One row.
 
     key: short name, used in log lines. name: below the robot's namespace unless it begins with a slash, with one of
-    COMPONENTS in braces where there is a topic for each. rate: Hz, or LATCHED, or JOINT_STATE_RATE; None for topics
-    that the robot subscribes to. function: the method of a `Part` behind the topic. Its arguments are
+    COMPONENTS in braces if each has its own topic. rate: Hz, or LATCHED, or JOINT_STATE_RATE; None for topics that the
+    robot subscribes to. function: the method of a `Part` behind the topic. Its arguments are
 
     - (time_s, component, snapshot) for a topic with a rate; it returns the message;
     - (publisher) for a latched topic; it is called once and publishes on its own;
     - (component, message, time_s) for a topic that the robot subscribes to; it raises CommandRefused.
 
-    component: one of COMPONENTS, None where there is one topic, (limb, joint) where there is one for each joint of each
-    limb; snapshot: `snapshot.Snapshot`.
+    component: one of COMPONENTS, None for a single topic, (limb, joint) for a topic of each joint; snapshot:
+    `snapshot.Snapshot`.
     """
 
     key: str
@@ -44,7 +44,7 @@ class Topic:
         return self.rate is not None
 
     def names(self):
-        """[(component or None, topic name)], one for each limb, navigator ... where the topic exists for each."""
+        """[(component or None, topic name)], one for each limb, navigator ... that has its own topic."""
         kinds = [kind for kind in COMPONENTS if "{%s}" % kind in self.name]
         names = []
         for components in itertools.product(*(COMPONENTS[kind] for kind in kinds)):

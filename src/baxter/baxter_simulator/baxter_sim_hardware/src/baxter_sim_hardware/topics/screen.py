@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The head's screen as ROS sees it."""
+"""ROS interface of the head's screen."""
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 
@@ -16,7 +16,7 @@ class ScreenTopics(Part):
     """The head's screen; attribute `screen`: the Screen."""
 
     def __init__(self, context):
-        """`context`: the plugin's PluginContext; the renderers of the world get the picture there."""
+        """`context`: the plugin's PluginContext, which passes the picture to the renderers."""
         self.screen = Screen()
         glass = on_glass(context.robot)
         self._drawn = context.screen(GLASS_LINK, *glass, (WIDTH, HEIGHT)) if glass else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot's own senses as ROS messages. Rays are cast only for a topic that somebody listens to."""
+"""The robot's sensors as ROS messages. Rays are cast only for topics with subscribers."""
 import math
 
 import numpy as np
@@ -17,7 +17,7 @@ from .row import STATE_RATE_HZ, Part, Topic
 
 SONAR_FRAME = "sonar_ring"
 SONAR_RATE_HZ = 10.0
-_UNKNOWN = [-1.0] + [0.0] * 8  # the covariance of what an Imu does not measure
+_UNKNOWN = [-1.0] + [0.0] * 8  # the covariance of an Imu's missing measurement
 
 
 def accelerometer_frame(side):
@@ -28,7 +28,7 @@ class SensorTopics(Part):
     """world, model: of bullet_sim; robot: urdf_model.Robot; limb_index:
     {side: (7,) indices of its joints in the model's}; dt: length of a tick [s].
 
-    A robot whose description lacks a sensor's frame reports that it sees nothing and feels nothing there.
+    If the description lacks a sensor's frame, that sensor reports no echo and zero acceleration.
     """
 
     def __init__(self, world, model, robot, limb_index, dt):
@@ -50,7 +50,7 @@ class SensorTopics(Part):
             panel.attach(name, lambda side=side: round(1000.0 * sensors.range_from_hit(self._hit(side))))
 
     def _hit(self, side):
-        """How far [m] the nearest surface before one hand's range sensor is, or None."""
+        """Distance [m] of the nearest surface in front of one hand's range sensor, or None."""
         if RANGE_SENSORS[side] not in self._links:
             return None
         matrix = self._model.link_pose(RANGE_SENSORS[side]).matrix()
@@ -84,7 +84,7 @@ class SensorTopics(Part):
     # -- head
 
     def _distances(self):
-        """(12,) [m] to what each sonar hears; inf where nothing."""
+        """(12,) [m] distance of each sonar's echo; inf for none."""
         if SONAR_FRAME not in self._links:
             return np.full(sensors.SONAR_COUNT, np.inf)
         matrix = self._model.link_pose(SONAR_FRAME).matrix()

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot's joints after a physics step, as messages show them."""
+"""The robot's joints after a physics step, for the messages."""
 
 
 class Snapshot:
-    """The model's joints after a step; what is costly is computed once, and only if a message asks for it.
+    """The model's joints after a step; expensive values are computed once, and only on demand.
 
     position [rad, m], velocity, effort [Nm, N]: (n,) each, in the model's order; before: the same three when the step
     began.
@@ -17,15 +17,15 @@ class Snapshot:
 
     @property
     def gravity(self):
-        """(n,) what balances gravity [Nm, N]."""
+        """(n,) effort that balances gravity [Nm, N]."""
         if self._gravity is None:
             self._gravity = self._model.gravity_efforts(self.position)
         return self._gravity
 
     @property
     def own_effort(self):
-        """(n,) what the robot's own weight, motion and joint damping took in the last step [Nm, N]; the rest of the
-        effort went into what the robot touches."""
+        """(n,) effort for the robot's own weight, motion and joint damping in the last step [Nm, N]; the rest of the
+        effort acts on touched bodies."""
         if self._own_effort is None:
             position, velocity, _ = self.before
             acceleration = (self.velocity - velocity) / self._dt

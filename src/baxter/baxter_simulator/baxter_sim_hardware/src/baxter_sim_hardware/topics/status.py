@@ -59,7 +59,7 @@ class StatusTopics(Part):
         if not (msg.link or msg.joint):
             return  # the description that the robot itself publishes on this topic
         status.check_fragment(msg.link, msg.joint, msg.urdf, self._links)
-        # A new time means a new fragment; what the robot passed on comes back to it with the same time.
+        # A new time means a new fragment; the robot receives its own message again, with the same time.
         if self._fragment_time == msg.time:
             return
         self._fragment_time = msg.time

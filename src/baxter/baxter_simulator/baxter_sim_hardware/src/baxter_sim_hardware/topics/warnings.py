@@ -20,5 +20,5 @@ class Warnings:
             self._log.warn(text)
 
     def reset(self):
-        """Forget what was said: each kind is logged again."""
+        """Forget earlier warnings: each kind is logged again."""
         self._last.clear()
