@@ -11,15 +11,15 @@ from baxter_sim_kinematics.budget import USUAL
 from baxter_sim_kinematics.errors import InvalidPosture
 from baxter_sim_kinematics.target import Targets
 
-# Poses that a thread takes at a time: long enough to hide the hand-over, short enough to share hard poses out.
+# Poses that a thread takes at a time: large enough to hide the overhead, small enough to distribute hard poses.
 _CHUNK = 64
 
 
 @dataclass(frozen=True)
 class BatchResult:
-    """q: (m, n) joint values, inside the limits. solved: (m,) whether they are a solution; where not, they are the best
-    attempt, and :func:`baxter_sim_kinematics.solve` says why. residual_m, residual_rad: (m,) what is left of the error.
-    iterations, restarts: (m,) the effort."""
+    """q: (m, n) joint values, inside the limits. solved: (m,) whether they are a solution; otherwise they are the best
+    attempt, and :func:`baxter_sim_kinematics.solve` says why. residual_m, residual_rad: (m,) remaining pose error [m],
+    [rad]. iterations, restarts: (m,) the effort."""
 
     q: np.ndarray
     solved: np.ndarray
@@ -48,7 +48,7 @@ def solve_batch(chain, targets, seeds, *, postures=None, budget=USUAL, threads=N
 
     with ThreadPoolExecutor(threads or len(os.sched_getaffinity(0))) as pool:
         for _ in pool.map(work, range(0, count, _CHUNK)):
-            pass  # raises here what was raised there
+            pass  # raises the thread's error here
     arrived, starts, iterations, residual_m, residual_rad = outcomes.T
     return BatchResult(solutions, arrived > 0, residual_m.copy(), residual_rad.copy(), iterations.astype(int),
                        starts.astype(int) - 1)

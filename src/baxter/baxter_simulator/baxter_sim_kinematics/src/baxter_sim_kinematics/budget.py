@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How exact a solution has to be, and how much is tried before a pose counts as one without."""
+"""How exact a solution must be, and the effort before a pose counts as unsolvable."""
 import math
 from dataclasses import dataclass, field
 
@@ -13,9 +13,9 @@ MAX_ITERATIONS = 100
 class Budget:
     """The effort of a search.
 
-    candidates: starts that have to arrive, of which the solution nearest the preferred posture is the answer. Two cost
-    about 0.06 ms on a 7-joint arm and are the nearest there is three times out of four, 32 cost 1 ms and miss 1 in 100.
-    max_starts: starts before a pose counts as one without a solution; max_iterations: of one start.
+    candidates: number of starts that must arrive; of their solutions, the nearest to the preferred posture is the
+    answer. Two take about 0.06 ms on a 7-joint arm and find the nearest solution three times out of four; 32 take 1 ms
+    and miss 1 in 100. max_starts: starts before a pose counts as unsolvable; max_iterations: of one start.
     tolerance_m, tolerance_rad: pose error below which a start has arrived.
 
     Raises ValueError for tolerances that are not positive and for counts that are not finite or below 1.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A :class:`CollisionChecker` on the shapes of a bullet_sim world. Imported only where it is used: PyBullet takes its
-time.
+"""A :class:`CollisionChecker` on the shapes of a bullet_sim world. Imported only where it is used: importing PyBullet
+is slow.
 """
 import itertools
 from collections import Counter
@@ -13,15 +13,13 @@ from bullet_sim import World
 
 
 class BulletChecker:
-    """Asks a world of its own, or one that is given, whether a robot touches itself or what else stands there.
-
-    One thread at a time. Only contacts count that the asked joints can change: the other arm's hand on the table is its
-    own affair.
+    """Checks in a world of its own, or in a given one, whether a robot touches itself or another model. One thread at a
+    time. Only contacts that the given joints can change count: the other arm's contact with a table does not.
     """
 
     def __init__(self, world, model, self_collision_pairs=None, margin_m=0.0):
         """``model``: the robot in ``world`` (bullet_sim); ``self_collision_pairs``: [(link, link)] that must not
-        touch, all that make sense where None. ``margin_m``: how deep a touch is let pass; shapes are often a little
+        touch, all plausible ones if None. ``margin_m``: allowed depth of a contact; shapes are often a little
         too large.
         """
         self._world, self._model, self._margin_m = world, model, margin_m
@@ -42,21 +40,21 @@ class BulletChecker:
 
     @property
     def world(self):
-        """The bullet_sim.World; spawn into it what the robot is to keep clear of."""
+        """The bullet_sim.World; spawn obstacles into it."""
         return self._world
 
     def known(self, joint_names, q):
-        """Return (names, values) of those joints that the robot has and whose value is a number."""
+        """Return (names, values) of the joints that the robot has and whose value is finite."""
         has = set(self._model.joint_names)
         pairs = [pair for pair in zip(joint_names, q, strict=False) if pair[0] in has and np.isfinite(pair[1])]
         return [name for name, _ in pairs], [value for _, value in pairs]
 
     def set_posture(self, joint_names, q):
-        """Put other joints of the robot, such as the other arm's, where they are."""
+        """Set the other joints of the robot, such as the other arm's."""
         self._model.set_joint_positions(self._model.index(joint_names), np.asarray(q, dtype=float))
 
     def contact(self, joint_names, q):
-        """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None where it is clear."""
+        """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None if there is none."""
         index, moved = self._plan(tuple(joint_names))
         self._model.set_joint_positions(index, q)
         worst = None
@@ -69,11 +67,11 @@ class BulletChecker:
         return worst
 
     def close(self):
-        """Give the world back."""
+        """Close the world."""
         self._world.close()
 
     def _plan(self, joint_names):
-        """Return (index of the joints, names of the links that they move); worked out once."""
+        """Return (index of the joints, names of the links that they move); computed once."""
         if joint_names not in self._plans:
             moved = set()
             for joint in self._model.merged.joints.values():  # parents come before their children
@@ -102,9 +100,8 @@ def self_checker(robot, find_mesh):
 
 
 def plausible_pairs(world, model, samples=50):
-    """Return [(link, link)] of ``model`` that have no joint between them and do not overlap by their make.
-
-    That is taken to be so where they touch in more than half of ``samples`` random postures.
+    """Return [(link, link)] of ``model`` that have no joint between them and do not always overlap. A pair counts as
+    always overlapping if it touches in more than half of ``samples`` random postures.
     """
     neighbours = {frozenset((joint.parent, joint.child)) for joint in model.merged.joints.values()}
     pairs = [pair for pair in itertools.combinations(model.merged.links, 2) if frozenset(pair) not in neighbours]

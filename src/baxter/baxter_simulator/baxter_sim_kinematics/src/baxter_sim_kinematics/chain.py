@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A serial chain of joints from a base link to a tip link: where things are, and how they move with the joints."""
+"""A serial chain of joints from a base link to a tip link: poses of its links, and their motion with the joints."""
 import math
 
 import numpy as np
@@ -17,18 +17,19 @@ class Chain:
     base link's frame [m]. A chain never changes and may be used from any number of threads.
 
     base, tip: link names. joint_names: tuple of n. lower, upper: (n,) limits, infinite where there is none.
-    link_names: every link on the way, base first, fixed ones included.
+    link_names: every link of the chain, base first, including fixed ones.
     """
 
     def __init__(self, base, tip, steps):
         """``steps``: (name, type, child link, origin (4, 4), axis (3,), lower, upper) per URDF joint, base to tip.
 
-        Raises ChainError for a joint type that a chain cannot have, a zero axis, or limits in the wrong order.
+        Raises ChainError for an unsupported joint type, a zero axis, or limits in the wrong order.
         """
         self.base, self.tip = base, tip
         names, lower, upper, prismatic, rotations, offsets = [], [], [], [], [], []
         link_names, hangs_on = [base], [(-1, np.eye(4))]
-        # The frame of the last moved joint is turned so that its axis is z; ``pending`` leads from there to the link.
+        # The frame of the last moved joint is turned so that its axis is z; ``pending`` is the transform from there to
+        # the link.
         pending = np.eye(4)
         for name, kind, child, origin, axis, low, high in steps:
             pending = pending @ np.asarray(origin, dtype=float)
@@ -81,10 +82,9 @@ class Chain:
         return cls(base, tip, steps)
 
     def _set_reach(self):
-        """Two balls around the first joint that the arm cannot leave, whatever its joints do: links end to end.
-
-        One for the tip, one for the origin of the last joint. A pose of the tip fixes the latter when the joint turns:
-        it lies at ``wrist_in_tip`` (3,), seen from the tip.
+        """Compute two balls around the first joint, by the sum of the links' lengths: the tip and the origin of the
+        last joint never leave them. A pose of the tip determines that origin if the last joint is revolute: it lies at
+        ``wrist_in_tip`` (3,) in the tip's frame.
         """
         rotations, offsets, prismatic = self.arrays
         stroke = np.where(prismatic, np.maximum(np.abs(self.limit_arrays[0]), np.abs(self.limit_arrays[1])), 0.0)
@@ -110,7 +110,8 @@ class Chain:
         return np.clip(middle, self.lower, self.upper)
 
     def posture(self, values):
-        """Return ``values`` as a new array (n,). Raises InvalidPosture for a wrong count, or one not finite."""
+        """Return ``values`` as a new array (n,). Raises InvalidPosture for a wrong count, or a value that is not
+        finite."""
         try:
             q = np.array(values, dtype=np.float64)
         except (TypeError, ValueError):
@@ -118,14 +119,15 @@ class Chain:
         if q.shape != (len(self),):
             raise InvalidPosture("expected %d joint values (%s), got an array of shape %s"
                                  % (len(self), ", ".join(self.joint_names), q.shape), values)
-        # The sum of the squares is finite for all but what is not, and for values that no joint has.
+        # The sum of the squares is finite unless a value is not, or is impossibly large.
         if not math.isfinite(q.dot(q)) and not all(map(math.isfinite, q.tolist())):
             bad = ["%s = %s" % pair for pair in zip(self.joint_names, q, strict=True) if not math.isfinite(pair[1])]
             raise InvalidPosture("joint values must be finite, got %s" % ", ".join(bad), values)
         return q
 
     def posture_by_name(self, names, positions):
-        """Return the posture (n,) picked out of parallel lists of joint names and positions; other joints may be there.
+        """Return the posture (n,) picked out of parallel lists of joint names and positions; other joints may be in the
+        lists.
 
         Raises InvalidPosture when the lists differ in length, or a joint of the chain is missing, repeated, not finite.
         """
@@ -152,7 +154,7 @@ class Chain:
         return self.fk_and_jacobian(q)[1]
 
     def fk_and_jacobian(self, q):
-        """Return (:meth:`fk`, :meth:`jacobian`) for little more than the price of one. Raises InvalidPosture."""
+        """Return (:meth:`fk`, :meth:`jacobian`) for little more than the cost of one. Raises InvalidPosture."""
         return kernels.tip_and_jacobian(*self.arrays, self.posture(q))
 
     def joint_frames(self, q):
@@ -161,7 +163,7 @@ class Chain:
         return kernels.joint_frames(*self.arrays, self.posture(q))
 
     def link_frames(self, q):
-        """Return {link name: pose (4, 4) in the base frame} for every link on the way. Raises InvalidPosture."""
+        """Return {link name: pose (4, 4) in the base frame} for every link of the chain. Raises InvalidPosture."""
         rotations, origins = self.joint_frames(q)
         frames = {}
         for link, (joint, offset) in zip(self.link_names, self._hangs_on, strict=True):
@@ -177,7 +179,7 @@ def wrench_from_torques(jacobian, torques, damping=0.01):
 
     Base frame, about the tip's origin. The least-squares solution of ``J^T w = torques``, damped (``damping`` in the
     unit of the Jacobian) so that a direction in which the arm is nearly singular gives a small wrench, not a huge one.
-    Torques that balance gravity or accelerate the arm are to be taken off beforehand.
+    Subtract torques that balance gravity or accelerate the arm first.
     """
     jacobian = np.array(jacobian, dtype=np.float64)
     torques = np.array(torques, dtype=np.float64)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics that keeps clear of the robot's own body and of the world."""
+"""Inverse kinematics that avoids collisions with the robot's own body and the world."""
 from collections import Counter
 from typing import NamedTuple, Protocol
 
@@ -8,7 +8,7 @@ import numpy as np
 from baxter_sim_kinematics.errors import Attempt, NoSolution, Reason
 from baxter_sim_kinematics.search import Collection, IkResult
 
-# Solutions that are looked at between two searches for more; the first are mostly free.
+# Number of solutions checked between two searches; the first ones are mostly free.
 _CHUNK = 6
 
 
@@ -22,17 +22,16 @@ class Touch(NamedTuple):
 
 
 class CollisionChecker(Protocol):
-    """Says whether a posture touches anything. Not to be shared between threads unless its class says so."""
+    """Checks whether a posture touches anything. Not thread-safe unless its class says so."""
 
     def contact(self, joint_names, q):
         """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None where it is clear."""
 
 
 def first_free(search, found, checker):
-    """Return the IkResult of ``found`` if it is clear, else of a clear solution, of the first ones that are met the
-    nearest to the preferred posture. Raises NoSolution that names the links that touch in most of the solutions.
-
-    All starts that ``search`` may make are made before it gives up.
+    """Return the IkResult of ``found`` if it has no contact, else of the solution without contact that is nearest to
+    the preferred posture, among the first ones found. Raises NoSolution, which names the pair that touches in most
+    solutions, after all starts of ``search``'s budget.
     """
     names = search.chain.joint_names
     touch = checker.contact(names, found.q)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The commands fk, ik and reach: what they share, and what each does. They need no master."""
+"""The commands fk, ik and reach: their shared options, and each command. They need no master."""
 import argparse
 import csv
 import json
@@ -61,7 +61,7 @@ def _chain(options):
 
 
 def _told(main):
-    """Run a command; what it raises on purpose becomes one line and exit status 1."""
+    """Run a command; its own errors become one line and exit status 1."""
     try:
         return main()
     except (KinematicsError, UrdfError, OSError, ValueError) as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where ROS messages meet this package's own types. Nothing else in the package knows messages."""
+"""Conversions between ROS messages and this package's own types. Few other modules know messages."""
 from baxter_kinematics_msgs.msg import IKVerdict
 from geometry_msgs.msg import Point, Pose, Quaternion
 from sensor_msgs.msg import JointState

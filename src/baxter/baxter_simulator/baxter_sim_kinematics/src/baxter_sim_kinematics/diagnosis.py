@@ -11,20 +11,20 @@ from baxter_sim_kinematics.errors import Attempt, NoSolution, Reason
 from baxter_sim_kinematics.kernels import Rows
 from baxter_sim_kinematics.search import Collection
 
-# A pose error that stays above this with limits lifted is no matter of more iterations [m or rad].
+# If the pose error stays above this without limits, more iterations will not help [m or rad].
 _CLEARLY_OFF = 1e-4
-# Starts for finding out why: the questions are easier than the search was.
+# Starts of a diagnosis, which is easier than the search.
 _STARTS_TO_EXPLAIN = 60
-# A joint that goes less far than another has to be found with this share of the other's way.
+# A better joint must be found within this share of the previous joint's excess.
 _SHORTER = 0.95
-# Walks towards the limit that a joint has broken; each gets about half of what is left to get.
+# Number of walks towards the limit that a joint exceeds; each covers about half of the remaining distance.
 _PULLS = 5
-# Solutions without limits among which the one that breaks the limits least is looked for.
+# Number of solutions without limits, among which the one with the least excess is chosen.
 _UNLIMITED = 48
 
 
 def beyond_reach(chain, target):
-    """Return the sentence that the target lies outside a ball which the arm cannot leave, or "" when it lies inside.
+    """Return a sentence if the target lies outside a ball that the arm cannot leave, or "" if it lies inside.
 
     With the orientation given, the origin of a last revolute joint is known, so there is a ball for that as well.
     """
@@ -41,9 +41,8 @@ def beyond_reach(chain, target):
 
 
 def explain(search, found):
-    """Raise the NoSolution that says why ``search`` came to ``found``, which has not arrived.
-
-    Returns a solution where the inquiry happens to meet one.
+    """Raise the NoSolution that explains why ``search`` failed with ``found``. Returns a solution if the diagnosis
+    happens to find one.
     """
     chain, target = search.chain, search.target
     reach = beyond_reach(chain, target)
@@ -80,7 +79,7 @@ def explain(search, found):
 
 
 def _budget(search, starts):
-    """The search's tolerances, one solution, and the usual iterations whatever its own budget says."""
+    """The search's tolerances, one solution, and the default number of iterations."""
     return replace(search.budget, candidates=1, max_starts=starts, max_iterations=MAX_ITERATIONS)
 
 
@@ -95,15 +94,14 @@ def _failure(search, reason, detail, nearest, joints=(), excess=()):
 
 
 def _least_excess(search, start, lifted):
-    """Return (a solution inside the limits after all or None, {joint name: signed excess} of those that must give way).
-
-    One joint alone if that is enough, and of those the one that has to go least far; else several together. ``lifted``:
-    a solution without limits.
+    """Return (a solution inside the limits or None, {joint name: signed excess} of the joints that must exceed their
+    limits). One joint alone if that is enough, the one with the least excess; else several together. ``lifted``: a
+    solution without limits.
     """
     chain = search.chain
     least, bound = {}, math.inf
     for joint in range(len(chain)):
-        # A joint that does not get there within one bound does not within a tighter one: each fails but once.
+        # A joint that fails within one bound also fails within a tighter one, so each fails only once.
         while True:
             inside, over = _alone(search, joint, bound, start)
             if inside is not None:
@@ -121,15 +119,15 @@ def _least_excess(search, start, lifted):
 
 
 def _alone(search, joint, bound, start):
-    """Return (a solution inside the limits or None, {name of joint number ``joint``: signed excess}, empty if it does
-    not get there within ``bound`` [rad or m] beyond its limits).
+    """Return (a solution inside the limits or None, {name of joint number ``joint``: signed excess}, empty if it fails
+    within ``bound`` [rad or m] beyond its limits).
     """
     chain, limits = search.chain, search.free_limits(joint, bound)
     found = search.run(budget=_budget(search, _STARTS_TO_EXPLAIN), limits=limits, postures=(start, start))
     if not found.arrived:
         return None, {}
     for _ in range(_PULLS):
-        # Along the self-motion to where this joint is least beyond.
+        # Walk along the self-motion to the least excess of this joint.
         wrapped = _wrapped(chain, found.q)
         found = search.run(budget=_budget(search, 1), limits=limits,
                            postures=(wrapped, np.clip(wrapped, *chain.limit_arrays)))
@@ -142,21 +140,21 @@ def _sum(over):
 
 
 def _settled(search, q):
-    """Return what is Found from ``q``, turned into the limits, if that arrives; else None."""
+    """Return the Found of a search from ``q``, wrapped into the limits, if it arrives; else None."""
     start = np.clip(_wrapped(search.chain, q), *search.chain.limit_arrays)
     inside = search.run(budget=_budget(search, 1), postures=(start, search.preferred))
     return inside if inside.arrived else None
 
 
 def _wrapped(chain, q):
-    """Turn revolute joints by whole turns to where they are inside their limits, or least outside."""
+    """Turn revolute joints by whole turns into their limits, or to the least excess."""
     lower, upper = chain.limit_arrays
     turns = np.round((q - chain.mid_range) / (2.0 * math.pi))
     return np.where(chain.arrays[2] | ~np.isfinite(lower) | ~np.isfinite(upper), q, q - 2.0 * math.pi * turns)
 
 
 def _excess(chain, q):
-    """Return {joint name: how far beyond its limit [rad or m], negative below the lower} of ``q`` modulo whole
+    """Return {joint name: excess beyond its limit [rad or m], negative below the lower one} of ``q`` modulo whole
     turns.
     """
     over = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What can go wrong in this package, each error with the values that it is about."""
+"""The errors of this package, each with the values that it concerns."""
 import enum
 from typing import NamedTuple
 
@@ -7,10 +7,11 @@ import numpy as np
 
 
 class KinematicsError(Exception):
-    """Root of every error that this package raises on purpose. All of them can be sent between processes."""
+    """Base class of this package's errors. All of them can be pickled."""
 
     def __reduce__(self):
-        # Exception would call the class with the message alone, and a pool waits for ever for what cannot be unpacked.
+        # By default, unpickling calls the class with the message alone, which fails, and a process pool then waits for
+        # ever.
         return _restored, (type(self), self.args, self.__dict__)
 
 
@@ -19,7 +20,7 @@ class ChainError(KinematicsError):
 
 
 class InvalidTarget(KinematicsError):
-    """The pose asked for is not a pose. ``value`` is what was given."""
+    """The target is not a pose. ``value`` is the given one."""
 
     def __init__(self, message, value):
         super().__init__(message)
@@ -27,7 +28,7 @@ class InvalidTarget(KinematicsError):
 
 
 class InvalidPosture(KinematicsError):
-    """Joint values that do not fit the chain: wrong number, wrong names, or not finite. ``value`` is what was given."""
+    """Joint values that do not fit the chain: wrong number, wrong names, or not finite. ``value`` is the given one."""
 
     def __init__(self, message, value):
         super().__init__(message)
@@ -35,7 +36,7 @@ class InvalidPosture(KinematicsError):
 
 
 class InvalidSeed(KinematicsError):
-    """A request says nothing that a search could start from; the text says what would be right."""
+    """A request has no usable seed; the text says what would be right."""
 
 
 class Reason(enum.Enum):
@@ -49,7 +50,7 @@ class Reason(enum.Enum):
 
 
 class Attempt(NamedTuple):
-    """Joint values q (n,), the tip's pose (4, 4) there, and how far that is from the target."""
+    """Joint values q (n,), the tip's pose (4, 4) there, and its distance to the target."""
 
     q: np.ndarray
     pose: np.ndarray
@@ -60,14 +61,13 @@ class Attempt(NamedTuple):
 class NoSolution(KinematicsError):
     """Inverse kinematics found no posture for ``target``.
 
-    target: the (4, 4) pose asked for, tip in base [m].
+    target: the requested pose (4, 4), tip in base [m].
     reason: a :class:`Reason`.
-    detail: one sentence that says what was found and what would help.
-    best: joint values (n,) inside the limits that put the tip as near the target as was found; nearest: its pose (4, 4)
-    there; residual_m, residual_rad: how far that is from the target. 0 in effect where a collision is the reason.
-    joints: names of the joints whose limits are in the way, excess: by how much each would have to go beyond [rad or m]
-    (only for JOINT_LIMIT).
-    pair: the two links that touch (only for collisions; a link of the world as "model/link").
+    detail: one sentence that says what was found and what would help. best: joint values (n,) inside the limits with
+    the tip nearest to the target; nearest: the tip's pose (4, 4) there; residual_m, residual_rad: its distance to the
+    target, about 0 if a collision is the reason. joints: names of the joints whose limits prevent a solution, excess:
+    how far each would have to exceed its limit [rad or m] (only for JOINT_LIMIT). pair: the two links that touch (only
+    for collisions; a link of the world as "model/link").
     """
 
     def __init__(self, target, reason, detail, attempt, *, joints=(), excess=(), pair=()):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics: from a pose of the tip to joint values inside the limits, or to the reason why there are none."""
+"""Inverse kinematics: from a pose of the tip to joint values inside the limits, or to the reason why none exist."""
 import math
 from dataclasses import dataclass, replace
 
@@ -16,18 +16,17 @@ from baxter_sim_kinematics.target import Target
 def solve(chain, target, seed, *, posture=None, budget=USUAL, checker=None):
     """Return an :class:`IkResult` whose q puts the tip of ``chain`` on ``target``.
 
-    ``target``: a :class:`Target`, or the pose (4, 4), tip in base [m], of which everything counts. ``seed`` (n,): where
+    ``target``: a :class:`Target`, or the pose (4, 4), tip in base [m], all six components. ``seed`` (n,): where
     the search starts. ``budget``: a :class:`Budget`.
 
-    Damped least squares, started at ``seed`` and then at random postures until as many starts have arrived as the
-    budget says. Where the arm has more joints than the pose needs, each solution is then moved along its self-motion
-    to the point nearest ``posture`` (n,), which is the seed unless given (least squares over the joints); the nearest
-    of all is returned. Joint limits are never broken; a seed outside of them is clamped. The random postures are seeded
-    by the request itself: the same request gives the same answer bit for bit.
+    Damped least squares, started at ``seed`` and then at random postures until the budget's number of starts has
+    arrived. If the arm has more joints than the pose needs, each solution is then moved along its self-motion to the
+    point nearest ``posture`` (n,), which is the seed unless given (least squares over the joints); the nearest of all
+    is returned. Joint limits are never broken; a seed outside of them is clamped. The random postures depend only on
+    the request, so the same request gives the same answer bit for bit.
 
-    checker: a :class:`CollisionChecker`; postures that touch are no solutions.
-
-    Raises NoSolution, which says why; InvalidTarget; InvalidPosture for a seed or posture that does not fit the chain.
+    checker: a :class:`CollisionChecker`; postures with contacts are no solutions. Raises NoSolution, which says why;
+    InvalidTarget; InvalidPosture for a seed or posture that does not fit the chain.
     """
     search = Search(chain, Target.of(target), seed, posture, budget)
     found = search.run(budget=replace(budget, max_starts=1) if beyond_reach(chain, search.target) else budget)
@@ -43,8 +42,8 @@ class Several:
     """How many solutions :func:`solve_all` returns, and which.
 
     An arm with more joints than the pose needs has whole curves of solutions: with ``settle`` each solution is moved to
-    the nearest point of its curve, so that there is one for each way to hold the arm; without, they are spread along
-    the curves. ``apart``: in some joint each differs by that much [rad or m] from every other.
+    the nearest point of its curve, so that there is one for each arm configuration; without, they are spread along the
+    curves. ``apart``: least difference in some joint [rad or m] between any two solutions.
 
     Raises ValueError for a number that is not finite or below 1, and for a negative distance.
     """
@@ -63,12 +62,12 @@ class Several:
 def solve_all(chain, target, seed, wanted, *, posture=None, budget=USUAL, checker=None):
     """Return distinct solutions of :func:`solve`'s problem, as a list of IkResult, nearest to ``posture`` first.
 
-    ``wanted``: :class:`Several`, or the most solutions to return. Fewer come back where the budget's starts find no
-    more; its ``candidates`` do not count. Raises as :func:`solve` does where there is not one solution.
+    ``wanted``: :class:`Several`, or the most solutions to return. Returns fewer if the budget's starts find no more;
+    its ``candidates`` are not used. Raises as :func:`solve` if there is no solution.
     """
     wanted = wanted if isinstance(wanted, Several) else Several(wanted)
     search = Search(chain, Target.of(target), seed, posture, budget)
-    # All that there are, so that the nearest are among those kept; a spread answer is as long as the caller asks.
+    # Collect all solutions, so that the nearest are kept; a spread answer is as long as the caller requests.
     rows = np.empty((max(int(wanted.number), int(budget.max_starts) if wanted.settle or checker else 0), len(chain)))
     count, starts, iterations = (0, 1, 0) if beyond_reach(chain, search.target) else search.gather(
         rows, Collection(settle=bool(wanted.settle), apart=float(wanted.apart)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The newest joint states of an arm, read only when they are asked for. Knows messages."""
+"""The newest joint states of an arm, deserialized only on demand. Uses messages."""
 import struct
 
 import genpy
@@ -10,13 +10,13 @@ _STAMP = struct.Struct("<4xII")
 
 
 class UnreadJointState(JointState):
-    """A JointState that stays as it came: of those that arrive only a few are read."""
+    """A JointState that keeps its bytes: only a few of the messages are ever read."""
 
     def __init__(self):
-        """Leaves the fields out: nobody reads them, and making them costs as much as all else that is done here."""
+        """Does not create the fields: nobody reads them, and creating them takes as long as all other work here."""
 
     def deserialize(self, buffer):
-        """Keep the bytes. Raises genpy.DeserializationError where they end within the header."""
+        """Keep the bytes. Raises genpy.DeserializationError if they end within the header."""
         if len(buffer) < _STAMP.size:
             raise genpy.DeserializationError("joint states of %d bytes" % len(buffer))
         self.serialized = bytes(buffer)
@@ -24,15 +24,15 @@ class UnreadJointState(JointState):
 
 
 class NewestState:
-    """Takes UnreadJointStates; any thread may read the newest that has all of ``joint_names``."""
+    """Takes UnreadJointStates; any thread may read the newest one with all of ``joint_names``."""
 
     def __init__(self, joint_names, time_went_back):
         """``time_went_back()`` is called when a state is older than the one before it."""
-        # A string on the wire is its length and its bytes. A grip of the fingers may come in a message of its own.
+        # A serialized string is its length and its bytes. The fingers may come in a message of their own.
         self._needed = [struct.pack("<I", len(name)) + name for name in map(str.encode, joint_names)]
         self._time_went_back = time_went_back
         self._serialized, self._stamp = None, (0, 0)
-        self._read = None, None  # what was read last, and out of what
+        self._read = None, None  # the last result, and the message that it came from
 
     def take(self, message):
         stamp = _STAMP.unpack_from(message.serialized)
@@ -42,12 +42,12 @@ class NewestState:
             self._serialized, self._stamp = message.serialized, stamp
 
     def read(self):
-        """Return the newest JointState, None where there is none yet. Raises genpy.DeserializationError."""
+        """Return the newest JointState, or None if there is none yet. Raises genpy.DeserializationError."""
         serialized = self._serialized
         if serialized is None:
             return None
         source, state = self._read
-        if source is not serialized:  # a request with thousands of poses asks thousands of times
+        if source is not serialized:  # a request with thousands of poses calls this thousands of times
             state = JointState().deserialize(serialized)
             self._read = serialized, state
         return state

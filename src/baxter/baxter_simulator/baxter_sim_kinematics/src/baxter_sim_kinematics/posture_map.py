@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A table of well-chosen postures to seed inverse kinematics with: the one whose tip is nearest the target wins."""
+"""A table of well-chosen postures as seeds of inverse kinematics: it returns the one whose tip is nearest the
+target."""
 import math
 
 import numpy as np
@@ -23,12 +24,12 @@ class PostureMap:
 
 
 def mirrored(values, joint_names, turned_over):
-    """Return joint values for the arm on the other side: those named in ``turned_over`` change their sign."""
+    """Return joint values for the arm on the other side: the joints in ``turned_over`` change their sign."""
     return [-value if name in turned_over else value for name, value in zip(joint_names, values, strict=True)]
 
 
 def _separation(a, b):
-    """Distance [m] between two poses, rotation weighed in."""
+    """Distance [m] between two poses, including a weighted rotation."""
     cosine = 0.5 * (float(np.tensordot(a[:3, :3], b[:3, :3])) - 1.0)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     return math.hypot(float(np.linalg.norm(a[:3, 3] - b[:3, 3])), METRES_PER_RADIAN * angle)

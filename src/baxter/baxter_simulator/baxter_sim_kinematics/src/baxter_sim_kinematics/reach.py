@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where an arm gets to: a volume in cells, and in each the share of orientations that the tip can have there."""
+"""Workspace of an arm: a volume in cells, and for each cell the share of orientations that the tip can reach."""
 import json
 import math
 import multiprocessing
@@ -16,21 +16,21 @@ from baxter_sim_kinematics.budget import Budget
 from baxter_sim_kinematics.errors import KinematicsError
 from urdf_model.transforms import matrix_from_quaternion
 
-# Cells that are computed, saved and counted together: about a second's work.
+# Cells that are computed, saved and counted together: about a second of work.
 _CHUNK = 32
-# A million cells take a day. A request for far more is a typing error, and would not fit into memory.
+# A million cells take a day. A request for far more is a mistake, and would not fit into memory.
 _MOST_CELLS = 10_000_000
 
 
 class ReachError(KinematicsError):
-    """A map that cannot be made, or not be gone on with."""
+    """A map cannot be made or continued."""
 
 
 @dataclass(frozen=True)
 class MapSettings:
-    """What a map depends on. lower, upper: corners (3,) of the volume [m, base frame]; cell_m: edge of a cell;
-    orientations: how many are tried in each; tool: (3,) the direction of the tip's z axis [base frame] if only turns
-    about that count, else None; starts: of each search; chain: whatever tells one arm from another."""
+    """The settings that a map depends on. lower, upper: corners (3,) of the volume [m, base frame]; cell_m: edge of a
+    cell; orientations: how many are tried in each; tool: (3,) the direction of the tip's z axis [base frame] if only
+    turns about that count, else None; starts: of each search; chain: data that identifies the arm."""
 
     lower: tuple
     upper: tuple
@@ -56,7 +56,7 @@ class MapSettings:
 
     @property
     def shape(self):
-        """How many cells there are along x, y, z."""
+        """Number of cells along x, y, z."""
         return tuple(max(1, int(round((high - low) / self.cell_m)))
                      for low, high in zip(self.lower, self.upper, strict=True))
 
@@ -83,7 +83,7 @@ def compute(chain, settings, folder, processes, progress=lambda done, total: Non
     """Compute a map and return (share (x, y, z) in 0 to 1, mean manipulability (x, y, z), NaN where nothing is
     reached).
 
-    Each finished part is kept in ``folder``; parts that are there already are not computed again. ``progress`` is
+    Each finished part is kept in ``folder``; existing parts are not computed again. ``progress`` is
     called with the number of cells done and of all. Raises ReachError where ``folder`` holds parts of another map.
     """
     parts = _Parts(Path(folder), settings)
@@ -107,13 +107,13 @@ def compute(chain, settings, folder, processes, progress=lambda done, total: Non
 def cell_values(chain, settings, centres):
     """Return share and mean manipulability (k,) of the cells at ``centres`` (k, 3).
 
-    Manipulability is Yoshikawa's sqrt(det(J J^T)), the mean over the orientations that are reached.
+    Manipulability is Yoshikawa's sqrt(det(J J^T)), the mean over the reached orientations.
     """
     rotations = settings.rotations()
     budget = Budget(candidates=1, max_starts=settings.starts, tolerance_m=1e-5, tolerance_rad=1e-5)
     share, manipulability = np.zeros(len(centres)), np.full(len(centres), math.nan)
     for k, centre in enumerate(centres):
-        # Where the outstretched arm does not get to there is nothing to search.
+        # No search is needed beyond the outstretched arm.
         if math.dist(centre, chain.shoulder) > chain.tip_reach_m:
             continue
         targets = np.tile(np.eye(4), (len(rotations), 1, 1))
@@ -150,13 +150,13 @@ class _Parts:
                 raise ReachError("'%s' holds parts of a map with another %s (%s there); choose another folder or "
                                  "delete it" % (self._folder, other[0], kept[other[0]]))
         else:
-            # Under another name until it is whole, like the parts: what is there counts.
+            # Written under another name and then renamed, like the parts: an existing file is complete.
             unfinished = self._folder / (".settings.%d.json" % os.getpid())
             unfinished.write_text(json.dumps(wanted, indent=1) + "\n")
             unfinished.rename(note)
 
     def load(self, sizes):
-        """Return {first cell: (share, manipulability)} of those parts of ``sizes`` {first cell: cells} that are whole.
+        """Return {first cell: (share, manipulability)} of the complete parts of ``sizes`` {first cell: cells}.
         """
         values = {}
         for first, size in sizes.items():

@@ -10,7 +10,7 @@ _INK, _PAPER = (60, 60, 60), (255, 255, 255)
 
 
 def draw(share, settings, path, max_panels=12):
-    """Write the PNG ``path`` of ``share`` (x, y, z). Of many levels ``max_panels`` are drawn, evenly chosen.
+    """Write the PNG ``path`` of ``share`` (x, y, z). At most ``max_panels`` levels are drawn, evenly chosen.
 
     Raises OSError when it cannot be written.
     """
@@ -36,7 +36,7 @@ def draw(share, settings, path, max_panels=12):
 
 
 def _coloured(share):
-    """Colours (h, w, 3) of shares 0 to 1; what is never reached is light grey."""
+    """Colours (h, w, 3) of shares 0 to 1; unreachable cells are light grey."""
     colours = cv2.applyColorMap(np.clip(255.0 * share, 0, 255).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
     colours[share <= 0.0] = (225, 225, 225)
     return colours

@@ -16,8 +16,8 @@ _NEAREST = Budget(max_starts=40, max_iterations=100)
 
 
 class IkResult(NamedTuple):
-    """A solution. q: joint values (n,) in chain order, inside the limits. residual_m, residual_rad: what is left of the
-    pose error. iterations, restarts: the effort, of all starts together."""
+    """A solution. q: joint values (n,) in chain order, inside the limits. residual_m, residual_rad: the remaining pose
+    error. iterations, restarts: the effort of all starts together."""
 
     q: np.ndarray
     residual_m: float
@@ -27,7 +27,8 @@ class IkResult(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What a search came to. arrived: starts that did; q: the chosen solution, or the best attempt where none did."""
+    """The result of a search. arrived: number of starts that arrived; q: the chosen solution, or the best attempt if
+    none arrived."""
 
     arrived: int
     starts: int
@@ -40,9 +41,9 @@ class Found(NamedTuple):
 class Collection(NamedTuple):
     """How :meth:`Search.gather` fills its rows.
 
-    held: rows that are full already. first_start: number of the start to begin with. settle: each solution moves along
-    its self-motion to the point nearest the preferred posture. apart: two solutions differ by that in some joint [rad
-    or m].
+    held: number of filled rows. first_start: number of the first start. settle: each solution moves along
+    its self-motion to the point nearest the preferred posture. apart: least difference of two solutions in some joint
+    [rad or m].
     """
 
     held: int = 0
@@ -54,7 +55,7 @@ class Collection(NamedTuple):
 class Search:
     """A :class:`Target`, a Chain and a :class:`Budget`.
 
-    ``seed`` (n,): where it starts; ``posture`` (n,): the one that solutions should be near, the seed where None.
+    ``seed`` (n,): where it starts; ``posture`` (n,): the one that solutions should be near, the seed if None.
     Raises InvalidPosture for values that do not fit the chain.
     """
 
@@ -64,7 +65,7 @@ class Search:
         self.preferred = self.seed if posture is None else chain.posture(posture)
 
     def run(self, *, budget=None, limits=None, postures=None, rows=None):
-        """Return what is Found, with the search's own groups where others are not given.
+        """Return the Found; arguments replace the search's own groups.
 
         ``limits``: (lower, upper) in place of the chain's; ``postures``: (seed, preferred); ``rows``: the Rows of the
         error that count.
@@ -78,7 +79,7 @@ class Search:
         return Found(*outcome, q)
 
     def gather(self, solutions, collection, *, budget=None, limits=None):
-        """Fill rows of ``solutions`` (m, n) with solutions that differ, as a :class:`Collection` says.
+        """Fill rows of ``solutions`` (m, n) with different solutions, as a :class:`Collection` describes.
 
         Returns (rows filled, starts used, iterations).
         """
@@ -90,14 +91,15 @@ class Search:
         return kernels.pose_error(self.chain.arrays, self.target.arrays, q)
 
     def nearest(self):
-        """Return (q, error [m], error [rad]): inside the limits, the tip as near the target as it gets."""
+        """Return (q, error [m], error [rad]): inside the limits, with the tip as near to the target as possible."""
         q = np.empty(len(self.chain))
         errors = kernels.nearest(self.chain.arrays, self.chain.limit_arrays, self.target.arrays, _NEAREST.effort,
                                  METRES_PER_RADIAN, self.seed, q)
         return (q, *errors)
 
     def free_limits(self, joint=None, by=math.inf):
-        """Return (lower, upper) with the limits of ``joint`` (index), or of all, moved outwards ``by`` [rad or m]."""
+        """Return (lower, upper) with the limits of ``joint`` (index), or of all, moved outwards by ``by`` [rad or
+        m]."""
         lower, upper = (limit.copy() for limit in self.chain.limit_arrays)
         which = slice(None) if joint is None else joint
         lower[which] -= by

@@ -7,7 +7,7 @@ from baxter_sim_kinematics.errors import InvalidPosture, InvalidSeed, NoSolution
 
 
 class SeedMode(enum.IntEnum):
-    """The numbers are those of baxter_core_msgs/SolvePositionIK, for a request's mode and for an answer's type."""
+    """The numbers of baxter_core_msgs/SolvePositionIK, for a request's mode and a response's type."""
 
     AUTO = 0
     USER = 1
@@ -32,8 +32,8 @@ def seed_mode(number):
 
 
 class SeedRequest(NamedTuple):
-    """What a request says about seeds. given: (joint names, positions) per pose, as far as the caller sent them; a pair
-    of empty lists is no seed. poses: how many poses are asked for.
+    """The seeds of a request. given: (joint names, positions) per pose, as far as the caller sent them; a pair of empty
+    lists is no seed. poses: number of poses in the request.
     """
 
     mode: SeedMode
@@ -42,19 +42,20 @@ class SeedRequest(NamedTuple):
 
 
 class SeedPolicy:
-    """Tries seeds in the order of the mode. ``neutral`` (n,): stands in for a current posture that is not known."""
+    """Tries seeds in the order of the mode. ``neutral`` (n,): used if the current posture is not known."""
 
     def __init__(self, chain, posture_map, neutral, current):
-        """``current()``: returns the posture (n,) of now, or raises InvalidPosture that says why it is not known."""
+        """``current()``: returns the current posture (n,), or raises InvalidPosture, which says why it is not known."""
         self._chain, self._posture_map, self._neutral, self._current = chain, posture_map, neutral, current
-        self._reported = None  # why the current posture was not known when it was asked for last, if it was not
+        self._reported = None  # why the current posture was unknown at the last call, or None
 
     def answer(self, request, index, target, solve, remarks):
-        """Return (SeedMode that led there, what ``solve(seed)`` returned) for pose number ``index`` of a SeedRequest.
+        """Return (SeedMode of the seed that succeeded, result of ``solve(seed)``) for pose number ``index`` of a
+        SeedRequest.
 
-        ``target`` (4, 4): the pose, tip in base. A search that did not converge is begun again at the next seed; any
-        other diagnosis is about the pose and holds for every seed. Appends to ``remarks`` what the caller should know
-        besides. Raises NoSolution of the last search, InvalidSeed.
+        ``target`` (4, 4): the pose, tip in base. A search that did not converge is repeated with the next seed; any
+        other diagnosis concerns the pose and holds for every seed. Appends remarks for the caller to ``remarks``.
+        Raises NoSolution of the last search, InvalidSeed.
         """
         failure = None
         for mode in _TRIED[request.mode]:
@@ -70,7 +71,7 @@ class SeedPolicy:
         raise failure
 
     def _seed(self, mode, request, index, target, remarks):
-        """Return the posture to start from, or None where AUTO has to do without a user's seed."""
+        """Return the posture to start from, or None if AUTO has no user's seed."""
         if mode is SeedMode.NS_MAP:
             return self._posture_map.nearest(target)
         if mode is SeedMode.CURRENT:
@@ -94,7 +95,8 @@ class SeedPolicy:
         try:
             current = self._current()
         except InvalidPosture as error:
-            # Once, not with every request: it lasts until the robot speaks, and a log line costs as much as an answer.
+            # Once, not with every request: it stays true until joint states arrive, and a log line takes as long as an
+            # answer.
             if str(error) != self._reported:
                 self._reported = str(error)
                 remarks.append("%s; the neutral posture stands in for the current one" % error)

@@ -8,19 +8,19 @@ from baxter_sim_kinematics import kernels
 from baxter_sim_kinematics.errors import InvalidTarget
 from urdf_model.transforms import matrix_from_quaternion, rigid
 
-# Off by less than this a rotation is taken for a rounded one and normalised (the labs' quaternion is off by 9e-4).
+# A rotation with a smaller error counts as rounded and is normalised (the labs' quaternion has an error of 9e-4).
 ROUNDED = 1e-2
-# How much one radian of turning counts, in metres of moving, where poses are compared: about the length of a forearm.
+# Weight of a radian of rotation in metres, to compare poses: about the length of a forearm.
 METRES_PER_RADIAN = 0.3
-# In place of a basis where no axis is free: nothing looks at it.
+# Unused basis of a target without a free axis.
 _NO_AXIS = np.eye(3)
 
 
 def pose_from_quaternion(position, quaternion_xyzw):
     """Return the pose (4, 4) at ``position`` (x, y, z) [m] with orientation (x, y, z, w).
 
-    A quaternion whose length is off by less than 0.01 is normalised. Raises InvalidTarget for any other length and for
-    numbers that are not finite.
+    A quaternion whose length differs from 1 by less than 0.01 is normalised. Raises InvalidTarget for any other length
+    and for numbers that are not finite.
     """
     try:
         x, y, z = position
@@ -39,17 +39,15 @@ def pose_from_quaternion(position, quaternion_xyzw):
 
 
 class Target:
-    """A pose (4, 4) of the tip in the base frame, checked, and how much of it counts.
-
-    rotation (3, 3), orthonormal; position (3,) [m]; rows: which :class:`~baxter_sim_kinematics.kernels.Rows` of the
-    pose error count; arrays: rotation, position, rows, basis, as the kernels take them.
+    """A pose (4, 4) of the tip in the base frame, checked, and which of its components count. rotation (3, 3),
+    orthonormal; position (3,) [m]; rows: which :class:`~baxter_sim_kinematics.kernels.Rows` of the pose error count;
+    arrays: rotation, position, rows, basis, as the kernels take them.
     """
 
     def __init__(self, pose, position_only=False, free_axis=None):
-        """``position_only``: any orientation will do. ``free_axis`` (3,): any turn about this axis of the tip, in the
-        tip's frame, will do, e.g. (0, 0, 1) for a gripper that may come from any side.
-
-        Raises InvalidTarget for what is no pose, ValueError for an axis that is no direction.
+        """``position_only``: the orientation is free. ``free_axis`` (3,): the rotation about this axis of the tip, in
+        the tip's frame, is free, e.g. (0, 0, 1) for a gripper that may come from any side. Raises InvalidTarget for an
+        invalid pose, ValueError for an axis without direction.
         """
         try:
             matrix = np.array(pose, dtype=np.float64)
@@ -69,23 +67,23 @@ class Target:
 
     @classmethod
     def of(cls, target):
-        """Return ``target``, a Target or a pose (4, 4) of which everything counts, as a Target."""
+        """Return ``target``, a Target or a full pose (4, 4), as a Target."""
         return target if isinstance(target, cls) else cls(target)
 
     @property
     def pose(self):
-        """A new (4, 4) of what was asked for, made orthonormal."""
+        """The requested pose as a new (4, 4), made orthonormal."""
         return rigid(self.rotation, self.position)
 
 
 class Targets:
-    """Many poses (m, 4, 4), and how much of each counts: a :class:`Target` each, checked together.
+    """Many poses (m, 4, 4), each as a :class:`Target`, checked together.
 
     arrays: rotations (m, 3, 3), positions (m, 3) [m], rows, bases (m, 3, 3), as the kernels take them.
     """
 
     def __init__(self, poses, position_only=False, free_axis=None):
-        """Raises InvalidTarget, with the number of the pose, for what is none; ValueError as Target does."""
+        """Raises InvalidTarget with the number of an invalid pose, and ValueError as Target does."""
         try:
             matrices = np.array(poses, dtype=np.float64)
         except (TypeError, ValueError):
@@ -108,7 +106,7 @@ class Targets:
 
     @classmethod
     def of(cls, targets):
-        """Return ``targets``, Targets or poses (m, 4, 4) of which everything counts, as Targets."""
+        """Return ``targets``, Targets or full poses (m, 4, 4), as Targets."""
         return targets if isinstance(targets, cls) else cls(targets)
 
     def __len__(self):
@@ -116,7 +114,7 @@ class Targets:
 
 
 def rows_of(position_only, free_axis):
-    """Return the Rows of the pose error that count; of both wishes the position alone is the greater."""
+    """Return the Rows of the pose error that count; position_only overrides free_axis."""
     if position_only:
         return kernels.Rows.POSITION
     return kernels.Rows.POSE if free_axis is None else kernels.Rows.FREE_TURN

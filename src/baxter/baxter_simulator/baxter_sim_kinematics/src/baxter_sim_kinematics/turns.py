@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fair turns: a lock that goes to the thread that has waited longest."""
+"""A fair lock, which goes to the thread that has waited longest."""
 import collections
 import threading
 
 
 class Turns:
-    """A lock, as a context, whose waiters get it in the order in which they asked.
-
-    Python's own goes to the fastest thread, which is the one that has just released it: a loop over ten thousand
-    poses would keep everybody else waiting until its end.
+    """A lock, as a context manager, which threads get in the order of their requests. Python's own lock usually goes to
+    the thread that has just released it: a loop over ten thousand poses would keep all other threads waiting until its
+    end.
     """
 
     def __init__(self):

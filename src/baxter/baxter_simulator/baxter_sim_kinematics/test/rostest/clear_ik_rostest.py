@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The IK service told to keep the robot off itself: a verdict where nothing is clear, else a clear answer."""
+"""The IK service with avoid_collisions: a verdict if every posture collides, else an answer without collision."""
 import sys
 import threading
 import unittest
@@ -15,7 +15,7 @@ from baxter_sim_kinematics import Chain, convert
 from lab_testing.waiting import wait_until
 from urdf_model import parse_urdf
 
-# The left hand in the chest, in whatever way the arm is held; and the neutral posture.
+# The left hand in the chest, in any posture; and the neutral posture.
 IN_THE_CHEST = (-0.4, -0.6, -2.2, 1.8, -1.3, 1.6, -1.4)
 NEUTRAL = (0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0)
 WAIT_S = 60.0

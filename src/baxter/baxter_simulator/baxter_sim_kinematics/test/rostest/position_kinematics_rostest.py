@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The IK service as clients meet it. This process plays the robot: the left arm's joints and a tf frame."""
+"""The IK service as clients use it. This process acts as the robot: the left arm's joints and a tf frame."""
 import concurrent.futures
 import math
 import random
@@ -34,7 +34,8 @@ LAB_ANGLES = (-1.0051802515115758, -1.0358377913378556, -0.33102594774694544, 1.
 TOO_FAR = ((3.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
 SHELF_IN_BASE = (0.2, -0.1, 0.3)
 WAIT_S = 20.0
-# Joint states in one go, and how long the last of them may take to be used: one by one they would need twice that.
+# Number of joint states sent at once, and the deadline for the last to be used: handled one by one they would take
+# twice as long.
 BURST = 1000
 BURST_TIMEOUT_S = 10.0
 
@@ -73,7 +74,7 @@ class PositionKinematics(unittest.TestCase):
         shelf.transform.translation.x, shelf.transform.translation.y, shelf.transform.translation.z = SHELF_IN_BASE
         shelf.transform.rotation.w = 1.0
         cls.broadcaster.sendTransform(shelf)
-        # Only the left arm's joints are ever published: the right arm is the robot that has not spoken yet.
+        # Only the left arm's joints are ever published: the right arm stands for a robot that has not published yet.
         cls.joint_states = rospy.Publisher("/robot/joint_states", JointState, queue_size=BURST, latch=True)
         wait_until(lambda: cls.joint_states.get_num_connections() == 2, "both nodes to subscribe to joint states")
         cls.say_current()
@@ -139,7 +140,7 @@ class PositionKinematics(unittest.TestCase):
             answer = self.ask("left", [here], mode=mode)
             self.assertEqual(answer.result_type[0], expected)
             np.testing.assert_allclose(answer.joints[0].position, CURRENT, atol=1e-5)
-        # Seeds are not looked at with CURRENT and NS_MAP.
+        # CURRENT and NS_MAP ignore seeds.
         answer = self.ask("left", [here], [seed("left", [1.0] * 7)], SolvePositionIKRequest.SEED_CURRENT)
         np.testing.assert_allclose(answer.joints[0].position, CURRENT, atol=1e-5)
         neutral = self.chains["left"].fk(NEUTRAL)
@@ -225,7 +226,7 @@ class PositionKinematics(unittest.TestCase):
         solved, far, limit, invalid = report.verdicts
         self.assertEqual(solved.joints_there, answer.joints[0])
         self.assertEqual(solved.detail, "")
-        # As far as it says, and the joint values lead there.
+        # The distance is right, and the joint values reach the nearest pose.
         there = self.chains["left"].fk(far.joints_there.position)[:3, 3]
         nearest = far.nearest.position
         np.testing.assert_allclose([nearest.x, nearest.y, nearest.z], there, atol=1e-9)

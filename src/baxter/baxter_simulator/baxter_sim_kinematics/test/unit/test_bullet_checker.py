@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics that keeps clear, on a robot of boxes of which it is plain what touches what."""
+"""Collision-free inverse kinematics, on a robot of boxes with obvious contacts."""
 import math
 
 import numpy as np
@@ -47,7 +47,7 @@ def test_straight_arm_is_clear_and_folded_arm_touches(checker):
     touch = checker.contact(_JOINTS, np.array([0.0, 2 * math.pi / 3, 2 * math.pi / 3 + 0.12]))
     assert {touch.link_a, touch.link_b} == {"l1", "l3"}
     assert not touch.with_world and touch.depth_m > 0.0
-    # Clear again: it keeps nothing of what it was asked before.
+    # Clear again: it keeps no state between calls.
     assert checker.contact(_JOINTS, np.zeros(3)) is None
 
 
@@ -66,7 +66,7 @@ def test_links_that_the_joints_do_not_move_do_not_count(checker):
 
 
 def test_answer_bends_around_what_stands_there(planar, checker):
-    """The tip on the x axis: the elbow may be on either side. A box stands on the one where the plain answer has it."""
+    """The tip on the x axis: the elbow may be on either side. A box stands on the side of the plain answer."""
     chain = Chain.from_robot(planar, "foot", "tip")
     target = rigid(np.eye(3), (1.8, 0.0, 0.0))
     seed = np.array([0.8, -0.8, -0.8])
@@ -78,7 +78,7 @@ def test_answer_bends_around_what_stands_there(planar, checker):
     assert checker.contact(_JOINTS, plain.q) is not None
     assert checker.contact(_JOINTS, answer.q) is None
     np.testing.assert_allclose(chain.fk(answer.q)[:3, 3], target[:3, 3], atol=2e-6)
-    # A wall on both sides leaves nothing, and the verdict names it.
+    # Walls on both sides leave no solution, and the verdict names them.
     checker.world.spawn(box("wall", "0.3 9 1"), "wall", Pose((1.0, 0.0, 0)), static=True)
     with pytest.raises(NoSolution, match="wall/box") as caught:
         solve(chain, anyhow, seed, checker=checker)

@@ -28,7 +28,7 @@ NEUTRAL = np.array([0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0])
 LAB_POSE = pose_from_quaternion((0.644, 0.0, 0.066), (-0.381, 0.923, -0.015, 0.052))
 LAB_ANGLES = np.array([-1.0051802515115758, -1.0358377913378556, -0.33102594774694544, 1.7033657530084771,
                        0.3050684684989051, 0.8610601980794869, -1.4742358938106646])
-# What the vendor's IK demo asks for.
+# The target of the vendor's IK demo.
 DEMO_POSES = {
     "left": ((0.657579481614, 0.851981417433, 0.0388352386502),
              (-0.366894936773, 0.885980397775, 0.108155782462, 0.262162481772)),
@@ -38,7 +38,7 @@ DEMO_POSES = {
 
 
 def planar_arm(*limits, length=1.0):
-    """Links of equal length in a plane, each joint with (lower, upper) [rad]: easy to say what can be reached."""
+    """Links of equal length in a plane, each joint with (lower, upper) [rad]: its workspace is known."""
     steps = [("j%d" % (i + 1), "revolute", "l%d" % (i + 1), rigid(np.eye(3), (length if i else 0.0, 0, 0)), (0, 0, 1),
               *limit) for i, limit in enumerate(limits)]
     steps.append(("tool", "fixed", "tip", rigid(np.eye(3), (length, 0, 0)), (0, 0, 1), None, None))
@@ -93,7 +93,7 @@ def test_seed_that_is_a_solution_is_the_answer(chain):
 
 
 def test_answer_is_the_nearest_to_the_seed_on_its_self_motion(chain):
-    """No small step that keeps the pose and the limits comes nearer."""
+    """No small step within pose and limits gets nearer."""
     for q in np.random.default_rng(9).uniform(chain.lower, chain.upper, (200, 7)):
         answer = solve(chain, chain.fk(q), NEUTRAL).q
         free = (answer > chain.lower) & (answer < chain.upper)
@@ -198,7 +198,7 @@ def test_joint_limit_of_baxter_is_named(left, posture, joint):
 
 
 def test_joint_that_would_have_to_leave_its_range_is_named(left):
-    """Take every redundancy away from one joint: lock all others, then ask for what only it could do."""
+    """Lock all other joints, then request a pose that only this joint could reach."""
     for index, name in enumerate(left.joint_names):
         home = left.mid_range
         locked = Chain("base", "tip", [(joint, "revolute", "l%d" % i, *_step(left, i), home[i], home[i])

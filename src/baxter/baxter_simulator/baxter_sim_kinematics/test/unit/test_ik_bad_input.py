@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is no pose, no posture, no chain or half a map is refused in words, or got over."""
+"""Invalid poses, postures and chains are refused with a message; an incomplete map is continued or refused."""
 import json
 import math
 import pickle

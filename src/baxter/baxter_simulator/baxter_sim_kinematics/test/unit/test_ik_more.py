@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What inverse kinematics offers beyond one answer: several, free axes, a posture to stay near, batches, other arms."""
+"""Further features of inverse kinematics: several solutions, free axes, a preferred posture, batches, other arms."""
 import math
 
 import numpy as np
@@ -82,7 +82,7 @@ def test_several_of_an_unreachable_pose_say_why(left):
         solve_all(left, left.fk(left.mid_range), left.mid_range, 0)
 
 
-# -- what is free --------------------------------------------------------------------------------------------------
+# -- free axes --------------------------------------------------------------------------------------------------
 
 
 def test_free_axis_lets_the_tip_turn_about_it_and_nothing_else(chain):
@@ -95,7 +95,7 @@ def test_free_axis_lets_the_tip_turn_about_it_and_nothing_else(chain):
         np.testing.assert_allclose(tip[:3, 3], target[:3, 3], atol=1.1e-6)
         np.testing.assert_allclose(tip[:3, :3] @ axis, target[:3, :3] @ axis, atol=1.5e-6)
         turns.append(rotation_angle(tip[:3, :3].T @ target[:3, :3]))
-    assert np.median(turns) > 0.1  # it uses what it is given
+    assert np.median(turns) > 0.1  # it uses the given array
 
 
 def test_free_axis_reaches_what_the_full_pose_does_not(six_axes):
@@ -136,7 +136,7 @@ def test_posture_draws_the_elbow(left):
 
 
 def test_posture_that_is_a_solution_is_the_answer(chain):
-    """But for one or two in a hundred, where the way there along the arm's self-motion first leads away."""
+    """Except one or two in a hundred, where the path along the self-motion first leads away."""
     postures = np.random.default_rng(47).uniform(chain.lower, chain.upper, (400, 7))
     missed = 0
     for q in postures:
@@ -210,7 +210,7 @@ def test_thousand_poses_of_a_desk_arm(six_axes):
 
 
 class Fence:
-    """A checker that calls every posture a touch whose first joint is beyond a fence."""
+    """A checker that reports a contact for every posture whose first joint is beyond a fence."""
 
     def __init__(self, fence, with_world=False):
         self._fence, self._with_world = fence, with_world

@@ -25,7 +25,7 @@ class _Server(ThreadingMixIn, SimpleXMLRPCServer):
 
 
 class _Master:
-    """As much of a ROS master as a starting node talks to. Calls `on_call(name, arguments)` before each answer."""
+    """A ROS master with the calls that a starting node makes. Calls `on_call(name, arguments)` before each answer."""
 
     def __init__(self, parameters):
         self._parameters = parameters

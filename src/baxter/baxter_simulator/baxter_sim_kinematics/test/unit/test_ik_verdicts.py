@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses that are bad for a cause that is known because they were built that way: the verdict finds the cause."""
+"""Unsolvable poses, constructed with a known cause: the verdict finds the cause."""
 import numpy as np
 import pytest
 
@@ -16,7 +16,7 @@ def random_rotation(rng):
 
 
 def verdict(chain, target, seed, **options):
-    """The NoSolution of a pose, having looked at what every verdict must hold; None where there is a solution."""
+    """The NoSolution of a pose, after general checks of the verdict; None if there is a solution."""
     try:
         solve(chain, target, seed, **options)
     except NoSolution as failure:
@@ -77,7 +77,7 @@ def narrowed(chain, home, joint, half_range, slack):
 
 
 def bent_postures(chain, rng, count):
-    """Postures without two joints in line, which could stand in for each other."""
+    """Postures without two collinear joint axes, because such joints can replace each other."""
     postures = []
     while len(postures) < count:
         q = rng.uniform(chain.lower, chain.upper)
@@ -88,7 +88,7 @@ def bent_postures(chain, rng, count):
 
 @pytest.mark.parametrize("arm", ["baxter", "six_axes"])
 def test_joint_that_stops_short_is_named(left, six_axes, arm):
-    """All other joints are as good as locked, so nobody else can do what the joint would have to."""
+    """All other joints are nearly locked, so that none of them can replace the joint."""
     chain = left if arm == "baxter" else six_axes
     rng = np.random.default_rng(33)
     right = []
@@ -105,7 +105,8 @@ def test_joint_that_stops_short_is_named(left, six_axes, arm):
 
 
 def test_limit_of_the_whole_arm_is_named_with_what_would_do(left):
-    """The named joint, let go alone, reaches the pose, hardly farther beyond than in the posture it was built from."""
+    """With only the named joint's limit removed, the pose is reached, at about the excess of the posture it was built
+    from."""
     rng = np.random.default_rng(34)
     right = []
     while len(right) < 60:
@@ -114,7 +115,7 @@ def test_limit_of_the_whole_arm_is_named_with_what_would_do(left):
         beyond = rng.uniform(0.1, 0.6)
         q[joint] = left.upper[joint] + beyond
         target = left.fk(q)
-        # Bad only if nobody gets there inside the limits, with ten times the effort of a request.
+        # Counts as wrong only if a search with ten times a request's effort finds no solution inside the limits.
         if solve_batch(left, [target], left.mid_range, budget=Budget(candidates=1, max_starts=2000)).solved[0]:
             continue
         failure = verdict(left, target, left.mid_range)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compiled code is kept between runs, but never longer than the sources that it was made from."""
+"""Compiled code is kept between runs, as long as its sources do not change."""
 import os
 import shutil
 import subprocess
@@ -25,7 +25,7 @@ print(sum(kernels.pose_error.stats.cache_hits.values()))
 
 
 def source_of(module):
-    """A package's folder; in a devel space catkin puts one in front of it that has nothing but a relay."""
+    """A package's folder; in a devel space, catkin puts a relay package in front of it."""
     return max(module.__path__, key=lambda folder: len(os.listdir(folder)))
 
 
@@ -77,6 +77,6 @@ def test_kernels_find_a_cache_when_neither_source_nor_home_can_be_written(copy, 
             "print(kernels.tip_and_jacobian._cache.cache_path)")
     cache, = copy(code, HOME=str(tmp_path / "home"), TMPDIR=str(tmp_path / "tmp"))
     assert cache.startswith(str(tmp_path / "tmp" / "baxter_sim_kinematics-"))
-    # A cache that cannot be written is as good as none.
+    # A cache that cannot be written counts as none.
     cache, = copy(code, HOME=str(tmp_path), NUMBA_CACHE_DIR=str(tmp_path / "home" / "cache"))
     assert cache.startswith(str(tmp_path / ".cache" / "numba" / "baxter_sim_kinematics-"))

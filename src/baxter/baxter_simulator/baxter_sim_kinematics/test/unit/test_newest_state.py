@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint states are kept as bytes until somebody asks."""
+"""Joint states are kept as bytes until they are read."""
 from io import BytesIO
 
 import genpy

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which seeds the service tries, in which order, and what it says about those that it cannot use."""
+"""Which seeds the service tries, in which order, and its remarks about unusable ones."""
 import numpy as np
 import pytest
 from baxter_core_msgs.srv import SolvePositionIKRequest
@@ -18,7 +18,7 @@ def chain():
 
 
 class Robot:
-    """Its posture, or why it is not known."""
+    """A robot with a posture, or with the reason why it is not known."""
 
     def __init__(self):
         self.problem = None

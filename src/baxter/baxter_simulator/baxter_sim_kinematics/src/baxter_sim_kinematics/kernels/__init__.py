@@ -1,20 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Compiled inner loops: forward kinematics, Jacobian, and the search behind :func:`baxter_sim_kinematics.solve`.
 
-Arrays and numbers that belong together are a plain tuple: numba takes that over from Python in a third of the time of a
-named one. Their parts, in order:
+Arrays and numbers that belong together are a plain tuple: passing it from Python to numba takes a third of the time of
+a named one. Their parts, in order:
 
 - arm, n joints, each turned so that it moves about (or along) its own z axis: rotations (n + 1, 3, 3) and offsets
   (n + 1, 3) [m], the constant pose of joint i's frame in the frame that joint i - 1 moves, the last entry from the last
   joint to the tip; prismatic (n,) bool;
 - limits: lower, upper (n,) [rad or m], infinite where there is no limit;
-- target: rotation (3, 3), position (3,), rows: the value of a :class:`Rows`, basis (3, 3): which axis is free, see
+- target: rotation (3, 3), position (3,), rows: the value of a :class:`Rows`, basis (3, 3): the free axis, see
   :func:`fill_basis`;
-- effort: tolerances [m], [rad], iterations of one start, starts, starts that have to arrive before a search ends;
+- effort: tolerances [m], [rad], iterations of one start, starts, number of starts that must arrive before a search
+  ends;
 - postures: seed (n,), where a search starts, and preferred (n,), which solutions should be near;
-- collection, how :func:`gather` fills its rows: number of rows that are full already; number of the first start;
-  whether each solution moves along its self-motion to the point nearest the preferred posture; by how much two
-  solutions differ in some joint [rad or m].
+- collection, how :func:`gather` fills its rows: number of filled rows; number of the first start; whether each solution
+  moves along its self-motion to the point nearest the preferred posture; least difference of two solutions in some
+  joint [rad or m].
 
 Positions are in metres and angles in radians, everything in the base frame. The functions keep no state and release the
 GIL, so any number of threads may call them.

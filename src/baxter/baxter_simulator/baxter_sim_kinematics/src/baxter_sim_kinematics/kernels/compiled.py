@@ -4,6 +4,6 @@ from pathlib import Path
 
 from numba_cache import compiler
 
-#: Decorates a function: compiled when it is first called, or loaded if all of these files are as they were then.
-#: Division as the processor does it, without a check each for an exception: a tenth faster, the same bits.
+#: Decorates a function: compiled at the first call, or loaded from the cache if these files are unchanged. Division
+#: follows the processor, without a check for zero: a tenth faster, the same bits.
 compiled = compiler("baxter_sim_kinematics", Path(__file__).parent.glob("*.py"), nogil=True, error_model="numpy")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Descent from one start: onto the target, along it towards a posture, or as near to it as possible."""
+"""Descent from one start: to the target, along the self-motion towards a posture, or as near to the target as
+possible."""
 import math
 
 import numpy as np
@@ -10,8 +11,8 @@ from baxter_sim_kinematics.kernels.motion import place_joints
 from baxter_sim_kinematics.kernels.starts import clamped, fill_start, state_of
 from baxter_sim_kinematics.kernels.task import fill_error, fill_task_jacobian, on_target, pose_error, workspace
 
-# Tried on 4,000 random poses of each of two arms. With less damping starts arrive sooner still, but more often at a
-# solution far from where they began: at a quarter of this 3 in 1,000 that began 0.05 rad away, of 1,500; at this none.
+# Tried on 4,000 random poses of each of two arms. With less damping, starts arrive even sooner, but more often at a
+# distant solution: at a quarter of this value, 3 in 1,000 starts that began 0.05 rad away; at this value none of 1,500.
 _DAMPING = 0.2
 # A joint this close to its limit [rad or m] is at its limit.
 _TOUCHING = 1e-12
@@ -19,7 +20,8 @@ _TOUCHING = 1e-12
 
 @compiled
 def _fill_slope(jacobian, error, rows, limits, q, slope):
-    """Fill ``slope`` (n,) with J^T e. A joint at its limit and pushed outwards sits out: its column becomes 0."""
+    """Fill ``slope`` (n,) with J^T e. A joint at its limit that is pushed outwards is excluded: its column becomes
+    0."""
     lower, upper = limits
     for i in range(q.shape[0]):
         value = 0.0
@@ -38,7 +40,7 @@ def reach(arm, limits, target, effort, q, best):
 
     ``best`` gets the visited posture with the least error. Returns (solved, iterations, least error). The damping is in
     proportion to the squared error (Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt
-    method", IEEE T-RO 27(5), 2011): bold when near, careful when far.
+    method", IEEE T-RO 27(5), 2011): small damping near the target, large damping far from it.
     """
     n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
     target_rotation, target_position, rows, basis = target
@@ -58,7 +60,7 @@ def reach(arm, limits, target, effort, q, best):
             best[:] = q
             return True, iteration, size
         if iteration % 8 == 7:
-            # A start that does not pay is left early: the next one costs less than waiting.
+            # A start without progress is given up early: the next one is cheaper than waiting.
             if least > 0.7 * mark:
                 return False, iteration + 1, least
             mark = least
@@ -73,9 +75,8 @@ def reach(arm, limits, target, effort, q, best):
 @compiled
 def _fill_drift(jacobian, error, rows, limits, preferred, q, room):
     """Of ``room``, (gram (6, 6), pull (6,), correction (6,), drift (n,), fix (n,)), fill fix, the minimum-norm
-    correction of the pose error, and drift, the part of (preferred - q) that the tip does not feel.
-
-    Joints that the drift would push through their limit are taken out, one round at a time: their columns become 0.
+    correction of the pose error, and drift, the part of (preferred - q) that does not move the tip. Joints that the
+    drift would push through their limit are excluded, one round at a time: their columns become 0.
     """
     n, (lower, upper), (gram, pull, correction, drift, fix) = q.shape[0], limits, room
     for _ in range(n):
@@ -110,12 +111,10 @@ def _fill_drift(jacobian, error, rows, limits, preferred, q, room):
 
 @compiled
 def walk(arm, limits, target, effort, preferred, q, best):
-    """Walk from the solution ``q`` towards ``preferred`` without leaving the target: down the distance, in the null
-    space.
-
-    ``best`` (a solution on entry) gets the nearest solution met. Returns the iterations used. Each step is what
-    :func:`_fill_drift` says, scaled by the step length that the last two steps suggest (Barzilai and Borwein, IMA J.
-    Numer. Anal. 8, 1988).
+    """Walk from the solution ``q`` towards ``preferred`` in the null space, so that the tip stays on the target.
+    ``best`` (a solution on entry) gets the nearest solution found. Returns the iterations used. Each step is the drift
+    of :func:`_fill_drift`, scaled by the step length of the last two steps (Barzilai and Borwein, IMA J. Numer. Anal.
+    8, 1988).
     """
     n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
     target_rotation, target_position, rows, basis = target
@@ -142,7 +141,7 @@ def walk(arm, limits, target, effort, preferred, q, best):
                 best[:] = q
             return iteration
         if strayed > 0.3 * taken and taken > 1e-6:
-            # Near a singularity the way bends sharply: back, and on in shorter steps.
+            # Near a singularity the curve bends sharply: go back and use shorter steps.
             q[:] = last_q
             longest, taken = 0.25 * taken, 0.0
             continue
@@ -153,7 +152,7 @@ def walk(arm, limits, target, effort, preferred, q, best):
                 change += (q[i] - last_q[i]) ** 2
                 curve += (q[i] - last_q[i]) * (last_drift[i] - drift[i])
             gain = min(max(change / curve, 0.1), 4.0) if curve > 1e-16 else 1.0
-        # The tip leaves the target with the square of the step: keep steps short, and inside the limits.
+        # The pose error grows with the square of the step: keep steps short, and inside the limits.
         scale = gain
         if size * scale > longest:
             scale = longest / size
@@ -176,9 +175,8 @@ def walk(arm, limits, target, effort, preferred, q, best):
 
 @compiled
 def _approach(arm, limits, target, metres_per_radian, max_iterations, q):
-    """Take ``q`` (changed in place) downhill to where the tip is nearest the target; returns the squared error [m^2].
-
-    Levenberg-Marquardt that only ever takes steps downhill; the damping follows Nielsen, "Damping parameter in
+    """Take ``q`` (changed in place) to a local minimum of the tip's distance to the target; returns the squared error
+    [m^2]. Levenberg-Marquardt that only accepts steps downhill; the damping follows Nielsen, "Damping parameter in
     Marquardt's method", IMM-REP-1999-05.
     """
     n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
@@ -219,8 +217,8 @@ def _approach(arm, limits, target, metres_per_radian, max_iterations, q):
 def nearest(arm, limits, target, effort, metres_per_radian, seed, solution):
     """The posture inside the limits whose tip comes nearest to a target that cannot be reached.
 
-    Near means sqrt(error [m]^2 + (metres_per_radian * error [rad])^2). Looked for from the seed and from random
-    postures. Fills ``solution`` (n,); returns its pose error [m], [rad].
+    Near means sqrt(error [m]^2 + (metres_per_radian * error [rad])^2). Searched from the seed and from random postures.
+    Fills ``solution`` (n,); returns its pose error [m], [rad].
     """
     q, seed = np.empty(seed.shape[0]), clamped(seed, limits)
     _, _, max_iterations, max_starts, _ = effort

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Vectors and small symmetric matrices: seven by seven at most, and numba's ``numpy.linalg`` would need scipy."""
+"""Vectors and small symmetric matrices: at most seven by seven. Own code, because numba's ``numpy.linalg`` needs
+scipy."""
 import math
 
 import numpy as np
 
 from baxter_sim_kinematics.kernels.compiled import compiled
 
-# A pivot below this (the matrices are of order 1) means that a direction is lost.
+# A pivot below this (the matrices are of order 1) means a singular direction.
 _SINGULAR = 1e-14
 
 
@@ -21,7 +22,7 @@ def length(vector, start, stop):
 
 @compiled
 def distance(a, b):
-    """Return how far two postures (n,) are apart."""
+    """Return the distance of two postures (n,)."""
     total = 0.0
     for i in range(a.shape[0]):
         total += (a[i] - b[i]) ** 2
@@ -32,7 +33,7 @@ def distance(a, b):
 def factorise(matrix, size):
     """Cholesky factor in place (lower triangle), the inverse of each pivot on the diagonal.
 
-    A direction that is lost gets 0 there, so it stays still.
+    A singular direction gets 0 there, so it does not move.
     """
     for j in range(size):
         pivot = matrix[j, j]
@@ -64,7 +65,8 @@ def back_substitute(factor, size, vector):
 
 @compiled
 def damp(jacobian, rows, damping, normal, step):
-    """Turn ``step`` (n,), the slope J^T e on entry, into (J^T J + damping I)^-1 J^T e; ``normal`` (n, n) is space."""
+    """Turn ``step`` (n,), the slope J^T e on entry, into (J^T J + damping I)^-1 J^T e; ``normal`` (n, n) is work
+    space."""
     n = step.shape[0]
     for i in range(n):
         for j in range(i + 1):

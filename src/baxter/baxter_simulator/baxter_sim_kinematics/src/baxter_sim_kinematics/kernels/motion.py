@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a chain puts its joints and its tip, and how the tip moves with them."""
+"""Forward kinematics of joints and tip, and Jacobians."""
 import math
 
 import numpy as np

@@ -15,8 +15,8 @@ from baxter_sim_kinematics.kernels.task import pose_error
 def search(arm, limits, target, effort, postures, solution):
     """Look for postures that put the tip on the target, and keep the one nearest the preferred posture.
 
-    The first start is the seed, the others are random postures inside the limits whose generator is seeded by the
-    request itself, so the same request gives the same answer bit for bit. Ends when as many starts have arrived as the
+    The first start is the seed, the others are random postures inside the limits. Their generator is seeded by the
+    request, so the same request gives the same answer bit for bit. Ends when as many starts have arrived as the
     effort's ``candidates``.
 
     ``solution`` (n,) gets the answer, or the best attempt. Returns (starts that arrived, starts, iterations, the
@@ -66,10 +66,10 @@ def search_many(arm, limits, targets, effort, postures, part, answers):
 
 @compiled
 def gather(arm, limits, target, effort, postures, collection, solutions):
-    """Collect solutions of one target that differ, as the ``collection`` says, in the rows of ``solutions`` (m, n).
+    """Collect different solutions of one target, as ``collection`` describes, in the rows of ``solutions`` (m, n).
 
     Makes the starts that :func:`search` would make, from the collection's first to the effort's last, until the rows
-    are full; of two solutions that are the same the first stays. Returns (rows filled, starts, iterations).
+    are full; of two equal solutions the first one stays. Returns (rows filled, starts, iterations).
     """
     seed, preferred = clamped(postures[0], limits), clamped(postures[1], limits)
     n, (held, first_start, settle, apart) = seed.shape[0], collection

@@ -27,7 +27,7 @@ def _stir(state, values):
 
 @compiled
 def state_of(target, seed):
-    """Return the generator's first state: it follows from the request alone."""
+    """Return the generator's first state: it depends only on the request."""
     rotation, position, _, _ = target
     return _stir(_stir(_stir(np.uint64(seed.shape[0]), position), rotation.ravel()), seed)
 
@@ -47,7 +47,7 @@ def fill_start(attempt, state, limits, seed, start):
     """Fill ``start`` (n,) with the posture that attempt number ``attempt`` begins at: the seed first, then random ones.
 
     Depends on nothing but the arguments: ``state`` is that of :func:`state_of`, so the same request gives the same
-    starts, and a search can be taken up at any attempt.
+    starts, and a search can continue at any attempt.
     """
     n, (lower, upper) = seed.shape[0], limits
     if attempt == 0:
@@ -65,7 +65,7 @@ def fill_start(attempt, state, limits, seed, start):
 
 @compiled
 def turn_towards(arm, limits, preferred, q):
-    """A joint without limits: of its many equal angles take the one nearest the posture ``preferred``."""
+    """For a joint without limits, choose the equivalent angle nearest the posture ``preferred``."""
     _, _, prismatic = arm
     lower, upper = limits
     for i in range(q.shape[0]):

@@ -53,10 +53,8 @@ def split_pose(pose, allowed, rotation, position):
 
 @compiled
 def fill_basis(target_rotation, axis, basis):
-    """Fill ``basis`` (3, 3): its last row is the target's ``axis`` (3,), given in the tip's frame, the others
-    complete it.
-
-    For a target that leaves the turn about that axis free. Base frame; ``axis`` has length 1.
+    """Fill ``basis`` (3, 3): its last row is the target's ``axis`` (3,), given in the tip's frame, the others complete
+    the basis. For a target with free rotation about that axis. Base frame; ``axis`` has length 1.
     """
     for a in range(3):
         basis[2, a] = (target_rotation[a, 0] * axis[0] + target_rotation[a, 1] * axis[1]
@@ -79,13 +77,13 @@ def fill_error(rotation, position, target_rotation, target_position, rows, basis
     """Pose error: translation [m], then the rotation vector [rad] that turns the tip into the target; base frame.
 
     With a free turn the rotation is the smallest that turns the tip's free axis into the target's; it has no part along
-    that axis, so that its components along the first two rows of ``basis`` are all of it.
+    that axis, so that its components along the first two rows of ``basis`` describe it completely.
     """
     for a in range(3):
         error[a] = target_position[a] - position[a]
     t, r = target_rotation, rotation
     if rows == Rows.FREE_TURN:
-        # The tip's axis, which is the target's in the tip's frame, now; then along the rows of the basis.
+        # The tip's present axis, in the base frame; then its components along the rows of the basis.
         x = t[0, 0] * basis[2, 0] + t[1, 0] * basis[2, 1] + t[2, 0] * basis[2, 2]
         y = t[0, 1] * basis[2, 0] + t[1, 1] * basis[2, 1] + t[2, 1] * basis[2, 2]
         z = t[0, 2] * basis[2, 0] + t[1, 2] * basis[2, 1] + t[2, 2] * basis[2, 2]
@@ -135,7 +133,7 @@ def on_target(error, rows, tolerance_m, tolerance_rad):
 
 @compiled
 def workspace(n):
-    """Return room for a posture's joint lines (n, 6), tip rotation (3, 3), position (3,), jacobian (6, n) and error
+    """Return arrays for a posture's joint lines (n, 6), tip rotation (3, 3), position (3,), jacobian (6, n) and error
     (6,).
     """
     return np.empty((n, 6)), np.empty((3, 3)), np.empty(3), np.empty((6, n)), np.empty(6)
