@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Open and close the robot's cameras, list them, look for them again."""
+"""Open, close and list the robot's cameras, or search for them again."""
 import argparse
 import sys
 

@@ -36,7 +36,7 @@ class Report:
 
 
 def run_test(name, report):
-    """Return whether the test passed; what it raises is its result."""
+    """Return whether the test passed; an exception means failure."""
     report.say("=== %s: %s" % (name, TESTS[name].__doc__))
     try:
         TESTS[name](report.say)

@@ -23,7 +23,7 @@ def parse_arguments(argv):
 
 
 def look_ahead():
-    """Turn the head forward: the arms fold around it. A head that does not turn is no reason to leave them."""
+    """Turn the head forward: the arms fold around it. If the head does not turn, folding still goes on."""
     try:
         Head().set_pan(0.0, speed=HEAD_SPEED)
     except OSError as failure:

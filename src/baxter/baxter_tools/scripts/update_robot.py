@@ -16,13 +16,13 @@ from baxter_interface.robot_enable import VERSION_PARAMETER
 
 # The last software that is updated this way.
 LAST_VERSION = (1, 0)
-# What the updater says while it goes on; anything else is its end.
+# Status texts of a running update; any other text is its end.
 UNDER_WAY = {getattr(UpdateStatus, name) for name in (
     "STS_IDLE", "STS_BUSY", "STS_MOUNT_UPDATE", "STS_VERIFY_UPDATE", "STS_PREP_STAGING", "STS_MOUNT_STAGING",
     "STS_EXTRACT_UPDATE")}
 STATUS_NAMES = {getattr(UpdateStatus, name): name[len("STS_"):].lower()
                 for name in vars(UpdateStatus) if name.startswith("STS_")}
-# The robot may say nothing for as long while it works [s].
+# Longest silence of a working robot [s].
 SILENCE_TIMEOUT_S = 60.0
 POLL_S = 0.1
 
@@ -45,7 +45,7 @@ def require_old_robot():
 
 
 class Updater:
-    """The robot's updater: what is on the stick, and how far an update is."""
+    """The robot's updater: the updates on the stick, and the progress of an update."""
 
     def __init__(self):
         self.sources = self._status = None
@@ -87,7 +87,7 @@ class Updater:
             raise
 
     def _report(self, status):
-        """Print how far it is; return whether it is done. Raises ProgramFailed."""
+        """Print the progress; return whether it is done. Raises ProgramFailed."""
         name = STATUS_NAMES.get(status.status, str(status.status))
         line = "%s %3.0f %% %s" % (name, status.progress, status.long_description)
         if line != self._last_line:

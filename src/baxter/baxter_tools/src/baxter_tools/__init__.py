@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the command-line tools for the robot are made of."""
+"""The modules of the command-line tools for the robot."""

@@ -38,7 +38,7 @@ def run_arm_procedure(node_name, procedure, kind, data, timeout_s, description):
 
 
 def _require_bare_hand(limb, procedure):
-    """Raise ProgramFailed if the arm carries a gripper: its weight would be taken for the arm's."""
+    """Raise ProgramFailed if the arm carries a gripper: the robot would count its weight as the arm's."""
     try:
         kind = Gripper(limb).type()
     except NoGripper:

@@ -21,13 +21,13 @@ from baxter_model import SIDES, poses
 from .path_planner import NoPath, PathPlanner
 from .self_clearance import SelfClearance
 
-# Least distance between parts on the way [m]; the folded arms themselves are nearer to each other.
+# Least distance between parts on the path [m]; the folded arms themselves are nearer to each other.
 MARGIN_M = 0.01
-# Longest time for one straight stretch of the way [s]; the longest possible one takes 10 s.
+# Longest time for one straight segment of the path [s]; the longest possible one takes 10 s.
 STRETCH_TIMEOUT_S = 30.0
-# How often the robot is told to leave its own collision avoidance aside [Hz]; it forgets after 0.6 s.
+# Rate of the messages that suppress the robot's own collision avoidance [Hz]; each is valid for 0.6 s.
 SUPPRESS_RATE_HZ = 20.0
-# Postures by way of which nearly every other one can be reached.
+# Postures from which nearly every other one can be reached.
 OPEN_POSES = ("untucked", "neutral")
 
 
@@ -51,11 +51,11 @@ class Arms:
     def follow(self, way, is_enabled):
         """Move both arms through the postures of `way` (dicts of name to rad), all joints in step; stop at each.
 
-        `is_enabled` tells whether the robot is. Raises ProgramFailed; the arms then stay where they are.
+        `is_enabled` returns whether the robot is enabled. Raises ProgramFailed; the arms then stay where they are.
         """
         resets = self._resets()
         clock = RosClock(gives_up=lambda: rospy.is_shutdown() or self._resets() != resets)
-        # Raw: a robot at a low speed ratio would let the joints fall behind one by one, and off the way.
+        # Raw: a robot at a low speed ratio would slow the joints differently, and they would leave the path.
         try:
             for here, there in itertools.pairwise(way):
                 move = Move(here, there, STRETCH_TIMEOUT_S)
@@ -83,7 +83,7 @@ class Arms:
 
 
 class Folding:
-    """Ways for the arms to named poses: "tucked", "untucked".
+    """Paths for the arms to named poses: "tucked", "untucked".
 
     Reads the robot's description from the parameter server. Raises ProgramFailed if there is none.
     """
@@ -97,7 +97,7 @@ class Folding:
         self._clearance = SelfClearance(text, names, rospy.logwarn)
 
     def way(self, angles, pose):
-        """Return the way from `angles` (dict of name to rad) to the named pose as a list of such dicts.
+        """Return the path from `angles` (dict of name to rad) to the named pose as a list of such dicts.
 
         Raises ProgramFailed if there is none.
         """
@@ -118,9 +118,8 @@ class Folding:
 
 @contextlib.contextmanager
 def own_collision_avoidance():
-    """Leave the robot's collision avoidance aside for the length of a `with`: folded arms are too near for it.
-
-    Yields a function that lists what the robot itself holds for too near now.
+    """Suppress the robot's collision avoidance inside a `with` block: folded arms are too close for it. Yields a
+    function that lists the parts that the robot now counts as too close.
     """
     near = {}
     subscribers = [
@@ -132,7 +131,7 @@ def own_collision_avoidance():
     ended = threading.Event()
 
     def suppress():
-        # Wall time: the robot's patience runs on while a simulation's clock may not.
+        # Wall time: simulation time may stand still.
         while not ended.wait(1.0 / SUPPRESS_RATE_HZ):
             for publisher in publishers:
                 publisher.publish()

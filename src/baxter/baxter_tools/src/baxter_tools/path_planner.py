@@ -1,39 +1,39 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A collision-free way between two postures. Free of ROS.
+"""A collision-free path between two postures. Free of ROS.
 
 Two trees of postures grow from both ends towards random ones and towards each other until they meet (RRT-connect:
-Kuffner and LaValle, ICRA 2000); then corners are cut off. Straight ways, also by way of given postures, are tried
-first: nearly always one of them is free.
+Kuffner and LaValle, ICRA 2000); then corners are cut off. Straight paths, also through given postures, are tried first:
+nearly always one of them is free.
 """
 import itertools
 
 import numpy as np
 
-# Distance between postures at which a way is looked at: the joint that moves most [rad].
+# Distance between checked postures of a path, by the joint that moves most [rad].
 RESOLUTION_RAD = 0.02
-# Longest stretch that a tree grows at once, by the same measure [rad].
+# Longest extension of a tree, by the same measure [rad].
 STRETCH_RAD = 0.4
 TREE_LIMIT = 3000
 SHORT_CUTS = 60
-# How far around a start that touches something a free posture is looked for [rad], and how often.
+# Search for a free posture around a start in contact: distance [rad] and number of tries.
 ESCAPE_RADII_RAD = (0.05, 0.1, 0.2, 0.4, 0.8)
 ESCAPE_TRIES = 60
-# What a way out of a touch may come nearer than the touch itself [m].
+# A path out of a contact may be closer than the contact by this much [m].
 ESCAPE_SLACK_M = 0.001
 
 
 class NoPath(Exception):
-    """No free way was found; the text says from where on."""
+    """No free path was found; the text gives the reason."""
 
 
 class PathPlanner:
-    """Finds ways for postures (n,) [rad].
+    """Plans paths of postures (n,) [rad].
 
     Parameters:
         lower, upper: limits of the joints (n,).
         clearance: function of a posture that returns the least distance between parts [m], negative where they overlap.
-        margin_m: least clearance of a way; where an end itself has less, its own.
-        rng: numpy random generator; the same one gives the same ways.
+        margin_m: least clearance of a path; if an end has less, that of the end. rng: numpy random generator; the same
+        one gives the same paths.
     """
 
     def __init__(self, lower, upper, clearance, margin_m, rng):
@@ -43,15 +43,14 @@ class PathPlanner:
         self._rng = rng
 
     def plan(self, start, goal, via=()):
-        """Return a way from `start` to `goal` as a list of postures, straight in between; `via`: postures to try first.
-
-        A start that touches something is left on the way that frees it. Raises NoPath.
+        """Return a path from `start` to `goal` as a list of postures, straight in between; `via`: postures to try
+        first. A start in contact is left by a path that increases the clearance. Raises NoPath.
         """
         start, goal = (np.asarray(end, dtype=float) for end in (start, goal))
         at_goal_m = self._clearance(goal)
         if at_goal_m <= 0.0:
             raise NoPath("parts of the robot overlap by %.0f mm where it should go" % (-1000.0 * at_goal_m))
-        # The folded arm is nearer to its own body than one would choose to be on the way.
+        # The folded arm is closer to its own body than the margin of a path.
         margin_m = min(self._margin_m, 0.9 * at_goal_m)
         way = [start]
         if self._clearance(start) < margin_m:
@@ -64,7 +63,7 @@ class PathPlanner:
 
     def _is_free(self, a, b, margin_m):
         count = max(1, int(np.ceil(np.abs(b - a).max() / RESOLUTION_RAD)))
-        # Far apart first: what is in the way is thick, and found sooner so.
+        # Coarse steps first: obstacles are thick, and are found sooner this way.
         steps = sorted(range(1, count + 1), key=_bits_reversed)
         return all(self._clearance(a + (b - a) * (step / count)) >= margin_m for step in steps)
 
@@ -92,7 +91,7 @@ class PathPlanner:
         raise NoPath("no free way was found in %d tries" % TREE_LIMIT)
 
     def _grow(self, tree, target, margin_m):
-        """Grow `tree` by one stretch towards `target`; return the new node, None where something is in the way."""
+        """Extend `tree` towards `target`; return the new node, or None if it is blocked."""
         nearest = tree.nearest(target)
         from_here = tree.postures[nearest]
         distance = np.abs(target - from_here).max()
@@ -100,7 +99,7 @@ class PathPlanner:
         return tree.add(end, nearest) if self._is_free(from_here, end, margin_m) else None
 
     def _shorten(self, way, margin_m):
-        """Leave out postures between which the straight way is free. The first stretch out of a touch stays."""
+        """Remove postures where the straight path is free. The first segment out of a contact stays."""
         first = 1 if len(way) > 1 and self._clearance(way[0]) < margin_m else 0
         for _ in range(SHORT_CUTS):
             if len(way) - first < 3:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How near the arms are to each other and to the body, from the robot's description. Free of ROS messages and masters.
-
-The shapes and the pairs of parts that can meet are those that the simulator collides, on a physics world of our own.
+"""Distances of the arms to each other and to the body, from the robot's description. Free of ROS messages and masters.
+It uses the simulator's shapes and collision pairs, in a physics world of its own.
 """
 import numpy as np
 
@@ -16,11 +15,11 @@ from urdf_model import parse_urdf
 class SelfClearance:
     """Called with a posture (n,) [rad] of the joints `names`, returns the least distance between parts [m].
 
-    Negative where parts overlap; FAR where none is nearer than SEEN_M, or a fiftieth of the smaller one's size. Fingers
-    count as spread as far as they go.
+    Negative if parts overlap; FAR if none is nearer than SEEN_M, or a fiftieth of the smaller one's size. Fingers count
+    as fully open.
 
     Parameters: the text of the robot's URDF; `names` of the joints; `warn` takes a line of text.
-    Raises UrdfError and BulletSimError for a description that is none of Baxter.
+    Raises UrdfError and BulletSimError if the description is not a Baxter's.
     Attributes: lower, upper: limits (n,) [rad].
     """
 
@@ -43,5 +42,5 @@ class SelfClearance:
         return min((contact.distance for contact in self._world.contacts(self._model)), default=self.FAR)
 
     def close(self):
-        """Give the physics world back."""
+        """Close the physics world."""
         self._world.close()

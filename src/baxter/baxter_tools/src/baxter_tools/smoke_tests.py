@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Short tests of everything the robot has; each is a function that raises when something is not as it should be."""
+"""Short tests of everything the robot has; each is a function that raises when something is wrong."""
 import concurrent.futures
 import itertools
 import os
@@ -34,7 +34,7 @@ REACHABLE = ((0.657579481614, 0.851981417433, 0.0388352386502),
              (-0.366894936773, 0.885980397775, 0.108155782462, 0.262162481772))
 LIGHTS = tuple("%s_%s_light" % pair for pair in itertools.product(LOCATIONS, ("inner", "outer")))
 CAMERA_RESOLUTION = (960, 600)
-# What the cameras are left with.
+# The cameras' settings after the tests.
 USUAL_RESOLUTION, USUAL_FPS = (640, 400), 25.0
 
 

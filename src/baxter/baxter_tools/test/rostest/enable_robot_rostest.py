@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""enable_robot.py as people call it: what it prints, and its exit status."""
+"""enable_robot.py as users call it: its output and its exit status."""
 import os
 import pathlib
 import signal

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""camera_control.py, tare.py, calibrate_arm.py and update_robot.py as people call them."""
+"""camera_control.py, tare.py, calibrate_arm.py and update_robot.py as users call them."""
 import subprocess
 import unittest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ways of Baxter's arms into and out of the folded pose: free of contact all along, looked at closely."""
+"""Paths of Baxter's arms into and out of the folded pose: free of contact, checked in small steps."""
 import itertools
 
 import numpy as np
@@ -48,7 +48,8 @@ def plan(clearance, poses, start, pose):
 
 
 def test_folded_and_unfolded_arms_and_the_straight_way_between_them_are_clear(clearance, poses):
-    """Of the head itself, not of the field around it: the vendor's program goes that way with the field suppressed."""
+    """Of the head itself, not of the field around it: the vendor's program takes that path with the field
+    suppressed."""
     assert least([poses("untucked"), poses("tucked")], clearance) > MARGIN_M
 
 

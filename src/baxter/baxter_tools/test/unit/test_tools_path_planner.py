@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ways around a wall in the plane: free all along, out of a touch, and refused where there is none."""
+"""Paths around a wall in the plane: free everywhere, out of a contact, and refused if there is none."""
 import itertools
 
 import numpy as np
