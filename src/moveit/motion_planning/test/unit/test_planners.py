@@ -254,13 +254,22 @@ def test_what_are_no_postures_is_refused(snake, exact, start, goals, text):
         plan_path(Scene(snake), "arm", start, goals, search(exact))
 
 
-def shut_in(model):
-    """The straight arm lies in a tunnel, where no joint can turn far enough to get out."""
+def shut_in(model, gap=0.025):
+    """The straight arm lies in a tunnel, ``gap`` [m] from its walls: no joint can turn far enough to get out."""
+    off = 0.04 + gap
     walls = [WorldObject("wall%d%d" % (k, side), pose(offset), ((Box((1.6, 0.02, 0.2) if k else (1.6, 0.2, 0.02)),
                                                                 np.eye(4)),))
              for k in (0, 1) for side in (-1, 1)
-             for offset in [(1.0, 0.065 * side, 0.0) if k else (1.0, 0.0, 0.065 * side)]]
+             for offset in [(1.0, off * side, 0.0) if k else (1.0, 0.0, off * side)]]
     return Scene(model).with_objects(walls), np.zeros(4), np.array([1.5, 0.2, 0.5, -0.3])
+
+
+def test_goals_that_no_way_leads_out_of_are_no_path(snake, exact):
+    scene, inside, outside = shut_in(snake, gap=0.006)
+    assert not SphereChecker(SphereModel.of(snake, None), snake.groups["arm"], scene).valid(inside)[0]
+    for goals in ([inside], [inside, inside + 1e-6]):
+        with pytest.raises(NoPath, match="time was over"):
+            plan_path(scene, "arm", outside, goals, patient(exact, 1))
 
 
 def test_time_that_is_over_and_a_stop_are_told_apart(snake, exact):

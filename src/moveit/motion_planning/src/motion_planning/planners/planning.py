@@ -130,11 +130,11 @@ class _Planning:
         run = self._run(_SHARE_OF_SPHERES)
         outwards = self._way_out(start, run)
         inwards = []
-        for goal in goals:
+        for last, goal in enumerate(goals, 1 - len(goals)):
             try:
                 inwards.append(self._way_out(goal, run)[::-1])
             except NoPath as error:
-                if error.stopped or goal is goals[-1] and not inwards:
+                if error.stopped or last == 0 and not inwards:
                     raise
         entries = np.array([way[0] for way in inwards])
         checker, seed = self.checker, self.search.seed
