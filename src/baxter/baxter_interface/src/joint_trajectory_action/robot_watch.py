@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 from baxter_interface import startup
 from baxter_interface.presence import Presence
 from baxter_interface.resets import PUT_ELSEWHERE, Resets
-from baxter_model.readiness import lost, why_not_ready
+from baxter_model.readiness import STATES_KEPT, lost, why_not_ready
 
 # Joint states come 50 times a second or more; older ones [s, ROS time] are no basis for motion.
 STALE_AFTER_S = 0.5
@@ -33,7 +33,7 @@ class RobotWatch:
         self._presence = Presence(self._topic, lambda: time.monotonic() - self._heard_wall_s)
         self._resets = Resets(self._on_reset)
         self._subscribers = [
-            rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=1),
+            rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=STATES_KEPT),
             rospy.Subscriber("robot/joint_states", JointState, self._on_joint_states, queue_size=1, tcp_nodelay=True),
             # A robot without a cuff is as good as one whose cuff nobody squeezes.
             rospy.Subscriber("robot/digital_io/%s_lower_cuff/state" % side, DigitalIOState, self._on_cuff,

@@ -19,6 +19,7 @@ from .settings import SIDES
 
 ACTION_NAME = "trajActionServer"
 _FEEDBACK_PERIOD_S = 0.1
+STOPPED_MEANWHILE = "the robot was disabled or stopped on the way; its arms have stopped where they were"
 
 
 class Interpolator:
@@ -72,7 +73,7 @@ class Interpolator:
         return judge(trajectory.joint_names, rows_of_points(trajectory.points), self._limits, measured, self._settings)
 
     def _follow(self, handle):
-        resets = self._robot.resets
+        before = self._robot.resets, self._robot.stops
         try:
             plan = self._judge(handle, self._robot.angles())
         except GoalRefused as refusal:
@@ -81,13 +82,16 @@ class Interpolator:
             return
         self._count += 1
         handle.set_accepted()
-        end, text = self._stream(handle, plan, resets)
+        end, text = self._stream(handle, plan, *before)
         if text:
             rospy.logwarn("goal %d: %s", self._count, text)
         end(self._result(handle), text)
 
-    def _stream(self, handle, plan, resets):
-        """Move the arms; returns how the goal ends: the handle's method, and a text. resets: those before ``plan``."""
+    def _stream(self, handle, plan, resets, stops):
+        """Move the arms; returns how the goal ends: the handle's method, and a text.
+
+        resets, stops: how many of each the robot had seen before ``plan`` was made.
+        """
         now = rospy.get_time()
         motion = Motion(plan, now, self._settings.stop_deceleration)
         # The time of a simulator that is gone stands still.
@@ -99,11 +103,10 @@ class Interpolator:
             before, now = now, rospy.get_time()
             if why := self._robot.why_not_ready():
                 return handle.set_aborted, why
-            if now < before or self._robot.resets != resets:
+            if why := self._why_elsewhere(now < before, resets, stops):
                 # What was commanded last is far from where the arms are now, and they follow it until it expires.
                 self._command(plan.joint_names, np.zeros(len(plan.joint_names)), JointCommand.VELOCITY_MODE)
-                return handle.set_aborted, (
-                    "time went backwards: the simulation was reset" if now < before else PUT_ELSEWHERE)
+                return handle.set_aborted, why
             left_alone = self._settings.stop_when_client_leaves and not self._server.has_client(handle)
             if left_alone or self._is_unwanted():
                 motion.stop(now)
@@ -130,6 +133,14 @@ class Interpolator:
                     return handle.set_aborted, late
             ticker.sleep()
         return handle.set_aborted, "the trajectory server was shut down"
+
+    def _why_elsewhere(self, went_back, resets, stops):
+        """Why the arms are not where the plan has them, in words; empty while they are."""
+        if went_back:
+            return "time went backwards: the simulation was reset"
+        if self._robot.resets != resets:
+            return PUT_ELSEWHERE
+        return STOPPED_MEANWHILE if self._robot.stops != stops else ""
 
     def _is_unwanted(self):
         """Whether the goal at hand was cancelled, or a newer one waits that may take over."""

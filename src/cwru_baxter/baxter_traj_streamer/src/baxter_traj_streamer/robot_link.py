@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 from baxter_interface import startup
 from baxter_interface.presence import Presence
 from baxter_interface.resets import Resets
-from baxter_model.readiness import lost, why_not_ready
+from baxter_model.readiness import STATES_KEPT, lost, why_not_ready
 
 
 class RobotLink:
@@ -23,13 +23,14 @@ class RobotLink:
         self._lock = threading.Lock()
         self._angles = {}
         self._state = None
+        self._stops = 0
         self._heard_wall_s = time.monotonic()
         self._topic = rospy.resolve_name("robot/joint_states")
         self._presence = Presence(self._topic, lambda: time.monotonic() - self._heard_wall_s)
         self._resets = Resets()
         # Subscribe last: from here on callbacks run on another thread.
         self._subscribers = [
-            rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=1),
+            rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=STATES_KEPT),
             rospy.Subscriber("robot/joint_states", JointState, self._on_joint_states, queue_size=1, tcp_nodelay=True)]
 
     def wait(self):
@@ -48,6 +49,11 @@ class RobotLink:
         """How often the robot was put elsewhere so far, which only a simulation does."""
         return self._resets.count
 
+    @property
+    def stops(self):
+        """How often so far the robot ceased to take commands, for however short a time."""
+        return self._stops
+
     def is_gone(self):
         """Whether no node is there any more that publishes joint angles. A paused simulation is not gone."""
         return self._presence.is_gone()
@@ -62,6 +68,8 @@ class RobotLink:
         return why_not_ready(state)
 
     def _on_state(self, message):
+        if why_not_ready(message) and not (self._state is not None and why_not_ready(self._state)):
+            self._stops += 1
         self._state = message
 
     def _on_joint_states(self, message):

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
-from baxter_core_msgs.msg import JointCommand
+from baxter_core_msgs.msg import AssemblyState, JointCommand
 from rosgraph_msgs.msg import Log
 from traj_rostest_kit import DEADLINE_S, Client, FakeRobotTest, wait_until
 
@@ -119,6 +119,18 @@ class TrajStreamerTest(FakeRobotTest):
         state, text, _ = self.client.end()
         self.assertEqual(state, GoalStatus.ABORTED)
         self.assertIn("not enabled", text)
+
+    def test_disabling_for_a_moment_aborts(self):
+        state = rospy.Publisher("/robot/state", AssemblyState, queue_size=10)
+        wait_until(lambda: any(connection.endpoint_id == SERVER for connection in state.impl.connections),
+                   "the server to listen")
+        self.move(["right_w0"], [0.5], 4.0)
+        self.client.wait_until_moving()
+        for enabled in (False, True):
+            state.publish(AssemblyState(ready=True, enabled=enabled))
+        state, text, _ = self.client.end()
+        self.assertEqual(state, GoalStatus.ABORTED)
+        self.assertIn("was disabled", text)
 
     def test_the_other_version_of_the_action_is_refused_with_a_line_that_says_which_to_use(self):
         from baxter_traj_streamer.msg import trajActionGoal
