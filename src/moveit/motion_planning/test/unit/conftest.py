@@ -44,6 +44,7 @@ MIX_SRDF = """<robot name="mix">
   <group name="listed"><joint name="push"/><joint name="turn"/></group>
   <group name="ends"><joint name="grip"/><joint name="look"/></group>
   <group_state name="out" group="arm"><joint name="push" value="0.3"/><joint name="grip" value="1"/></group_state>
+  <group_state name="fist" group="hand"><joint name="grip" value="1"/><joint name="oppose" value="-1.75"/></group_state>
   <disable_collisions link1="turret" link2="base" reason="Adjacent"/>
   <disable_default_collisions link="eye"/>
   <enable_collisions link1="finger" link2="eye"/>

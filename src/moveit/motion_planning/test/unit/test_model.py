@@ -52,12 +52,20 @@ def test_frames_follow_the_joints_and_those_that_mimic_them(mix):
         mix.frames(q[:2])
 
 
+def test_joints_that_mimic_others_have_values(mix):
+    assert mix.mimics == {"oppose": ("grip", -2.0, 0.25)}
+    assert mix.joint_values([0.7, 0.2, 0.5]) == {"turn": 0.7, "push": 0.2, "grip": 0.5, "oppose": -0.75}
+
+
 def test_groups(mix):
     arm, hand = mix.groups["arm"], mix.groups["hand"]
     assert (arm.joints, arm.base, arm.tip, arm.links) == (("turn", "push"), "base", "slide", ("turret", "slide"))
     assert arm.indices.tolist() == [0, 1] and arm.moving_links == ("turret", "slide", "finger", "thumb")
     assert isinstance(arm.chain, Chain) and arm.chain.joint_names == arm.joints
     assert arm.states == {"out": {"push": 0.3}} and "'grip'" in mix.warnings[-1]
+    assert arm.valued_joints == arm.joints
+    assert hand.valued_joints == ("grip", "oppose") and hand.joints == ("grip",)
+    assert hand.states == {"fist": {"grip": 1.0}} and not any("'oppose'" in text for text in mix.warnings)
     assert (hand.joints, hand.all_joints) == (("grip",), ("grip", "oppose"))
     assert (hand.base, hand.tip, hand.chain) == (None, None, None) and hand.moving_links == ("finger", "thumb")
     # Joints come in the robot's order, and a list of joints is as good as a chain.

@@ -9,6 +9,7 @@ from geometry_msgs.msg import PoseStamped
 from .exception import MoveItCommanderException
 from .planning_scene_interface import PlanningSceneInterface
 from .robot import RobotCommander
+from .states import named_positions
 
 __all__ = ["MoveGroupCommandInterpreter", "MoveGroupInfoLevel"]
 
@@ -218,11 +219,10 @@ class MoveGroupCommandInterpreter:
 
     def _values(self, name):
         """Values of a state in the group's order; joints that a named state leaves out stand where they are."""
-        values = self._group().get_named_target_values(name)
-        joints = self._group().get_active_joints()
-        if set(values) != set(joints):
-            values = {**dict(zip(joints, self._group().get_current_joint_values(), strict=True)), **values}
-        return [values[joint] for joint in joints]
+        group = self._group()
+        now = named_positions(group.get_current_state().joint_state)
+        values = {**now, **group.get_named_target_values(name)}
+        return [values[joint] for joint in group.get_joints() if joint in now]
 
     def _record(self, words):
         self._group().remember_joint_values(_name(words, "record NAME"))

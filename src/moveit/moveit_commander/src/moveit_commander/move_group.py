@@ -28,7 +28,7 @@ from .exception import MoveItCommanderException
 from .plan import Plan, trajectory_of
 from .requests import ORIENTATION, POSE, POSITION, Settings
 from .retiming import retimed
-from .targets import JointTarget, jacobian, random_values, within_limits
+from .targets import JointTarget, jacobian, random_values, values_of, with_followers, within_limits
 from .tuning import Tunable
 
 __all__ = ["MoveGroupCommander"]
@@ -84,8 +84,8 @@ class MoveGroupCommander(Tunable):
         return list(self._group.all_joints)
 
     def get_variable_count(self):
-        """Return the number of joint values of the group."""
-        return len(self._group)
+        """Return the number of joint values of the group, of joints that mimic others, too."""
+        return len(self._group.valued_joints)
 
     def get_named_targets(self):
         """Return the names of the SRDF's states of this group, and of remembered joint values."""
@@ -132,8 +132,8 @@ class MoveGroupCommander(Tunable):
         return self.enforce_bounds(self.get_current_state())
 
     def get_current_joint_values(self):
-        """Return the joint values now, in the group's order."""
-        return self._state_now().q[self._group.indices].tolist()
+        """Return the joint values now, in the group's order, with those of joints that mimic others."""
+        return self._values_of(self._state_now())
 
     def get_current_pose(self, end_effector_link=""):
         """Return the PoseStamped of a link now, in the planning frame; the end effector's unless one is named."""
@@ -144,13 +144,19 @@ class MoveGroupCommander(Tunable):
         return list(rpy_from_matrix(self._frame_of(self._state_now(), end_effector_link)))
 
     def get_random_joint_values(self):
-        """Return joint values within the limits, evenly spread, in the group's order."""
-        return random_values(self._model, self._group, self._random).tolist()
+        """Return joint values within the limits, evenly spread, in the order of :meth:`get_current_joint_values`."""
+        return self._values_of(self._random_state(self._model.default_state()))
 
     def get_random_pose(self, end_effector_link=""):
         """Return the PoseStamped, in the planning frame, of a link at random joint values."""
-        state = self._state_now().with_q(self.get_random_joint_values(), self._group.indices)
+        state = self._random_state(self._state_now())
         return self._stamped(pose_of(self._frame_of(state, end_effector_link)), self._model.frame)
+
+    def _random_state(self, state):
+        return state.with_q(random_values(self._model, self._group, self._random), self._group.indices)
+
+    def _values_of(self, state):
+        return values_of(self._model, self._group, state.q)
 
     def _state_now(self):
         message = self.get_current_state()
@@ -198,7 +204,7 @@ class MoveGroupCommander(Tunable):
     # -- targets: joints --------------------------------------------------------------------------------------------
 
     def get_joint_value_target(self):
-        """Return the target's joint values, in the group's order."""
+        """Return the target's joint values, in the order of :meth:`get_current_joint_values`."""
         return self._joint_target.values()
 
     def set_joint_value_target(self, arg1, arg2=None, arg3=None):
@@ -240,7 +246,7 @@ class MoveGroupCommander(Tunable):
         stamped = self._in_reference_frame(pose)
         request = PositionIKRequest(group_name=self._group.name, ik_link_name=link, pose_stamped=stamped)
         request.robot_state = states.message_of(
-            self._model, self._state_now().with_q(self._joint_target.values(), self._group.indices))
+            self._model, self._state_now().with_q(self._joint_target.moved(), self._group.indices))
         answer = self._connection.call("compute_ik", ik_request=request)
         if answer.error_code.val == MoveItErrorCodes.SUCCESS:
             solution = states.named_positions(answer.solution.joint_state)
@@ -280,18 +286,18 @@ class MoveGroupCommander(Tunable):
     def get_named_target_values(self, target):
         """Return {joint: value} of a remembered or named state. Raises MoveItCommanderException for an unknown name."""
         if target in self._remembered:
-            return dict(zip(self._group.joints, self._remembered[target], strict=True))
+            return dict(zip(self._group.valued_joints, self._remembered[target], strict=True))
         if target not in self._group.states:
             raise MoveItCommanderException("group '%s' has no state '%s'; it has %s" % (
                 self._group.name, target, ", ".join(self.get_named_targets()) or "none"))
-        return dict(self._group.states[target])
+        return with_followers(self._model, self._group, self._group.states[target])
 
     def remember_joint_values(self, name, values=None):
         """Remember joint values, those of now unless some are given, under a name."""
         values = list(values) if values is not None else self.get_current_joint_values()
-        if len(values) != len(self._group):
+        if len(values) != self.get_variable_count():
             raise MoveItCommanderException("group '%s' has %d joints, got %d values"
-                                           % (self._group.name, len(self._group), len(values)))
+                                           % (self._group.name, self.get_variable_count(), len(values)))
         self._remembered[name] = values
 
     def get_remembered_joint_values(self):
@@ -382,7 +388,7 @@ class MoveGroupCommander(Tunable):
     def construct_motion_plan_request(self):
         """Return the MotionPlanRequest that plan() would send."""
         if self._kind == _JOINTS:
-            goals = [requests.joint_goal(self._group.joints, self.get_joint_value_target(),
+            goals = [requests.joint_goal(self._group.joints, self._joint_target.moved(),
                                          self.get_goal_joint_tolerance())]
         else:
             goals = requests.pose_goals(self._pose_targets, self._kind, self._settings)

@@ -29,7 +29,7 @@ class Joint:
         return self._name
 
     def variable_count(self):
-        """Return how many values it has: none for a fixed joint or one that mimics another, 7 where a base floats."""
+        """Return how many values it has: none for a fixed joint, 7 where a base floats."""
         return self._robot.variables_of(self._name)
 
     def bounds(self):
@@ -54,7 +54,8 @@ class Joint:
         if group_name is None:
             raise MoveItCommanderException("no group has joint '%s'; it cannot be moved" % self._name)
         group = self._robot.get_group(group_name)
-        values = dict(zip(group.get_active_joints(), group.get_current_joint_values(), strict=True))
+        values = self._robot.get_current_variable_values()
+        values = {name: values[name] for name in group.get_active_joints()}
         group.set_joint_value_target({**values, self._name: float(position)})
         return group.go(wait)
 
@@ -174,7 +175,7 @@ class RobotCommander:
     def get_current_variable_values(self):
         """Return {variable: value}; a floating base has seven, as "world_joint/trans_x"."""
         state = states.state_of(self._model, self.get_current_state())
-        return {**states.base_variables(self._model, state), **state.positions}
+        return {**states.base_variables(self._model, state), **self._model.joint_values(state.q)}
 
     def pose_of(self, link):
         """Return the PoseStamped of a link now, in the planning frame."""
@@ -187,11 +188,14 @@ class RobotCommander:
         """Return how many values a joint has."""
         if self._is_floating(joint):
             return len(states.base_variables(self._model, self._model.default_state()))
-        return int(joint in self._model.variables)
+        return int(joint in self._model.index or joint in self._model.mimics)
 
     def bounds_of(self, joint):
         """Return [lower, upper] of a joint, [] where it has no value of its own or no single one."""
-        return self._model.bounds[self._model.index[joint]].tolist() if joint in self._model.variables else []
+        if joint in self._model.mimics:
+            limit = self._model.robot.joints[joint].limit
+            return [limit.lower, limit.upper]
+        return self._model.bounds[self._model.index[joint]].tolist() if joint in self._model.index else []
 
     def value_of(self, joint):
         """Return where a joint stands now; a list for a floating base, [] for a fixed joint."""

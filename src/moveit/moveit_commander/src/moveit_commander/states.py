@@ -36,11 +36,11 @@ def state_of(model, message):
 
 
 def message_of(model, state):
-    """Return the RobotState of a State: all joint variables, and the virtual joint where there is one."""
+    """Return the RobotState of a State: all joints that have a value, and the virtual joint where there is one."""
     message = RobotState()
     message.joint_state.header.frame_id = message.multi_dof_joint_state.header.frame_id = model.frame
-    message.joint_state.name = list(model.variables)
-    message.joint_state.position = state.q.tolist()
+    values = model.joint_values(state.q)
+    message.joint_state.name, message.joint_state.position = list(values), list(values.values())
     if model.virtual_joint is not None:
         message.multi_dof_joint_state.joint_names = [model.virtual_joint.name]
         message.multi_dof_joint_state.transforms = [list_to_transform(pose_to_list(pose_of(state.base)))]

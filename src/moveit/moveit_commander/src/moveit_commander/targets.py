@@ -25,24 +25,34 @@ class JointTarget:
         return self._state.q
 
     def values(self):
-        """The group's values, in the group's order."""
+        """The group's values, in the order of its ``valued_joints``."""
+        return values_of(self._model, self._group, self._state.q)
+
+    def moved(self):
+        """The values of the group's ``joints``, those that can be moved."""
         return self._state.q[self._group.indices].tolist()
 
     def set_values(self, values, tolerance):
-        """Set all values of the group, given in the group's order."""
-        values = [float(value) for value in values]
-        if len(values) != len(self._group):
+        """Set all values of the group, given in the order of its ``valued_joints``, or of its ``joints``."""
+        names, values = self._group.valued_joints, [float(value) for value in values]
+        if len(values) != len(names):
+            names = self._group.joints
+        if len(values) != len(names):
             raise MoveItCommanderException("group '%s' has %d joints (%s), got %d values" % (
-                self._group.name, len(self._group), ", ".join(self._group.joints), len(values)))
-        self.set_by_name(dict(zip(self._group.joints, values, strict=True)), tolerance)
+                self._group.name, len(self._group.valued_joints), ", ".join(self._group.valued_joints), len(values)))
+        self.set_by_name(dict(zip(names, values, strict=True)), tolerance)
 
     def set_by_name(self, values, tolerance):
-        """Set the values, {joint: value}, of some of the group's joints; the others stay as they are."""
-        foreign = [name for name in values if name not in self._group.joints]
+        """Set the values, {joint: value}, of some of the group's joints; the others stay as they are.
+
+        The values of joints that mimic others are ignored: they follow.
+        """
+        known = self._group.valued_joints
+        foreign = [name for name in values if name not in known]
         if foreign:
             raise MoveItCommanderException("group '%s' has no joint %s; its joints are %s" % (
-                self._group.name, ", ".join("'%s'" % name for name in foreign), ", ".join(self._group.joints)))
-        self._set(values, tolerance)
+                self._group.name, ", ".join("'%s'" % name for name in foreign), ", ".join(known)))
+        self._set({name: value for name, value in values.items() if name in self._group.joints}, tolerance)
 
     def set_robot(self, values, tolerance):
         """Set the values, {joint: value}, of any joints of the robot; fixed and mimic joints are ignored."""
@@ -68,8 +78,24 @@ class JointTarget:
                 "%s = %g, limits are %g to %g" % one for one in beyond))
 
 
+def values_of(model, group, q):
+    """Return the values of the group's ``valued_joints`` at ``q`` (n,), as a list."""
+    values = model.joint_values(q)
+    return [values[name] for name in group.valued_joints]
+
+
+def with_followers(model, group, values):
+    """Return ``values``, {joint: value}, with those of the group's joints that mimic them."""
+    followers = {name: model.mimics[name] for name in group.valued_joints if name in model.mimics}
+    return {**values, **{name: multiplier * values[source] + offset
+                         for name, (source, multiplier, offset) in followers.items() if source in values}}
+
+
 def random_values(model, group, generator):
-    """Return values (k,) of the group within the limits, evenly spread. ``generator``: numpy.random.Generator."""
+    """Return values (k,) of the group's ``joints`` within the limits, evenly spread.
+
+    ``generator``: numpy.random.Generator. Raises MoveItCommanderException for joints without limits.
+    """
     low, high = model.bounds[group.indices].T
     if not np.isfinite(low).all() or not np.isfinite(high).all():
         raise MoveItCommanderException("group '%s' has joints without limits" % group.name)

@@ -12,7 +12,7 @@ from moveit_commander.description import Description
 from moveit_commander.states import message_of
 
 URDF = """<robot name="arm"><link name="base"/><link name="upper"/><link name="lower"/><link name="tool"/>
-  <link name="finger"/>
+  <link name="finger"/><link name="thumb"/>
   <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
     <origin xyz="0 0 0.5"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
   <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/>
@@ -20,14 +20,19 @@ URDF = """<robot name="arm"><link name="base"/><link name="upper"/><link name="l
   <joint name="flange" type="fixed"><parent link="lower"/><child link="tool"/><origin xyz="0.3 0 0"/></joint>
   <joint name="grip" type="prismatic"><parent link="tool"/><child link="finger"/><axis xyz="0 1 0"/>
     <limit lower="0" upper="0.04" effort="1" velocity="1"/></joint>
+  <joint name="oppose" type="prismatic"><parent link="tool"/><child link="thumb"/><axis xyz="0 -1 0"/>
+    <limit lower="0" upper="0.08" effort="1" velocity="1"/><mimic joint="grip" multiplier="2" offset="0.01"/></joint>
 </robot>"""
 SRDF = """<robot name="arm">
   <virtual_joint name="stand" type="floating" parent_frame="world" child_link="base"/>
   <group name="arm"><chain base_link="base" tip_link="tool"/></group>
-  <group name="hand"><joint name="grip"/></group>
+  <group name="hand"><joint name="grip"/><joint name="oppose"/></group>
   <group name="all"><group name="arm"/><group name="hand"/></group>
   <group_state name="ready" group="arm">
     <joint name="shoulder" value="0.5"/><joint name="elbow" value="1"/>
+  </group_state>
+  <group_state name="open" group="hand">
+    <joint name="grip" value="0.03"/><joint name="oppose" value="0.07"/>
   </group_state>
   <end_effector name="gripper" group="hand" parent_link="tool" parent_group="arm"/>
 </robot>"""

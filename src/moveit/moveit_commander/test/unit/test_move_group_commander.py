@@ -106,7 +106,7 @@ def test_current_values_and_pose(arm, connection):
     assert conversions.pose_to_list(pose.pose)[:3] == pytest.approx([0.0, 0.4, 0.2], abs=1e-9)
     assert conversions.pose_to_list(arm.get_current_pose("upper").pose)[:3] == pytest.approx([0.0, 0.0, 0.5])
     assert arm.get_current_rpy("upper") == pytest.approx([0.0, 0.0, math.pi / 2])
-    assert arm.get_current_state().joint_state.name == ["shoulder", "elbow", "grip"]
+    assert arm.get_current_state().joint_state.name == ["shoulder", "elbow", "grip", "oppose"]
 
 
 def test_a_base_that_moved_moves_the_pose(arm, connection):
@@ -217,6 +217,36 @@ def test_pose_targets_in_every_form(arm, pose):
     assert orientation.orientation.z == pytest.approx(1.0)
     assert orientation.absolute_z_axis_tolerance == 1e-3
     assert position.weight == orientation.weight == 1.0
+
+
+@pytest.fixture
+def hand(connection):
+    return MoveGroupCommander("hand")
+
+
+def test_joints_that_mimic_others_have_values_too(hand):
+    """The fingers of most grippers: programs write both, as they read them."""
+    assert hand.get_active_joints() == ["grip"] and hand.get_joints() == ["grip", "oppose"]
+    assert hand.get_variable_count() == 2
+    assert hand.get_current_joint_values() == pytest.approx([0.02, 0.05])
+    assert hand.get_named_target_values("open") == pytest.approx({"grip": 0.03, "oppose": 0.07})
+    random = hand.get_random_joint_values()
+    assert random[1] == pytest.approx(2 * random[0] + 0.01)
+    hand.remember_joint_values("here")
+    assert hand.get_named_target_values("here") == pytest.approx({"grip": 0.02, "oppose": 0.05})
+
+
+@pytest.mark.parametrize("target", [
+    [0.03, 0.07], [0.03, 0.0], [0.03], {"grip": 0.03, "oppose": 0.07}, {"grip": 0.03}, "open",
+    JointState(name=["oppose", "grip"], position=[0.07, 0.03])])
+def test_joints_that_mimic_others_follow_in_targets(hand, target):
+    if isinstance(target, str):
+        hand.set_named_target(target)
+    else:
+        hand.set_joint_value_target(target)
+    assert hand.get_joint_value_target() == pytest.approx([0.03, 0.07])
+    goal, = hand.construct_motion_plan_request().goal_constraints
+    assert [(one.joint_name, one.position) for one in goal.joint_constraints] == [("grip", 0.03)]
 
 
 def test_several_poses_are_alternatives_and_links_are_reached_together(arm):
@@ -563,7 +593,8 @@ def test_retiming_what_cannot_be_timed(arm):
 def test_enforcing_bounds(arm):
     state = RobotState(joint_state=JointState(name=["shoulder", "elbow"], position=[3.0, 0.0]))
     bounded = arm.enforce_bounds(state).joint_state
-    assert dict(zip(bounded.name, bounded.position, strict=True)) == {"shoulder": 2.0, "elbow": 0.2, "grip": 0.0}
+    assert dict(zip(bounded.name, bounded.position, strict=True)) == {
+        "shoulder": 2.0, "elbow": 0.2, "grip": 0.0, "oppose": 0.01}
     with pytest.raises(genpy.DeserializationError):
         arm.enforce_bounds(RobotState())
 

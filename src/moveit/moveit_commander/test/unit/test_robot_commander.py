@@ -22,12 +22,12 @@ def test_names(robot):
     assert robot.get_planning_frame() == "world" and robot.get_root_link() == "base"
     assert robot.get_group_names() == ["arm", "hand", "all"]
     assert robot.has_group("arm") and not robot.has_group("leg")
-    assert robot.get_joint_names() == ["stand", "shoulder", "elbow", "flange", "grip"]
+    assert robot.get_joint_names() == ["stand", "shoulder", "elbow", "flange", "grip", "oppose"]
     assert robot.get_joint_names("arm") == ["shoulder", "elbow", "flange"]
     assert robot.get_active_joint_names() == ["shoulder", "elbow", "grip"]
     assert robot.get_active_joint_names("hand") == ["grip"]
-    assert robot.get_link_names() == ["base", "upper", "lower", "tool", "finger"]
-    assert robot.get_link_names("hand") == ["finger"]
+    assert robot.get_link_names() == ["base", "upper", "lower", "tool", "finger", "thumb"]
+    assert robot.get_link_names("hand") == ["finger", "thumb"]
     assert robot.get_default_owner_group("elbow") == "arm"
     assert robot.get_default_owner_group("flange") is None
 
@@ -51,6 +51,9 @@ def test_joints(robot, connection, success):
     assert joint.variable_count() == 1
     assert joint.bounds() == [0.2, 2.6] and (joint.min_bound(), joint.max_bound()) == (0.2, 2.6)
     assert joint.value() == 1.0
+    follower = robot.get_joint("oppose")
+    assert follower.variable_count() == 1 and follower.bounds() == [0.0, 0.08]
+    assert follower.value() == pytest.approx(2 * 0.02 + 0.01)
     fixed = robot.get_joint("flange")
     assert fixed.variable_count() == 0 and fixed.bounds() == [] and fixed.value() == []
     base = robot.get_joint("stand")
@@ -69,7 +72,7 @@ def test_state(robot, connection):
     connection.base[0, 3] = 2.0
     values = robot.get_current_variable_values()
     assert values["elbow"] == 1.0 and values["stand/trans_x"] == 2.0 and values["stand/rot_w"] == 1.0
-    assert robot.get_current_state().joint_state.name == ["shoulder", "elbow", "grip"]
+    assert robot.get_current_state().joint_state.name == ["shoulder", "elbow", "grip", "oppose"]
     pose = robot.get_link("lower").pose()
     assert pose.header.frame_id == "world"
     assert conversions.pose_to_list(pose.pose)[:3] == pytest.approx([2.0, 0.4, 0.5])

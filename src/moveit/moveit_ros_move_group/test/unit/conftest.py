@@ -7,11 +7,13 @@ from motion_planning.scene import Scene
 
 URDF = """<robot name="crane">
   <link name="base"/><link name="arm"><collision><geometry><box size="0.1 0.1 0.4"/></geometry></collision></link>
-  <link name="hand"/>
+  <link name="hand"/><link name="counterweight"/>
   <joint name="turn" type="revolute"><origin xyz="0 0 0.5"/><parent link="base"/><child link="arm"/>
     <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
   <joint name="reach" type="prismatic"><parent link="arm"/><child link="hand"/><axis xyz="1 0 0"/>
     <limit lower="0" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="balance" type="prismatic"><parent link="arm"/><child link="counterweight"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="0" effort="1" velocity="1"/><mimic joint="reach" multiplier="-0.5" offset="-0.1"/></joint>
 </robot>"""
 SRDF = """<robot name="crane">
   <virtual_joint name="world_joint" type="floating" parent_frame="world" child_link="base"/>

@@ -39,6 +39,16 @@ def broken(scene, **constraints):
     return found.broken(scene.model, scene.state, scene)
 
 
+def test_a_joint_that_mimics_another_is_where_that_one_puts_it(scene):
+    """Clients name such joints beside those that they follow; at 0.2 the joint that is followed puts it at -0.2."""
+    def off(position, above=0.01, below=0.01):
+        return broken(scene, joint_constraints=[JointConstraint("balance", position, above, below, 1.0)])
+
+    assert off(-0.2) is None and off(-0.25, above=0.06) is None and off(-0.15, below=0.06) is None
+    assert "'reach' is at 0.2000; expected 0.2800 to 0.3200" in off(-0.25)
+    assert off(-0.25, below=0.06) and off(-0.15, above=0.06)
+
+
 def test_nothing_is_none(scene):
     assert constraint_set_of(Constraints(name="empty"), scene, READER) is None
 

@@ -226,7 +226,7 @@ def test_components_choose_parts(scene):
     assert [one.id for one in names.world.collision_objects] == ["box", "mixed"]
     assert not names.world.collision_objects[0].primitives and not names.robot_state.joint_state.name
     state = scene_message(there, wants.ROBOT_STATE)
-    assert state.robot_state.joint_state.name == ["turn", "reach"]
+    assert state.robot_state.joint_state.name == ["turn", "reach", "balance"]
     assert not state.robot_state.attached_collision_objects and not state.world.collision_objects
     assert scene_message(there, wants.ROBOT_STATE_ATTACHED_OBJECTS).robot_state.attached_collision_objects
 
@@ -269,6 +269,12 @@ def test_states_are_laid_over(scene):
     message.joint_state.position = [float("inf"), 0.0]
     READER.with_robot_state(scene, message, errors)
     assert "joint 'reach' is not finite" in errors[1]
+
+
+def test_a_state_has_the_joints_that_mimic_others(scene):
+    joints = state_message(scene.model, scene.state).joint_state
+    assert dict(zip(joints.name, joints.position, strict=True)) == pytest.approx(
+        {"turn": 0.5, "reach": 0.2, "balance": -0.2})
 
 
 def test_states_there_and_back(scene):

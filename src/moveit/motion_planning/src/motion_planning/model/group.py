@@ -19,6 +19,7 @@ class Group:
     """Some joints of a model, as the SRDF names them. It never changes.
 
     joints: names of the k joints that can be moved; indices (k,): where they stand in the model's variables.
+    valued_joints: these and the joints that mimic others, in order: what MoveIt counts as the group's variables.
     links: the links that hang on the group's joints, fixed ones included; moving_links: all links of the robot that
     move with the group, whoever they belong to.
     base, tip: ends of the chain that the group is, None where it is none; chain: its kinematics, None where nothing in
@@ -41,15 +42,16 @@ class Group:
     end_effector: EndEffector | None
     end_effectors: tuple[str, ...]
     all_joints: tuple[str, ...]
+    valued_joints: tuple[str, ...]
 
     def __len__(self):
         return len(self.joints)
 
 
-def build_groups(robot, srdf, variables, warnings):
+def build_groups(robot, srdf, model, warnings):
     """Return {name: Group} of ``srdf``'s groups, in its order, for ``robot`` (limits as they shall hold).
 
-    ``variables``: {joint: index}. What cannot be used is told to ``warnings`` (list of sentences).
+    ``model``: has index {joint: where} and mimics. What cannot be used is told to ``warnings`` (list of sentences).
     """
     order = depth_first(robot)
     rank = {joint.name: number for number, joint in enumerate(order)}
@@ -74,18 +76,19 @@ def build_groups(robot, srdf, variables, warnings):
         if not joints:
             warnings.append("group '%s' holds no joint; it is left out" % name)
             continue
-        active = tuple(joint.name for joint in joints if joint.name in variables)
+        active = tuple(joint.name for joint in joints if joint.name in model.index)
+        valued = tuple(joint.name for joint in joints if joint.name in model.index or joint.name in model.mimics)
         base, tip = _ends(robot, joints, rank)
         effectors = [effector for effector in srdf.end_effectors if effector.group == name]
         links = tuple(joint.child for joint in joints)
         groups[name] = Group(
-            name, active, read_only([variables[joint] for joint in active], np.int64), links,
+            name, active, read_only([model.index[joint] for joint in active], np.int64), links,
             _moving_links(robot, order, active), tip, base, _chain(robot, base, tip, active), entry.subgroups,
-            _states(srdf, name, active, warnings), effectors[0] if effectors else None,
+            _states(srdf, name, active, valued, warnings), effectors[0] if effectors else None,
             tuple(effector.name for effector in srdf.end_effectors
                   if effector.group != name and (effector.parent_group == name
                                                  or not effector.parent_group and effector.parent_link in links)),
-            tuple(joint.name for joint in joints))
+            tuple(joint.name for joint in joints), valued)
     return groups
 
 
@@ -140,12 +143,12 @@ def _moving_links(robot, order, active):
     return tuple(link for link in (joint.child for joint in order) if link in moving)
 
 
-def _states(srdf, group, active, warnings):
+def _states(srdf, group, active, valued, warnings):
     states = {}
     for state in srdf.states:
         if state.group != group:
             continue
-        foreign = [joint for joint in state.values if joint not in active]
+        foreign = [joint for joint in state.values if joint not in valued]
         if foreign:
             warnings.append("state '%s' names %s, which group '%s' does not move; ignored there"
                             % (state.name, ", ".join("'%s'" % joint for joint in foreign), group))

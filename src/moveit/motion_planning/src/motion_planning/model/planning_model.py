@@ -23,6 +23,7 @@ class PlanningModel:
     root: root link. frame: the planning frame, that is the virtual joint's parent frame, or else the root.
     virtual_joint: srdf.VirtualJoint or None.
     variables: names of the n joints that can be moved (not fixed, not mimic), depth-first; index: {name: where}.
+    mimics: {joint that mimics another: (variable, multiplier, offset)}: it stands at multiplier * variable + offset.
     bounds (n, 2) [rad or m], -pi to pi for a joint that turns without end; velocity (n,), acceleration (n,) [per s,
     per s^2]; continuous (n,) bool: turns without end.
     links: names, depth-first, parents first; link_index: {name: where}.
@@ -45,10 +46,11 @@ class PlanningModel:
         self.root = robot.root
         self.virtual_joint = srdf.virtual_joints[0] if srdf.virtual_joints else None
         self.frame = self.virtual_joint.parent_frame if self.virtual_joint else self.root
+        self.mimics = {}
         self.links = (self.root, *(joint.child for joint in joints))
         self.link_index = {name: number for number, name in enumerate(self.links)}
         self._set_kinematics(joints)
-        self.groups = build_groups(robot, srdf, self.index, self.warnings)
+        self.groups = build_groups(robot, srdf, self, self.warnings)
         self.end_effectors = {effector.name: effector for effector in srdf.end_effectors}
         self.passive = frozenset(srdf.passive_joints)
         self.disabled = frozenset(pair_of(pair.link1, pair.link2) for pair in srdf.disabled)
@@ -83,6 +85,8 @@ class PlanningModel:
             kinds[number] = _KINDS.get(joint.type, 0)
             source, factors[number] = self._driver(joint)
             variables[number] = self.index.get(source, -1)
+            if joint.mimic is not None and joint.movable and source in self.index:
+                self.mimics[joint.name] = (source, *map(float, factors[number]))
         self.kinematics = tuple(read_only(array, array.dtype) for array in (
             parents, origins, axes, kinds, variables, factors))
 
@@ -126,6 +130,13 @@ class PlanningModel:
         return values
 
     # -- states -------------------------------------------------------------------------------------------------
+
+    def joint_values(self, q):
+        """Return {joint: value} at ``q`` (n,): the variables in order, then the joints that mimic them."""
+        values = dict(zip(self.variables, self.checked(q).tolist(), strict=True))
+        values.update({name: multiplier * values[source] + offset
+                       for name, (source, multiplier, offset) in self.mimics.items()})
+        return values
 
     def state(self, values=None, base=None, attached=None):
         """Return a State: ``values`` {joint: value} or (n,), over :meth:`default_state`'s; ``base`` (4, 4)."""

@@ -19,7 +19,7 @@ def constraint_set_of(message, scene, reader):
     Frames are looked up in ``scene`` as it is now, by ``reader`` (SceneReader). Raises PlanningError.
     """
     found = ConstraintSet(
-        message.name, [_joint(one) for one in message.joint_constraints],
+        message.name, [_joint(one, scene.model) for one in message.joint_constraints],
         [_position(one, scene, reader) for one in message.position_constraints],
         [_orientation(one, scene, reader) for one in message.orientation_constraints],
         [_visibility(one, scene, reader) for one in message.visibility_constraints])
@@ -31,9 +31,16 @@ def _weight(message):
     return message.weight if message.weight > 0.0 else 1.0
 
 
-def _joint(message):
-    return JointTarget(message.joint_name, message.position, message.tolerance_above, message.tolerance_below,
-                       _weight(message))
+def _joint(message, model):
+    """Of a joint that mimics another: what it means for that one. MoveIt's clients name both."""
+    joint, multiplier, offset = model.mimics.get(message.joint_name, (message.joint_name, 1.0, 0.0))
+    if multiplier == 0.0:
+        raise MessageError("joint '%s' always stands at %g, whatever a constraint says" % (message.joint_name, offset))
+    above, below = message.tolerance_above, message.tolerance_below
+    if multiplier < 0.0:
+        above, below = below, above
+    return JointTarget(joint, (message.position - offset) / multiplier, above / abs(multiplier),
+                       below / abs(multiplier), _weight(message))
 
 
 def _position(message, scene, reader):

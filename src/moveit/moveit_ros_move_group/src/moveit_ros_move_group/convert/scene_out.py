@@ -53,7 +53,7 @@ def state_message(model, state, stamp=None, attached=True, is_diff=False):
     stamp = stamp or rospy.Time()
     message.joint_state.header.frame_id = model.frame
     message.joint_state.header.stamp = stamp
-    values = dict(zip(model.variables, state.q.tolist(), strict=True))
+    values = model.joint_values(state.q)
     message.joint_state.name = list(values)
     message.joint_state.position = list(values.values())
     if model.virtual_joint is not None and model.virtual_joint.type != "fixed":
