@@ -72,10 +72,12 @@ def cartesian_path(model, group, start, link, waypoints, steps):
     follower = _Follower(model, model.groups[group], start, link, steps.accept)
     waypoints = [follower.pose(i, waypoint) for i, waypoint in enumerate(waypoints)]
     here = follower.pose_of_link(follower.q)
-    counts = [_steps(a, b, max_step) for a, b in zip([here, *waypoints], waypoints, strict=False)]
-    if sum(counts) > _MOST_STEPS:
-        raise CartesianError("steps of %g m make %d points, the most is %d; make the steps larger"
-                             % (max_step, sum(counts), _MOST_STEPS))
+    pieces = [_pieces(a, b) for a, b in zip([here, *waypoints], waypoints, strict=False)]
+    if len(pieces) > _MOST_STEPS or not sum(pieces) / _MOST_STEPS <= max_step:
+        raise CartesianError("%d waypoints over %g m in steps of %g m are too many points, the most is %d; make the "
+                             "steps larger" % (len(pieces), sum(pieces), max_step, _MOST_STEPS))
+    # The little taken off keeps 0.3 / 0.1 from becoming four.
+    counts = [max(1, math.ceil(piece / max_step - 1e-6)) for piece in pieces]
     points, done, reason = [follower.q], [0.0], None
     for leg, (goal, count) in enumerate(zip(waypoints, counts, strict=True)):
         for step in range(count):
@@ -143,11 +145,11 @@ def _axis(rotation, angle):
     return axis / np.linalg.norm(axis)
 
 
-def _steps(begin, end, max_step):
-    distance = np.linalg.norm(end[:3, 3] - begin[:3, 3])
+def _pieces(begin, end):
+    """What steps are cut from [m]: the way, or the turn in proportion where that is more."""
+    distance = float(np.linalg.norm(end[:3, 3] - begin[:3, 3]))
     angle = rotation_angle(begin[:3, :3].T @ end[:3, :3])
-    # The little taken off keeps 0.3 / 0.1 from becoming four.
-    return max(1, math.ceil(max(distance, angle / _RADIANS_PER_METRE) / max_step - 1e-6))
+    return max(distance, angle / _RADIANS_PER_METRE)
 
 
 class _Follower:

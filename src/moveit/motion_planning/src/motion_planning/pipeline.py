@@ -244,9 +244,11 @@ class _Planning:
             q = next(iter(samples), None)
             if q is None:
                 why = getattr(samples, "reason", None)
-                unreached = unreached or PlanningFailure(
-                    Code.NO_IK_SOLUTION if why else Code.GOAL_CONSTRAINTS_VIOLATED, "no posture of group '%s' meets "
-                    "the goal: %s" % (self.query.group, why or "its constraints leave none"))
+                self._look_up()
+                by_joints = getattr(goal, "joints", ()) and not (goal.positions or goal.orientations)
+                code = Code.NO_IK_SOLUTION if why and not by_joints else Code.GOAL_CONSTRAINTS_VIOLATED
+                unreached = unreached or PlanningFailure(code, "no posture of group '%s' meets the goal: %s" % (
+                    self.query.group, why or "its constraints leave none"))
                 continue
             state = scene.state.with_q(q, self.indices)
             contacts = self.tools.exact.contacts(scene, state, self.query.group)
@@ -260,7 +262,11 @@ class _Planning:
                                             % (_SHARE_FOR_GOALS * self.query.allowed_time))
 
     def _samples(self, goal, scene, exact):
-        return self.tools.sampler(self.model, self.query.group, goal, scene, exact, self.tools.seed)
+        return self.tools.sampler(self.model, self.query.group, goal, scene, exact, self.tools.seed, stop=self._is_over)
+
+    def _is_over(self):
+        """Whether nothing more is to be tried: stopped, or the time is up."""
+        return self.tools.stop() or self._elapsed() > self.query.allowed_time
 
     def _is_met(self, state, scene):
         return any(not self._violated(goal, state, scene) for goal in self.query.goals)

@@ -61,7 +61,8 @@ class Octree:
             raise ValueError("an octree needs a positive resolution and finite boxes, got resolution %r"
                              % (self.resolution,))
         sides = boxes[:, 3]
-        levels = np.rint(np.log2(np.maximum(sides, 1e-9) / self.resolution))
+        with np.errstate(over="ignore"):
+            levels = np.rint(np.log2(np.maximum(sides, 1e-9) / self.resolution))
         wrong = (np.abs(self.resolution * 2.0 ** levels - sides) > 1e-3 * sides) | (levels < 0)
         wrong |= levels >= OCTREE_DEPTH
         if wrong.any():

@@ -59,7 +59,7 @@ class Samples:
             yield self.goal.q
 
 
-def sampler(model, group, goal, scene, exact, seed):
+def sampler(model, group, goal, scene, exact, seed, stop=None):
     return Samples(scene, goal, exact)
 
 

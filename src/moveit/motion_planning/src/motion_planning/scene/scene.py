@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,6 +16,8 @@ from motion_planning.scene.allowed import AllowedCollisions
 from motion_planning.scene.objects import OCTOMAP, AttachedBody, SceneError, WorldObject
 from urdf_model.transforms import inverse
 
+# So many known names are compared with an unknown one.
+_COMPARED = 300
 _MAPPINGS = ("objects", "colours", "transforms", "link_padding", "link_scale")
 
 
@@ -58,9 +61,7 @@ class Scene:
         """Return the scene with many WorldObjects added at once. Raises SceneError for one without shapes or name."""
         objects = dict(self.objects)
         for one in new:
-            _check_name(one.id)
-            if not one.shapes:
-                raise SceneError("object '%s' has no shapes; give it a primitive, a mesh or a plane" % one.id)
+            check_object(one)
             objects[one.id] = one
         return replace(self, objects=objects)
 
@@ -79,6 +80,10 @@ class Scene:
             return self._without(list(self.objects))
         self._object(name)
         return self._without([name])
+
+    def without_objects(self, names):
+        """Return the scene without many objects; names that there are none of do not count."""
+        return self._without(names)
 
     def moved(self, name, pose, shape_poses=None):
         """Return the scene with an object at ``pose`` (4, 4), and its shapes at ``shape_poses`` [(4, 4), ...] in it
@@ -195,14 +200,7 @@ class Scene:
         """Return the pose (4, 4) in the planning frame of a link, of something the robot holds, of an object, of
         "object/subframe", or of a fixed frame; in this order. Raises SceneError for an unknown name."""
         name = name.lstrip("/")
-        pose = self._pose_of(name)
-        if pose is None and "/" in name:
-            owner, _, subframe = name.rpartition("/")
-            holder = self.state.attached[owner].object if owner in self.state.attached else self.objects.get(owner)
-            if holder is not None and subframe in holder.subframes:
-                pose = self._pose_of(owner) @ holder.subframes[subframe]
-        if pose is None:
-            pose = self.transforms.get(name)
+        pose = self._known_pose(name)
         if pose is None:
             raise SceneError("'%s' is no frame: neither a link, nor an object of the scene or a subframe of one%s"
                              % (name, _like(name, self.frame_names())))
@@ -210,7 +208,7 @@ class Scene:
 
     def has_frame(self, name):
         """Whether :meth:`frame` knows ``name``."""
-        return name.lstrip("/") in self.frame_names()
+        return self._known_pose(name.lstrip("/")) is not None
 
     def frame_names(self):
         """A new list of all names that :meth:`frame` knows."""
@@ -219,6 +217,15 @@ class Scene:
                 *(name for things in (held, self.objects) for name in things),
                 *("%s/%s" % (name, subframe) for things in (held, self.objects) for name, one in things.items()
                   for subframe in one.subframes), *self.transforms]
+
+    def _known_pose(self, name):
+        pose = self._pose_of(name)
+        if pose is None and "/" in name:
+            owner, _, subframe = name.rpartition("/")
+            holder = self.state.attached[owner].object if owner in self.state.attached else self.objects.get(owner)
+            if holder is not None and subframe in holder.subframes:
+                pose = self._pose_of(owner) @ holder.subframes[subframe]
+        return self.transforms.get(name) if pose is None else pose
 
     def _pose_of(self, name):
         if name in self.model.link_index:
@@ -256,6 +263,13 @@ class Scene:
         return self.state.attached[name]
 
 
+def check_object(new):
+    """Raise SceneError for a WorldObject that a scene would not take."""
+    _check_name(new.id)
+    if not new.shapes:
+        raise SceneError("object '%s' has no shapes; give it a primitive, a mesh or a plane" % new.id)
+
+
 def _check_name(name):
     if name == OCTOMAP:
         raise SceneError("'%s' is the octomap's name; give the object another" % OCTOMAP)
@@ -264,6 +278,7 @@ def _check_name(name):
 
 
 def _like(name, known):
-    """The rest of a sentence: which of the ``known`` names is most like ``name``, if any."""
-    near = difflib.get_close_matches(name, list(known)[:2000], 1)
+    """The rest of a sentence: which of the ``known`` names is most like ``name``, if any; of the first ones, for a
+    message may hold thousands of wrong names."""
+    near = difflib.get_close_matches(name, list(itertools.islice(known, _COMPARED)), 1)
     return "; did you mean '%s'?" % near[0] if near else ""

@@ -22,10 +22,12 @@ WINDOW_S = 0.1
 
 ALGORITHMS = ("iterative_time_parameterization", "iterative_spline_parameterization",
               "time_optimal_trajectory_generation", "ruckig")
+# A longer motion [s] is refused: controllers would get more points than they can hold.
+LONGEST_S = 10000.0
 # Points nearer than this [rad or m, in every joint] are one.
 _SAME = 1e-9
 
-__all__ = ["ALGORITHMS", "TOLERANCE", "Timed", "TimingError", "time_path", "within_limits"]
+__all__ = ["ALGORITHMS", "LONGEST_S", "TOLERANCE", "Timed", "TimingError", "time_path", "within_limits"]
 
 
 class TimingError(PlanningError):
@@ -44,8 +46,8 @@ def time_path(path, velocity, acceleration, algorithm="time_optimal_trajectory_g
     - iterative_time_parameterization: through every point of the path, by cubic splines; equal points become one;
     - iterative_spline_parameterization: the same, with acceleration 0 at both ends (two points are added).
 
-    Raises TimingError for a path or limits that are not finite, of the wrong shape, or not above 0, and ValueError
-    for an unknown algorithm.
+    Raises TimingError for a path or limits that are not finite, of the wrong shape, or not above 0, for limits that
+    make it longer than ``LONGEST_S``, and ValueError for an unknown algorithm.
     """
     if algorithm == "time_optimal":
         algorithm = "time_optimal_trajectory_generation"
@@ -53,6 +55,7 @@ def time_path(path, velocity, acceleration, algorithm="time_optimal_trajectory_g
         raise ValueError("no time parameterization '%s'; there are %s" % (algorithm, ", ".join(ALGORITHMS)))
     path, velocity, acceleration = _checked(path, velocity, acceleration)
     path = path[np.concatenate([[True], np.abs(np.diff(path, axis=0)).max(axis=1) > _SAME])]
+    _check_duration(path, velocity, acceleration)
     if len(path) == 1:
         rest = np.zeros_like(path)
         return Timed(np.zeros(1), path, rest, rest)
@@ -81,6 +84,18 @@ def _checked(path, velocity, acceleration):
     if not np.isfinite(path).all():
         raise TimingError("point %d of the path is not finite" % np.argwhere(~np.isfinite(path))[0][0])
     return path, velocity, acceleration
+
+
+def _check_duration(path, velocity, acceleration):
+    """Raise TimingError where no motion could be short enough: at full speed, and from rest to rest on one line."""
+    way = np.abs(np.diff(path, axis=0)).sum(axis=0)
+    far = np.abs(path - path[0]).max(axis=0)
+    with np.errstate(over="ignore"):
+        least = max(float((way / velocity).max()), float(2.0 * np.sqrt(far / acceleration).max()))
+    if not least <= LONGEST_S:
+        raise TimingError("limits of %s rad/s and %s rad/s^2 make the motion last %.3g s, the most is %g; are the "
+                          "scaling factors meant?" % (np.array2string(velocity, precision=3),
+                                                      np.array2string(acceleration, precision=3), least, LONGEST_S))
 
 
 def _time_optimal(path, velocity, acceleration, tolerance, window):
