@@ -89,8 +89,8 @@ def answered(name, response_type):
             except PlanningError as error:
                 code = tell(self.context, name, error, _group_of(request))
             except Exception as error:  # the node outlives whatever a request does to it
-                rospy.logerr("%s: %s: %s", name, type(error).__name__, error)
-                code = MoveItErrorCodes.FAILURE
+                code = tell(self.context, name, RequestError(MoveItErrorCodes.FAILURE, "%s: %s" % (
+                    type(error).__name__, error)), _group_of(request))
             if hasattr(response, "error_code"):
                 response.error_code.val = response.error_code.val or code
             return response

@@ -69,7 +69,7 @@ class Executor:
             return Outcome(MoveItErrorCodes.SUCCESS)
         flaw = _flaw(trajectory)
         if flaw:
-            return Outcome(MoveItErrorCodes.INVALID_MOTION_PLAN, flaw)
+            return Outcome(MoveItErrorCodes.CONTROL_FAILED, flaw)
         if not self._busy.acquire(blocking=False):
             return Outcome(MoveItErrorCodes.CONTROL_FAILED,
                            "another trajectory is being executed; wait or stop it first")
@@ -206,7 +206,7 @@ def _flaw(trajectory):
             given = len(getattr(point, name))
             if given not in (0, count):
                 return "point %d of the trajectory has %d %s for %d joints" % (i, given, name, count)
-        numbers = (*point.positions, *point.velocities, *point.accelerations)
+        numbers = (*point.positions, *point.velocities, *point.accelerations, *point.effort)
         if not all(map(math.isfinite, numbers)):
             return "point %d of the trajectory holds a number that is not finite" % i
         now = point.time_from_start.to_sec()

@@ -7,6 +7,8 @@ from moveit_msgs.msg import ContactInformation
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from moveit_ros_move_group.texts import one_line
+
 _KINDS = {"robot": ContactInformation.ROBOT_LINK, "object": ContactInformation.WORLD_OBJECT,
           "attached": ContactInformation.ROBOT_ATTACHED}
 _RADIUS_M = 0.02
@@ -31,6 +33,7 @@ class Failures:
 
     def tell(self, request, code, text, group="", contacts=(), joints=None):
         """Log and publish one failure. contacts: exact.Contacts; joints: {joint: value}."""
+        text = one_line(text)
         rospy.logwarn("%s%s: %s", request, " of group '%s'" % group if group else "", text)
         message = Failure(request=request, group_name=group, error_code=int(code), text=text)
         message.header.stamp, message.header.frame_id = rospy.Time.now(), self._frame

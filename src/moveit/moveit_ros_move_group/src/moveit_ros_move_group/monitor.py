@@ -22,6 +22,8 @@ _FRAME_TIMEOUT_S = 0.5
 _IMPATIENT_S = 1.0
 # How often in a second the scene is published, where no parameter says so.
 _USUAL_HZ = 4.0
+# Errors of one message that are told one by one.
+_TOLD = 10
 _NAMES = {"joint_state_topic": "joint_states", "attached_collision_object_topic": "attached_collision_object",
           "planning_scene_topic": "planning_scene"}
 
@@ -87,15 +89,10 @@ class SceneMonitor:
     def apply(self, message, request):
         """Apply a PlanningScene; return the list of sentences on what could not be. ``request`` names who asked."""
         # Where attached things hang depends on where the robot is.
-        errors = self._change(lambda _: self.reader.with_planning_scene(self.scene(), message), request)
-        if message.world.octomap.octomap.id:
-            self._octomap = message.world.octomap
-        elif not message.is_diff:
-            self._octomap = None
-        return errors
+        return self._change(lambda _: self.reader.with_planning_scene(self.scene(), message), request,
+                            message.world.octomap)
 
     def clear_octomap(self):
-        self._octomap = None
         self._change(lambda scene: (scene.with_octomap(None), []), "clear_octomap")
 
     def change(self, function, request):
@@ -108,20 +105,30 @@ class SceneMonitor:
         """``listener()`` is called after each change of the scene that is not the robot's motion."""
         self._listeners.append(listener)
 
-    def _change(self, function, request):
+    def _change(self, function, request, octomap=None):
+        """Put the scene of ``function(scene)`` = (scene, errors) in the scene's place; return the errors.
+
+        octomap: the OctomapWithPose that a new octomap comes from.
+        """
         with self._changing:
             try:
                 scene, errors = function(self._scene)
-                self._replace(scene)
+                self._replace(scene, octomap)
             except PlanningError as error:
                 errors = [str(error)]
-        for error in errors:
+            except Exception as error:  # the node outlives whatever a message holds
+                errors = ["%s: %s" % (type(error).__name__, error)]
+        for error in errors[:_TOLD]:
             self._say_failure(request, error)
+        if len(errors) > _TOLD:
+            self._say_failure(request, "%d more of this message could not be applied" % (len(errors) - _TOLD))
         self._tell()
         return errors
 
-    def _replace(self, scene):
+    def _replace(self, scene, octomap=None):
         with self._lock:
+            if scene.octomap is not self._scene.octomap:
+                self._octomap = None if scene.octomap is None else octomap
             self._scene = scene
 
     def _tell(self):
@@ -139,8 +146,7 @@ class SceneMonitor:
                      "attached_collision_object")
 
     def _on_world(self, message):
-        self._octomap = message.octomap if message.octomap.octomap.id else None
-        self._change(lambda scene: self.reader.with_world(scene, message), "planning_scene_world")
+        self._change(lambda scene: self.reader.with_world(scene, message), "planning_scene_world", message.octomap)
 
     # -- the robot ----------------------------------------------------------------------------------------------
 
@@ -167,11 +173,13 @@ class SceneMonitor:
     def wait_for_state(self, after, timeout_s, joints=(), given_up=lambda: False):
         """Wait in wall time until each of ``joints`` has a value no older than ``after`` (rospy.Time).
 
-        Returns None, or the sentence why that did not come to be.
+        Returns None, as where it is given up, or the sentence why that did not come to be.
         """
         deadline = time.monotonic() + timeout_s
         with self._news:
-            while not rospy.is_shutdown() and not given_up():
+            while True:
+                if rospy.is_shutdown() or given_up():
+                    return None
                 with self._lock:
                     late = [name for name in joints if self._stamps.get(name, rospy.Time()) < after
                             or name not in self._values]

@@ -4,6 +4,14 @@ from moveit_msgs.msg import MoveItErrorCodes
 
 # Field and class share names; only the constants are of interest.
 _NAMES = {value: name for name, value in vars(MoveItErrorCodes).items() if isinstance(value, int) and name.isupper()}
+# A sentence that names what a request holds could be as long as the request.
+_LONGEST = 1000
+
+
+def one_line(text):
+    """Return ``text`` in one line, its end left out where it is too long for one."""
+    text = " ".join(text.split())
+    return text if len(text) <= _LONGEST else "%s ... (%d characters in all)" % (text[:_LONGEST], len(text))
 
 
 def result_text(code, reason="", *, empty=False, plan_only=False):
@@ -24,6 +32,7 @@ def result_text(code, reason="", *, empty=False, plan_only=False):
         codes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
             "Solution found but the environment changed during execution and the path was aborted",
     }.get(code)
+    reason = one_line(reason)
     text = fixed or _NAMES.get(code, "error code %d" % code)
     if not reason:
         return text

@@ -196,7 +196,7 @@ def test_one_that_never_ends_is_stopped():
     ({"accelerations": [1.0, float("nan")]}, "not finite"), ({"time_from_start": rospy.Duration(0)}, "have to grow")])
 def test_flaws_of_trajectories_are_named(change, sentence):
     outcome = Lab().executor.execute(trajectory(1.0, **change))
-    assert outcome.code == MoveItErrorCodes.INVALID_MOTION_PLAN and sentence in outcome.text
+    assert outcome.code == MoveItErrorCodes.CONTROL_FAILED and sentence in outcome.text
 
 
 # -- handles ----------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import GetCartesianPath, GetCartesianPathResponse
 
 from motion_planning.cartesian import CartesianError, Steps, cartesian_path
-from motion_planning.timing import time_path
+from motion_planning.timing import LONGEST_S, time_path
 from moveit_ros_move_group.context import RequestError, answered
 from moveit_ros_move_group.convert.constraints import constraint_set_of
 from moveit_ros_move_group.convert.geometry import matrix_of
@@ -83,9 +83,15 @@ class CartesianPath:
 
 
 def slowed(model, state, group, link, timed, speed):
-    """Return ``timed``, stretched so that the origin of ``link`` is nowhere faster than ``speed`` [m/s]."""
+    """Return ``timed``, stretched so that the origin of ``link`` is nowhere faster than ``speed`` [m/s].
+
+    Raises RequestError where that would take longer than a motion may.
+    """
     times = np.linspace(0.0, timed.duration, max(2, 4 * len(timed.times)))
     points = np.array([model.frame_of(state.with_q(q, group.indices).q, link, state.base)[:3, 3]
                        for q in timed.sampled(times)[0]])
     fastest = float((np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(times)).max())
+    if timed.duration * fastest > speed * LONGEST_S:
+        raise RequestError(MoveItErrorCodes.FAILURE, "at %.3g m/s the path would take more than %g s; is "
+                           "max_cartesian_speed meant?" % (speed, LONGEST_S))
     return timed.stretched(fastest / speed) if fastest > speed else timed

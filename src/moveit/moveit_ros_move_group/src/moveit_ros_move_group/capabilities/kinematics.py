@@ -14,6 +14,8 @@ from urdf_model.transforms import inverse
 
 # [s], for a request without a time-out.
 _TIMEOUT_S = 0.05
+# [s], however long a request would wait for another solution where all are refused: a service cannot be cancelled.
+_LONGEST_S = 5.0
 
 
 class Kinematics:
@@ -31,6 +33,7 @@ class Kinematics:
         scene = context.scene_from(request.robot_state, "compute_ik")
         poses = self._poses(request, group, scene)
         timeout = request.timeout.to_sec() or self._timeouts.get(group.name, _TIMEOUT_S)
+        timeout = min(timeout, _LONGEST_S)
         constraints = constraint_set_of(request.constraints, scene, context.monitor.reader)
         touching = []
 

@@ -92,6 +92,8 @@ class MoveAction:
         joints = self.context.model.groups[group].joints
         late = self.context.monitor.wait_for_state(rospy.Time.now(), _STATE_TIMEOUT_S, joints,
                                                    self._server.is_preempt_requested)
+        if self._server.is_preempt_requested():
+            raise RequestError(MoveItErrorCodes.PREEMPTED, "stopped on request before anything was planned")
         if late:
             rospy.logwarn("move_group: %s", late)
 
@@ -120,7 +122,7 @@ class MoveAction:
             raise RequestError(MoveItErrorCodes.INVALID_ROBOT_STATE, "the complete state of the robot is not yet "
                                "known: no joint state has come for %s on %s"
                                % (", ".join(silent), context.monitor.joint_state_topic))
-        attempts = 1 + ((options.replan_attempts or self._replan_attempts) if options.replan else 0)
+        attempts = 1 + (max(0, options.replan_attempts or self._replan_attempts) if options.replan else 0)
         for attempt in range(attempts):
             self._changed.clear()
             scene = context.monitor.scene()
@@ -180,6 +182,9 @@ class ExecuteAction:
         try:
             if self.context.executor is None:
                 raise RequestError(MoveItErrorCodes.CONTROL_FAILED, "~allow_trajectory_execution is false")
+            if not (goal.trajectory.joint_trajectory.points or goal.trajectory.multi_dof_joint_trajectory.points):
+                raise RequestError(MoveItErrorCodes.CONTROL_FAILED, "the trajectory to execute has no points; was it "
+                                   "planned with success?")
             self._server.publish_feedback(ExecuteTrajectoryFeedback("MONITOR"))
             outcome = self.context.executor.execute(goal.trajectory, self._server.is_preempt_requested)
             result.error_code.val, reason = outcome.code, outcome.text
@@ -243,7 +248,6 @@ def failed(context, request, error, group=""):
     if isinstance(error, PlanningError):
         return tell(context, request, error, group), str(error)
     text = "%s: %s" % (type(error).__name__, error)
-    rospy.logerr("%s: %s", request, text)
     context.failures.tell(request, MoveItErrorCodes.FAILURE, text, group)
     return MoveItErrorCodes.FAILURE, text
 

@@ -12,12 +12,19 @@ from motion_planning.constraints import (
 )
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of, mesh_shape_of, shape_of
 
+# A cone of sight is drawn with so many corners at most.
+_MOST_SIDES = 100
+
 
 def constraint_set_of(message, scene, reader):
     """Return the ConstraintSet of a Constraints message, None for one without any constraint.
 
-    Frames are looked up in ``scene`` as it is now, by ``reader`` (SceneReader). Raises PlanningError.
+    Frames are looked up in ``scene`` as it is now, by ``reader`` (SceneReader). Raises PlanningError, for names of
+    joints and links that nothing has too.
     """
+    for one in (*message.position_constraints, *message.orientation_constraints):
+        if not (one.link_name in scene.model.link_index or scene.has_frame(one.link_name)):
+            raise MessageError("a constraint is on link '%s', which the robot has not, nor holds" % one.link_name)
     found = ConstraintSet(
         message.name, [_joint(one, scene.model) for one in message.joint_constraints],
         [_position(one, scene, reader) for one in message.position_constraints],
@@ -34,6 +41,9 @@ def _weight(message):
 def _joint(message, model):
     """Of a joint that mimics another: what it means for that one. MoveIt's clients name both."""
     joint, multiplier, offset = model.mimics.get(message.joint_name, (message.joint_name, 1.0, 0.0))
+    if joint not in model.index:
+        raise MessageError("a constraint names joint '%s', which the robot has not or which cannot be moved"
+                           % message.joint_name)
     if multiplier == 0.0:
         raise MessageError("joint '%s' always stands at %g, whatever a constraint says" % (message.joint_name, offset))
     above, below = message.tolerance_above, message.tolerance_below
@@ -72,6 +82,7 @@ def _visibility(message, scene, reader):
     seen = reader.frame(scene, target.header.frame_id) @ matrix_of(target.pose, "the visibility's target")
     # The sensor moves with the robot: its frame is looked up in each state.
     return VisibilityTarget(message.target_radius, seen, matrix_of(sensor.pose, "the visibility's sensor"),
-                            sensor_frame=sensor.header.frame_id.lstrip("/"), cone_sides=max(3, message.cone_sides),
+                            sensor_frame=sensor.header.frame_id.lstrip("/"),
+                            cone_sides=min(max(3, message.cone_sides), _MOST_SIDES),
                             view_axis=message.sensor_view_direction, max_view_angle=message.max_view_angle,
                             max_range_angle=message.max_range_angle, weight=_weight(message))

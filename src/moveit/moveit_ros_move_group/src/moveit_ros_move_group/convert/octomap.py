@@ -32,7 +32,10 @@ def octree_of(message):
         boxes = (_binary if message.binary else _full)(data, message.resolution)
     except (IndexError, struct.error):
         raise MessageError("the octomap's data end too early, after %d bytes" % len(data)) from None
-    return Octree(message.resolution, np.array(boxes)) if boxes else None
+    try:
+        return Octree(message.resolution, np.array(boxes)) if boxes else None
+    except ValueError as error:
+        raise MessageError(str(error)) from None
 
 
 def _children(centre, size):

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What messages do to a scene, with MoveIt's meaning of each."""
+import itertools
 import math
+from functools import partial
 
 import numpy as np
 from moveit_msgs.msg import CollisionObject
 
 from motion_planning.errors import PlanningError
-from motion_planning.scene import AllowedCollisions, Scene, SceneError, WorldObject
+from motion_planning.scene import AllowedCollisions, Scene, SceneError, WorldObject, check_object
 from moveit_ros_move_group.convert.geometry import (
     MessageError,
     matrix_of,
@@ -19,6 +21,10 @@ from urdf_model.transforms import inverse
 
 _OPERATIONS = {CollisionObject.ADD: "ADD", CollisionObject.REMOVE: "REMOVE", CollisionObject.APPEND: "APPEND",
                CollisionObject.MOVE: "MOVE"}
+
+
+# So many parts of one message may be refused before the rest of it is left out.
+_MOST_ERRORS = 1000
 
 
 class SceneReader:
@@ -134,7 +140,7 @@ class SceneReader:
         taken = {name for name in scene.state.attached if name not in held_before and name not in scene.objects}
         objects = [one for one in message.collision_objects
                    if not (one.id in taken and one.operation == CollisionObject.REMOVE)]
-        scene = self._each(scene, objects, self.with_collision_object, errors)
+        scene = self._with_objects(scene, objects, errors)
         if message.octomap.octomap.id:
             try:
                 octree = octree_of(message.octomap.octomap)
@@ -143,6 +149,39 @@ class SceneReader:
             except PlanningError as error:
                 errors.append("octomap: %s" % error)
         return scene
+
+    def _with_objects(self, scene, messages, errors):
+        """The scene after CollisionObjects. A message may bring or remove 100,000 of them: they are put in or taken out
+        together."""
+        own_frames = {"", scene.model.frame, *scene.model.links}
+
+        def kind(message):
+            adds = message.operation == CollisionObject.ADD and message.header.frame_id.lstrip("/") in own_frames
+            return "add" if adds else "remove" if message.operation == CollisionObject.REMOVE and message.id else ""
+
+        for what, some in itertools.groupby(messages, kind):
+            if what == "add":
+                scene = scene.with_objects(self._made(some, partial(self._added, scene), errors))
+            elif what == "remove":
+                scene = scene.without_objects(self._made(some, partial(self._gone, scene), errors))
+            else:
+                scene = self._each(scene, some, self.with_collision_object, errors)
+        return scene
+
+    def _gone(self, scene, message):
+        """The name of the object that a CollisionObject removes. Raises PlanningError where it is not there."""
+        if message.id not in scene.objects:
+            self.with_collision_object(scene, message)
+        return message.id
+
+    def _added(self, scene, message):
+        """The WorldObject that a CollisionObject adds. Raises PlanningError; the sentence names the object."""
+        try:
+            new = _object_of(message, self.frame(scene, message.header.frame_id))
+            check_object(new)
+            return new
+        except PlanningError as error:
+            raise type(error)(_about("collision object", "ADD", message.id, error)) from None
 
     def _with_transforms(self, scene, transforms, errors):
         known = {}
@@ -155,12 +194,25 @@ class SceneReader:
         return scene.with_transforms(known)
 
     def _each(self, scene, messages, apply, errors):
+        def step(message):
+            nonlocal scene
+            scene = apply(scene, message)
+
+        self._made(messages, step, errors)
+        return scene
+
+    def _made(self, messages, make, errors):
+        """[make(message), ...] of those that can be done; why others cannot is told to ``errors``."""
+        made = []
         for message in messages:
+            if len(errors) >= _MOST_ERRORS:
+                errors.append("after %d errors the rest of the message is left out" % _MOST_ERRORS)
+                break
             try:
-                scene = apply(scene, message)
+                made.append(make(message))
             except PlanningError as error:
                 errors.append(str(error))
-        return scene
+        return made
 
 
 def state_over(scene, message, reader):
