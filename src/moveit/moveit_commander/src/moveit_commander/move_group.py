@@ -222,9 +222,10 @@ class MoveGroupCommander(Tunable):
             link = next((option for option in options if isinstance(option, str)), "")
             self._set_joints_at(arg1, link, any(option is True for option in options))
         elif isinstance(arg1, str):
-            if arg2 is None or arg3 is not None:
+            if arg2 is None or arg3 is not None or np.size(arg2) != 1:
                 raise MoveItCommanderException("expected one value for joint '%s'" % arg1)
-            self._joint_target.set_by_name({arg1: arg2}, self._settings.joint_tolerance)
+            value, = [arg2] if np.ndim(arg2) == 0 else arg2
+            self._joint_target.set_by_name({arg1: value}, self._settings.joint_tolerance)
         elif arg2 is not None or arg3 is not None:
             raise MoveItCommanderException("expected joint values alone, got more: %r, %r" % (arg2, arg3))
         else:
@@ -376,6 +377,8 @@ class MoveGroupCommander(Tunable):
 
     def limit_max_cartesian_link_speed(self, speed, link_name=""):
         """Limit the speed of a link [m/s], the end effector's unless one is named."""
+        if not speed > 0.0:
+            raise MoveItCommanderException("expected a speed above 0, got %s" % speed)
         self._settings.cartesian_speed = float(speed)
         self._settings.cartesian_speed_link = self._link(link_name, "limit the speed of")
 
@@ -460,9 +463,12 @@ class MoveGroupCommander(Tunable):
             return RobotTrajectory(), -1.0
         return answer.solution, answer.fraction
 
-    def execute(self, plan_msg, wait=True):
-        """Execute a RobotTrajectory, JointTrajectory or plan; tell whether that succeeded, or was sent."""
-        goal = ExecuteTrajectoryGoal(trajectory_of(plan_msg))
+    def execute(self, trajectory=None, wait=True, plan_msg=None):
+        """Execute a RobotTrajectory, JointTrajectory or plan; tell whether that succeeded, or was sent.
+
+        plan_msg: melodic's name of ``trajectory``.
+        """
+        goal = ExecuteTrajectoryGoal(trajectory_of(plan_msg if trajectory is None else trajectory))
         if not wait:
             self._connection.start("execute_trajectory", goal)
             return True

@@ -127,10 +127,10 @@ class RobotCommander:
         return list(self._model.links if group is None else self._group(group).links)
 
     def get_default_owner_group(self, joint_name):
-        """Return the name of the smallest group that has a joint, None where none has it."""
+        """Return the name of the group with the fewest links that has a joint, None where none has it."""
         self.get_joint(joint_name)
-        owners = [group for group in self._model.groups.values() if joint_name in group.joints]
-        return min(owners, key=len).name if owners else None
+        owners = [group for group in self._model.groups.values() if joint_name in group.all_joints]
+        return min(owners, key=lambda group: len(group.links)).name if owners else None
 
     def _group(self, name):
         if name not in self._model.groups:

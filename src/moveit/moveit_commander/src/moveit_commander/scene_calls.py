@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The planning scene of a running move_group: asked for, and changed. ``connection``: a connection.Connection."""
+import rospy
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene, PlanningSceneComponents
 
 
@@ -9,9 +10,11 @@ def scene(connection, components):
 
 
 def robot_state(connection):
-    """Return the RobotState now, with what the robot holds."""
-    return scene(connection, PlanningSceneComponents.ROBOT_STATE
-                 | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS).robot_state
+    """Return the RobotState now, with what the robot holds. It has no stamp, as MoveIt's: programs compare states."""
+    state = scene(connection, PlanningSceneComponents.ROBOT_STATE
+                  | PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS).robot_state
+    state.joint_state.header.stamp = state.multi_dof_joint_state.header.stamp = rospy.Time()
+    return state
 
 
 def difference():

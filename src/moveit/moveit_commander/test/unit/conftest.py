@@ -84,6 +84,8 @@ class FakeConnection:
     def scene(self):
         scene = PlanningScene()
         scene.robot_state = message_of(self._model, self._model.state(self.joints, self.base))
+        for part in (scene.robot_state.joint_state, scene.robot_state.multi_dof_joint_state):
+            part.header.stamp = rospy.Time(6)
         scene.robot_state.attached_collision_objects = self.held
         scene.world.collision_objects = self.objects
         return scene

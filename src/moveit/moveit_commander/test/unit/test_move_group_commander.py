@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import genpy
 import numpy as np
 import pytest
+import rospy
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
 from moveit_msgs.msg import (
     AttachedCollisionObject,
@@ -106,7 +107,9 @@ def test_current_values_and_pose(arm, connection):
     assert conversions.pose_to_list(pose.pose)[:3] == pytest.approx([0.0, 0.4, 0.2], abs=1e-9)
     assert conversions.pose_to_list(arm.get_current_pose("upper").pose)[:3] == pytest.approx([0.0, 0.0, 0.5])
     assert arm.get_current_rpy("upper") == pytest.approx([0.0, 0.0, math.pi / 2])
-    assert arm.get_current_state().joint_state.name == ["shoulder", "elbow", "grip", "oppose"]
+    state = arm.get_current_state()
+    assert state.joint_state.name == ["shoulder", "elbow", "grip", "oppose"]
+    assert state.joint_state.header.stamp == state.multi_dof_joint_state.header.stamp == rospy.Time()
 
 
 def test_a_base_that_moved_moves_the_pose(arm, connection):
@@ -147,14 +150,16 @@ def test_joint_targets_in_every_form(arm, target):
 
 
 def test_one_joint_at_a_time_begins_at_the_default_state(arm):
-    arm.set_joint_value_target("shoulder", 0.4)
-    assert arm.get_joint_value_target() == pytest.approx([0.4, 1.4])
+    for value in (0.4, [0.4], np.float64(0.4)):
+        arm.set_joint_value_target("shoulder", value)
+        assert arm.get_joint_value_target() == pytest.approx([0.4, 1.4])
 
 
 @pytest.mark.parametrize(("arguments", "text"), [
     (([0.1],), "has 2 joints"), (([0.1, 5.0],), "elbow = 5, limits are 0.2 to 2.6"),
     (({"toe": 0.1},), "no joint 'toe'"),
     (({"grip": 0.01},), "no joint 'grip'"), (("shoulder",), "expected one value"), (("shoulder", 9.0), "within bounds"),
+    (("shoulder", [0.1, 0.2]), "expected one value"),
     (([0.1, 0.5], 1.0), "joint values alone"), (([0.1, math.nan],), "nan"),
     ((JointState(name=["toe"], position=[0.0]),), "no joint 'toe'"),
     ((JointState(name=["elbow"], position=[]),), "1 names and 0 positions"), ((Pose(), 3.0), "link's name")])
@@ -333,6 +338,9 @@ def test_scaling_is_above_zero_and_at_most_one(arm, value):
 def test_other_bad_settings(arm):
     with pytest.raises(MoveItCommanderException, match="0, 4 or 6 values"):
         arm.set_workspace([1, 2, 3])
+    for speed in (0.0, -1.0, math.nan):
+        with pytest.raises(MoveItCommanderException, match="a speed above 0"):
+            arm.limit_max_cartesian_link_speed(speed)
     with pytest.raises(MoveItCommanderException, match="no stored constraints named 'upright'"):
         arm.set_path_constraints("upright")
     assert arm.get_known_constraints() == []
@@ -439,6 +447,7 @@ def test_execute_takes_every_form_of_a_trajectory(arm, planned, success, form):
     assert action == "execute_trajectory"
     assert isinstance(goal.trajectory, RobotTrajectory) and len(goal.trajectory.joint_trajectory.points) == 2
     assert arm.execute(form(arm.plan()), wait=False) is True and planned.started[-1][0] == "execute_trajectory"
+    assert arm.execute(trajectory=form(arm.plan())) is True and arm.execute(plan_msg=form(arm.plan())) is True
 
 
 def test_execute_refuses_what_is_no_trajectory(arm):

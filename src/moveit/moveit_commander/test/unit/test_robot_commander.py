@@ -29,7 +29,8 @@ def test_names(robot):
     assert robot.get_link_names() == ["base", "upper", "lower", "tool", "finger", "thumb"]
     assert robot.get_link_names("hand") == ["finger", "thumb"]
     assert robot.get_default_owner_group("elbow") == "arm"
-    assert robot.get_default_owner_group("flange") is None
+    assert robot.get_default_owner_group("flange") == "arm" and robot.get_default_owner_group("oppose") == "hand"
+    assert robot.get_default_owner_group("stand") is None
 
 
 def test_parts_by_attribute(robot):
@@ -62,8 +63,10 @@ def test_joints(robot, connection, success):
     assert joint.move(1.5) is True
     constraints = connection.sent[-1][1].request.goal_constraints[0].joint_constraints
     assert [(one.joint_name, one.position) for one in constraints] == [("shoulder", 0.0), ("elbow", 1.5)]
-    with pytest.raises(MoveItCommanderException, match="no group has joint 'flange'"):
+    with pytest.raises(MoveItCommanderException, match="no joint 'flange'"):
         fixed.move(0.1)
+    with pytest.raises(MoveItCommanderException, match="no group has joint 'stand'"):
+        base.move(0.0)
 
 
 def test_state(robot, connection):
