@@ -11,7 +11,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from baxter_core_msgs.msg import AssemblyState, JointCommand
 from rosgraph_msgs.msg import Log
-from traj_rostest_kit import DEADLINE_S, Client, FakeRobotTest, wait_until
+from traj_rostest_kit import DEADLINE_S, SERVER, Client, FakeRobotTest, wait_until
 
 from baxter_traj_streamer.settings import arm_joint_names
 
