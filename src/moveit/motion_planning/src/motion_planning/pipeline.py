@@ -9,19 +9,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from motion_planning.constraints.manifold import Manifold
 from motion_planning.errors import PlanningError
-from motion_planning.planners import NoPath, Search
+from motion_planning.planners import NoPath, Search, first_touching
 from motion_planning.scene import Scene
 from motion_planning.timing import Timed, time_path
 
 # How far [rad or m] corners may be cut, tried in this order: a curve that meets something is drawn tighter.
 _CORNERS = (0.05, 0.01, 0.001)
-# States of the timed trajectory are checked so far apart at most [rad or m, in any joint].
-_RESOLUTION = 0.03
+# States of the timed trajectory are checked so far apart at most [rad or m, in any joint]: by exact geometry; where
+# path constraints hold; and those in between, which exact geometry sees only where spheres are not free.
+_RESOLUTION, _CONSTRAINED, _BETWEEN = 0.03, 0.01, 0.003
 # Postures of goals that a planner gets, and how long [s] more than one are looked for.
 _GOALS, _MORE_GOALS_S = 8, 0.02
 # Share of the allowed time for goal postures, and random states around a start that touches something.
 _SHARE_FOR_GOALS, _JIGGLES = 0.5, 100
+# Paths that are timed before the request is given up, where one is not valid as it would be played.
+_MOST_PATHS = 4
 # Contacts that a sentence names.
 _NAMED = 3
 
@@ -150,7 +154,15 @@ class _Planning:
                     raise
                 break
         paths.sort(key=lambda path: float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()))
-        return self._timed(scene, lead, paths[0])
+        for attempt in itertools.count(len(paths)):
+            try:
+                return self._timed(scene, lead, paths.pop(0))
+            except PlanningFailure as failure:
+                if failure.code != Code.INVALID_MOTION_PLAN or not paths and attempt >= _MOST_PATHS:
+                    raise
+                if not paths:
+                    self._look_up()
+                    paths.append(self._path(scene, start, goals, attempt))
 
     # -- start --------------------------------------------------------------------------------------------------
 
@@ -205,10 +217,12 @@ class _Planning:
         found, failures = [], []
         for goal in self.query.goals:
             try:
-                samples = self._samples(goal, scene, self.tools.exact)
-                found += self._some(samples, scene, len(self.query.goals))
-            except PlanningFailure:
-                raise
+                samples = self._samples(goal, scene, self.tools.exact, _SHARE_FOR_GOALS)
+                found += self._some(samples, goal, scene, len(self.query.goals))
+            except PlanningFailure as failure:
+                if failure.code == Code.PREEMPTED:
+                    raise
+                failures.append(failure)
             except PlanningError as error:
                 failures.append(PlanningFailure(Code.INVALID_GOAL_CONSTRAINTS, str(error)))
         if found:
@@ -217,16 +231,17 @@ class _Planning:
             raise failures[0]
         raise self._why_no_goal(scene)
 
-    def _some(self, samples, scene, sets):
+    def _some(self, samples, goal, scene, sets):
         found, begin = [], self._elapsed()
         refused = ""
         for q in samples:
             self._look_up()
             violated = self._violated(self.query.path_constraints, scene.state.with_q(q, self.indices), scene)
-            if violated:
+            q = self._brought_back(q, goal, scene) if violated else np.array(q)
+            if q is None:
                 refused = violated
             else:
-                found.append(np.array(q))
+                found.append(q)
             late = self._elapsed() - begin
             if len(found) >= max(1, _GOALS // sets) or found and late > _MORE_GOALS_S or \
                     late > _SHARE_FOR_GOALS * self.query.allowed_time / sets:
@@ -236,12 +251,25 @@ class _Planning:
                                   "no posture of the goal keeps the path constraints: %s" % refused)
         return found
 
+    def _brought_back(self, q, goal, scene):
+        """A free posture (k,) near ``q`` that meets a goal and the path constraints, None where none is found."""
+        path = self.query.path_constraints
+        near = Manifold(scene, self.group, goal.merged(path), q).project(q)
+        if near is None:
+            return None
+        state = scene.state.with_q(near, self.indices)
+        if self._violated(goal, state, scene) or self._violated(path, state, scene):
+            return None
+        return near if self.tools.exact.free(scene, state, self.query.group) else None
+
     def _why_no_goal(self, scene):
         """The PlanningFailure of the goal that got furthest."""
         unreached = None
         for goal in self.query.goals:
-            samples = self._samples(goal, scene, None)
+            samples = self._samples(goal, scene, None, 1.0)
             q = next(iter(samples), None)
+            if q is None and self._is_over():
+                break
             if q is None:
                 why = getattr(samples, "reason", None)
                 self._look_up()
@@ -261,12 +289,9 @@ class _Planning:
         return unreached or PlanningFailure(Code.TIMED_OUT, "no posture of the goal was found within %.2f s"
                                             % (_SHARE_FOR_GOALS * self.query.allowed_time))
 
-    def _samples(self, goal, scene, exact):
-        return self.tools.sampler(self.model, self.query.group, goal, scene, exact, self.tools.seed, stop=self._is_over)
-
-    def _is_over(self):
-        """Whether nothing more is to be tried: stopped, or the time is up."""
-        return self.tools.stop() or self._elapsed() > self.query.allowed_time
+    def _samples(self, goal, scene, exact, share):
+        return self.tools.sampler(self.model, self.query.group, goal, scene, exact, self.tools.seed,
+                                  stop=lambda: self._is_over(share))
 
     def _is_met(self, state, scene):
         return any(not self._violated(goal, state, scene) for goal in self.query.goals)
@@ -275,15 +300,16 @@ class _Planning:
         """The sentence on the first constraint that ``state`` does not meet, or an empty one."""
         if constraints is None:
             return ""
-        return next((sentence for satisfied, _, sentence in constraints.evaluate(self.model, state, scene)
-                     if not satisfied), "")
+        evaluated = constraints.evaluate(self.model, state, scene, self.tools.exact)
+        return next((sentence for satisfied, _, sentence in evaluated if not satisfied), "")
 
     # -- path ---------------------------------------------------------------------------------------------------
 
     def _path(self, scene, start, goals, attempt):
         left = self.query.allowed_time - self._elapsed()
         search = Search(exact=self.tools.exact, seed=self.tools.seed + attempt, allowed_time=max(left, 0.01),
-                        clock=self.tools.clock, planner_id=self.query.planner_id, stop=self.tools.stop)
+                        clock=self.tools.clock, planner_id=self.query.planner_id, stop=self.tools.stop,
+                        constraints=self.query.path_constraints)
         try:
             path = self.tools.plan_path(scene, self.query.group, start, goals, search)
         except NoPath as error:
@@ -298,9 +324,14 @@ class _Planning:
         whole = np.concatenate([lead, path])
         hit = None
         through = self.query.timing.startswith("iterative")  # its splines keep to the lines by the points being near
-        for tolerance in _CORNERS:
-            points = _dense(whole, 2.0 * tolerance) if through else whole
-            timed = time_path(points, velocity, acceleration, self.query.timing, tolerance=tolerance)
+        ways = [(self.query.timing, tolerance) for tolerance in _CORNERS]
+        if self.query.path_constraints is not None and not through:
+            # Constraints that leave next to nothing: through every point of a path that is dense.
+            ways.append(("iterative_time_parameterization", _CORNERS[-1]))
+        for timing, tolerance in ways:
+            self._look_up()
+            points = _dense(whole, 2.0 * tolerance) if timing.startswith("iterative") else whole
+            timed = time_path(points, velocity, acceleration, timing, tolerance=tolerance)
             hit = self._first_hit(scene, timed, len(lead) > 0)
             if hit is None:
                 return Plan(self.query.scene.state, whole, timed, self._elapsed())
@@ -309,7 +340,8 @@ class _Planning:
 
     def _first_hit(self, scene, timed, from_collision):
         """None, or (sentence, contacts) of the first state of a trajectory that may not be."""
-        states, _, _ = timed.sampled(timed.spaced(_RESOLUTION))
+        step = _RESOLUTION if self.query.path_constraints is None else _CONSTRAINED
+        states, _, _ = timed.sampled(timed.spaced(step))
         low, high = self.model.bounds[self.indices].T
         turns = self.model.continuous[self.indices]
         # Who starts a little beyond a limit is led back.
@@ -320,6 +352,9 @@ class _Planning:
             at, joint = beyond[0]
             return "joint '%s' reaches %.4f, its limits are %.4f and %.4f" % (
                 self.names[joint], states[at, joint], low[joint], high[joint]), []
+        return self._in_the_way(scene, states, from_collision) or self._in_between(scene, timed, from_collision)
+
+    def _in_the_way(self, scene, states, from_collision):
         left = not from_collision
         for q in states:
             self._look_up()
@@ -335,10 +370,26 @@ class _Planning:
                     return violated, []
         return None
 
+    def _in_between(self, scene, timed, from_collision):
+        states, _, _ = timed.sampled(timed.spaced(_BETWEEN))
+        for begin in range(0, len(states), 512):
+            self._look_up()
+            some = states[begin:begin + 512]
+            first = first_touching(self.tools.exact, scene, self.group, some)
+            if first is not None and not from_collision:
+                contacts = self.tools.exact.contacts(scene, scene.state.with_q(some[first], self.indices),
+                                                     self.query.group)
+                return _named(contacts), contacts
+        return None
+
     # -- time ---------------------------------------------------------------------------------------------------
 
     def _elapsed(self):
         return self.tools.clock() - self.begin
+
+    def _is_over(self, share=1.0):
+        """Whether nothing more is to be tried: stopped, or this share of the time is over."""
+        return self.tools.stop() or self._elapsed() > share * self.query.allowed_time
 
     def _look_up(self):
         if self.tools.stop():

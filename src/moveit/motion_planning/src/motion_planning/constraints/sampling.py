@@ -212,10 +212,9 @@ class Sampler:
         orientation = next((one for one in self._constraints.orientations if one.link == link), None)
         pose = np.array(self._model.frame_of(start, link, self._scene.state.base))
         if orientation is not None:
-            pose[:3, :3] = orientation.rotation
-            if not first:
-                pose[:3, :3] = orientation.rotation @ regions.turn_within(
-                    orientation.tolerances, orientation.rotation_vector, generator)
+            turn = np.eye(3) if first else regions.turn_within(orientation.tolerances, orientation.rotation_vector,
+                                                               generator)
+            pose[:3, :3] = orientation.rotation @ turn @ orientation.axes.T
         if position is None:
             return pose
         shape, place = position.regions[0 if first else int(generator.integers(len(position.regions)))]

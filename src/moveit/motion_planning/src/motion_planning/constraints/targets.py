@@ -120,6 +120,8 @@ class OrientationTarget:
     frame: str = ""
     rotation_vector: bool = False
     weight: float = 1.0
+    # The axes that are meant, in the link (3, 3): others than its own where it holds what the constraint is on.
+    axes: np.ndarray = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self):
         try:
@@ -137,7 +139,7 @@ class OrientationTarget:
 
     def evaluate(self, context):
         wanted = context.frame(self.frame)[:3, :3] @ self.rotation
-        turn = wanted.T @ context.link_pose(self.link)[:3, :3]
+        turn = wanted.T @ context.link_pose(self.link)[:3, :3] @ self.axes
         angles = self.angles(turn)
         kept = all(abs(angle) <= allowed + _ROUNDING for angle, allowed in zip(angles, self.tolerances, strict=True))
         return Evaluation(kept, self.weight * float(np.abs(angles).sum()), "" if kept else
@@ -157,8 +159,8 @@ class OrientationTarget:
 
     def resolved(self, scene):
         link, inside = _holder(scene, self.link)
-        rotation = _frame(scene, self.frame)[:3, :3] @ self.rotation @ inside[:3, :3].T
-        return replace(self, link=link, rotation=rotation, frame="")
+        rotation = _frame(scene, self.frame)[:3, :3] @ self.rotation
+        return replace(self, link=link, rotation=rotation, frame="", axes=inside[:3, :3] @ self.axes)
 
 
 @dataclass(frozen=True, eq=False)

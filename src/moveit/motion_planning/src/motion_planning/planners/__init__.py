@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Paths that collide with nothing: found by spheres, shortened, and checked by exact geometry."""
 from motion_planning.planners.errors import NoPath
-from motion_planning.planners.planning import Search, plan_path, prepare
+from motion_planning.planners.planning import Search, first_touching, plan_path, prepare
 from motion_planning.planners.trees import Path, Run, rrt_connect, shorten
 from motion_planning.planners.warming import warm_up
 
-__all__ = ["NoPath", "Path", "Run", "Search", "plan_path", "prepare", "rrt_connect", "shorten", "warm_up"]
+__all__ = ["NoPath", "Path", "Run", "Search", "first_touching", "plan_path", "prepare", "rrt_connect", "shorten",
+           "warm_up"]

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from motion_planning.planners.constrained import ConstrainedPlanning
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import REACH, Path, Run, rrt_connect, shorten
 from motion_planning.planners.warming import warm_up
@@ -24,14 +25,15 @@ _CANDIDATES = 48
 # Edges that are checked by exact geometry alone are shorter: most of them fail.
 _EXACT_REACH = 0.25
 
-_sphere_models = weakref.WeakKeyDictionary()
-_sphere_models_lock = threading.Lock()
+_sphere_models, _checkers = weakref.WeakKeyDictionary(), weakref.WeakKeyDictionary()
+_sphere_models_lock, _checkers_lock = threading.Lock(), threading.Lock()
 
 
 class Search(NamedTuple):
     """How to look for a path. exact: ExactChecker. seed: the same one gives the same path where time suffices.
     allowed_time [s] on ``clock``, a function that returns seconds. planner_id: kept for the caller; there is one
-    planner. stop: asked every few ms whether to end."""
+    planner. stop: asked every few ms whether to end. constraints: ConstraintSet that every state on the path keeps to,
+    or None."""
 
     exact: Any
     seed: int
@@ -39,6 +41,7 @@ class Search(NamedTuple):
     clock: Callable[[], float]
     planner_id: str = ""
     stop: Callable[[], bool] = lambda: False
+    constraints: Any = None
 
 
 def sphere_model_of(exact):
@@ -47,6 +50,24 @@ def sphere_model_of(exact):
         if exact not in _sphere_models:
             _sphere_models[exact] = SphereModel.of(exact.model, exact.meshes)
         return _sphere_models[exact]
+
+
+def checker_of(exact, scene, group):
+    """Return the SphereChecker of a Group in a scene, made once for each scene and group."""
+    model = sphere_model_of(exact)
+    with _checkers_lock:
+        known = _checkers.setdefault(scene, {})
+        if group.name not in known:
+            known[group.name] = SphereChecker(model, group, scene)
+        return known[group.name]
+
+
+def first_touching(exact, scene, group, states):
+    """Return the number of the first of ``states`` (m, k) of the Group at which something touches, None if there is
+    none. Spheres tell most of those that are free, exact geometry decides on the others: dense states cost little."""
+    doubtful = np.flatnonzero(~checker_of(exact, scene, group).valid(states))
+    first = exact.first_blocked(scene, np.asarray(states)[doubtful], group.name) if len(doubtful) else None
+    return None if first is None else int(doubtful[first])
 
 
 def prepare(exact):
@@ -65,7 +86,8 @@ def plan_path(scene, group, start, goals, search):
 
     It is looked for and shortened by spheres that contain the robot, then every state on it, as close as those that the
     spheres were asked about and between them, is checked by ``search.exact``. Where exact geometry is free and the
-    spheres are not, it leads out of there by exact geometry. Raises NoPath.
+    spheres are not, it leads out of there by exact geometry. With ``search.constraints``, start and goals have to keep
+    to them, and the points of the path are as dense as it takes. Raises NoPath.
     """
     return _Planning(scene, group, search).path(start, goals)
 
@@ -76,7 +98,7 @@ class _Planning:
         self.group = self.model.group(group)
         self.last, self.times = search.clock(), {}
         self.random = np.random.default_rng(search.seed & (1 << 63) - 1)
-        self.checker = SphereChecker(sphere_model_of(search.exact), self.group, scene)
+        self.checker = checker_of(search.exact, scene, self.group)
         self._note("tables")
         # The first plan of a robot may have to make its spheres: that shall not use up its time.
         self.begin = self.last
@@ -87,6 +109,10 @@ class _Planning:
         self._free_or_raise("the start", [start])
         goals = self._free_or_raise("every goal" if len(goals) > 1 else "the goal", goals)
         self._note("ends")
+        if self.search.constraints is not None:
+            found = ConstrainedPlanning(self.scene, self.group, self.checker, self.search).path(start, goals)
+            self._note("search")
+            return found._replace(times=self.times)
         try:
             return self._by_spheres(start, goals)._replace(times=self.times)
         except NoPath as error:

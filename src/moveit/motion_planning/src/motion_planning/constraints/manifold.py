@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Postures brought onto constraints by Newton's method."""
+import math
+
+import numpy as np
+
+from motion_planning.constraints import regions
+from motion_planning.kinematics import KinematicsFailure, limbs_of
+from urdf_model import Box, Cylinder, Sphere
+from urdf_model.transforms import inverse
+
+# The share of a tolerance that postures are brought within: what lies between two of them needs the rest.
+_SHARE = 0.8
+_STEPS = 25
+# Newton's steps are damped by this, and no joint moves by more in one of them [rad or m].
+_DAMPING, _LONGEST = 1e-4, 0.5
+# Residuals below are none [rad or m].
+_NONE = 1e-10
+_LEAST_COSINE = 0.05
+
+
+class Manifold:
+    """The postures (k,) of a group that keep to joint, position and orientation constraints.
+
+    bounds (k, 2): of the joints, with the joint constraints in them. Constraints on links that the group does not move
+    alone, and lines of sight, are not looked at here.
+    """
+
+    def __init__(self, scene, group, constraints, near):
+        """group: Group; constraints: ConstraintSet. near (k,): joints that turn without end stay in its turn. Raises
+        ConstraintError for names that nothing has."""
+        model, constraints = scene.model, constraints.resolved(scene)
+        self.bounds = _bounds(model, group, constraints, near)
+        frames = model.frames(scene.state.q, scene.state.base)
+        self._parts = []
+        for kind, targets in ((_Place, constraints.positions), (_Turn, constraints.orientations)):
+            for target in targets:
+                try:
+                    limb = limbs_of(model, group, [target.link])[0]
+                except KinematicsFailure:
+                    continue
+                columns = np.searchsorted(group.indices, limb.indices)
+                self._parts.append(kind(target, limb.chain, columns, frames[model.link_index[limb.base]]))
+
+    def keeps(self, q):
+        """Whether the posture ``q`` (k,) keeps to the constraints, by their whole tolerances."""
+        return bool((q >= self.bounds[:, 0] - _NONE).all() and (q <= self.bounds[:, 1] + _NONE).all()
+                    and not any(np.any(part.residual(q, 1.0)[0]) for part in self._parts))
+
+    def project(self, q):
+        """Return a posture (k,) near ``q`` that keeps to the constraints with some tolerance left, None if none is
+        found."""
+        q = np.clip(q, self.bounds[:, 0], self.bounds[:, 1])
+        if not self._parts:
+            return q
+        for _ in range(_STEPS):
+            residual, jacobian = self._residual(q)
+            if np.abs(residual).max() <= _NONE:
+                return q
+            # Joints at a limit that would go beyond it stay out.
+            free = np.ones(len(q), dtype=bool)
+            for _ in range(2):
+                part = jacobian[:, free]
+                step = np.zeros(len(q))
+                step[free] = -part.T @ np.linalg.solve(part @ part.T + _DAMPING * np.eye(len(part)), residual)
+                inside = ((q > self.bounds[:, 0]) | (step > 0.0)) & ((q < self.bounds[:, 1]) | (step < 0.0))
+                if (inside | ~free).all():
+                    break
+                free &= inside
+            most = np.abs(step).max()
+            q = np.clip(q + step * min(1.0, _LONGEST / max(most, _NONE)), self.bounds[:, 0], self.bounds[:, 1])
+            if most < _NONE:
+                return None
+        return None
+
+    def _residual(self, q):
+        parts = [part.residual(q, _SHARE) for part in self._parts]
+        return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+
+
+class _Part:
+    """One constraint on a link: what is beyond its tolerance, and how that changes with the joints."""
+
+    def __init__(self, target, chain, columns, root):
+        self._target, self._chain, self._columns, self._root = target, chain, columns, root
+
+    def residual(self, q, share):
+        """Return (residual (3,), its derivatives (3, k)); 0 within ``share`` of the tolerance."""
+        pose, jacobian = self._chain.fk_and_jacobian(q[self._columns])
+        turn = self._root[:3, :3]
+        whole = np.zeros((6, len(q)))
+        whole[:3, self._columns], whole[3:, self._columns] = turn @ jacobian[:3], turn @ jacobian[3:]
+        residual, derivatives = self._beyond(self._root @ pose, whole, share)
+        # What is within its tolerance asks for nothing.
+        derivatives[residual == 0.0] = 0.0
+        return residual, derivatives
+
+    def _beyond(self, pose, jacobian, share):
+        raise NotImplementedError
+
+
+class _Turn(_Part):
+    def _beyond(self, pose, jacobian, share):
+        wanted = self._target.rotation
+        angles = np.asarray(self._target.angles(wanted.T @ pose[:3, :3] @ self._target.axes))
+        tolerances = np.array(self._target.tolerances)
+        tolerances = np.where(tolerances >= math.pi, np.inf, share * tolerances)
+        rates = _of_rotation_vector(angles) if self._target.rotation_vector else _of_angles(angles)
+        return angles - np.clip(angles, -tolerances, tolerances), rates @ wanted.T @ jacobian[3:]
+
+
+class _Place(_Part):
+    def _beyond(self, pose, jacobian, share):
+        lever = pose[:3, :3] @ self._target.offset
+        point = pose[:3, 3] + lever
+        found = []
+        for shape, place in self._target.regions:
+            beyond = _beyond_shape(shape, inverse(place)[:3] @ np.append(point, 1.0), share)
+            found.append((float(np.linalg.norm(beyond)), beyond, place))
+        _, beyond, place = min(found, key=lambda one: one[0])
+        x, y, z = lever
+        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        return beyond, place[:3, :3].T @ (jacobian[:3] - cross @ jacobian[3:])
+
+
+def _beyond_shape(shape, point, share):
+    """The vector (3,) from a shape, shrunk to a share of its size, to a point (3,) in its frame; 0 within."""
+    if isinstance(shape, Box):
+        half = 0.5 * share * np.asarray(shape.size)
+        return point - np.clip(point, -half, half)
+    if isinstance(shape, Sphere):
+        length = float(np.linalg.norm(point))
+        return point * max(0.0, 1.0 - share * shape.radius / length) if length > 0.0 else np.zeros(3)
+    if isinstance(shape, Cylinder):
+        out = math.hypot(point[0], point[1])
+        half = 0.5 * share * shape.length
+        sideways = point[:2] * (max(0.0, 1.0 - share * shape.radius / out) if out > 0.0 else 0.0)
+        return np.array([*sideways, point[2] - min(max(point[2], -half), half)])
+    middle = regions.middle_of(shape)
+    return np.zeros(3) if regions.holds(shape, middle + (point - middle) / share) else point - middle
+
+
+def _of_angles(angles):
+    """How angles about x, then the new y, then the new z change with an angular velocity in the fixed frame (3, 3)."""
+    sine_x, cosine_x = math.sin(angles[0]), math.cos(angles[0])
+    sine_y, cosine_y = math.sin(angles[1]), math.cos(angles[1])
+    cosine_y = math.copysign(max(abs(cosine_y), _LEAST_COSINE), cosine_y)
+    about_z = np.array([0.0, -sine_x / cosine_y, cosine_x / cosine_y])
+    return np.array([np.array([1.0, 0.0, 0.0]) - sine_y * about_z, [0.0, cosine_x, sine_x], about_z])
+
+
+def _of_rotation_vector(vector):
+    """How a rotation vector changes with an angular velocity in the fixed frame (3, 3)."""
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-4:
+        factor = 1.0 / 12.0
+    else:
+        half = 0.5 * min(angle, math.pi - 1e-6)
+        factor = (1.0 - half / math.tan(half)) / angle**2
+    return np.eye(3) - 0.5 * cross + factor * cross @ cross
+
+
+def _bounds(model, group, constraints, near):
+    """Bounds (k, 2) of the joints, with those of joint constraints in them; endless joints a turn about ``near``."""
+    bounds = np.array(model.bounds[group.indices])
+    turns = model.continuous[group.indices]
+    bounds[turns] = np.column_stack([near - math.pi, near + math.pi])[turns]
+    for one in constraints.joints:
+        at = np.flatnonzero(group.indices == model.index[one.joint])
+        if len(at):
+            position = one.position
+            if turns[at[0]]:
+                position += 2.0 * math.pi * round((near[at[0]] - position) / (2.0 * math.pi))
+            low, high = bounds[at[0]]
+            bounds[at[0]] = max(low, position - one.below), min(high, position + one.above)
+            if bounds[at[0], 0] > bounds[at[0], 1]:
+                bounds[at[0]] = np.clip(position, low, high)
+    return bounds

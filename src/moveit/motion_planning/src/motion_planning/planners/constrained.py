@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Paths all of whose states keep to constraints: RRT-Connect whose steps are brought back onto them
+(CBiRRT; Berenson, Srinivasa, Ferguson and Kuffner 2009)."""
+import itertools
+import math
+
+import numpy as np
+
+from motion_planning.constraints.manifold import Manifold
+from motion_planning.planners.errors import NoPath
+from motion_planning.planners.trees import Path, Run
+
+# A step of a tree [rad, Euclidean]; one that was brought back may be longer by this factor.
+_STEP, _STRETCH = 0.12, 2.0
+# A step that gains less than this on its target leads nowhere [rad].
+_GAIN = 1e-3
+# Straight lines between two states are halved until points on them keep to the constraints, at most so often.
+_HALVINGS = 6
+_LOOKS = (0.25, 0.5, 0.75)
+# Shortcuts: tries in all, tries in vain one after the other, and the share of the time that is left for them.
+_TRIES, _MISSES, _SHARE_OF_REST = 100, 30, 0.3
+# A shortcut has to be worth this much of the path.
+_WORTH = 1e-3
+
+
+class ConstrainedPlanning:
+    """One search. checker: SphereChecker; where spheres touch, exact geometry is asked."""
+
+    def __init__(self, scene, group, checker, search):
+        """group: Group; search: planning.Search with constraints."""
+        self._scene, self._group, self._checker, self._search = scene, group, checker, search
+        self._random = np.random.default_rng(search.seed & (1 << 63) - 1)
+        self._run = Run(search.seed, search.clock() + search.allowed_time, search.clock, search.stop)
+        # Set once exact geometry has refused a path that spheres had found free.
+        self._doubts_spheres = False
+        self._manifold = None
+
+    def path(self, start, goals):
+        """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), which keep to the constraints and are free.
+
+        Its points are so dense that the lines between them keep to the constraints too. Raises NoPath.
+        """
+        self._manifold = Manifold(self._scene, self._group, self._search.constraints, start)
+        kept = [goal for goal in goals if self._manifold.keeps(goal)]
+        if not self._manifold.keeps(start) or not kept:
+            raise NoPath("%s does not keep to the path constraints"
+                         % ("the start" if kept else "the goal" if len(goals) == 1 else "no goal"))
+        kept.sort(key=lambda goal: np.linalg.norm(goal - start))
+        while True:
+            points = self._shortened(self._connected(start, np.array(kept)))
+            blocked = self._first_blocked(points)
+            if blocked is None:
+                return Path(points)
+            self._run.check("a path was looked for that exact geometry agrees with")
+            self._doubts_spheres = True
+
+    # -- trees --------------------------------------------------------------------------------------------------
+
+    def _connected(self, start, goals):
+        """Points (m, k) from start to one of the goals."""
+        trees = (_Tree(start[None]), _Tree(goals))
+        for number in range(len(goals)):
+            end = self._grow(trees[0], 0, goals[number])
+            if np.array_equal(trees[0].points[end], goals[number]):
+                return trees[0].way(end)
+        low, high = self._manifold.bounds.T
+        for turn in itertools.count():
+            grown, other = (trees[0], trees[1]) if turn % 2 == 0 else (trees[1], trees[0])
+            sample = self._random.uniform(low, high)
+            new = self._grow(grown, grown.nearest(sample), sample)
+            target = grown.points[new]
+            end = self._grow(other, other.nearest(target), target)
+            if np.array_equal(other.points[end], target):
+                ways = (grown.way(new), other.way(end))
+                first, second = ways if turn % 2 == 0 else ways[::-1]
+                return np.concatenate([first, second[-2::-1]])
+            self._run.check("a path that keeps to the constraints was looked for: the trees from start and goal have "
+                            "%d and %d postures" % (trees[0].size, trees[1].size))
+
+    def _grow(self, tree, node, target):
+        """Add nodes from ``node`` towards ``target`` (k,) as far as it goes; return the last one."""
+        for step in self._steps(tree.points[node], target):
+            for q in step:
+                node = tree.add(q, node)
+        return node
+
+    def _steps(self, q, target):
+        """Towards a target, step by step: each a list of points (k,) whose lines keep to the constraints and are free;
+        the last point is the target itself where it is reached."""
+        while True:
+            self._run.check("a path that keeps to the constraints was looked for")
+            rest = target - q
+            left = float(np.linalg.norm(rest))
+            if left == 0.0:
+                return
+            new = target if left <= _STEP else self._manifold.project(q + rest * (_STEP / left))
+            if new is None or np.linalg.norm(target - new) > left - min(_GAIN, 0.5 * left) \
+                    or np.linalg.norm(new - q) > _STRETCH * _STEP:
+                return
+            points = self._line(q, new, _HALVINGS)
+            if points is None or not self._is_free(q, points):
+                return
+            yield points
+            q = new
+
+    def _line(self, a, b, halvings):
+        """Points after ``a`` up to ``b`` whose lines keep to the constraints; None where that cannot be had."""
+        if all(self._manifold.keeps(a + share * (b - a)) for share in _LOOKS):
+            return [b]
+        middle = self._manifold.project(0.5 * (a + b)) if halvings else None
+        if middle is None or max(np.linalg.norm(middle - a), np.linalg.norm(b - middle)) > np.linalg.norm(b - a):
+            return None
+        first = self._line(a, middle, halvings - 1)
+        second = self._line(middle, b, halvings - 1) if first is not None else None
+        return None if second is None else first + second
+
+    def _shortened(self, points):
+        run = self._run
+        end = run.clock() + _SHARE_OF_REST * max(0.0, run.deadline - run.clock())
+        missed = 0
+        for _ in range(_TRIES):
+            if len(points) < 3 or missed >= _MISSES or run.clock() >= end:
+                break
+            i, k = sorted(self._random.choice(len(points), 2, replace=False))
+            direct = float(np.linalg.norm(points[k] - points[i]))
+            if k - i < 2 or direct > (1.0 - _WORTH) * _length(points[i:k + 1]):
+                missed += 1
+                continue
+            way = [points[i], *itertools.chain.from_iterable(self._steps(points[i], points[k]))]
+            if np.array_equal(way[-1], points[k]) and \
+                    _length(points[i:k + 1]) - _length(np.array(way)) > _WORTH * _length(points):
+                points = np.concatenate([points[:i], way, points[k + 1:]])
+                missed = 0
+            else:
+                missed += 1
+        return points
+
+    # -- collisions ---------------------------------------------------------------------------------------------
+
+    def _is_free(self, a, points):
+        for b in points:
+            if (self._doubts_spheres or not self._checker.edge(a, b)) and \
+                    self._first_blocked(np.array([a, b])) is not None:
+                return False
+            a = b
+        return True
+
+    def _first_blocked(self, points):
+        """The first of the states along ``points``, but the first point, that touches something; None if all are
+        free."""
+        states = []
+        for a, b in itertools.pairwise(points):
+            count = max(1, math.ceil(np.linalg.norm(b - a) / (0.5 * self._checker.resolution)))
+            states.append(a + (b - a) * (np.arange(1, count + 1)[:, None] / count))
+        for some in states:
+            self._run.check("a path was checked by exact geometry")
+            first = self._search.exact.first_blocked(self._scene, some, self._group.name)
+            if first is not None:
+                return some[first]
+        return None
+
+
+class _Tree:
+    """Postures and where each came from."""
+
+    def __init__(self, roots):
+        self._room = np.array(roots, dtype=float)
+        self._parents, self.size = [-1] * len(roots), len(roots)
+
+    @property
+    def points(self):
+        """(size, k)"""
+        return self._room[:self.size]
+
+    def add(self, q, parent):
+        if self.size == len(self._room):
+            self._room = np.concatenate([self._room, np.empty((max(64, self.size), self._room.shape[1]))])
+        self._room[self.size] = q
+        self._parents.append(parent)
+        self.size += 1
+        return self.size - 1
+
+    def nearest(self, q):
+        return int(np.square(self.points - q).sum(axis=1).argmin())
+
+    def way(self, node):
+        """Points (m, k) from a root to the node."""
+        way = []
+        while node >= 0:
+            way.append(self._room[node])
+            node = self._parents[node]
+        return np.array(way[::-1])
+
+
+def _length(points):
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
