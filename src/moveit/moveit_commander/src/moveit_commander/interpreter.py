@@ -4,8 +4,10 @@ import re
 import time
 from pathlib import Path
 
+import rosgraph
 from geometry_msgs.msg import PoseStamped
 
+from .conversions import list_to_pose
 from .exception import MoveItCommanderException
 from .planning_scene_interface import PlanningSceneInterface
 from .robot import RobotCommander
@@ -15,25 +17,34 @@ __all__ = ["MoveGroupCommandInterpreter", "MoveGroupInfoLevel"]
 
 #: What `ground` puts under the robot: a slab of this size [m], its top a little below zero: nothing stands in it.
 _GROUND_SIZE, _GROUND_TOP = (3.0, 3.0, 0.1), -0.01
-_FILE = ".moveit_commander_states"
+_FILE = "move_group.cfg"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_SWITCHES = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
+_SWITCHES = {"true": True, "on": True, "1": True, "t": True, "false": False, "off": False, "0": False, "f": False}
+_SHORT = {"tol": "tolerance", "rec": "record", "del": "delete", "random": "rand", "q": "quit", "exit": "quit"}
+# For the robot's SRDF.
+_STATE = """\
+<group_state name="custom_state" group="%s">
+%s
+</group_state>"""
+_STATE_JOINT = '    <joint name="%s" value="%.17g"/>'
 
 _HELP = """\
-use NAME                 work with this group
+use NAME, use previous   work with this group; with the one before
 use, groups              the groups that were used
 id, which                the group in use
 joints, eef              its joints; its end effector's link
 current                  its joint values and poses now
-vars, show [NAME]        names of states; a state's values, or all of them
-group_state [NAME]       the same
-record NAME, delete NAME remember where it is now under a name; forget it
+vars, show [NAME], NAME  names of states; a state's values, or all of them
+group_state              where it is now, as a state for the SRDF
+record NAME, rand NAME   remember where it is now, or random values, under a name
+delete NAME              forget it
 x = y, x = [1 2 3], x[0] = 0.5   a new name for a state; values under a name; one of them
 save [FILE], load [FILE] write remembered states into a file; run the commands in a file
-plan NAME, plan rand     plan to a state, to a random one
+plan NAME, plan rand     plan to a state, to a random one; plan alone shows the last plan
 execute                  execute that plan
 go NAME, go rand         plan and execute
-go up|down|left|right|forward|backward D   move D metres along the planning frame's z, y or x
+go up|down|left|right|forward|backward D   move D metres along the planning frame's z, y or x; x, y, z do as well
+go X Y Z R P Y [approx]  plan and execute to a pose; approx: or to the nearest that can be reached
 rotate R P Y             plan and execute to this roll, pitch and yaw
 pick NAME, place NAME    pick an object up; put it down
 stop                     stop moving
@@ -42,7 +53,7 @@ planner NAME             use this planner
 constrain [NAME]         hold stored constraints on the way; hold none
 allow looking|replanning true|false
 trace on|off             name what is done while it is done
-database                 where stored constraints are
+database, host           where stored constraints are; where the master is
 ground                   put a floor into the scene
 wait S                   wait
 help, quit"""
@@ -62,20 +73,23 @@ class MoveGroupCommandInterpreter:
 
     DEFAULT_FILENAME = _FILE
     # What go DIRECTION DISTANCE does: axis of the planning frame, sign.
-    GO_DIRS = {"up": (2, 1), "down": (2, -1), "left": (1, 1), "right": (1, -1), "forward": (0, 1), "backward": (0, -1)}
+    GO_DIRS = {"up": (2, 1), "down": (2, -1), "left": (1, 1), "right": (1, -1), "forward": (0, 1), "backward": (0, -1),
+               "back": (0, -1), "x": (0, 1), "y": (1, 1), "z": (2, 1)}
 
     def __init__(self, robot=None, scene=None):
         self._robot, self._scene = robot or RobotCommander(), scene or PlanningSceneInterface()
-        self._groups, self._group_name = {}, ""
+        self._groups, self._group_name, self._previous_name = {}, "", ""
         self._plan = None
         self._trace = False
         # The first word of a command to what does it.
         self._without_group = {"help": self._help, "id": self._which, "which": self._which, "groups": self._loaded,
                                "use": self._use, "wait": self._wait, "trace": self._set_trace, "load": self._load,
-                               "ground": self._ground, "database": self._database, "quit": self._quit, "q": self._quit}
+                               "ground": self._ground, "database": self._database, "host": self._host,
+                               "quit": self._quit}
         self._with_group = {"joints": self._joints, "eef": self._end_effector, "current": self._current,
-                            "vars": self._variables, "show": self._show, "group_state": self._show,
-                            "record": self._record, "delete": self._delete, "save": self._save, "plan": self._make_plan,
+                            "vars": self._variables, "show": self._show, "group_state": self._group_state,
+                            "record": self._record, "rand": self._record_random, "delete": self._delete,
+                            "save": self._save, "plan": self._make_plan,
                             "execute": self._execute, "go": self._go, "rotate": self._rotate, "pick": self._pick,
                             "place": self._place, "stop": self._stop, "tolerance": self._tolerance,
                             "time": self._time, "planner": self._planner, "constrain": self._constrain,
@@ -117,10 +131,12 @@ class MoveGroupCommandInterpreter:
     def _do(self, text):
         if "=" in text:
             return self._assign(*(part.strip() for part in text.split("=", 1)))
-        word, *words = text.split()
-        word = word.lower()
+        first, *words = text.split()
+        word = _SHORT.get(first.lower(), first.lower())
         if word in self._without_group:
             return self._without_group[word](words)
+        if not words and self._group_name and first in self._known_names():
+            return MoveGroupInfoLevel.INFO, _list(self._values(first))
         if word not in self._with_group:
             return MoveGroupInfoLevel.FAIL, "unknown command '%s'; help lists them" % text
         self._group()
@@ -147,12 +163,15 @@ class MoveGroupCommandInterpreter:
         if not words:
             return self._loaded(words)
         name = words[0]
+        if name == "previous":
+            name = self._previous_name or self._group_name
         if not self._robot.has_group(name):
             raise MoveItCommanderException("there is no group '%s'; the robot has %s"
                                            % (name, ", ".join(self._robot.get_group_names())))
         if name not in self._groups:
             self._groups[name] = self._robot.get_group(name)
-        self._group_name = name
+        if name != self._group_name:
+            self._group_name, self._previous_name = name, self._group_name
         return "using group %s" % name
 
     def _wait(self, words):
@@ -165,6 +184,8 @@ class MoveGroupCommandInterpreter:
 
     def _load(self, words):
         path = Path(words[0] if words else self.DEFAULT_FILENAME)
+        if not path.exists() and (Path("cmd") / path).is_file():
+            path = Path("cmd") / path
         answers = []
         for line in path.read_text(encoding="utf-8").splitlines():
             level, answer = self.execute(line)
@@ -186,6 +207,9 @@ class MoveGroupCommandInterpreter:
 
     def _database(self, words):
         return MoveGroupInfoLevel.INFO, "no data base of constraints"
+
+    def _host(self, words):
+        return MoveGroupInfoLevel.INFO, "the master is %s" % rosgraph.get_master_uri()
 
     def _quit(self, words):
         return MoveGroupInfoLevel.INFO, "quit"
@@ -219,13 +243,28 @@ class MoveGroupCommandInterpreter:
 
     def _values(self, name):
         """Values of a state in the group's order; joints that a named state leaves out stand where they are."""
+        now = self._values_now()
+        return list({**now, **self._group().get_named_target_values(name)}.values())
+
+    def _values_now(self):
+        """{joint: value}, in the group's order."""
         group = self._group()
         now = named_positions(group.get_current_state().joint_state)
-        values = {**now, **group.get_named_target_values(name)}
-        return [values[joint] for joint in group.get_joints() if joint in now]
+        return {joint: now[joint] for joint in group.get_joints() if joint in now}
+
+    def _group_state(self, words):
+        if words:
+            return self._show(words)
+        return MoveGroupInfoLevel.INFO, _STATE % (
+            self._group_name, "\n".join(_STATE_JOINT % one for one in self._values_now().items()))
 
     def _record(self, words):
         self._group().remember_joint_values(_name(words, "record NAME"))
+        return "remembered as %s" % words[0]
+
+    def _record_random(self, words):
+        group = self._group()
+        group.remember_joint_values(_name(words, "rand NAME"), group.get_random_joint_values())
         return "remembered as %s" % words[0]
 
     def _delete(self, words):
@@ -268,6 +307,8 @@ class MoveGroupCommandInterpreter:
             self._group().set_named_target(name)
 
     def _make_plan(self, words):
+        if not words:
+            return MoveGroupInfoLevel.INFO, "no plan" if self._plan is None else str(self._plan[1])
         self._target(words, "plan NAME")
         self._plan = self._group().plan()
         return "planned" if self._plan[0] else (MoveGroupInfoLevel.FAIL, "no plan")
@@ -283,6 +324,10 @@ class MoveGroupCommandInterpreter:
         if len(words) == 2 and words[0] in self.GO_DIRS:
             axis, sign = self.GO_DIRS[words[0]]
             group.shift_pose_target(axis, sign * float(words[1]))
+        elif len(words) == 7 and words[6] in ("approx", "approximate"):
+            group.set_joint_value_target(list_to_pose([float(word) for word in words[:6]]), True)
+        elif len(words) == 6:
+            group.set_pose_target([float(word) for word in words])
         else:
             self._target(words, "go NAME, or go DIRECTION DISTANCE")
         done = group.go()
@@ -330,11 +375,12 @@ class MoveGroupCommandInterpreter:
 
     def _allow(self, words):
         allow = {"looking": self._group().allow_looking, "replanning": self._group().allow_replanning}
-        if len(words) != 2 or words[0] not in allow:
+        what = [name for name in allow if words and name in (words[0], words[0] + "ing", words[0] + "ning")]
+        if len(words) != 2 or not what:
             raise MoveItCommanderException("expected: allow looking|replanning true|false")
-        value = _switch(words[1:], "allow %s true|false" % words[0])
-        allow[words[0]](value)
-        return "%s is %s" % (words[0], "allowed" if value else "not allowed")
+        value = _switch(words[1:], "allow %s true|false" % what[0])
+        allow[what[0]](value)
+        return "%s is %s" % (what[0], "allowed" if value else "not allowed")
 
 
 def _done(success, yes, no):
