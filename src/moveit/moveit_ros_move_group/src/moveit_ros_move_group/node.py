@@ -31,14 +31,17 @@ def build():
                                                                   "robot_description"))
     urdf = wait_for_param(name, _DESCRIPTION_TIMEOUT_S)
     srdf = wait_for_param(name + "_semantic", _DESCRIPTION_TIMEOUT_S)
-    limits = rospy.get_param(name + "_planning/joint_limits", None)
+    planning = rospy.get_param(name + "_planning", None) or {}
+    limits = planning.get("joint_limits")
     model = PlanningModel.from_xml(urdf, srdf, {"joint_limits": limits} if limits else None)
     failures = Failures(model.frame)
     monitor = SceneMonitor(model, lambda request, text: failures.tell(request, 0, text))
     exact = ExactChecker(model, MeshReader(ResourceFinder()))
+    scene_now, unclear = settings.described_scene(monitor.scene(), planning)
+    monitor.change(lambda _: scene_now, "robot_description_planning")
     pipes, usual, complaints = settings.pipelines(model.groups)
     wanted, unknown = settings.capabilities()
-    for text in (*model.warnings, *exact.warnings, *complaints, *unknown):
+    for text in (*model.warnings, *exact.warnings, *unclear, *complaints, *unknown):
         rospy.logwarn("%s", text)
     may_execute = rospy.get_param("~allow_trajectory_execution", True)
     context = Context(model, monitor, exact, failures, pipes, usual, _executor(monitor) if may_execute else None)

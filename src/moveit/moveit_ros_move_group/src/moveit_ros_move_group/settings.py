@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import rospy
 
+from motion_planning.errors import PlanningError
 from moveit_ros_move_group.controllers import read_list
 from moveit_ros_move_group.execution import ExecutionSettings
 
@@ -80,6 +81,34 @@ def _pipeline(name, tree, groups):
     pipeline.start_bounds_error = _number(tree.get("start_state_max_bounds_error"), pipeline.start_bounds_error)
     pipeline.jiggle = _number(tree.get("jiggle_fraction"), pipeline.jiggle)
     return pipeline
+
+
+def described_scene(scene, planning):
+    """Return (Scene, list of complaints): ``scene`` with what ``robot_description_planning`` says of collisions.
+
+    ``planning``: its mapping. Padding and scale of all links and of single ones; pairs that may touch or may not.
+    """
+    complaints = []
+
+    def of_links(what, usual):
+        usual = _number(planning.get("default_robot_" + what), usual)
+        named = planning.get("default_robot_link_" + what)
+        return {**dict.fromkeys(scene.model.links, usual), **(named if isinstance(named, dict) else {})}
+
+    for what, usual in (("padding", 0.0), ("scale", 1.0)):
+        for link, value in of_links(what, usual).items():
+            try:
+                scene = scene.with_padding(**{what: {link: _number(value, math.nan)}}) if value != usual else scene
+            except PlanningError as error:
+                complaints.append("robot_description_planning: %s; left out" % error)
+    pairs = {}
+    for entry in planning.get("default_collision_operations") or []:
+        try:
+            pairs[entry["object1"], entry["object2"]] = {"disable": True, "enable": False}[entry["operation"]]
+        except (KeyError, TypeError):
+            complaints.append("default_collision_operations: %r is left out; expected object1, object2, and operation "
+                              "enable or disable" % (entry,))
+    return scene.with_allowed(scene.allowed.with_entries(pairs)) if pairs else scene, complaints
 
 
 def execution_settings():

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the parameter server says is understood; what cannot be is said."""
+from moveit_ros_move_group.settings import described_scene
+
+
+def test_a_robot_that_nothing_is_said_of_is_as_it_is(scene):
+    assert described_scene(scene, {}) == (scene, [])
+
+
+def test_padding_and_scale_of_all_links_and_of_single_ones(scene):
+    found, complaints = described_scene(scene, {
+        "default_robot_padding": 0.01, "default_robot_link_padding": {"hand": 0.03, "base": 0.0},
+        "default_robot_link_scale": {"arm": 1.1}})
+    assert complaints == []
+    assert [found.link_padding.get(link, 0.0) for link in ("base", "arm", "hand")] == [0.0, 0.01, 0.03]
+    assert [found.link_scale.get(link, 1.0) for link in ("base", "arm", "hand")] == [1.0, 1.1, 1.0]
+
+
+def test_pairs_that_may_touch(scene):
+    found, complaints = described_scene(scene, {"default_collision_operations": [
+        {"object1": "arm", "object2": "table", "operation": "disable"},
+        {"object1": "arm", "object2": "wall", "operation": "enable"}]})
+    assert complaints == []
+    assert found.allowed.allowed("table", "arm") and not found.allowed.allowed("arm", "wall")
+
+
+def test_what_is_not_understood_is_said(scene):
+    found, complaints = described_scene(scene, {
+        "default_robot_padding": "much", "default_robot_link_padding": {"toe": 0.1, "arm": -1.0, "hand": "thick"},
+        "default_collision_operations": [{"object1": "arm"}, "off", {"object1": "a", "object2": "b",
+                                                                    "operation": "maybe"}]})
+    assert found.link_padding == scene.link_padding and found.allowed is scene.allowed
+    text = "\n".join(complaints)
+    assert len(complaints) == 6
+    for part in ("no such link", "of link 'arm' is -1.0", "of link 'hand' is nan", "'off' is left out", "maybe"):
+        assert part in text
