@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A PID controller for one quantity. Loads without ROS; its time is ROS time unless it is given another."""
+"""A PID controller for one quantity. Loads without ROS; its time is ROS time unless another clock is given."""
 
 
 def _ros_time():
-    import rospy  # Late, so that a caller with a clock of its own needs no ROS.
+    import rospy  # Imported late, so that a caller with a clock of its own needs no ROS.
 
     return rospy.get_time()
 
 
 class PID:
-    """Output = kp e + ki (integral of e) + kd (de/dt), for an error e that is told at times of the caller's choice.
+    """Output = kp e + ki (integral of e) + kd (de/dt), for an error e that the caller passes at any time.
 
     Parameters: the gains; `now`, a function that reads a clock [s], ROS time by default.
     """
@@ -40,8 +40,8 @@ class PID:
     def compute_output(self, error):
         """Return the output for the present `error`.
 
-        The first call after initialize() has neither integral nor derivative, and so has one at which the clock did
-        not advance (a simulation that is paused or was reset) no derivative.
+        The first call after initialize() has neither integral nor derivative. A call at which the clock did not advance
+        (a paused or reset simulation) has no derivative.
         """
         now_s = self._now()
         derivative = 0.0

@@ -7,16 +7,16 @@ import rospy
 
 from .waiting import Stopwatch
 
-# A simulation that runs ticks hundreds of times a second; longer silence is worth a line in the log.
+# A simulation that runs ticks hundreds of times a second; a longer silence is logged.
 STALL_NOTICE_S = 5.0
-# How often a sleeper looks up although the clock did not tick, to notice a shutdown [s, wall].
+# Period of checks for a shutdown while the clock stands still [s, wall].
 LOOK_UP_S = 0.2
 
 
 class RosClock:
     """ROS time (wall time, or /clock under use_sim_time), with a warning when simulated time stands still.
 
-    `gives_up()` ends a sleep, and is asked several times a second; by default that is at shutdown.
+    `gives_up()` is called several times a second and ends a sleep when it is true; by default at shutdown.
     """
 
     def __init__(self, gives_up=rospy.is_shutdown):
@@ -33,7 +33,8 @@ class RosClock:
         return rospy.is_shutdown()
 
     def sleep(self, duration_s):
-        """Sleep for `duration_s` of ROS time. Returns early when it gives up; time that jumps back is no error."""
+        """Sleep for `duration_s` of ROS time. Returns early when `gives_up()` is true; time that jumps back is no
+        error."""
         if rospy.rostime.is_wallclock():
             time.sleep(max(0.0, duration_s))
             return
@@ -51,9 +52,9 @@ class RosClock:
 
 
 def _tell_of_silence(time_s):
-    """Say that simulated time stands still at `time_s`; shut this node down if a new master has taken over.
+    """Log that simulated time stands still at `time_s`; shut this node down if there is a new master.
 
-    A node registers once; a master that was started anew does not know it, and would never connect it to anything.
+    A node registers once; a restarted master does not know it, and would never connect it to anything.
     """
     uri = rosgraph.get_master_uri()
     try:

@@ -8,7 +8,7 @@ class Signal:
     """Call every connected slot with the arguments that the signal is called with.
 
     Slots are functions or bound methods, held weakly: connecting an object's method does not keep the object alive,
-    and a slot that has gone is skipped. (So a lambda needs a name of its own that outlives the call of connect.)
+    and a slot that has gone is skipped. (So keep a reference to a lambda, or it is dropped at once.)
     """
 
     def __init__(self):
@@ -29,7 +29,7 @@ class Signal:
             self._references = [known for known in self._references if known != reference]
 
     def __call__(self, *args, **kwargs):
-        """Call the slots in the order of their connection; what a slot raises reaches the caller."""
+        """Call the slots in the order of their connection; errors of a slot reach the caller."""
         with self._lock:
             self._references = [reference for reference in self._references if reference() is not None]
             references = list(self._references)
@@ -43,5 +43,5 @@ class Signal:
 def _weak_reference(slot):
     if not callable(slot):
         raise TypeError("a slot is a function or a bound method, not %r" % (slot,))
-    # A plain reference to a bound method would die at once: the method object is made anew at each access.
+    # A plain weak reference to a bound method would be dead at once: each access makes a new method object.
     return weakref.WeakMethod(slot) if hasattr(slot, "__self__") and hasattr(slot, "__func__") else weakref.ref(slot)

@@ -28,7 +28,7 @@ class Stopwatch:
 
 
 class Ticker:
-    """A steady beat on a clock: the time that the work between two beats takes comes off the sleep."""
+    """A steady beat on a clock: the sleep is shortened by the time of the work between two beats."""
 
     def __init__(self, clock, rate_hz):
         if not rate_hz > 0.0:
@@ -38,7 +38,7 @@ class Ticker:
         self._next_s = clock.now() + self._period_s
 
     def sleep(self):
-        """Sleep until the next beat. Beats that were missed, or that the clock jumped over, are not caught up."""
+        """Sleep until the next beat. Missed beats, also after a jump of the clock, are not caught up."""
         now_s = self._clock.now()
         remaining_s = self._next_s - now_s
         if remaining_s < -self._period_s or remaining_s > self._period_s:

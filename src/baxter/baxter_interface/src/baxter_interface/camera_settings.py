@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the robot's cameras can be set to. Free of ROS."""
+"""The settings of the robot's cameras. Free of ROS."""
 from dataclasses import dataclass, field
 
 # Pictures that the cameras can make, width and height in pixels; the largest is the whole sensor.
 MODES = ((1280, 800), (960, 600), (640, 400), (480, 300), (384, 240), (320, 200))
-# As a value: let the camera choose.
+# Value for "automatic".
 AUTO = -1
-# Of a camera that was opened without settings.
+# Defaults of a camera that was opened without settings.
 DEFAULT_RESOLUTION = (320, 200)
 DEFAULT_FPS = 20.0
 
 
 @dataclass(frozen=True)
 class Control:
-    """A camera control: its number on the wire, its largest value, and what it is before it was set."""
+    """A camera control: its number in messages, its largest value, and its default."""
 
     id: int
     largest: int
@@ -37,7 +37,7 @@ CONTROLS = {
 
 @dataclass
 class CameraSettings:
-    """Settings of one camera; what does not fit is refused with the right range. `values` holds those that were set."""
+    """Settings of one camera; invalid values are refused with the valid range. `values` holds those that were set."""
 
     resolution: tuple = DEFAULT_RESOLUTION
     fps: float = DEFAULT_FPS

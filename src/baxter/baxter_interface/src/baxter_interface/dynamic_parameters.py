@@ -5,17 +5,17 @@ import math
 import rospy
 from dynamic_reconfigure.server import Server
 
-# dynamic_reconfigure's names of types -> what a value of one may be.
+# dynamic_reconfigure's names of types -> the Python types of their values.
 _KINDS = {"double": (int, float), "int": (int,), "bool": (bool,), "str": (str,)}
-# What stands beside the parameters in a configuration.
+# Entries of a configuration that are no parameters.
 _GROUPS = "groups"
 
 
 def check(values, table):
-    """Raise ValueError for what must not get into a configuration.
+    """Raise ValueError for values that must not get into a configuration.
 
-    values: {name: value}; table: a dynamic_reconfigure type with `min`, `max` and `type`, {name: ...} each. What is
-    beyond a parameter's range, infinity too, may pass: it is clamped.
+    values: {name: value}; table: a dynamic_reconfigure type with `min`, `max` and `type`, {name: ...} each. Values
+    beyond a parameter's range, also infinity, pass: they are clamped.
     """
     for name, value in values.items():
         if name == _GROUPS:
@@ -30,15 +30,15 @@ def check(values, table):
 
 
 class ParameterServer(Server):
-    """A dynamic_reconfigure server that refuses what its own does not notice, in the words of `check`.
+    """A dynamic_reconfigure server that also refuses what `check` refuses.
 
-    dynamic_reconfigure's takes NaN, which is neither below nor above a range, and names that no parameter has, with any
-    value, which go out with every update from then on. A client gets the refusal as a ServiceException. Raises
-    ValueError at the start for what stands on the ROS parameter server.
+    The original accepts NaN, which is neither below nor above a range, and unknown names with any value, and then
+    publishes them with every update. A client gets the refusal as a ServiceException. Raises ValueError at the start
+    for invalid values on the ROS parameter server.
     """
 
     def _clamp(self, config):
-        # Called with everything that may become the configuration, before it does.
+        # Called with every configuration before it is accepted.
         check(config, self.type)
         super()._clamp(config)
 

@@ -19,18 +19,18 @@ from .presence import Presence
 from .resets import PUT_ELSEWHERE, Resets
 
 RATE_HZ = 20.0
-# No goal ends sooner than this after it has come [s, wall]: actionlib's simple client loses track of a goal, and waits
-# for ever, when the end comes before its send_goal has returned.
+# No goal ends sooner than this after it has come [s, wall]: actionlib's simple client loses a goal, and waits for ever,
+# if the goal ends before its send_goal has returned.
 SHORTEST_GOAL_S = 0.05
 _LOOK_UP_S = 0.5
 
 
 class Work(NamedTuple):
-    """How one goal is carried out.
+    """The work of one goal.
 
-    `step()` does what is to be done now and tells whether the goal is reached; `stop()` is called when it ends early
-    and the robot can still be commanded; `missed()` says how far it came; `make_result()` makes the result message;
-    `timeout_s` [s, ROS time], below 0 for none; `refusal` says why the goal is not begun, "" if it is.
+    `step()` does the next step and returns whether the goal is reached; `stop()` is called when it ends early and the
+    robot can still be commanded; `missed()` returns a text about the remaining error; `make_result()` makes the result
+    message; `timeout_s` [s, ROS time], below 0 for none; `refusal` is the reason why the goal is refused, or "".
     """
 
     step: Callable
@@ -79,7 +79,7 @@ class GoalLoop:
             try:
                 end, result, text = self._carry_out(handle)
             except Exception as error:
-                # A goal has an end, whatever happens.
+                # Every goal must end, whatever happens.
                 rospy.logerr("%s: %s", self._label, traceback.format_exc())
                 end, result, text = handle.set_aborted, None, "the action server failed: %s" % error
             time.sleep(max(0.0, begin_s + SHORTEST_GOAL_S - time.monotonic()))
@@ -115,9 +115,9 @@ class GoalLoop:
         return handle.set_aborted, work.make_result(), why
 
     def _stop_after_reset(self, work):
-        """Stop what a step may have begun that was said before the reset and heard after it.
+        """Stop a motion whose command was sent before the reset and received after it.
 
-        A stop says where the robot is, which must not be where it was; so time has to pass.
+        The stop commands the measured position, which must be one from after the reset; so time has to pass.
         """
         clock = RosClock(gives_up=lambda: self._is_unwanted() or self._ending or rospy.is_shutdown())
         clock.sleep(1.0 / RATE_HZ)
@@ -128,7 +128,7 @@ class GoalLoop:
         return self._goals.is_cancelled or self._goals.has_next
 
     def _trouble(self, since_reset=False):
-        """Why nothing can be moved now, "" if it can. since_reset: although the robot was put elsewhere meanwhile."""
+        """Why nothing can be moved now, or "". since_reset: ignore a reset in the meantime."""
         if self._ending or rospy.is_shutdown():
             return "the action server was shut down"
         if self._presence.is_gone():
@@ -139,10 +139,10 @@ class GoalLoop:
 
 
 def can_be_answered(goal_id):
-    """Whether an actionlib_msgs/GoalID that came in can be sent back; says in the log why not.
+    """Whether an actionlib_msgs/GoalID can be sent back; logs the reason if not.
 
-    genpy reads stamps that it cannot write. Such an id in the list of states would leave all of them unsent, and half
-    of a message to be sent with the next one.
+    genpy reads stamps that it cannot write. With such an id in the status list, no status could be sent, and a partial
+    message would remain for the next one.
     """
     try:
         goal_id.serialize(io.BytesIO())
@@ -155,13 +155,13 @@ def can_be_answered(goal_id):
 def start(server):
     """Start an actionlib.ActionServer whose status goes on when simulated time goes back, as at a restart.
 
-    actionlib's own timer would end then, for good. When it fires while Ctrl-C closes its topic, nobody need know.
-    Goals and cancel requests with an id that cannot be answered are dropped.
+    actionlib's own timer would end then. Errors of the timer while Ctrl-C closes the topic are ignored. Goals and
+    cancel requests with an id that cannot be sent back are dropped.
     """
     take_goal, take_cancel = server.internal_goal_callback, server.internal_cancel_callback
 
     def on_goal(goal):
-        # A server that takes the bytes of its goals looks at the id by itself.
+        # A server that receives its goals as bytes checks the id itself.
         if not hasattr(goal, "goal_id") or can_be_answered(goal.goal_id):
             take_goal(goal)
 
@@ -169,7 +169,7 @@ def start(server):
         if can_be_answered(goal_id):
             take_cancel(goal_id)
 
-    # Before the server subscribes to its topics with them.
+    # Done before the server subscribes to its topics.
     server.internal_goal_callback, server.internal_cancel_callback = on_goal, on_cancel
 
     def publish_status(event):

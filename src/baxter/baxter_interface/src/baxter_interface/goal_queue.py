@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The goal that an action server works at, and the newest one that waits for its turn. Free of ROS."""
+"""The active goal of an action server, and the newest pending one. Free of ROS."""
 import threading
 
 
 class GoalQueue:
     """Hands goals from the server's threads to the one thread that carries them out.
 
-    ``cancel(handle, text)`` ends a goal that was not begun. A newer goal takes the place of one that waits.
+    ``cancel(handle, text)`` ends a pending goal. A newer goal replaces a pending one.
     """
 
     def __init__(self, cancel):
@@ -16,9 +16,9 @@ class GoalQueue:
         self._cancelled = self._is_closed = False
 
     def put(self, handle, check=lambda is_busy: None):
-        """Any thread: have a goal wait. ``check(is_busy)`` goes first, told whether a goal is at work.
+        """Any thread: add a goal. ``check(is_busy)`` is called first; is_busy: whether a goal is active.
 
-        What it raises is passed on, and the queue is as it was.
+        If it raises, the error is passed on, and the queue does not change.
         """
         with self._changed:
             check(self._current is not None)
@@ -28,7 +28,7 @@ class GoalQueue:
             self._changed.notify()
 
     def cancel(self, handle):
-        """Any thread: end a goal that waits; note that the one at work is to end."""
+        """Any thread: end a pending goal, or mark the active one as cancelled."""
         with self._changed:
             if self._waiting is not None and self._waiting == handle:
                 self._waiting = None
@@ -37,29 +37,29 @@ class GoalQueue:
                 self._cancelled = True
 
     def close(self):
-        """Any thread: no longer have :meth:`take` wait."""
+        """Any thread: make :meth:`take` return at once."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()
 
     def take(self, timeout_s):
-        """Return the goal that waits, which is then at work until :meth:`done`; None if none comes within [s, wall]."""
+        """Return the pending goal, which is then active until :meth:`done`; None if none comes within [s, wall]."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting is not None or self._is_closed, timeout_s)
             self._current, self._waiting, self._cancelled = self._waiting, None, False
             return self._current
 
     def done(self):
-        """The goal at work has ended, or is about to."""
+        """The active goal has ended, or is about to."""
         with self._changed:
             self._current = None
 
     @property
     def is_cancelled(self):
-        """Whether the goal at work is to end by request."""
+        """Whether the active goal was cancelled."""
         return self._cancelled
 
     @property
     def has_next(self):
-        """Whether a newer goal waits."""
+        """Whether a newer goal is pending."""
         return self._waiting is not None

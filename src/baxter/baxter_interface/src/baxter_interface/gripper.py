@@ -15,8 +15,9 @@ from .version_check import VersionMismatch
 class Gripper:
     """The gripper of the "left" or the "right" arm.
 
-    Positions, forces and speeds are in percent; position 0 is closed, 100 open. What a kind of gripper cannot do is
-    logged, and returns None. A blocking command returns whether it had its effect; if not, one line of log says so.
+    Positions, forces and speeds are in percent; position 0 is closed, 100 open. A command that a kind of gripper does
+    not have is logged, and returns None. A blocking command returns whether it had its effect; if not, it logs one
+    line.
 
     Parameters:
         versioned: compare the firmware of an electric gripper with this SDK.
@@ -67,7 +68,8 @@ class Gripper:
         return dict(getattr(self._link.kind, "defaults", {}))
 
     def set_parameters(self, parameters=None, defaults=False):
-        """Change parameters (dict), after going back to the `defaults` if so, and send them all; unknown ones warn."""
+        """Change parameters (dict), after a reset to the defaults if `defaults`, and send them all; unknown ones are
+        logged."""
         valid = self.valid_parameters()
         if defaults:
             self._link.parameters = dict(valid)
@@ -86,7 +88,8 @@ class Gripper:
         return self._link.override("set_properties", wanted, lambda: self._link.properties == wanted, timeout)
 
     def reset_custom_state(self, timeout=2.0):
-        """Tell the robot the default state of a custom gripper, unknown in all; return whether it took it."""
+        """Tell the robot the default state of a custom gripper, unknown in all fields; return whether it accepted
+        it."""
         if not self._is_custom("reset_custom_state"):
             return None
         flags = ("enabled", "calibrated", "ready", "moving", "gripping", "missed", "error", "reverse")
@@ -104,7 +107,7 @@ class Gripper:
         return self._do("reboot", timeout, delay_check)
 
     def clear_calibration(self, block=True, timeout=2.0):
-        """Forget the calibration (electric)."""
+        """Clear the calibration (electric)."""
         return self._do("clear_calibration", block, timeout)
 
     def calibrate(self, block=True, timeout=5.0):

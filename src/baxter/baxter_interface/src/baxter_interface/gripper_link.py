@@ -16,7 +16,7 @@ from .gripper_types import TYPES
 
 # Numbers of commands wrap here.
 SEQUENCE_END = 2**31 - 1
-# What is left at least for the effect of a command after its acknowledgement was waited for [s].
+# Least time for the effect of a command after the wait for its acknowledgement [s].
 EFFECT_TIMEOUT_S = 0.5
 
 
@@ -25,7 +25,7 @@ class NoGripper(OSError):
 
 
 class GripperLink:
-    """What the classes of gripper_types work on; waits for the gripper as startup.wait_for_part does."""
+    """The link that the classes of gripper_types use; waits for the gripper as startup.wait_for_part does."""
 
     def __init__(self, side):
         self.name = "%s_gripper" % side
@@ -67,7 +67,7 @@ class GripperLink:
     def command(self, command, block=False, test=None, timeout_s=0.0, args=None, delay_s=0.0):
         """Send a command. Returns True if not `block`; otherwise whether `test()` came true in `timeout_s`.
 
-        Sent again at 100 Hz until the gripper acknowledges it; only then, and `delay_s` later, `test` counts.
+        Repeats it at 100 Hz until the gripper acknowledges it, and calls `test` only from `delay_s` later.
         """
         self._sequence = self._sequence % SEQUENCE_END + 1
         message = EndEffectorCommand(
@@ -113,7 +113,7 @@ class GripperLink:
             end.unregister()
 
     def _acknowledges(self, message):
-        # A robot that does not count commands says 0.
+        # A robot that does not count commands reports 0.
         return (self.state.command_sender == message.sender
                 and self.state.command_sequence in (message.sequence, 0))
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What each kind of gripper can do, one class per kind. Free of ROS.
+"""The commands of each kind of gripper, one class per kind. Free of ROS.
 
-A kind has only the methods that it is capable of; the public Gripper says so when another one is asked for. Each works
-on a `link` with `command(command, block, test, timeout_s, args)` → bool, `state` (the last EndEffectorState), `details`
-(its JSON object), `parameters` (the configured values), `configure()`, `sleep(duration_s)` and `warn(text)`.
-Flags of the state are 0, 1, or 2 for unknown: only 1 counts as true.
+A kind has only the methods that it supports; the public Gripper logs the use of another one. Each works on a `link`
+with `command(command, block, test, timeout_s, args)` → bool, `state` (the last EndEffectorState), `details` (its JSON
+object), `parameters` (the configured values), `configure()`, `sleep(duration_s)` and `warn(text)`. Flags of the state
+are 0, 1, or 2 for unknown: only 1 counts as true.
 """
 from datetime import datetime
 
@@ -12,7 +12,7 @@ from baxter_model import CUSTOM, ELECTRIC, SUCTION
 
 CLOSED, OPEN = 0.0, 100.0
 DATE_FORMAT = "%Y/%m/%d %H:%M:%S"
-# After a reboot the hand answers before it takes commands [s].
+# After a reboot, the gripper publishes its state this long before it takes commands [s].
 REBOOT_PAUSE_S = 1.0
 
 
@@ -22,7 +22,7 @@ def clip_percent(value):
 
 
 class CustomGripper:
-    """A tool that the robot knows nothing about: it has neither motor nor parameters."""
+    """A tool that is unknown to the robot, without motor and parameters."""
 
     name, defaults = CUSTOM.name, CUSTOM.parameters
 
@@ -70,7 +70,7 @@ class ElectricGripper:
             self._link.warn("it is not calibrated, so it does not move: call calibrate() first")
             return False
         position = clip_percent(position)
-        # The dead zone of this command, whatever is configured while it runs.
+        # The dead zone at the start of this command, even if it is changed meanwhile.
         dead_zone = self._link.parameters["dead_zone"]
         return self._link.command(
             "go", block,

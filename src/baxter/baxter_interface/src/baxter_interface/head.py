@@ -49,8 +49,8 @@ class Head:
         """Turn the head and wait until it is within HEAD_PAN_ANGLE_TOLERANCE of `angle` [rad], -pi/2 to pi/2.
 
         Parameters:
-            speed: share of full speed, 0.0 to 1.0; with `scale_speed` in percent. Out of range it is logged and sent.
-            timeout: longest time for it [s, ROS time]; 0 sends the command once and does not wait.
+            speed: share of full speed, 0.0 to 1.0; with `scale_speed` in percent. A value out of range is logged and
+            sent. timeout: longest time for it [s, ROS time]; 0 sends the command once and does not wait.
         Raises OSError with errno ETIMEDOUT; ValueError for a number that is not finite.
         """
         angle = require_number(angle, "the head's angle [rad]")
@@ -67,7 +67,7 @@ class Head:
                                  "while the robot is enabled" % (angle, timeout))
 
     def command_nod(self, timeout=5.0):
-        """Nod once and wait for the end of it; `timeout` [s, ROS time] is for its start and again for its end.
+        """Nod once and wait for its end; `timeout` [s, ROS time] applies to its start, and again to its end.
 
         With `timeout` 0 the command is sent once and not waited for. Raises OSError with errno ETIMEDOUT.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What digital and analogue channels have in common: finding one, and setting it until it reports what was set."""
+"""Base of digital and analogue channels: find a channel, and set it until it reports the value."""
 import errno
 
 import rospy
@@ -12,9 +12,9 @@ from . import startup
 class IOChannel:
     """A channel of the robot by its name.
 
-    A subclass says what it is (`KIND` in the topics' names, `ADJECTIVE` in errors), its messages, and how to read a
-    value out of a state, and may do something `_on_change`.
-    Raises OSError with errno ETIMEDOUT if the channel does not report, rospy.ROSInitException before rospy.init_node.
+    A subclass defines its name (`KIND` in the topics' names, `ADJECTIVE` in errors), its messages, and how to read a
+    value from a state; it may override `_on_change`. Raises OSError with errno ETIMEDOUT if the channel does not
+    report, rospy.ROSInitException before rospy.init_node.
     """
 
     KIND = ADJECTIVE = STATE = COMMAND = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a limb accepts: names and numbers, refused with a text that lists the right ones. Free of ROS."""
+"""Checks of names and numbers for a limb; errors list the valid ones. Free of ROS."""
 import math
 from collections.abc import Mapping
 
@@ -7,9 +7,9 @@ from baxter_model import SIDES, joint_names
 
 
 class UnknownNameError(ValueError, KeyError):
-    """A name that the robot does not have.
+    """The robot has no such name.
 
-    Also a KeyError: that is what a wrong name used to be in the SDK, and programs catch it.
+    Also a KeyError, which the original SDK raised and programs catch.
     """
 
     # KeyError would print the text in quotes.
@@ -36,7 +36,7 @@ def require_joint(name, known):
 
 
 def require_number(value, what):
-    """Return `value` as a finite float. Raises ValueError that says `what` it was meant to be."""
+    """Return `value` as a finite float. Raises ValueError, which names it `what`."""
     try:
         number = float(value)
     except (TypeError, ValueError):
@@ -63,7 +63,7 @@ def require_joint_values(values, known, unit):
 
 
 def require_count(value, largest, what):
-    """Return `value` as an int from 0 to `largest`. Raises ValueError that says `what` it was meant to be."""
+    """Return `value` as an int from 0 to `largest`. Raises ValueError, which names it `what`."""
     number = require_number(value, what)
     if number != int(number) or not 0 <= number <= largest:
         raise ValueError("%s must be a whole number from 0 to %d, got %r" % (what, largest, value))

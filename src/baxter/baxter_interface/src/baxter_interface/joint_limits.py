@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far and how fast the robot's joints can go, from its own description."""
+"""Position and velocity limits of the robot's joints, from its description."""
 import math
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ import urdf_model
 
 
 class JointLimit(NamedTuple):
-    """``lower``, ``upper`` [rad] and ``velocity`` [rad/s]; infinite where the description says nothing."""
+    """``lower``, ``upper`` [rad] and ``velocity`` [rad/s]; infinite if the description has none."""
 
     lower: float = -math.inf
     upper: float = math.inf
@@ -19,7 +19,7 @@ class JointLimit(NamedTuple):
 def read_joint_limits(names):
     """{joint name: JointLimit} for `names`, from the parameter robot_description.
 
-    Without a description, or with one that cannot be read, no joint has limits; one line of log says so.
+    Without a readable description, no joint has limits, and one line is logged.
     """
     try:
         joints = urdf_model.parse_urdf(rospy.get_param("robot_description"), source="robot_description").joints

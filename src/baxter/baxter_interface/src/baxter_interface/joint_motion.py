@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A smooth move of some joints to a target, and the check of their arrival. Free of ROS.
 
-Why not send the target and let the robot's own limits shape the move? Because programs expect a gentle one, and a
-step makes every joint leave at full speed and stop hard. Why not low-pass the command? Because a filter never quite
+Why not send the target and let the robot's own limits shape the move? Because programs expect a gentle move, and after
+a step every joint starts at full speed and stops hard. Why not low-pass the command? Because a filter never quite
 arrives, starts with a jump of speed, and has a time constant for one loop rate only. A minimum-jerk curve starts and
 ends at rest, is the same at any loop rate, ends exactly on the target at a known time, and carries all joints along a
 straight line in joint space.
@@ -23,13 +23,13 @@ PEAK_ACCELERATION_RAD_S2 = 2.0
 _PEAK_SLOPE = 15.0 / 8.0
 _PEAK_CURVATURE = 10.0 / math.sqrt(3.0)
 
-# An arm inside the tolerance may still be moving. It gets this long to come to rest [s]: a program that next
+# An arm inside the tolerance may still be moving. It gets this long to come to rest [s], so that a program that then
 # reads the angles, or freezes them with exit_control_mode, gets those of the target ...
 SETTLE_TIME_S = 0.5
-# ... where this counts as rest [rad/s].
+# ... below this speed it counts as resting [rad/s].
 SETTLED_SPEED_RAD_S = 0.005
-# A robot that says it is disabled must keep saying so for this long [s]: news of an enable() that has just succeeded
-# may reach another subscriber first.
+# A robot counts as disabled after it has reported so for this long [s]: another subscriber may get the state after a
+# successful enable() first.
 DISABLED_GRACE_S = 0.25
 
 
@@ -60,9 +60,9 @@ def _duration_s(name, distance_rad):
 
 @dataclass(frozen=True)
 class Step:
-    """What to do now: command these angles [rad] (None: command nothing), and how the move ended, if it did.
+    """The next action: command these angles [rad] (None: command nothing), and how the move ended, if it did.
 
-    halt: stop the joints wherever they are by now; the angles at hand may be of another time.
+    halt: stop the joints at their present position; the known angles may be outdated.
     """
 
     command: dict | None
@@ -80,7 +80,7 @@ class Move:
 
     Parameters: `start` and `target` as dicts of joint name to rad; `timeout_s`, None for no limit; `threshold_rad`,
     the error below which a joint has arrived. With a threshold above the SDK's tolerance the move ends as soon as it
-    is met, for programs that only pass by; otherwise the whole curve is driven and the arm comes to rest first.
+    is met, for programs that only pass through; otherwise the whole curve is driven and the arm comes to rest first.
     """
 
     def __init__(self, start, target, timeout_s, threshold_rad=JOINT_ANGLE_TOLERANCE):
@@ -96,13 +96,13 @@ class Move:
         """Decide at `elapsed_s` after the start.
 
         Parameters: measured `angles` [rad] and `speeds` [rad/s] by joint name (more joints than the target's do no
-        harm); `enabled` as the robot says it, None if it does not; `aborted` by the caller's own test; `interrupted`:
-        what has happened to the robot that ends every motion.
+        harm); `enabled` as the robot reports it, None if it does not; `aborted` by the caller's own test;
+        `interrupted`: what has happened to the robot that ends every motion.
         """
         here = {name: angles[name] for name in self._target}
         if interrupted:
             return Step(None, failure="%s; %s" % (interrupted, self._worst(here)), halt=True)
-        # A disabled robot ignores commands: wherever it is, it does not hold the target.
+        # A disabled robot ignores commands: it does not hold the target, even if it is there.
         powered = enabled is None or enabled
         if powered and self._is_there(elapsed_s, here, speeds):
             return Step(dict(self._target), arrived=True)
@@ -115,7 +115,7 @@ class Move:
             text = "not there after %.1f s: %s" % (self._timeout_s, self._worst(here))
             if elapsed_s >= self._path.duration_s:
                 return Step(dict(self._target), failure=text)
-            # Too short a time for the way: the arm stops where it is, as nobody drives the curve on.
+            # The time was too short: the arm stops where it is, since nobody commands the rest of the curve.
             return Step(here, failure="%s. A gentle move takes %.1f s" % (text, self._path.duration_s))
         return Step(self._path.angles(elapsed_s))
 

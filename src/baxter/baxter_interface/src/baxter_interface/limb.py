@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One arm: what it reports, and commands to it."""
+"""One arm: its state, and commands to it."""
 import collections
 import copy
 import threading
@@ -27,14 +27,14 @@ IK_TIMEOUT_S = 5.0
 
 
 class NoIKSolution(ValueError):
-    """No joint angles put the end-point where it was asked to be."""
+    """No joint angles put the end-point at the requested pose."""
 
 
 class Limb:
     """One of the two arms, "left" or "right".
 
     Waits up to 30 s of wall time for a robot that is still starting. Angles are in rad, speeds in rad/s, torques in Nm,
-    end-point poses in the frame `base`. What the methods return is the caller's own copy.
+    end-point poses in the frame `base`. The methods return copies.
     Raises UnknownNameError (a ValueError and a KeyError) for another name, OSError with errno ETIMEDOUT if the robot
     does not come up, rospy.ROSInitException before rospy.init_node.
     """
@@ -122,7 +122,8 @@ class Limb:
         return {"force": self._point(wrench.force), "torque": self._point(wrench.torque)}
 
     def set_command_timeout(self, timeout):
-        """Let the robot leave velocity, torque and raw mode when no command came for `timeout` [s] (0.2 at start)."""
+        """Set the time without commands after which the robot leaves velocity, torque and raw mode [s] (0.2 at
+        start)."""
         self._timeout_publisher.publish(Float64(data=require_number(timeout, "the command time-out [s]")))
 
     def exit_control_mode(self, timeout=0.2):
@@ -139,28 +140,30 @@ class Limb:
 
         Parameters:
             positions: dict of joint name to rad; joints left out keep their set-points.
-            raw: pass by the robot's own smoothing and collision avoidance; the commands must be smooth then.
+            raw: bypass the robot's own smoothing and collision avoidance; the commands must be smooth then.
         Raises UnknownNameError, ValueError for a number that is not finite, TypeError for something that is no dict.
         """
         mode = JointCommand.RAW_POSITION_MODE if raw else JointCommand.POSITION_MODE
         self._command(mode, positions, "rad")
 
     def set_joint_velocities(self, velocities):
-        """Command joint speeds, a dict of name to rad/s; to be repeated within the command time-out. Raises so too."""
+        """Command joint speeds, a dict of name to rad/s; to be repeated within the command time-out. Raises the same
+        errors."""
         self._command(JointCommand.VELOCITY_MODE, velocities, "rad/s")
 
     def set_joint_torques(self, torques):
-        """Command joint torques on top of gravity compensation, a dict of name to Nm; to be repeated. Raises so too."""
+        """Command joint torques on top of gravity compensation, a dict of name to Nm; to be repeated. Raises the same
+        errors."""
         self._command(JointCommand.TORQUE_MODE, torques, "Nm")
 
     def halt(self):
-        """Stop the joints where they are, however fast they move, and hold them there."""
-        # Expires into position mode, without the angles being known.
+        """Stop the joints at any speed, and hold them there."""
+        # A zero velocity command expires into position mode; it needs no known angles.
         self.set_joint_velocities(dict.fromkeys(self._joint_names, 0.0))
 
     @property
     def resets(self):
-        """How often the robot was put elsewhere so far, which only a simulation does; what moves it ends then."""
+        """Number of resets of the simulation so far; a reset ends all moves."""
         return self._resets.count
 
     def move_to_neutral(self, timeout=15.0):
@@ -177,8 +180,8 @@ class Limb:
             test: called at every step; when it returns True the arm stops.
         Returns True on arrival: the exact target is commanded last and held. Returns False on time-out, when `test`
         stopped it, when the robot is not enabled, when its simulation was reset, and when no joints were given; one
-        line of log says which, with the joint that is farthest off.
-        Raises as set_joint_positions; rospy.ROSInterruptException when the node is shut down meanwhile.
+        logged line has the reason and the joint with the largest error. Raises as set_joint_positions;
+        rospy.ROSInterruptException when the node is shut down meanwhile.
         """
         target = require_joint_values(positions, self._joint_names, "rad")
         if not target:
@@ -211,11 +214,11 @@ class Limb:
         Parameters:
             pose: what endpoint_pose() returns, geometry_msgs Pose or PoseStamped, or (position, orientation) as
                 sequences x y z [m] and x y z w; in the frame `base` unless stamped with another.
-            seed: dict of joint name to rad near which to look first, for some or all joints (default: where it is).
-            timeout: longest wait for the service, and again for its answer [s, wall].
+            seed: dict of joint name to rad as the start of the search, for some or all joints (default: the present
+            angles). timeout: longest wait for the service, and again for its answer [s, wall].
         Returns a dict of joint name to rad, as move_to_joint_positions takes it.
         Raises NoIKSolution (a ValueError); OSError with errno ETIMEDOUT if there is no service; ValueError, KeyError or
-        TypeError for a pose or a seed that is none.
+        TypeError for an invalid pose or seed.
         """
         request = SolvePositionIKRequest(pose_stamp=[_pose_stamped(pose)])
         if seed is not None:
@@ -254,7 +257,7 @@ class Limb:
         return self.Point(vector.x, vector.y, vector.z)
 
     def _enabled(self):
-        """Tell whether the robot says it is enabled; None if it says nothing."""
+        """Whether the robot reports that it is enabled; None without a report."""
         with self._lock:
             state = self._robot_state
         return None if state is None else state.enabled and not state.stopped
@@ -264,7 +267,7 @@ class Limb:
             return all(name in self._angles for name in self._joint_names)
 
     def _on_joint_states(self, message):
-        # Others may publish here too (a gripper's driver, a tool with positions only): take what concerns this arm.
+        # Others may publish here too (a gripper's driver, a tool with positions only): take only this arm's joints.
         index = {name: i for i, name in enumerate(message.name)}
         indices = {name: index[name] for name in self._joint_names if name in index}
         with self._lock:

@@ -5,10 +5,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-# A start that is quicker than this passes without a word [s].
+# A wait that is shorter than this prints nothing [s].
 FIRST_NOTICE_S = 1.0
 POLL_S = 0.05
-# How often one looks whether what is waited for is on its way [s].
+# Period of the checks whether the awaited thing is starting [s].
 LOOK_EVERY_S = 1.0
 
 
@@ -17,9 +17,8 @@ class Condition:
     """Something to wait for.
 
     Attributes:
-        what: names it, in "waiting for <what>".
-        is_met: tells whether it is there.
-        explain: says what was found instead and what would be right; called once, after the wait was in vain.
+        what: its name, in "waiting for <what>". is_met: returns whether it is there. explain: returns what was found
+        instead and what would be right; called once, after the wait has failed.
     """
 
     what: str
@@ -33,10 +32,9 @@ def wait_in_order(conditions, timeout_s, line=None, is_coming=lambda: False, is_
 
     Parameters:
         line: a lab_environment.waiting_line.WaitingLine, which shows what is waited for; None: nothing is shown.
-        is_coming: tells whether what is waited for is visibly on its way, asked once a second; as long as it is, the
-            time limit does not run. It may raise an OSError, which ends the wait.
-        is_shutdown: ends the wait.
-        now, sleep: the clock [s], wall time by default because nothing else can be relied on while a robot starts.
+        is_coming: returns whether the awaited thing is starting, called once a second; while it is true, the time limit
+        does not run. It may raise an OSError, which ends the wait. is_shutdown: ends the wait. now, sleep: the clock
+        [s], wall time by default because no other time is reliable while a robot starts.
     Raises OSError with errno ETIMEDOUT, or ESHUTDOWN.
     """
     begin_s = now()

@@ -10,15 +10,16 @@ import rospy
 
 from . import startup
 
-# After this much silence, see whether the topic's publisher is still there, and then as often as this [s, wall].
+# After this much silence, check whether the topic's publisher is still there, and repeat with this period [s, wall].
 SILENT_AFTER_S = 1.0
 _NO_ANSWER = (OSError, xmlrpc.client.Error, rosgraph.MasterException)
 
 
 class Presence:
-    """Watches over the publishers of `topic` (resolved name); `silence_s()` says how long none was heard [s, wall].
+    """Watches the publishers of `topic` (resolved name); `silence_s()` returns the time since the last message [s,
+    wall].
 
-    A simulation that is paused is silent, too, but not gone: its node answers. May be asked often, by any thread.
+    A paused simulation is silent too, but not gone: its node answers. Cheap, callable from any thread.
     """
 
     def __init__(self, topic, silence_s):
@@ -29,7 +30,7 @@ class Presence:
         self._gone = False
 
     def is_gone(self):
-        """Whether nobody is there any more who publishes the topic."""
+        """Whether the topic has no live publisher any more."""
         if self._silence_s() < SILENT_AFTER_S:
             self._gone = False
             return False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the robot's command-line programs share: start and end, an enabled robot, and a loop that notices its loss."""
+"""Shared by the robot's command-line programs: start and end, an enabled robot, and a loop that detects its loss."""
 import errno
 import os
 import signal
@@ -19,34 +19,34 @@ from .settings import CHECK_VERSION
 
 # A robot that has reported nothing for this long is lost [s, wall]; it reports 100 times a second.
 LOST_AFTER_S = 5.0
-# Longest time for disabling the robot at the end [s, wall]; one that is there takes a few hundredths.
+# Longest time for disabling the robot at the end [s, wall]; a present one takes a few hundredths.
 LAST_WORD_S = 5.0
 
 
 class ProgramFailed(OSError):
-    """A program's aim was not reached; the text says which and why."""
+    """A program did not reach its aim; the text says which and why."""
 
     def __init__(self, text, number=errno.EIO):
         super().__init__(number, text)
 
 
 class RobotLost(ProgramFailed):
-    """The robot was disabled, stopped or restarted, or has fallen silent, while a program worked with it."""
+    """The robot was disabled, stopped or restarted, or has stopped publishing, while a program worked with it."""
 
 
 def run(node_name, body, **options):
     """Run a program: wait for the robot, become the node `node_name`, call `body()`; return the exit status.
 
     `options` go to rospy.init_node. The status is 0 after success, 1 after an OSError, a ValueError or a ROSException,
-    with one line on stderr, or when ROS was shut down under it, and 130 after Ctrl-C. `body` meets Ctrl-C and
-    SIGTERM as KeyboardInterrupt, with ROS still running, so that its `finally` and `with` can leave the robot in order.
+    with one line on stderr, or when ROS was shut down meanwhile, and 130 after Ctrl-C. `body` gets Ctrl-C and SIGTERM
+    as KeyboardInterrupt while ROS still runs, so that its `finally` and `with` can bring the robot to a safe state.
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         startup.init_node(node_name, disable_signals=True, **options)
         body()
-        # Nobody but others can have done that, and their log line says why: its work was cut short.
+        # Another process has shut ROS down, and logged why: this program's work is incomplete.
         return 1 if rospy.is_shutdown() else 0
     except KeyboardInterrupt:
         return 130
@@ -64,10 +64,10 @@ def expect(done, text):
 
 
 class EnabledRobot:
-    """The robot, enabled as long as a `with` lasts; disabled at its end if it was so before.
+    """Keeps the robot enabled inside a `with`; disables it at the end if it was disabled before.
 
-    Raises as RobotEnable and its enable(), and RobotLost in place of an OSError in the `with` that came after the robot
-    was disabled by others.
+    Raises as RobotEnable and its enable(). An OSError inside the `with` becomes RobotLost if the robot was disabled by
+    others before.
     """
 
     def __init__(self, versioned=CHECK_VERSION):
@@ -83,7 +83,7 @@ class EnabledRobot:
         if rospy.is_shutdown() or isinstance(error, RobotLost):
             return
         if isinstance(error, OSError) and not self.is_enabled():
-            raise self._loss() from error  # whatever was not reached, that is why
+            raise self._loss() from error  # the loss is the reason of the failure
         if self._was_enabled:
             return
         failures = []
@@ -94,7 +94,7 @@ class EnabledRobot:
             except OSError as failure:
                 failures.append(failure)
 
-        # Its time-out is one of ROS time, which may have ended along with a simulation.
+        # Its time-out is in ROS time, which may have stopped with a simulation.
         worker = threading.Thread(target=disable, daemon=True)
         worker.start()
         worker.join(LAST_WORD_S)
@@ -109,9 +109,9 @@ class EnabledRobot:
         return state.enabled and not state.stopped
 
     def beats(self, rate_hz):
-        """Yield `rate_hz` times a second of ROS time until ROS shuts down, as long as the robot is enabled and there.
+        """Yield `rate_hz` times a second of ROS time until ROS shuts down, while the robot is present and enabled.
 
-        A paused or absent simulation is waited for, aloud. Raises RobotLost.
+        Waits for a paused or absent simulation, with log lines. Raises RobotLost.
         """
         clock = RosClock()
         ticker = Ticker(clock, rate_hz)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Count resets of the simulation, which put the robot elsewhere: commands from before one no longer count."""
+"""Count resets of the simulation, which move the robot: commands from before a reset are invalid."""
 import rospy
 from std_msgs.msg import UInt32
 
@@ -7,7 +7,7 @@ PUT_ELSEWHERE = "the robot was put elsewhere: the simulation was reset, or its j
 
 
 class Resets:
-    """Counts how often a simulated robot was put elsewhere; a physical one has no such topic, and counts 0.
+    """Counts the resets of a simulated robot; a physical one has no such topic, and counts 0.
 
     on_reset: function that is called each time, in a thread of rospy's.
     """
@@ -20,11 +20,11 @@ class Resets:
         self._subscriber = rospy.Subscriber("robot/sim/resets", UInt32, self._on_number, queue_size=10)
 
     def unregister(self):
-        """Listen no more."""
+        """Unsubscribe."""
         self._subscriber.unregister()
 
     def _on_number(self, message):
-        # Latched: the first one only says where counting begins, and the same one comes again with a new connection.
+        # Latched: the first message only gives the start of the count, and a new connection repeats the last one.
         before, self._last = self._last, message.data
         if before not in (None, message.data):
             self.count += 1

@@ -15,7 +15,7 @@ from baxter_model.readiness import RESET
 from . import settings, startup
 from .version_check import VersionMismatch, require_compatible
 
-# How long the robot may take over each request that it hears [s, ROS time].
+# Time limit for the robot to carry out each request [s, ROS time].
 ENABLE_TIMEOUT_S = 2.0
 DISABLE_TIMEOUT_S = 5.0
 RESET_TIMEOUT_S = 3.0
@@ -55,7 +55,7 @@ class RobotEnable:
             return copy.copy(self._state)
 
     def silence_s(self):
-        """Return how long ago the robot reported its state [s, wall]; one that is there does so all the time."""
+        """Return the time since the robot's last state [s, wall]; a present robot publishes it all the time."""
         with self._lock:
             return time.monotonic() - self._heard_at_s
 
@@ -121,8 +121,8 @@ class RobotEnable:
         # latch=False: a latched enable would reach the next robot that comes up.
         publisher = rospy.Publisher(topic, type(message), queue_size=10)
         try:
-            # On a busy machine the robot takes a while to connect. One listener is enough: others may be dead, and must
-            # not delay a stop.
+            # On a busy machine the robot takes a while to connect. One subscriber is enough: others may be dead, and
+            # must not delay a stop.
             startup.wait_for_subscribers(publisher, startup.PART_TIMEOUT_S, enough=1)
             wait_for(test=lambda: is_done(self.state()), timeout=timeout_s, rate=100,
                      body=lambda: publisher.publish(message))

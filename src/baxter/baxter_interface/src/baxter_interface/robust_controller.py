@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Run a procedure of the robot's own, such as taring or calibrating an arm, and wait for its end."""
+"""Run a procedure of the robot, such as taring or calibrating an arm, and wait for its end."""
 import rospy
 from baxter_core_msgs.msg import RobustControllerStatus
 
@@ -50,7 +50,7 @@ class RobustController:
         status = self._subscriber.resolved_name
         startup.wait_for_start([startup.topic_published(status)], startup.PART_TIMEOUT_S)
         startup.wait_for_subscribers(self._publisher)
-        # What it said before it was told to run belongs to an earlier run.
+        # Reports from before the request belong to an earlier run.
         self._report = None
         clock = RosClock()
         watch, ticker = Stopwatch(clock.now()), Ticker(clock, RATE_HZ)
@@ -65,7 +65,7 @@ class RobustController:
                     self._publisher.publish(self._messages[request])
                 ticker.sleep()
         except BaseException:
-            # Ctrl-C, say: the arm should not go on by itself. It would end anyway without further requests.
+            # For example Ctrl-C: the arm should stop at once, although it would end anyway without further requests.
             if not rospy.is_shutdown():
                 self._publisher.publish(self._messages[False])
             raise

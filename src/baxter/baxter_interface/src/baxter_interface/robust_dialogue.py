@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The dialogue with a procedure that runs on the robot itself, such as taring an arm. Free of ROS.
 
-The procedure runs as long as it is told to, at least once a second, and says when it has begun and how it ended.
+The procedure runs while the request is repeated, at least once a second, and reports when it has begun and how it
+ended.
 """
 import enum
 import errno
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 
 # Requests to the procedure are repeated this often [s].
 REQUEST_EVERY_S = 0.5
-# How long it may take to begin, and to end after it was told to [s].
+# Time limits for its start, and for its end after the request to stop [s].
 ANSWER_TIMEOUT_S = 10.0
 
 
@@ -30,7 +31,7 @@ class Completion(enum.IntEnum):
 
 @dataclass(frozen=True)
 class Report:
-    """What the procedure said last."""
+    """The procedure's last report."""
 
     is_enabled: bool
     complete: int = Completion.NOT_COMPLETE
@@ -42,7 +43,7 @@ class Dialogue:
 
     Attributes:
         state: a State; IDLE again when the run is over.
-        failure: (errno, text) of what went wrong, None as long as nothing has.
+        failure: (errno, text) of the failure, None without one.
     """
 
     def __init__(self, timeout_s):
@@ -67,7 +68,7 @@ class Dialogue:
         return self.state is not State.STOPPING
 
     def abort(self, elapsed_s):
-        """Break the run off: the procedure is told to stop."""
+        """Abort the run: request the procedure to stop."""
         self._end(elapsed_s, (errno.ECONNABORTED, "broken off"))
 
     def _start(self, elapsed_s, report):
@@ -95,7 +96,7 @@ class Dialogue:
 
     def _stop(self, elapsed_s, report):
         if elapsed_s <= self._stopping_since_s:
-            return  # whatever it reports, it is told to stop once
+            return  # send one stop request, whatever it reports
         if report is None or not report.is_enabled:
             self.state = State.IDLE
         elif elapsed_s - self._stopping_since_s >= ANSWER_TIMEOUT_S:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calling a service of the robot with a time limit, and one line of reason when it fails."""
+"""Calls a service of the robot with a time limit; an error has one line with the reason."""
 import errno
 import threading
 
@@ -7,9 +7,9 @@ import rospy
 
 
 class ServiceUnavailable(OSError, rospy.ROSException):
-    """A service that is not there, or does not answer in time.
+    """A service does not exist, or does not answer in time.
 
-    Also a ROSException: that is what waiting for a service in vain used to raise in the SDK.
+    Also a ROSException, which the original SDK raised then.
     """
 
     def __init__(self, text):
@@ -37,7 +37,7 @@ def call_service(name, kind, *arguments, timeout_s=5.0):
     def call():
         try:
             answers.append(rospy.ServiceProxy(name, kind)(*arguments))
-        except Exception as failure:  # handed to the caller below: this is another thread
+        except Exception as failure:  # raised in the caller's thread below
             failures.append(failure)
 
     # rospy's own call has no time limit: a server that was stopped would hold its clients for ever.

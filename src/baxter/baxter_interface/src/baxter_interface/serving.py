@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the action servers' programs share: serve until Ctrl-C, and notice when the ROS master was restarted."""
+"""Shared by the action servers' programs: serve until Ctrl-C, and detect a restart of the ROS master."""
 import time
 
 import rosgraph
@@ -14,7 +14,7 @@ def serve(factories, what):
     """Make the servers, one by each of `factories`, and let them serve until the node ends or is interrupted.
 
     Each server has `clean_shutdown()`, which is called while ROS still runs. `what` names them for the log.
-    Raises what the factories raise, and ProgramFailed when the ROS master was restarted: it knows none of its nodes.
+    Raises the factories' errors, and ProgramFailed when the ROS master was restarted and no longer knows its nodes.
     """
     servers = []
     try:

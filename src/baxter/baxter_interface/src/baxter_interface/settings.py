@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Constants of the SDK that programs import by name."""
 
-# A joint has arrived when it is nearer to its target than half a degree [rad].
+# A joint has arrived when its error is less than half a degree [rad].
 JOINT_ANGLE_TOLERANCE = 0.008726646
-# The same for the head, which is geared more coarsely: eight degrees [rad].
+# The same for the head, which is less accurate: eight degrees [rad].
 HEAD_PAN_ANGLE_TOLERANCE = 0.1396263401
 
 SDK_VERSION = "1.2.0"
-# What programs pass as RobotEnable(versioned=...): compare the robot's software with this SDK.
+# Programs pass it as RobotEnable(versioned=...): compare the robot's software with this SDK.
 CHECK_VERSION = True
 # Robot software that each SDK works with, by its first three numbers.
 VERSIONS_SDK2ROBOT = {"1.2.0": ["1.2.0"]}

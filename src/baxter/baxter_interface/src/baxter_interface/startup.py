@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waiting for a robot that is still starting: its master, topics, parameters and clock; and what to say if they fail.
+"""Waiting for a robot that is still starting: its master, topics, parameters and clock; with error texts.
 
 Everything here waits in wall time, since ROS time may not run yet.
 """
@@ -20,9 +20,9 @@ from rospy_limits.node import limit_ports
 
 from .patience import Condition, wait_in_order
 
-# Longest wait for a robot [s, wall], not counting the time in which a simulator is visibly starting.
+# Longest wait for a robot [s, wall], not counting the time while a simulator is starting.
 STARTUP_TIMEOUT_S = 30.0
-# Longest wait for one part of a robot that is up [s, wall]: a part that it does not have need not cost more.
+# Longest wait for one part of a robot that is up [s, wall]: shorter, because the part may not exist.
 PART_TIMEOUT_S = 5.0
 # Longest wait for one answer over the network [s].
 ANSWER_TIMEOUT_S = 2.0
@@ -31,7 +31,7 @@ ANSWER_TIMEOUT_S = 2.0
 LINE = WaitingLine()
 
 _LAUNCH_HINT = "is the robot or the simulator running (roslaunch baxter_gazebo baxter_world.launch)?"
-# All the ways in which asking the master can fail: not there, not a master, an answer that is an error.
+# All errors of a call to the master: not there, not a master, an error response.
 _MASTER_ERRORS = (OSError, http.client.HTTPException, xmlrpc.client.Error, xml.parsers.expat.ExpatError,
                   rosgraph.MasterException, rospy.ROSException)
 
@@ -39,10 +39,10 @@ _MASTER_ERRORS = (OSError, http.client.HTTPException, xmlrpc.client.Error, xml.p
 def init_node(name, topic="robot/state", **options):
     """Wait for the master and for a publisher of `topic`, then call rospy.init_node(name, **options).
 
-    The order matters when a program starts together with roslaunch: rospy.init_node looks at /use_sim_time once, and
-    roslaunch sets that parameter a moment after the master is up.
-    A simulator that is visibly starting is waited for as long as it is.
-    Raises OSError with errno ETIMEDOUT that says what was found and what would be right; SimulatorDied, an OSError.
+    The order matters when a program starts together with roslaunch: rospy.init_node reads /use_sim_time once, and
+    roslaunch sets that parameter a moment after the master is up. The time limit does not run while a simulator is
+    starting. Raises OSError with errno ETIMEDOUT, which says what was found and what would be right; SimulatorDied, an
+    OSError.
     """
     topic = rospy.resolve_name(topic)
     wait_in_order([master_answers(), topic_published(topic)], STARTUP_TIMEOUT_S, LINE, simulator_is_coming())
@@ -53,8 +53,7 @@ def init_node(name, topic="robot/state", **options):
 def wait_for_start(conditions, timeout_s=None):
     """Wait, as an initialised node, for the master, for `conditions` in their order, and for the clock to run.
 
-    Parameters: `timeout_s` [s, wall], None for STARTUP_TIMEOUT_S; it does not run while a simulator is visibly
-    starting.
+    Parameters: `timeout_s` [s, wall], None for STARTUP_TIMEOUT_S; it does not run while a simulator is starting.
     Raises OSError with errno ETIMEDOUT or ESHUTDOWN; SimulatorDied, an OSError; rospy.ROSInitException before
     rospy.init_node.
     """
@@ -65,9 +64,9 @@ def wait_for_start(conditions, timeout_s=None):
 
 
 def simulator_is_coming():
-    """Make a function that tells whether a simulator is visibly starting at this master.
+    """Return a function that returns whether a simulator is starting at this master.
 
-    It raises SimulatorDied, an OSError, once a simulator that it has seen is gone.
+    The function raises SimulatorDied, an OSError, if a simulator that it has seen is gone.
     """
     watch = StartWatch(rosgraph.get_master_uri(), _caller())
     return lambda: bool(watch.look())
@@ -99,7 +98,7 @@ def master_answers():
 
     def is_met():
         try:
-            # XML-RPC has no time-out of its own, so see first whether anybody listens there.
+            # XML-RPC has no time-out, so first check whether the port accepts connections.
             connect(host, port)
             _master().getPid()
         except _MASTER_ERRORS as error:
@@ -114,7 +113,7 @@ def master_answers():
 
 
 def connect(host, port):
-    """See whether anybody listens at a TCP port; raises OSError if not."""
+    """Check whether a TCP port accepts connections; raises OSError if not."""
     socket.create_connection((host, port), timeout=ANSWER_TIMEOUT_S).close()
 
 
@@ -172,8 +171,8 @@ def follow_simulated_time():
 def wait_for_subscribers(publisher, timeout=1.0, enough=None):
     """Wait until all nodes that the master lists as subscribers of `publisher` have connected to it, if there are any.
 
-    The first message after a publisher was made is lost to subscribers that have not connected yet. Returns after
-    `timeout` [s, wall] in any case: a subscriber on the list may be dead. `enough`: so many will do; None for all.
+    Subscribers that have not connected yet lose the first messages of a new publisher. Returns after
+    `timeout` [s, wall] in any case: a subscriber on the list may be dead. `enough`: this many are enough; None for all.
     """
     try:
         expected = len(_nodes_of(publisher.resolved_name, subscribers=True))
@@ -190,7 +189,7 @@ def wait_for_subscribers(publisher, timeout=1.0, enough=None):
 
 
 def _caller():
-    # Before init_node there is no node name; the master only wants to know who asks.
+    # Before init_node there is no node name; the master only needs some caller id.
     return "/baxter_interface_%d" % os.getpid()
 
 
@@ -211,7 +210,7 @@ def _publishers(topic):
 
 
 def _explain_topic(topic):
-    """Say why no message of `topic` may have come, from what the master knows."""
+    """Explain from the master's data why no message of `topic` came."""
     try:
         published = dict(_master().getSystemState()[0])
     except _MASTER_ERRORS as error:

@@ -7,8 +7,8 @@ import re
 class VersionMismatch(OSError):
     """The robot's software and this SDK do not fit together.
 
-    An OSError, like every refusal of RobotEnable, so that `except OSError` and `error.strerror` work on it. Uncaught it
-    ends a program with exit status 1, which is what a mismatch always did; a library itself ends no process.
+    An OSError, like every refusal of RobotEnable, so that `except OSError` and `error.strerror` work on it. Uncaught,
+    it ends a program with exit status 1, as in the original SDK.
     """
 
     def __init__(self, text):
@@ -18,8 +18,8 @@ class VersionMismatch(OSError):
 def require_compatible(robot_version, sdk_version, robots_by_sdk):
     """Check the text of the robot's software version against a table of those that each SDK works with.
 
-    Only the first three numbers count: "1.2.0", "1.2.0.57" and "1.2.0-rc1" are the same robot software.
-    Raises VersionMismatch, which says what was found and how to put it right.
+    Only the first three numbers count: "1.2.0", "1.2.0.57" and "1.2.0-rc1" are the same robot software. Raises
+    VersionMismatch, which says what was found and how to correct it.
     """
     accepted = robots_by_sdk[sdk_version]
     advice = (

@@ -11,9 +11,9 @@ from baxter_interface.gripper_types import OPEN, clip_percent
 from baxter_model import ELECTRIC, SUCTION
 from baxter_model.readiness import ENABLE
 
-# How many steps fingers that hold something are given to let go of it, before they count as stalled.
+# Number of steps that the fingers get to release an object before they count as stalled.
 STEPS_TO_BEGIN = 4
-# A cup sucks for this long where a goal has no time-out [s].
+# Suction time of a cup for a goal without time-out [s].
 LONG_SUCTION_S = 3600.0
 
 
@@ -85,7 +85,7 @@ class GripperActionServer:
 
 
 def _effort(asked, default):
-    """The force [%] that a goal's max_effort means."""
+    """The force [%] for a goal's max_effort."""
     return default if asked == 0.0 else 100.0 if asked == -1.0 else clip_percent(asked)
 
 

@@ -17,7 +17,7 @@ class HeadActionServer:
     """Turns the head to the goal's `position` [rad].
 
     `max_velocity` is the share of full speed, 0 to 1; 0 and less, or more than 1, mean full speed. `min_duration` is
-    not looked at. Parameters, from the mapping `reconfig_server.config` at each goal: `timeout` [s] (below 0: none) and
+    ignored. Parameters, from the mapping `reconfig_server.config` at each goal: `timeout` [s] (below 0: none) and
     `goal`, the error at which it is reached [rad]. A goal ends once: succeeded, aborted with a text that says why, or
     preempted; when it is not reached the head stops where it is. Waits for the robot, and raises, as Head does.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One arm under the trajectory server: what it is commanded, tick by tick. Free of ROS; time is an argument."""
+"""The commands of the trajectory server to one arm, tick by tick. Free of ROS; time is an argument."""
 import enum
 from typing import NamedTuple
 
@@ -8,17 +8,17 @@ import numpy as np
 from baxter_control.pid import PID
 from joint_trajectory import Follower, GoalTolerances, Tolerances, bounds, merge_tolerances
 
-# How long a stop takes, from the velocity at hand to rest [s].
+# Duration of a stop, from the present velocity to rest [s].
 STOP_DURATION_S = 0.25
-# How far beyond a limit of the robot's description a trajectory may lead, and by how much a joint may lag where it is
-# too fast [rad]. The robot's own tucked pose lies 0.03 rad beyond, and recordings of moves at full speed have steps of
-# one reading, 0.015 to 0.03 rad.
+# Tolerance of a trajectory beyond the position limits of the robot's description, and lag that a too fast joint may
+# have [rad]. The robot's own tucked pose lies 0.03 rad beyond, and recordings of moves at full speed have steps of one
+# reading, 0.015 to 0.03 rad.
 LIMIT_SLACK_RAD = 0.05
 _AS_SETTINGS = GoalTolerances()
 
 
 class Mode(enum.Enum):
-    """How an arm is commanded; the values are those of the server's option."""
+    """The command mode of an arm; the values are those of the server's option."""
 
     POSITION = "position"
     VELOCITY = "velocity"
@@ -28,9 +28,9 @@ class Mode(enum.Enum):
 class GoalDefaults(NamedTuple):
     """Tolerances and gains for a goal that gives none of its own; n joints.
 
-    ``path``, ``goal`` (n,): position errors allowed on the way and at the end [rad]; ``stopped_velocity`` [rad/s];
-    0 or less: any. ``goal_time_s``: how much later the end may be reached. ``gains`` (3, n): kp, ki, kd of velocity
-    mode, velocity [rad/s] per position error [rad].
+    ``path``, ``goal`` (n,): position errors allowed during the motion and at the end [rad]; ``stopped_velocity``
+    [rad/s]; 0 or less: any. ``goal_time_s``: allowed delay of the end. ``gains`` (3, n): kp, ki, kd of velocity mode,
+    velocity [rad/s] per position error [rad].
     """
 
     path: np.ndarray
@@ -55,8 +55,7 @@ class ArmMotion:
     Attributes
     ----------
     joint_names : list of n names
-    goal : object or None
-        What :meth:`begin` was given, until the goal has ended.
+    goal : object or None The argument of :meth:`begin`, until the goal has ended.
     engaged : bool
         Whether the joints are being commanded.
     begin_s : float
@@ -83,8 +82,8 @@ class ArmMotion:
 
         ``position`` (n,): measured [rad]; ``goal``: any object. ``wanted``: the goal's own
         :class:`joint_trajectory.GoalTolerances`, which override ``settings`` (:class:`GoalDefaults`). Joints that the
-        command does not name are left alone, or go on with what they were told before. The goal before is forgotten:
-        say so to its owner.
+        command does not name are not commanded, or continue with earlier commands. The previous goal is forgotten: the
+        caller must tell its owner.
 
         Returns the :class:`joint_trajectory.Replacement`. Raises :class:`joint_trajectory.TrajectoryError`; nothing
         has changed then.
@@ -94,7 +93,7 @@ class ArmMotion:
                               bounds(count, position=settings.goal, velocity=settings.stopped_velocity),
                               settings.goal_time_s)
         tolerances = merge_tolerances(defaults, self.joint_names, *wanted)
-        # The end is commanded in the tick before it; an arm that keeps up is still moving then.
+        # The end is commanded one tick before; the arm is still moving then.
         tolerances = tolerances._replace(goal_time_s=tolerances.goal_time_s + 2.0 * self._period_s)
         if not self.engaged:
             self._follower.start(now_s, position, np.zeros(count))
@@ -111,7 +110,7 @@ class ArmMotion:
     def tick(self, now_s, position, velocity):
         """Look at the measured ``position``, ``velocity`` (n,); returns the :class:`Verdict` if the goal ends now.
 
-        A goal that fails on the way stops the joints where they are; one that fails at its end holds the end.
+        A goal that fails during the motion stops the joints where they are; one that fails at its end holds the end.
         """
         self._now_s = now_s
         verdict = self._follower.update(now_s, position, velocity)
@@ -121,14 +120,15 @@ class ArmMotion:
             self._follower.release()
             if on_the_way:
                 self._follower.start(now_s, position, velocity)
-        # A command acts until the next one, so it says where to be then.
+        # A command acts until the next one, so it is the position at that time.
         self._output[:] = self._follower.look_ahead(now_s + self._period_s)
         if self._mode is Mode.VELOCITY:
             self._correct()
         return verdict
 
     def command(self):
-        """What to command now: {joint name: rad, or rad/s in velocity mode} of the joints that goals have named."""
+        """The command of this tick: {joint name: rad, or rad/s in velocity mode} of the joints that goals have
+        named."""
         row = 1 if self._mode is Mode.VELOCITY else 0
         return {name: float(value) for name, value, named
                 in zip(self.joint_names, self._output[row], self._named, strict=True) if named}
@@ -149,7 +149,7 @@ class ArmMotion:
         return self._follower.error
 
     def farthest(self, position):
-        """The joint that is farthest from its end of the trajectory: (name, error [rad])."""
+        """The joint with the largest error to the end of the trajectory: (name, error [rad])."""
         end = self._follower.trajectory.sample(self._follower.trajectory.end_time)[0]
         error = np.where(self._named, end - position, 0.0)
         joint = int(np.argmax(np.abs(error)))

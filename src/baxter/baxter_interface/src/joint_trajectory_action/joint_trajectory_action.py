@@ -37,9 +37,9 @@ from joint_trajectory import (
 from .arm_motion import LIMIT_SLACK_RAD, ArmMotion, GoalDefaults, Mode
 from .robot_watch import RobotWatch
 
-# How often an idle server looks whether the robot is still there [s, wall].
+# Period of an idle server's checks that the robot is still there [s, wall].
 _IDLE_S = 0.5
-# What taking up a goal costs for each of its points [s]; a long one begins so much later, and not with a jump.
+# Time to process each point of a goal [s]; a long goal starts this much later, and so without a jump.
 _POINT_S = 1e-5
 # Longest wait for the loop to end [s, wall].
 _END_TIMEOUT_S = 2.0
@@ -50,14 +50,14 @@ class JointTrajectoryActionServer:
 
     Parameters:
         limb: "left" or "right".
-        reconfig_server: what has a mapping `config` of the parameters, such as a dynamic_reconfigure server; read at
+        reconfig_server: object with a mapping `config` of the parameters, such as a dynamic_reconfigure server; read at
             each goal.
         rate: commands per second [Hz].
         mode: "position_w_id" (raw positions, with velocities and accelerations beside them), "position", "velocity".
-    Each goal ends once: succeeded, aborted with an error_code and an error_string, or preempted. One that cannot be
-    carried out is aborted before anything moves, and disturbs no other. After a goal its end is held, until the next
-    one, or until the robot is disabled, the cuff is squeezed, another node commands the arm, or clean_shutdown().
-    Waits up to 30 s of wall time for the robot, and raises, as Limb does.
+    Each goal ends once: succeeded, aborted with an error_code and an error_string, or preempted. An invalid one is
+    aborted before anything moves, and does not disturb others. After a goal its end is held, until the next one, or
+    until the robot is disabled, the cuff is squeezed, another node commands the arm, or clean_shutdown(). Waits up to
+    30 s of wall time for the robot, and raises, as Limb does.
     """
 
     def __init__(self, limb, reconfig_server, rate=100.0, mode="position_w_id"):
@@ -70,7 +70,7 @@ class JointTrajectoryActionServer:
         self._requests = collections.deque()
         self._wake = threading.Condition()
         self._ending = False
-        # A request is heard also while a simulation is paused.
+        # Requests arrive even while a simulation is paused.
         self._clock = RosClock(gives_up=lambda: (
             self._ending or self._requests or self._watch.was_interrupted() or self._watch.is_gone()))
         self._ticker = Ticker(self._clock, rate)
@@ -105,7 +105,7 @@ class JointTrajectoryActionServer:
     # -- rospy's threads --------------------------------------------------------------------------------------------
 
     def _on_goal(self, handle):
-        """Read a goal; what is wrong in itself is said at once."""
+        """Read a goal; refuse it at once if it is invalid in itself."""
         trajectory = handle.get_goal().trajectory
         try:
             if not trajectory.points:
@@ -136,7 +136,7 @@ class JointTrajectoryActionServer:
         try:
             self._run()
         except Exception:
-            # Publishing fails once ROS is down. Anything else is a fault, and a server without its loop serves nobody.
+            # Publishing fails once ROS is down. Any other error is a fault, and a server without its loop is useless.
             if not rospy.is_shutdown():
                 rospy.logfatal("%s arm: the trajectory server has failed:\n%s", self._limb.name, traceback.format_exc())
                 rospy.signal_shutdown("the trajectory server of the %s arm has failed" % self._limb.name)
@@ -150,7 +150,7 @@ class JointTrajectoryActionServer:
                 self._ticker.sleep()
         if self._motion.engaged:
             self._give_up("the trajectory server was shut down")
-            # In a mode that needs no stream of commands.
+            # Position mode needs no stream of commands.
             self._limb.exit_control_mode()
         for request in self._drained():
             request()
@@ -178,7 +178,7 @@ class JointTrajectoryActionServer:
             yield self._requests.popleft()
 
     def _now_s(self):
-        """The loop's own time [s], which never runs back."""
+        """The loop's own time [s], which never goes back."""
         return self._stopwatch.elapsed_s(self._clock.now())
 
     def _measured(self):
@@ -255,9 +255,9 @@ class JointTrajectoryActionServer:
             self._abort(handle, code_of_outcome(verdict.outcome), verdict.text)
 
     def _give_up(self, why):
-        """End what is being done, and stop the arm, if it can still be commanded.
+        """End the goal or the hold, and stop the arm, if it can still be commanded.
 
-        What was commanded last may be far from where the arm is now, and a robot follows it until it expires.
+        The last command may be far from the arm's present position, and a robot follows it until it expires.
         """
         goal = self._motion.goal
         if not self._watch.refusal():
@@ -267,12 +267,12 @@ class JointTrajectoryActionServer:
         else:
             text = "%s %.3f s after the start; %s is %.4f rad from its end" % (
                 why, self._now_s() - self._motion.begin_s, *self._motion.farthest(self._measured()[0]))
-            # The way was left; there is no code that says more.
+            # The path was left; there is no more specific code.
             self._abort(goal, ErrorCode.PATH_TOLERANCE_VIOLATED.value, text)
         self._motion.release()
 
     def _refuse(self, handle, error):
-        """End a goal that is not begun; `error`: an exception or a text."""
+        """Abort a goal before its start; `error`: an exception or a text."""
         code = code_of_error(error, bool(handle.get_goal().trajectory.header.stamp))
         threading.Timer(SHORTEST_GOAL_S, self._abort, (handle, code, str(error))).start()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Watch robot, cuff and clock for whatever keeps an arm from being commanded, now or since a motion began."""
+"""Watches robot, cuff and clock for reasons why an arm cannot be commanded, now or since a motion began."""
 import threading
 import time
 
@@ -19,7 +19,7 @@ STALE_AFTER_S = 0.5
 class RobotWatch:
     """Watches the robot for one arm, "left" or "right".
 
-    A robot that is disabled for one message only has been disabled: what happens is kept until :meth:`begin`.
+    One message with a disabled robot is enough: events are kept until :meth:`begin`.
     """
 
     def __init__(self, side):
@@ -35,7 +35,7 @@ class RobotWatch:
         self._subscribers = [
             rospy.Subscriber("robot/state", AssemblyState, self._on_state, queue_size=STATES_KEPT),
             rospy.Subscriber("robot/joint_states", JointState, self._on_joint_states, queue_size=1, tcp_nodelay=True),
-            # A robot without a cuff is as good as one whose cuff nobody squeezes.
+            # A robot without a cuff counts as one whose cuff is not squeezed.
             rospy.Subscriber("robot/digital_io/%s_lower_cuff/state" % side, DigitalIOState, self._on_cuff,
                              queue_size=1)]
         startup.wait_for_start([
@@ -43,13 +43,13 @@ class RobotWatch:
             startup.message_arrives(self._topic, lambda: self._heard_wall_s is not None)])
 
     def begin(self):
-        """Forget what happened until now; return why the arm cannot be commanded, "" if it can."""
+        """Forget earlier events; return why the arm cannot be commanded, or ""."""
         with self._lock:
             self._event = ""
         return self.refusal()
 
     def refusal(self):
-        """Why the arm cannot be commanded now, "" if it can."""
+        """Why the arm cannot be commanded now, or ""."""
         with self._lock:
             state, cuff = self._state, self._cuff
         if self.is_gone() or self._age_s() > STALE_AFTER_S:
@@ -57,7 +57,7 @@ class RobotWatch:
         return why_not_ready(state) or ("the %s cuff is squeezed" % self._side if cuff else "")
 
     def trouble(self):
-        """What has happened since :meth:`begin` that ends a motion, "" if nothing has."""
+        """The event since :meth:`begin` that ends a motion, or ""."""
         with self._lock:
             event = self._event
         if event:
@@ -70,16 +70,16 @@ class RobotWatch:
         return ""
 
     def was_interrupted(self):
-        """Whether something has happened since :meth:`begin` that ends a motion; cheaper than :meth:`trouble`."""
+        """Whether an event since :meth:`begin` ends a motion; cheaper than :meth:`trouble`."""
         return bool(self._event)
 
     def is_enabled(self):
-        """Whether the robot says it is enabled."""
+        """Whether the robot reports that it is enabled."""
         with self._lock:
             return self._state.enabled and not self._state.stopped
 
     def is_gone(self):
-        """Whether no node is there any more that publishes joint states. A paused simulation is not gone."""
+        """Whether no node publishes joint states any more. A paused simulation is not gone."""
         return self._presence.is_gone()
 
     def _age_s(self):

@@ -38,7 +38,7 @@ EXIT_TIMEOUT_S = 60.0
 
 
 def patience(client):
-    """Fields of a goal that does not fail when the machine is busy with other things."""
+    """Fields of a goal that does not fail on a busy machine."""
     return {"path_tolerance": [JointTolerance(name=name, position=-1.0) for name in client.names],
             "goal_time_tolerance": rospy.Duration(DEADLINE_S)}
 
@@ -136,7 +136,7 @@ class ActionServersTest(unittest.TestCase):
         for position, speed in ((0.0, 0.0), (1.57, 0.3), (-1.0, 0.4)):
             heard.clear()
             self.assertEqual(go(position, speed), (GoalStatus.SUCCEEDED, ""))
-            # The result may overtake what tells where the head is.
+            # The result may arrive before the head's last state.
             wait_until(lambda position=position: abs(head.pan() - position) <= HEAD_PAN_ANGLE_TOLERANCE
                        and heard and abs(heard[-1].position - position) <= HEAD_PAN_ANGLE_TOLERANCE,
                        "the head at %g rad" % position)

@@ -37,7 +37,7 @@ KNOBS = {
 
 
 class Fingers:
-    """Two fingers that are where they shall be at once, unless something lies between them."""
+    """Two fingers that jump to their target, unless something lies between them."""
 
     def __init__(self, knobs):
         self.gripper = ElectricGripper(TRAVEL_M, OPEN, 1.0 / RATE_HZ)
@@ -57,7 +57,7 @@ class Fingers:
 
 
 class Cup:
-    """A cup on something, or on air."""
+    """A cup on an object, or on nothing."""
 
     def __init__(self, knobs):
         self.gripper = SuctionGripper(1.0 / RATE_HZ)

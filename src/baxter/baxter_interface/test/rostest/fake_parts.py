@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Channels, a navigator and a head for the SDK's tests: the simulator's own, without a robot, with knobs for faults.
 
-Knobs are private parameters, read at the start and at each call of ~reload. Its service /robot/sim/press stands in
-for fingers, as the simulator's does.
+Knobs are private parameters, read at the start and at each call of ~reload. Its service /robot/sim/press presses
+buttons, as the simulator's does.
 """
 import threading
 import time
@@ -44,7 +44,7 @@ RANGE_MM = 123
 
 
 class PanJoint:
-    """A model of one joint, which is at once where it is driven to; limits as in the robot's description [rad]."""
+    """A model of one joint, which jumps to its target; limits as in the robot's description [rad]."""
 
     lower, upper, max_effort = np.array([-np.pi / 2.0]), np.array([np.pi / 2.0]), np.array([50.0])
 

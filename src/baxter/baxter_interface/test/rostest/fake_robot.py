@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""A robot of a few lines for the SDK's tests: states, commands and switches, with knobs for its faults.
+"""A minimal robot for the SDK's tests: states, commands and switches, with knobs for its faults.
 
 Knobs are private parameters, read at the start and again at each call of ~reload; see KNOBS.
 """
@@ -54,7 +54,7 @@ class FakeRobot:
             self._clock_publisher = rospy.Publisher("/clock", Clock, queue_size=1)
         self._subscribers = [
             rospy.Subscriber("/robot/limb/%s/joint_command" % side, JointCommand, self._on_command) for side in SIDES]
-        # Read by nobody here; what has no subscriber, wait_for_subscribers would not wait for.
+        # Not read here; without a subscriber, wait_for_subscribers would not wait.
         self._subscribers += [rospy.Subscriber("/robot/limb/%s/%s" % (side, topic), Float64, lambda message: None)
                               for side in SIDES for topic in ("set_speed_ratio", "joint_command_timeout")]
         self._subscribers += [
@@ -109,7 +109,7 @@ class FakeRobot:
             if self._state.enabled and message.mode in (JointCommand.POSITION_MODE, JointCommand.RAW_POSITION_MODE):
                 self._targets.update(zip(message.names, message.command, strict=True))
             elif self._state.enabled and message.mode == JointCommand.VELOCITY_MODE and not any(message.command):
-                # Of velocities it knows none but zero: stop, and hold.
+                # It supports only the velocity zero: stop, and hold.
                 self._targets.update((name, self._angles[name]) for name in message.names)
 
     def _on_enable(self, message):

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cameras, inverse kinematics, procedures and updates of a few lines, for tests of their clients, with knobs.
+"""Minimal cameras, inverse kinematics, procedures and updates, for tests of their clients, with knobs.
 
-Knobs are private parameters, read whenever something is asked of the node; see KNOBS.
+Knobs are private parameters, read at every request; see KNOBS.
 """
 import errno
 import threading
@@ -115,7 +115,7 @@ class FakeServices:
         self._steppers = [FakeProcedure(side, name, kind) for side in SIDES
                           for name, kind in (("Tare", TareEnable), ("CalibrateArm", CalibrateArmEnable))]
         self._steppers.append(FakeUpdater())
-        # What a camera may be asked is decided by the simulated robot's own code.
+        # The simulated robot's own code checks camera settings.
         self._rack, self._images = Rack(most_open=3), {}
         for name in KNOBS["cameras"]:
             self._rack.add(name, None)
@@ -162,7 +162,8 @@ class FakeServices:
         return EmptyResponse()
 
     def _on_ik(self, side, request):
-        """Angles that tell what was asked: the first is the pose's x, the rest are the seed's; far poses have none."""
+        """Angles that encode the request: the first is the pose's x, the rest are the seed's; far poses have no
+        solution."""
         time.sleep(knob("slow_ik"))
         answer = SolvePositionIKResponse()
         for index, stamped in enumerate(request.pose_stamp):

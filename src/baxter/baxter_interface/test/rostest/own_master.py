@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""For tests in which the master and the robot come and go."""
+"""For tests that start and end the master and the robot."""
 import os
 import pathlib
 import subprocess
@@ -13,7 +13,7 @@ from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 
 DEADLINE_S = 60.0
-# A process has so long to end before it is ended by force [s].
+# Time for a process to end before it is killed [s].
 END_S = 10.0
 FAKE_ROBOT = pathlib.Path(__file__).with_name("fake_robot.py")
 

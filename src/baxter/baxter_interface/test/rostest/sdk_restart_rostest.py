@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Loops and moves whose robot, simulation or master ends and comes back under them: they go on, or say why not."""
+"""Loops and moves during which robot, simulation or master ends and restarts: they go on, or report why not."""
 import os
 import sys
 
@@ -10,7 +10,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from own_master import DEADLINE_S, OwnMasterTest  # noqa: E402
 
 CLOCK_START_S = 1000.0
-# A loop as the examples have it, that prints each time it goes round; and a move that takes long.
+# A loop as in the examples, which prints at each turn; and a long move.
 LOOP = """
 import sys
 import baxter_dataflow.ros_clock, baxter_interface.programs

@@ -59,7 +59,7 @@ class LogRecorder(Recorder):
 
 
 class LatePublisher(rospy.Publisher):
-    """One that nobody can hear at first, as on a busy machine."""
+    """A publisher without connections at first, as on a busy machine."""
 
     DELAY_S = ENABLE_TIMEOUT_S + 0.5
 
@@ -271,7 +271,7 @@ class LimbTest(unittest.TestCase):
             wait_for(lambda recorder=recorder, target=target:
                      dict(zip(recorder.messages[-1].names, recorder.messages[-1].command, strict=True)) == target,
                      DEADLINE_S, timeout_msg="the exact target is not the last command")
-            # As many seconds of commands; a machine that is slow leaves some out.
+            # The number of commands for this many seconds; a slow machine skips some.
             self.assertLess(sum(message.command != recorder.messages[-1].command for message in recorder.messages),
                             3.0 * COMMAND_RATE_HZ)
             for name, angle in target.items():
@@ -342,7 +342,7 @@ class LimbTest(unittest.TestCase):
                 disable(enabled=False)
 
         self.assertIs(limb.move_to_joint_positions({"left_s0": 1.5}, test=disable_on_the_way), False)
-        # And not for want of time.
+        # And not because of a time-out.
         self.log.wait_for_text("the robot is not enabled")
 
     def test_move_right_after_enable_is_not_refused(self):

@@ -18,7 +18,7 @@ DEADLINE_S = 5.0
 
 
 def set_knobs(**knobs):
-    """Set the fake services' knobs, all others to their defaults; they look whenever they are asked."""
+    """Set the fake services' knobs, all others to their defaults; they are read at every request."""
     if rospy.has_param("/fake_services"):
         rospy.delete_param("/fake_services")
     for name, value in knobs.items():

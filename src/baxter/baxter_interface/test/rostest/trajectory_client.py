@@ -8,7 +8,7 @@ from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryA
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 JOINTS = ("s0", "s1", "e0", "e1", "w0", "w1", "w2")
-# How long something may take that takes seconds [s of ROS time; and of wall time for a server to come up].
+# Time limit of steps that take seconds [s, ROS time; wall time for the start of a server].
 DEADLINE_S = 60.0
 
 

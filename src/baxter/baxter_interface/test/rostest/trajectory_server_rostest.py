@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every way in which a trajectory goal can end, and that nothing moves where nothing should."""
+"""Every way in which a trajectory goal can end; and nothing moves when nothing should."""
 import math
 import os
 import signal
@@ -27,7 +27,7 @@ from lab_testing.waiting import stretched
 DEADLINE_S = stretched(30.0)
 HOME = [0.2, 0.5, 0.0, 0.5, -0.2, -0.1, 0.0]
 AWAY = [0.4, 0.3, 0.2, 0.7, 0.0, 0.1, 0.2]
-# As many messages of the robot's state, at 100 Hz, show that a server at 100 Hz commands nothing.
+# Number of the robot's state messages, at 100 Hz, after which a server at 100 Hz counts as silent.
 QUIET_MESSAGES = 30
 
 
@@ -100,7 +100,7 @@ class TrajectoryServerTest(unittest.TestCase):
             self.assertTrue(self.heard.wait_for(lambda: self.states >= end, DEADLINE_S), "no robot states")
 
     def assert_quiet(self):
-        """Nobody commands the arm any more. What was on its way is let pass first."""
+        """Check that nobody commands the arm. Messages that are still in transit are ignored first."""
         self.pass_states(QUIET_MESSAGES)
         before = len(self.commands)
         self.pass_states(QUIET_MESSAGES)
@@ -276,7 +276,7 @@ class TrajectoryServerTest(unittest.TestCase):
         self.assert_quiet()
 
     def release(self):
-        """Command the arm from here, until the server has let go of it."""
+        """Command the arm from here, until the server has released it."""
         own = rospy.get_name()
 
         def let_go():
@@ -294,7 +294,7 @@ class TrajectoryServerTest(unittest.TestCase):
         os.kill(pid, signal.SIGKILL)
         end = self.client.end()
         self.assert_aborts(end, FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED, "s after the start")
-        # The latter if the robot was back before it was missed.
+        # The latter if the robot was back before its loss was detected.
         self.assertRegex(end[2], "the robot was lost|time went back from .* the simulation was reset or restarted")
         wait_for(lambda: node_pid("/fake_robot") not in (None, pid), DEADLINE_S,
                  timeout_msg="waited in vain for the robot's return")

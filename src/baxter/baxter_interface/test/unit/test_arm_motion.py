@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the trajectory server commands an arm, and when a goal has ended."""
+"""The trajectory server's commands to an arm, and when a goal ends."""
 import numpy as np
 import pytest
 
@@ -15,7 +15,7 @@ TABLES = {Mode.POSITION: parameter_tables.POSITION, Mode.VELOCITY: parameter_tab
 
 
 class Arm:
-    """Joints that do what they are commanded, one tick later; those in `stuck` do not."""
+    """Joints that follow their commands one tick later; those in `stuck` do not."""
 
     def __init__(self, mode=Mode.POSITION_WITH_DYNAMICS, **changes):
         self.mode = mode

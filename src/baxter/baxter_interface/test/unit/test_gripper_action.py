@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the gripper's action server asks of a gripper, and when a goal is reached."""
+"""The gripper action server's commands to a gripper, and when a goal is reached."""
 import pytest
 
 from baxter_interface import parameter_tables

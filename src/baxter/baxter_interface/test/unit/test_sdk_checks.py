@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the SDK refuses, and what it says then."""
+"""The SDK's refusals and their texts."""
 import math
 
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What may become a server's configuration."""
+"""Valid configurations of a server."""
 import math
 from types import SimpleNamespace
 

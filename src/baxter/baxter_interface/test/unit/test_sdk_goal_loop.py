@@ -11,7 +11,7 @@ from baxter_interface import goal_loop
 
 
 def server(**attributes):
-    """As much of an actionlib server as `start` looks at."""
+    """The parts of an actionlib server that `start` uses."""
     taken = []
     return SimpleNamespace(start=lambda: None, internal_goal_callback=taken.append,
                            internal_cancel_callback=taken.append, taken=taken,
@@ -24,7 +24,7 @@ def read_from_the_wire(secs, nsecs, text):
 
 
 GOOD = [(0, 0, b""), (1, 2, b"goal-1"), (5, 0, "Ziel é".encode()), (5, 0, b"\xff\xfe")]
-# A stamp that is more than fits once its nanoseconds have been carried over.
+# A stamp that overflows once its nanoseconds are carried over.
 BAD = [(0xFFFFFFFF, 0xFFFFFFFF, b"goal-1")]
 
 
@@ -41,7 +41,7 @@ def test_goals_and_cancel_requests_come_in(wire):
 
 @pytest.mark.parametrize("wire", BAD)
 def test_an_id_that_cannot_be_sent_back_is_dropped(wire):
-    """It would stay in the list of states, of which then nothing is sent, for seconds."""
+    """It would stay in the status list for seconds, and no status could be sent."""
     it = server()
     goal_loop.start(it)
     goal_id = read_from_the_wire(*wire)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Goals on their way from the action server's threads to the loop that carries them out."""
+"""The queue of goals from the action server's threads to the loop that executes them."""
 import threading
 
 import pytest

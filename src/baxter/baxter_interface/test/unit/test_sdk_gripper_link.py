@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a gripper's state says in JSON, without a wire."""
+"""The JSON in a gripper's state, without ROS connections."""
 import pytest
 from baxter_core_msgs.msg import EndEffectorState
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Kinds of grippers, without a wire."""
+"""Kinds of grippers, without ROS connections."""
 import pytest
 
 from baxter_interface.gripper_types import TYPES, judge_firmware

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A move of the arm, against arms made of a few lines."""
+"""A move of the arm, against minimal simulated arms."""
 import math
 
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a program says when its robot is disabled or stopped while it does something else."""
+"""A program's message when its robot is disabled or stopped meanwhile."""
 import types
 
 import pytest
@@ -8,7 +8,7 @@ from baxter_interface.programs import EnabledRobot, ProgramFailed, RobotLost
 
 
 class Switch:
-    """In place of RobotEnable."""
+    """Replaces RobotEnable."""
 
     def __init__(self):
         self.enabled, self.stopped = False, False

@@ -18,7 +18,7 @@ CORES = ("baxter_interface.joint_motion", "baxter_interface.joint_checks", "baxt
 @pytest.mark.parametrize("core", CORES)
 def test_core_loads_without_ros(core):
     package = core.split(".")[0]
-    # The package's __init__ exports what needs ROS; a bare stand-in lets the core be imported on its own.
+    # The package's __init__ imports modules that need ROS; an empty replacement lets the core be imported alone.
     program = (
         "import importlib, sys, types; sys.modules.update(dict.fromkeys(%r)); "
         "bare = types.ModuleType(%r); bare.__path__ = [%r]; sys.modules[%r] = bare; importlib.import_module(%r)"

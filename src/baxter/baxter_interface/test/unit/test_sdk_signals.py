@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Signals call their slots and keep nobody alive."""
+"""Signals call their slots and keep no object alive."""
 import gc
 
 import pytest

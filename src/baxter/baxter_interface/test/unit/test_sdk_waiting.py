@@ -10,7 +10,7 @@ from baxter_interface.patience import Condition, wait_in_order
 
 
 class FakeClock:
-    """A clock that a sleep advances, and that can be told to misbehave."""
+    """A clock that a sleep advances, with simulated faults."""
 
     def __init__(self, now_s=100.0):
         self.now_s = now_s
