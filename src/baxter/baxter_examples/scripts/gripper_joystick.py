@@ -12,7 +12,7 @@ from baxter_interface.programs import EnabledRobot, run
 from baxter_model import SIDES
 
 DEAD_BAND_PERCENT = 2.5
-# By side: buttons with what they do, and the stick that moves the fingers.
+# By side: buttons with their actions, and the stick that moves the fingers.
 BUTTONS = {
     "left": (("leftTrigger", "close", "close"), ("leftBumper", "open", "open"), ("btnLeft", "calibrate", "calibrate"),
              ("dPadLeft", "holding force - 5 %", "change", "holding_force", -5.0),
@@ -23,7 +23,7 @@ BUTTONS = {
               ("dPadRight", "holding force + 5 %", "change", "holding_force", 5.0)),
 }
 STICKS = {"left": "leftStickVert", "right": "rightStickVert"}
-# A stick that is held opens or closes by so much each time [%].
+# Step of a held stick [%].
 STEP_PERCENT = 5.0
 
 

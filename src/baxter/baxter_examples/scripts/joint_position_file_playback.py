@@ -13,12 +13,12 @@ from baxter_interface.programs import EnabledRobot, expect, run
 from baxter_model import SIDES
 
 RATE_HZ = 1000.0
-# A gripper is sent what changed by more than this [%].
+# Smallest change that is sent to a gripper [%].
 GRIPPER_STEP_PERCENT = 1.0
 
 
 class Player:
-    """Sets the arms and grippers that a recording has to its values."""
+    """Sends a recording's values to its arms and grippers."""
 
     def __init__(self, record):
         self._parts = []

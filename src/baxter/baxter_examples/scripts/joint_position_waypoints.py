@@ -33,7 +33,7 @@ class Waypoints:
         while self._playing:
             print("playing %d waypoints" % len(self._waypoints), flush=True)
             for waypoint in self._waypoints:
-                # A failed move has said why; a robot that is lost is noticed by the beat.
+                # A failed move has logged why; the beat detects a lost robot.
                 self._limb.move_to_joint_positions(waypoint, threshold=self._accuracy_rad)
                 if next(robot.beats(RATE_HZ), self) is self:
                     return

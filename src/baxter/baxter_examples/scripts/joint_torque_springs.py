@@ -15,7 +15,7 @@ from baxter_interface.programs import EnabledRobot, expect, run
 from baxter_model import JOINTS
 
 RATE_HZ = 1000.0
-# The robot leaves torque mode when so many commands are missed.
+# The robot leaves torque mode after this many missed commands.
 MISSED_COMMANDS = 20
 
 
@@ -25,7 +25,7 @@ class Springs:
     def __init__(self, side):
         self._limb = Limb(side)
         self._gains = {}
-        # While somebody holds the cuff the robot ignores torques; here the arm is meant to be held.
+        # While the cuff is squeezed the robot ignores torques; here users must be able to hold the arm.
         self._cuff = rospy.Publisher("robot/limb/%s/suppress_cuff_interaction" % side, Empty, queue_size=1)
         self._server = ParameterServer(JointSpringsExampleConfig, self._on_gains)
 

@@ -11,7 +11,7 @@ from baxter_model import JOINTS, arm_angles
 
 # From shoulder to wrist [rad], on the left arm; the right one mirrors it.
 POSTURE = (-0.11, -0.62, -1.15, 1.32, 0.80, 1.27, 2.39)
-# Time [s] and what POSTURE is multiplied with.
+# Time [s] and factor of POSTURE.
 POINTS = ((7.0, 1.0), (9.0, 0.75), (12.0, 1.25))
 PATIENCE_S = 15.0
 

@@ -16,16 +16,16 @@ from baxter_interface.programs import EnabledRobot, run
 from baxter_model import SIDES
 
 GRIPPER_RATE_HZ = 20.0
-# Parameters of the action server: speed of the way to the recording's start [rad/s], and extra time at the end [s].
+# Parameters of the action server: speed of the move to the recording's start [rad/s], and extra time at the end [s].
 SERVER = "/rsdk_joint_trajectory_action_server/"
 DEFAULT_SPEED_RAD_S = 0.25
-# Of a way that is none the first point would have the time of the start [s].
+# Shortest duration of that move [s]: with zero, the first point would have the time of the start.
 SHORTEST_WAY_S = 0.5
 PATIENCE_S = 10.0
 
 
 def lead_in_s(here, row):
-    """Return the time for the way from `here` to the recording's first `row` [s], both by joint name."""
+    """Return the time for the move from `here` to the recording's first `row` [s], both by joint name."""
     return max(SHORTEST_WAY_S, *(
         abs(row[name] - here[name]) / rospy.get_param(SERVER + name + "_default_velocity", DEFAULT_SPEED_RAD_S)
         for name in here))

@@ -14,7 +14,7 @@ from baxter_examples.arguments import add_file, new_parser, parse
 from baxter_interface import startup
 from baxter_interface.programs import ProgramFailed, run
 
-# A latched picture is gone with its publisher: what has just connected gets so long to fetch it [s].
+# A latched picture disappears with its publisher: time for new subscribers to receive it [s].
 HAND_OVER_S = 1.0
 
 

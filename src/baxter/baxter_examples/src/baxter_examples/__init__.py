@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the examples for the robot share."""
+"""Shared modules of the examples for the robot."""
 from .joint_recorder import JointRecorder
 
 __all__ = ["JointRecorder"]

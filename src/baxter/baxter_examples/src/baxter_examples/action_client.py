@@ -26,7 +26,7 @@ class ActionClient:
         self._name = name
         self._client = actionlib.SimpleActionClient(name, kind)
         startup.wait_for_start([])
-        # A duration below 0 has it look once: its own wait says nothing when simulated time stands still.
+        # A duration below 0 makes it check once: its own wait logs nothing when simulated time stands still.
         look = self._client.action_client.wait_for_server
         if not wait_for(lambda: look(rospy.Duration(0, -1)), SERVER_TIMEOUT_S, raise_on_error=False, rate=20):
             raise ProgramFailed("there is no action server for %s: start it with: %s"

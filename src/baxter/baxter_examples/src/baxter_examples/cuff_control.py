@@ -8,10 +8,10 @@ from .mounted_grippers import mounted_grippers
 
 
 class CuffControl:
-    """One arm's cuff. Call work() regularly: it does what the buttons have asked for since.
+    """One arm's cuff. Call work() regularly: it executes the buttons' requests since the last call.
 
-    Parameters: `lights`: whether the navigator follows the cuff; `say` takes a line of text; `gripper`, looked for on
-    the arm if it is not given.
+    Parameters: `lights`: whether the navigator follows the cuff; `say` takes a line of text; `gripper`, the arm's own
+    by default.
     """
 
     def __init__(self, side, lights=True, say=lambda text: None, gripper=None):
@@ -28,7 +28,7 @@ class CuffControl:
         self._cuff.state_changed.connect(self._on_cuff)
 
     def work(self):
-        """Do what was asked for. Raises OSError if a light does not follow."""
+        """Execute the requests. Raises OSError if a light does not follow."""
         while not self._asked.empty():
             self._asked.get()()
 

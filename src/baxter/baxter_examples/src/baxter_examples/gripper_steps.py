@@ -12,7 +12,7 @@ class GripperSteps:
         return getattr(self._gripper, name)
 
     def change(self, parameter, step):
-        """Add `step` [%] to the parameter, kept within 0 to 100; a gripper without it says so."""
+        """Add `step` [%] to the parameter, kept within 0 to 100; a gripper without it logs that."""
         value = self._gripper.parameters().get(parameter, 0.0) + step
         self._gripper.set_parameters({parameter: max(0.0, min(100.0, value))})
 

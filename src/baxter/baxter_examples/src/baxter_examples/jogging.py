@@ -11,7 +11,8 @@ class Jogging:
 
     def __init__(self):
         self._limbs = {side: Limb(side) for side in SIDES}
-        # Steps add up from what was commanded, since the arm is still on its way there: quick keys would be lost.
+        # Steps add to the last command, not to the measured angle: the arm is still moving, and quick keys would be
+        # lost.
         self._targets = {}
 
     def step(self, side, joint, step_rad):

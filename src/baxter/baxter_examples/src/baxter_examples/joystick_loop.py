@@ -3,13 +3,13 @@
 from .key_table import KeyTable
 
 RATE_HZ = 100.0
-# A stick that is held acts this often [Hz].
+# Rate of the actions of a held stick [Hz].
 STICK_RATE_HZ = 10.0
 HELP_BUTTONS = ("function1", "function2")
 
 
 class JoystickTable:
-    """What the controls of `joystick` do; `title` goes above their list."""
+    """The actions of the controls of `joystick`; `title` goes above their list."""
 
     def __init__(self, title, joystick):
         self._joystick = joystick
@@ -33,7 +33,7 @@ class JoystickTable:
         return self._table.help()
 
     def work(self):
-        """Do what the controls ask for now; call it RATE_HZ times a second."""
+        """Execute the controls' present actions; call it RATE_HZ times a second."""
         for button in (*self._buttons, *HELP_BUTTONS):
             if self._joystick.button_down(button):
                 self._table.press(button)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keys (or joystick controls) with what they do, and the help that lists them. Free of ROS."""
+"""Keys (or joystick controls) with their actions, and the help that lists them. Free of ROS."""
 
 
 class KeyTable:
@@ -17,7 +17,7 @@ class KeyTable:
         self._actions[key] = (text, action, arguments)
 
     def press(self, key):
-        """Do what `key` is for, and say so."""
+        """Execute the action of `key`, and print it."""
         if key not in self._actions:
             self._show(self.help())
             return

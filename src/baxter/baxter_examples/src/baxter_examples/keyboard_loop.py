@@ -6,7 +6,7 @@ RATE_HZ = 100.0
 
 
 def keyboard_loop(table, robot):
-    """Press what is typed on `table` (a KeyTable) while `robot` (an EnabledRobot) is there. Raises RobotLost."""
+    """Press typed keys on `table` (a KeyTable) while `robot` (an EnabledRobot) is there. Raises RobotLost."""
     print(table.help() + "\n  Esc or Ctrl-C: quit", flush=True)
     with Keyboard() as keyboard:
         for _ in robot.beats(RATE_HZ):

@@ -14,7 +14,7 @@ COLUMNS = ["time", *(name for side in SIDES for name in (*limb_joint_names(side)
 
 
 class BadRecording(ValueError):
-    """A file that is no recording; the text says where and why."""
+    """The file is no valid recording; the text says where and why."""
 
 
 class Recording:
@@ -37,7 +37,8 @@ class Recording:
         return joints, side + "_gripper" in self.names
 
     def at(self, time_s):
-        """Return the values at `time_s`, on straight lines between the rows, the end rows' beyond them."""
+        """Return the values at `time_s`, interpolated linearly between the rows; beyond the ends, those of the end
+        rows."""
         after = bisect.bisect_right(self.times_s, time_s)
         if after == 0:
             return dict(self.rows[0])

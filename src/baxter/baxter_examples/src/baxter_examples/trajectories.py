@@ -27,7 +27,7 @@ class TrajectoryClient(ActionClient):
         self._goal.trajectory.joint_names = limb_joint_names(self._side)
 
     def set_goal_time(self, goal_time_s):
-        """Allow the arm so much time to arrive after the last point [s]."""
+        """Set the time that the arm may take to arrive after the last point [s]."""
         self._goal_time_s = goal_time_s
 
     def add(self, time_s, angles):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What happens on a joystick: buttons that go down and up, sticks that move. Free of ROS.
+"""Events of a joystick: buttons that go down and up, sticks that move. Free of ROS.
 
 Where the buttons and sticks are in a joy message differs between controllers; CONTROLLERS lists those we know, as their
-Linux drivers number them. Of a stick, left and up are positive.
+Linux drivers number them. For sticks, left and up are positive.
 """
 from dataclasses import dataclass
 
@@ -79,7 +79,7 @@ CONTROLLERS = {
 
 
 class ButtonEvents:
-    """A button's state, and its changes until somebody asks for them."""
+    """A button's state, and its changes since the last query."""
 
     def __init__(self):
         self.is_down = False
@@ -91,12 +91,12 @@ class ButtonEvents:
         self.is_down = is_down
 
     def take_down(self):
-        """Tell whether it has gone down since last asked."""
+        """Tell whether it has gone down since the last call."""
         self._went_down, happened = False, self._went_down
         return happened
 
     def take_up(self):
-        """Tell whether it has gone up since last asked."""
+        """Tell whether it has gone up since the last call."""
         self._went_up, happened = False, self._went_up
         return happened
 
@@ -113,6 +113,6 @@ class StickEvents:
         self.value = 0.0 if abs(raw) < self._deadband else self._scale * raw + self._offset
 
     def take_move(self):
-        """Return how far it has moved since last asked, signed."""
+        """Return its signed movement since the last call."""
         self._last, before = self.value, self._last
         return self.value - before

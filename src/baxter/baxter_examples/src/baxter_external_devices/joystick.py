@@ -9,7 +9,7 @@ from .controls import CONTROLLERS, ButtonEvents, StickEvents
 
 
 class Joystick:
-    """A joystick by what happens on it; see its subclasses for the controllers that we know.
+    """A joystick as a source of events; its subclasses are the known controllers.
 
     Parameters: a stick's value is `scale` * reading + `offset`, or 0 while its reading is within `deadband`.
     Names of buttons: btnLeft, btnUp, btnDown, btnRight, dPadUp, dPadDown, dPadLeft, dPadRight, leftBumper, rightBumper,
@@ -28,12 +28,12 @@ class Joystick:
         self._subscriber = rospy.Subscriber("/joy", Joy, self._on_joy, queue_size=10)
 
     def button_down(self, name):
-        """Tell whether the button has gone down since last asked."""
+        """Tell whether the button has gone down since the last call."""
         with self._lock:
             return self._buttons[name].take_down()
 
     def button_up(self, name):
-        """Tell whether the button has gone up since last asked."""
+        """Tell whether the button has gone up since the last call."""
         with self._lock:
             return self._buttons[name].take_up()
 
@@ -43,15 +43,15 @@ class Joystick:
             return self._sticks[name].value
 
     def stick_changed(self, name):
-        """Tell whether the stick has moved since last asked."""
+        """Tell whether the stick has moved since the last call."""
         return self._move(name) != 0.0
 
     def stick_inc(self, name):
-        """Tell whether the stick's value is greater than when last asked."""
+        """Tell whether the stick's value is greater than at the last call."""
         return self._move(name) > 0.0
 
     def stick_dec(self, name):
-        """Tell whether the stick's value is less than when last asked."""
+        """Tell whether the stick's value is less than at the last call."""
         return self._move(name) < 0.0
 
     def _move(self, name):

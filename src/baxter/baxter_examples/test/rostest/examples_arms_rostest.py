@@ -111,7 +111,7 @@ class SideBySideTest(ArmsTest):
         for action, state in ((PressRequest.PRESS, DigitalIOState.PRESSED),
                               (PressRequest.RELEASE, DigitalIOState.UNPRESSED)):
             self.assertTrue(press(component=component, action=action).success)
-            # A press shorter than a message would not be seen.
+            # A press that is shorter than the message period would be missed.
             wait_for_message("/robot/digital_io/%s/state" % component, DigitalIOState,
                              lambda message, state=state: message.state == state)
 
@@ -169,7 +169,7 @@ class ModesTest(ArmsTest):
         program.wait_for("move that arm")
         before = {name: self.angle(name) for name in ("right_s0", "right_w1")}
         self.assertTrue(self.limbs["left"].move_to_joint_positions({"left_s0": -0.4, "left_w1": 0.9}))
-        # The simulated arms' speeds are measured ones: what adds up over the way is near, not equal.
+        # The simulated arms' speeds are measured, so their integral is close to the distance, not equal.
         wait_until(lambda: self.angle("right_s0") > before["right_s0"] + 0.25, "right_s0 to mirror left_s0")
         self.assertLess(self.angle("right_w1"), before["right_w1"] - 0.2)
         self.assertEqual(program.interrupt(), 130)

@@ -24,7 +24,7 @@ FAN, LIGHT = "torso_fan", "torso_left_outer_light"
 
 
 class Seen:
-    """What a topic has said, each value when it changed."""
+    """The values of a topic, each when it changed."""
 
     def __init__(self, topic, kind, value):
         self.values = []
@@ -49,7 +49,7 @@ class ExamplesTest(unittest.TestCase):
 
 
 class ChannelsTest(ExamplesTest):
-    """Side by side, since none is in another's way."""
+    """Run in parallel, since they do not interfere."""
 
     def test_channels_navigator_screen_head_and_ik(self):
         fan = Seen("/robot/analog_io/%s/state" % FAN, AnalogIOState, lambda message: message.value)
