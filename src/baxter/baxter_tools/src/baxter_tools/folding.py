@@ -118,8 +118,9 @@ class Folding:
 
 @contextlib.contextmanager
 def own_collision_avoidance():
-    """Suppress the robot's collision avoidance inside a `with` block: folded arms are too close for it. Yields a
-    function that lists the parts that the robot now counts as too close.
+    """Suppress the robot's collision avoidance inside a `with` block: folded arms are too close for it.
+
+    Yields a function that lists the parts that the robot now counts as too close.
     """
     near = {}
     subscribers = [

@@ -44,7 +44,9 @@ class PathPlanner:
 
     def plan(self, start, goal, via=()):
         """Return a path from `start` to `goal` as a list of postures, straight in between; `via`: postures to try
-        first. A start in contact is left by a path that increases the clearance. Raises NoPath.
+        first.
+
+        A start in contact is left by a path that increases the clearance. Raises NoPath.
         """
         start, goal = (np.asarray(end, dtype=float) for end in (start, goal))
         at_goal_m = self._clearance(goal)
