@@ -26,7 +26,7 @@ def expand():
 
 @pytest.fixture(scope="session")
 def vendor():
-    """The vendor's own model, from the package that holds the meshes: an oracle that shares nothing with ours."""
+    """The vendor's own model, from the package that holds the meshes: a reference that is independent of ours."""
     try:
         file = importlib.metadata.distribution("example-robot-data").locate_file(VENDOR_URDF)
     except importlib.metadata.PackageNotFoundError:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Our xacro against the vendor's URDF: frames, axes, limits, masses, inertias, shapes, but for one table."""
+"""Our xacro against the vendor's URDF: frames, axes, limits, masses, inertias, shapes, except one table of
+differences."""
 import dataclasses
 from pathlib import Path
 
@@ -25,7 +26,7 @@ def vendor_names():
 
 
 def differences_table():
-    """The table with {side} spelled out: {(element, property): (ours, vendor)}."""
+    """The table with {side} expanded: {(element, property): (ours, vendor)}."""
     rows = yaml.safe_load((TEST / "vendor_differences.yaml").read_text())
     assert all(row["reason"] for row in rows)
     return {(row["element"].format(side=side), row["property"]): (row["ours"], row["vendor"])
