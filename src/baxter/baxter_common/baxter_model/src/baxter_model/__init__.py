@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Facts of the Baxter robot, each in one place: names, mirror signs, poses, grippers. Free of ROS.
 
-`self_collision` says which links can touch, and `description` reads what a URDF says about the robot; both are imported
+`self_collision` says which links can touch, and `description` reads facts from the robot's URDF; both are imported
 by programs that need them, so that `import baxter_model` stays cheap.
 """
 from .errors import ModelError, ModelMismatch, PoseError

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the URDF says about Baxter: which joints make an arm, where its tip is, what it carries there."""
+"""Facts from Baxter's URDF: the joints of an arm, its tip, its end effector."""
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,14 +13,14 @@ from .self_collision import HEAD_GUARDS
 
 @dataclass(frozen=True)
 class LimbModel:
-    """One arm as the URDF has it: its side and the names of its seven joints, torso to wrist."""
+    """One arm in the URDF: its side and the names of its seven joints, torso to wrist."""
 
     side: str
     joint_names: tuple
 
 
 def limbs_of(robot):
-    """The arms of an urdf_model.Robot. Raises ModelMismatch where one lacks a joint or its tip."""
+    """The arms of an urdf_model.Robot. Raises ModelMismatch if one lacks a joint or its tip."""
     movable = {joint.name for joint in robot.movable_joints()}
     limbs = []
     for side in SIDES:
@@ -45,13 +45,13 @@ def finger_openings(robot):
 
 
 def openings_of(robot, side):
-    """`finger_openings` of one arm; empty where it carries no electric gripper."""
+    """`finger_openings` of one arm; empty without an electric gripper."""
     return {name: opening for name, opening in finger_openings(robot).items()
             if name.startswith(finger_prefix(side))}
 
 
 def head_guards(robot):
-    """[(link, centre (3,) in `base` [m], radius [m])] of the balls around the head that arms are kept out of."""
+    """[(link, centre (3,) in `base` [m], radius [m])] of the balls around the head that arms must not enter."""
     frames = merge_fixed(robot).frames
     to_base = np.linalg.inv(frames[BASE_FRAME].offset)
     return [(name, (to_base @ frames[name].offset @ shape.origin)[:3, 3], shape.geometry.radius)
@@ -60,7 +60,7 @@ def head_guards(robot):
 
 
 def arm_radius(robot):
-    """How thick the arms are [m]: the widest of the cylinders that stand for their links; 0 without any."""
+    """Radius of the arms [m]: that of the widest cylinder among their collision shapes; 0 without any."""
     return max((shape.geometry.radius for name, link in robot.links.items()
                 if any(is_part_of_arm(name, side) for side in SIDES)
                 for shape in link.collisions if isinstance(shape.geometry, Cylinder)), default=0.0)

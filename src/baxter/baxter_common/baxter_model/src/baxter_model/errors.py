@@ -3,12 +3,12 @@
 
 
 class ModelError(Exception):
-    """Root of everything this package raises on purpose."""
+    """Base class of this package's errors."""
 
 
 class PoseError(ModelError):
-    """A named pose that does not exist or does not cover the joints asked for."""
+    """A named pose does not exist or does not cover the requested joints."""
 
 
 class ModelMismatch(ModelError):
-    """The URDF lacks a joint or a frame without which it is no Baxter."""
+    """The URDF lacks a joint or a frame that every Baxter has."""

@@ -21,5 +21,5 @@ SUCTION = GripperKind("suction", 1, 65537, {"vacuum_sensor_threshold": 18.0, "bl
 # [%]
 ELECTRIC = GripperKind("electric", 2, 65538,
                        {"velocity": 50.0, "moving_force": 40.0, "holding_force": 30.0, "dead_zone": 5.0})
-# A tool that only its program knows, or a bare arm: the robot does not tell them apart.
+# A custom tool or a bare arm: the robot does not distinguish them.
 CUSTOM = GripperKind("custom", 3, 131073, {})

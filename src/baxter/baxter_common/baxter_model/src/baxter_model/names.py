@@ -14,7 +14,7 @@ JOINTS = tuple(MIRROR_SIGNS)
 
 HEAD_JOINT = "head_pan"
 
-# The frame that poses are given in, which is also the link of the torso that does not move.
+# The reference frame of poses; also the fixed link of the torso.
 BASE_FRAME = "base"
 
 
@@ -24,7 +24,7 @@ def joint_names(side):
 
 
 def tip_of(side):
-    """Return the name of the frame that end-point topics and the IK service mean."""
+    """Return the name of the tip frame of the end-point topics and the IK service."""
     return "%s_gripper" % side
 
 
@@ -34,7 +34,7 @@ def other_side(side):
 
 
 def mirrored(angles):
-    """Return {joint without its side: angle [rad]} of the other arm where the two mirror each other."""
+    """Return {joint without its side: angle [rad]} of the other arm in the mirrored posture."""
     return {joint: MIRROR_SIGNS[joint] * angle for joint, angle in angles.items()}
 
 
@@ -47,13 +47,13 @@ def named(side, angles):
 def arm_angles(side, left):
     """Return {joint name: angle [rad]} of one arm, for a posture that is given for the left arm.
 
-    left: {joint without its side, such as "s0": angle [rad]}. The right arm takes the mirror image.
+    left: {joint without its side, such as "s0": angle [rad]}. The right arm gets the mirror image.
     """
     return named(side, left if side == SIDES[0] else mirrored(left))
 
 
 def finger_prefix(side):
-    """Return what the names of one electric gripper's links and joints begin with."""
+    """Return the prefix of the names of one electric gripper's links and joints."""
     return "%s_gripper_" % side[0]
 
 

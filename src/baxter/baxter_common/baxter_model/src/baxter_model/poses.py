@@ -27,7 +27,7 @@ class Poses:
         return tuple(self._table)
 
     def angles(self, name, side):
-        """{joint name: angle [rad]} of one arm; the side that is not given is the mirror image of the one that is.
+        """{joint name: angle [rad]} of one arm; a missing side is the mirror image of the other.
 
         Raises PoseError for an unknown pose.
         """
@@ -38,7 +38,7 @@ class Poses:
         return named(side, pose[side] if side in pose else mirrored(next(iter(pose.values()))))
 
     def extended(self, table):
-        """Return Poses with those of another table besides; one of the same name takes the place of ours.
+        """Return Poses with those of another table added; a pose of the same name replaces ours.
 
         Raises PoseError where a joint is missing.
         """
@@ -47,7 +47,7 @@ class Poses:
 
 @functools.cache
 def _file():
-    # Here: it takes longer to load than all of this package, and most programs ask for names alone.
+    # Imported here: it loads slower than the whole package, and most programs need only names.
     import yaml
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     with open(pathlib.Path(__file__).with_name("poses.yaml")) as stream:

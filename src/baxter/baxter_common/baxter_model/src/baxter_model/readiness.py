@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Why the robot does not move, in the words that every program uses, and the command that helps."""
+"""Sentences for all programs: why the robot does not move, and the command that helps."""
 
 ENABLE = "rosrun baxter_tools enable_robot.py -e"
 RESET = "rosrun baxter_tools enable_robot.py -r"

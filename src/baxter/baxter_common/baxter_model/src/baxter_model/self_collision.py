@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which parts of Baxter can hit which, the convex pieces that stand in for its body, and what is solid of its head.
+"""Collision pairs of Baxter's links, the convex pieces of its body, and the solid part of its head.
 
-Left out are pairs that a joint's limits keep apart and pairs whose shapes, thick cylinders with a wide bend between
-them, overlap although the robot's covers do not: neighbours and their neighbours along an arm, the upper arm and the
-torso, the two fingers of a hand (their boxes overlap by 5 mm when it is closed).
+Two kinds of pairs are left out: those that joint limits keep apart, and those whose shapes (thick cylinders, with a
+wide bend between them) overlap although the robot's covers do not. The latter are links one or two joints apart along
+an arm, the upper arm and the torso, and the two fingers of a hand (their boxes overlap by 5 mm when it is closed).
 """
 from .names import BASE_FRAME, SIDES, finger_prefix
 
-# The torso: the link of this name is merged with all that does not move.
+# The torso: the link of this name is merged with all fixed links.
 BODY = BASE_FRAME
 # The pan joint's link, to which the screen is fixed.
 HEAD = "head"
-# Two balls of the description around the head: the field that the robot's collision avoidance keeps its arms out of,
-# with nothing solid in it but the head, which the description gives no shape to collide with.
+# Two balls of the description around the head: the robot's collision avoidance keeps its arms out of this field. Its
+# only solid part is the head, which has no collision shape in the description.
 HEAD_GUARDS = ("collision_head_link_1", "collision_head_link_2")
 _SOLIDS = {HEAD: "as drawn", "screen": "as drawn", **dict.fromkeys(HEAD_GUARDS, "hollow")}
 # An arm from torso to wrist; the links of the description, of which several are one body.
@@ -22,8 +22,8 @@ HAND = ("lower_forearm", "wrist")
 
 # Planes through the meshes of the body [m, in the link's frame]: where its outline changes. Above -0.64 the pedestal
 # is a column, below it has legs; the torso has lugs for the arms from 0.08 to 0.17, a ledge up to 0.22, its back and
-# chest up to 0.48, handles up to 0.62, and a neck above. Up to the chest it is widest in front of -0.02, beside whose
-# back the arms are folded: cut there, it has no boxes that reach around them.
+# chest up to 0.48, handles up to 0.62, and a neck above. Up to the chest it is widest in front of -0.02; folded arms
+# lie beside its back. Cut there, no convex piece overlaps them.
 MESH_CUTS = {
     "pedestal": (("z", -0.64), *((axis, offset, -2.0, -0.64) for axis in "xy" for offset in (-0.17, 0.17))),
     "torso": (("z", 0.08), ("z", 0.17), ("z", 0.22), ("z", 0.48), ("z", 0.7),
@@ -36,7 +36,7 @@ def self_collision_pairs(links):
     """[(link, link)] of those that collide, for a Baxter with these link names (any container)."""
     arms = {side: _Arm(side, links) for side in SIDES}
     left, right = (arms[side] for side in SIDES)
-    # The shoulders' first links stand still but for a turn, far apart.
+    # The shoulders' first links only rotate, far apart.
     pairs = [(a, b) for a in left.everything for b in right.everything
              if not (a in left.shoulder and b in right.shoulder)]
     for arm in arms.values():
@@ -46,7 +46,7 @@ def self_collision_pairs(links):
 
 
 def spawn_options(links):
-    """What a model plugin says to have a Baxter with these link names (any container) spawned.
+    """Spawn options of a model plugin for a Baxter with these link names (any container).
 
     {"self_collision_pairs", "mesh_cuts": as for `bullet_sim.World.spawn`, "solids": as for
     `bullet_sim.solids.with_solids`}.

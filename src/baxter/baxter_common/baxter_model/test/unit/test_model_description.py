@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What this package says about the robot against its description and its messages."""
+"""The facts of this package against the robot's description and messages."""
 import itertools
 import subprocess
 import sys
@@ -124,7 +124,7 @@ def test_grippers_are_those_of_the_messages():
 
 
 def test_loads_without_ros():
-    """Also on a machine that has no ROS at all, and without what only some of its users need."""
+    """Also on a machine without ROS, and without packages that only some users need."""
     absent = ("rospy", "rospkg", "roslib", "genpy", "baxter_core_msgs", "urdf_model", "numpy", "pybullet")
     program = ("import sys; sys.modules.update(dict.fromkeys(%r)); import baxter_model, baxter_model.self_collision; "
                "baxter_model.null_space_postures('left')" % (absent,))

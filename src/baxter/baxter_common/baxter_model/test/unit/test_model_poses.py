@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The named poses against the figures that the robot's documents print."""
+"""The named poses against the values in the robot's documents."""
 import pytest
 
 import baxter_model

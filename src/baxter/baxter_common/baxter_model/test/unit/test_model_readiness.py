@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is said of a robot that does not move."""
+"""The sentences about a robot that does not move."""
 from types import SimpleNamespace
 
 import pytest
