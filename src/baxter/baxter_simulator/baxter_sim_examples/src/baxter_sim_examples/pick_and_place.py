@@ -50,8 +50,10 @@ def grip_yaw(yaw):
 
 
 def pick_and_place(arm, source, target):
-    """Carry the block from `source` to `target` (Spot). Raises BlockLost, and the arm's errors. The fingers keep their
-    angle to the block, so that it arrives turned by the difference of the two spots' yaw, up to quarter turns.
+    """Carry the block from `source` to `target` (Spot). Raises BlockLost, and the arm's errors.
+
+    The fingers keep their angle to the block, so that it arrives turned by the difference of the two spots' yaw, up to
+    quarter turns.
     """
     arm.open()
     pose = arm.move_to(start_angles(arm.name))
