@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The behaviour of the simulated Baxter, without ROS: the state table, command modes and time-outs, end-point forces.
+
 `plugin.BaxterPlugin` runs it in a world; it is not imported here, because it needs ROS.
 """
 from .arms.control import Arms, Drives

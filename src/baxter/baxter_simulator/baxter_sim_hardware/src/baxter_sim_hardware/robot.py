@@ -11,9 +11,10 @@ class Baxter:
     """The robot's state and its arms, one tick at a time.
 
     limbs, limits, measured, dt: as for `Arms`; profile: 'sim' or 'robot' (speed ratio at start); disabled: behaviour of
-    the arms without power, 'hold' or 'sink'; state: the first robot_state.State. Attributes: `profile`; `state`, a
-    `RobotState`; `arms`, an `Arms`; `measured`, the `Measured` that the caller updates before each tick, and before
-    each event between two ticks.
+    the arms without power, 'hold' or 'sink'; state: the first robot_state.State.
+
+    Attributes: `profile`; `state`, a `RobotState`; `arms`, an `Arms`; `measured`, the `Measured` that the caller
+    updates before each tick, and before each event between two ticks.
     """
 
     def __init__(self, limbs, limits, measured, dt=0.002, profile="sim", disabled="hold", state=None):

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The field that keeps the arms away from the head: it slows approaching arms and stops them at the guards. The
-description has two balls around the head. They are no bodies: nothing collides with them. An arm is modelled as a chain
-of capsules from elbow to tip, as thick as its links. When the commanded motion would bring a capsule nearer to a ball,
-all joints of the arm are slowed, so that the approach speed is at most proportional to the gap. Motion away is free.
+"""The field that keeps the arms away from the head: it slows approaching arms and stops them at the guards.
+
+The description has two balls around the head. They are no bodies: nothing collides with them. An arm is modelled as a
+chain of capsules from elbow to tip, as thick as its links. When the commanded motion would bring a capsule nearer to a
+ball, all joints of the arm are slowed, so that the approach speed is at most proportional to the gap. Motion away is
+free.
 """
 import math
 from typing import NamedTuple

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Collisions of an arm: detection, the states to report, and what clients suppress at present. Avoidance concerns the
-robot itself: an arm that touches the body, the other arm or its own shoulder yields. Then its drives push with a
-fraction of their effort, in the modes in which the physical robot keeps its arms apart (position and velocity).
-Detection concerns everything: an arm is in a collision when the torques on its joints exceed those of its own weight
-and motion, or the load on its hand exceeds its limit.
+"""Collisions of an arm: detection, the states to report, and what clients suppress at present.
+
+Avoidance concerns the robot itself: an arm that touches the body, the other arm or its own shoulder yields. Then its
+drives push with a fraction of their effort, in the modes in which the physical robot keeps its arms apart (position and
+velocity). Detection concerns everything: an arm is in a collision when the torques on its joints exceed those of its
+own weight and motion, or the load on its hand exceeds its limit.
 """
 from baxter_model import JOINTS, is_part_of_arm
 from baxter_model.self_collision import BODY

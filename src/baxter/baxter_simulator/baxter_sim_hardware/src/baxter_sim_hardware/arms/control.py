@@ -341,8 +341,9 @@ class Arms:
                       pushed, *self._torque_drive(pushed))
 
     def sink(self):
-        """Return the Drives for a tick without power: each joint sinks slowly, like a light body in a thick medium. The
-        drive pushes with no more than the weight itself.
+        """Return the Drives for a tick without power: each joint sinks slowly, like a light body in a thick medium.
+
+        The drive pushes with no more than the weight itself.
         """
         self.reset()
         limits, position, gravity = self.limits, self._measured.position, self._measured.gravity

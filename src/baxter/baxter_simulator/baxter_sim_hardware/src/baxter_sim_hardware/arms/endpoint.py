@@ -17,7 +17,9 @@ def twist(jacobian, velocity):
 
 def joint_velocities(jacobian, tip_twist):
     """(k,) [rad/s] that move the tip at (6,) twist [m/s, rad/s], approximately near singularities, so that no joint
-    gets too fast. Damped least squares: J^T (J J^T + d^2 I)^-1.
+    gets too fast.
+
+    Damped least squares: J^T (J J^T + d^2 I)^-1.
     """
     gram = jacobian @ jacobian.T
     gram.flat[::7] += _SINGULARITY_DAMPING**2

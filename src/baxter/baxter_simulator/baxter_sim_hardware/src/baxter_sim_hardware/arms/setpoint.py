@@ -42,10 +42,12 @@ def approach(position, velocity, target, speed, acceleration, dt):
 
 
 class SetPoints:
-    """The arrays that `follow` updates, (n,) each. position [rad], velocity [rad/s]: state of the set-points. target
-    [rad]: where they go, at most at speed [rad/s] and with acceleration [rad/s^2], or, where `braking`, with stopping
-    [rad/s^2]. Where `streams`, the target itself moves to goal [rad], by at most pace [rad/s] (of either sign). output
-    [rad], output_rate [rad/s]: set-points of the drives, with the position smoothed.
+    """The arrays that `follow` updates, (n,) each.
+
+    position [rad], velocity [rad/s]: state of the set-points. target [rad]: where they go, at most at speed [rad/s] and
+    with acceleration [rad/s^2], or, where `braking`, with stopping [rad/s^2]. Where `streams`, the target itself moves
+    to goal [rad], by at most pace [rad/s] (of either sign). output [rad], output_rate [rad/s]: set-points of the
+    drives, with the position smoothed.
 
     All are views of two arrays, `numbers` and `flags`: passing fifteen arrays to a compiled function takes longer than
     moving fourteen joints.

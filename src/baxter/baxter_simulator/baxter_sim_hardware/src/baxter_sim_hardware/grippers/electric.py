@@ -67,8 +67,9 @@ class ElectricGripper(Gripper):
         self._stand_at(position)
 
     def stop(self, position):
-        """Move no further than `position`, where the fingers are; a held object stays held. A running calibration is
-        aborted.
+        """Move no further than `position`, where the fingers are; a held object stays held.
+
+        A running calibration is aborted.
         """
         if self._phase is Phase.HOLDING:
             self._stays = True

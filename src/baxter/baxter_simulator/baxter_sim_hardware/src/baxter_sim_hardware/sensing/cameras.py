@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Baxter's cameras: valid settings, which may be open together, the effect of controls on a picture. A camera is an
-array of 1280 x 800 sensors. Every mode shows all of it, scaled, unless a window is requested: then the picture is that
-part of the array, pixel by pixel. Half resolution joins four sensors to one, which halves the array that a window is
-cut from. Without ROS.
+"""Baxter's cameras: valid settings, which may be open together, the effect of controls on a picture.
+
+A camera is an array of 1280 x 800 sensors. Every mode shows all of it, scaled, unless a window is requested: then the
+picture is that part of the array, pixel by pixel. Half resolution joins four sensors to one, which halves the array
+that a window is cut from. Without ROS.
 """
 import errno
 from typing import NamedTuple

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Buttons, lights, wheels and the other single channels of the robot, with their values. The names are the physical
-robot's. Documents leave open which of the torso's channels can be written; here a channel whose name says sensor, input
-or switch is an input. The part that measures a sensor attaches it.
+"""Buttons, lights, wheels and the other single channels of the robot, with their values.
+
+The names are the physical robot's. Documents leave open which of the torso's channels can be written; here a channel
+whose name says sensor, input or switch is an input. The part that measures a sensor attaches it.
 """
 from baxter_model import SIDES
 from baxter_sim_hardware.errors import CommandRefused
