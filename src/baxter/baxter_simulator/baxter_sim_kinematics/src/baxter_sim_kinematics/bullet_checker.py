@@ -13,8 +13,10 @@ from bullet_sim import World
 
 
 class BulletChecker:
-    """Checks in a world of its own, or in a given one, whether a robot touches itself or another model. One thread at a
-    time. Only contacts that the given joints can change count: the other arm's contact with a table does not.
+    """Checks in a world of its own, or in a given one, whether a robot touches itself or another model.
+
+    One thread at a time. Only contacts that the given joints can change count: the other arm's contact with a table
+    does not.
     """
 
     def __init__(self, world, model, self_collision_pairs=None, margin_m=0.0):
@@ -100,8 +102,9 @@ def self_checker(robot, find_mesh):
 
 
 def plausible_pairs(world, model, samples=50):
-    """Return [(link, link)] of ``model`` that have no joint between them and do not always overlap. A pair counts as
-    always overlapping if it touches in more than half of ``samples`` random postures.
+    """Return [(link, link)] of ``model`` that have no joint between them and do not always overlap.
+
+    A pair counts as always overlapping if it touches in more than half of ``samples`` random postures.
     """
     neighbours = {frozenset((joint.parent, joint.child)) for joint in model.merged.joints.values()}
     pairs = [pair for pair in itertools.combinations(model.merged.links, 2) if frozenset(pair) not in neighbours]

@@ -83,8 +83,10 @@ class Chain:
 
     def _set_reach(self):
         """Compute two balls around the first joint, by the sum of the links' lengths: the tip and the origin of the
-        last joint never leave them. A pose of the tip determines that origin if the last joint is revolute: it lies at
-        ``wrist_in_tip`` (3,) in the tip's frame.
+        last joint never leave them.
+
+        A pose of the tip determines that origin if the last joint is revolute: it lies at ``wrist_in_tip`` (3,) in the
+        tip's frame.
         """
         rotations, offsets, prismatic = self.arrays
         stroke = np.where(prismatic, np.maximum(np.abs(self.limit_arrays[0]), np.abs(self.limit_arrays[1])), 0.0)

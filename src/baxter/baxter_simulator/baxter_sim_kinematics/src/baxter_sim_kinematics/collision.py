@@ -30,8 +30,9 @@ class CollisionChecker(Protocol):
 
 def first_free(search, found, checker):
     """Return the IkResult of ``found`` if it has no contact, else of the solution without contact that is nearest to
-    the preferred posture, among the first ones found. Raises NoSolution, which names the pair that touches in most
-    solutions, after all starts of ``search``'s budget.
+    the preferred posture, among the first ones found.
+
+    Raises NoSolution, which names the pair that touches in most solutions, after all starts of ``search``'s budget.
     """
     names = search.chain.joint_names
     touch = checker.contact(names, found.q)

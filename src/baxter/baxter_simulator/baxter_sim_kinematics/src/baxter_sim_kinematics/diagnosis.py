@@ -41,8 +41,9 @@ def beyond_reach(chain, target):
 
 
 def explain(search, found):
-    """Raise the NoSolution that explains why ``search`` failed with ``found``. Returns a solution if the diagnosis
-    happens to find one.
+    """Raise the NoSolution that explains why ``search`` failed with ``found``.
+
+    Returns a solution if the diagnosis happens to find one.
     """
     chain, target = search.chain, search.target
     reach = beyond_reach(chain, target)
@@ -95,8 +96,10 @@ def _failure(search, reason, detail, nearest, joints=(), excess=()):
 
 def _least_excess(search, start, lifted):
     """Return (a solution inside the limits or None, {joint name: signed excess} of the joints that must exceed their
-    limits). One joint alone if that is enough, the one with the least excess; else several together. ``lifted``: a
-    solution without limits.
+    limits).
+
+    One joint alone if that is enough, the one with the least excess; else several together. ``lifted``: a solution
+    without limits.
     """
     chain = search.chain
     least, bound = {}, math.inf

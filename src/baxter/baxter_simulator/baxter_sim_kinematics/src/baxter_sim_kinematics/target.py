@@ -39,15 +39,17 @@ def pose_from_quaternion(position, quaternion_xyzw):
 
 
 class Target:
-    """A pose (4, 4) of the tip in the base frame, checked, and which of its components count. rotation (3, 3),
-    orthonormal; position (3,) [m]; rows: which :class:`~baxter_sim_kinematics.kernels.Rows` of the pose error count;
-    arrays: rotation, position, rows, basis, as the kernels take them.
+    """A pose (4, 4) of the tip in the base frame, checked, and which of its components count.
+
+    rotation (3, 3), orthonormal; position (3,) [m]; rows: which :class:`~baxter_sim_kinematics.kernels.Rows` of the
+    pose error count; arrays: rotation, position, rows, basis, as the kernels take them.
     """
 
     def __init__(self, pose, position_only=False, free_axis=None):
         """``position_only``: the orientation is free. ``free_axis`` (3,): the rotation about this axis of the tip, in
-        the tip's frame, is free, e.g. (0, 0, 1) for a gripper that may come from any side. Raises InvalidTarget for an
-        invalid pose, ValueError for an axis without direction.
+        the tip's frame, is free, e.g. (0, 0, 1) for a gripper that may come from any side.
+
+        Raises InvalidTarget for an invalid pose, ValueError for an axis without direction.
         """
         try:
             matrix = np.array(pose, dtype=np.float64)

@@ -5,9 +5,10 @@ import threading
 
 
 class Turns:
-    """A lock, as a context manager, which threads get in the order of their requests. Python's own lock usually goes to
-    the thread that has just released it: a loop over ten thousand poses would keep all other threads waiting until its
-    end.
+    """A lock, as a context manager, which threads get in the order of their requests.
+
+    Python's own lock usually goes to the thread that has just released it: a loop over ten thousand poses would keep
+    all other threads waiting until its end.
     """
 
     def __init__(self):

@@ -75,8 +75,9 @@ def reach(arm, limits, target, effort, q, best):
 @compiled
 def _fill_drift(jacobian, error, rows, limits, preferred, q, room):
     """Of ``room``, (gram (6, 6), pull (6,), correction (6,), drift (n,), fix (n,)), fill fix, the minimum-norm
-    correction of the pose error, and drift, the part of (preferred - q) that does not move the tip. Joints that the
-    drift would push through their limit are excluded, one round at a time: their columns become 0.
+    correction of the pose error, and drift, the part of (preferred - q) that does not move the tip.
+
+    Joints that the drift would push through their limit are excluded, one round at a time: their columns become 0.
     """
     n, (lower, upper), (gram, pull, correction, drift, fix) = q.shape[0], limits, room
     for _ in range(n):
@@ -112,6 +113,7 @@ def _fill_drift(jacobian, error, rows, limits, preferred, q, room):
 @compiled
 def walk(arm, limits, target, effort, preferred, q, best):
     """Walk from the solution ``q`` towards ``preferred`` in the null space, so that the tip stays on the target.
+
     ``best`` (a solution on entry) gets the nearest solution found. Returns the iterations used. Each step is the drift
     of :func:`_fill_drift`, scaled by the step length of the last two steps (Barzilai and Borwein, IMA J. Numer. Anal.
     8, 1988).
@@ -176,8 +178,10 @@ def walk(arm, limits, target, effort, preferred, q, best):
 @compiled
 def _approach(arm, limits, target, metres_per_radian, max_iterations, q):
     """Take ``q`` (changed in place) to a local minimum of the tip's distance to the target; returns the squared error
-    [m^2]. Levenberg-Marquardt that only accepts steps downhill; the damping follows Nielsen, "Damping parameter in
-    Marquardt's method", IMM-REP-1999-05.
+    [m^2].
+
+    Levenberg-Marquardt that only accepts steps downhill; the damping follows Nielsen, "Damping parameter in Marquardt's
+    method", IMM-REP-1999-05.
     """
     n, (rotations, offsets, prismatic), (lower, upper) = q.shape[0], arm, limits
     target_rotation, target_position, rows, basis = target

@@ -54,7 +54,9 @@ def split_pose(pose, allowed, rotation, position):
 @compiled
 def fill_basis(target_rotation, axis, basis):
     """Fill ``basis`` (3, 3): its last row is the target's ``axis`` (3,), given in the tip's frame, the others complete
-    the basis. For a target with free rotation about that axis. Base frame; ``axis`` has length 1.
+    the basis.
+
+    For a target with free rotation about that axis. Base frame; ``axis`` has length 1.
     """
     for a in range(3):
         basis[2, a] = (target_rotation[a, 0] * axis[0] + target_rotation[a, 1] * axis[1]
