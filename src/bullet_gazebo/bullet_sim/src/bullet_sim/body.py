@@ -132,8 +132,10 @@ class Body:
             self._world.note_touched(self)
 
     def feel_again(self):
-        """For World, after a step: apply again what was applied to the model while it slept. Bullet wakes a body at the
-        end of a step, so the body ignores forces in that step: its velocity is then exactly zero.
+        """For World, after a step: apply again what was applied to the model while it slept.
+
+        Bullet wakes a body at the end of a step, so the body ignores forces in that step: its velocity is then exactly
+        zero.
         """
         twist, self._late_twist = self._late_twist, None
         pushes, self._late_pushes = self._late_pushes, []
@@ -166,9 +168,10 @@ class Body:
         self._firm.add(index)
 
     def renew_contacts(self, link):
-        """Forget the contacts of a link's body; the next step detects them again. Bullet keeps contacts from step to
-        step, and sometimes a false one: its normal comes from two nearly parallel edges, and it can hold a body that
-        should come free.
+        """Forget the contacts of a link's body; the next step detects them again.
+
+        Bullet keeps contacts from step to step, and sometimes a false one: its normal comes from two nearly parallel
+        edges, and it can hold a body that should come free.
         """
         index = self._link_index[self._frame(link).link]
         # Every body is in group 1 and collides with all; setting this again makes Bullet drop the body's contacts.

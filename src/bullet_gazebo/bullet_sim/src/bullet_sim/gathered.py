@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Links with more shapes than PyBullet accepts: the surplus goes into files. PyBullet has room for 16 shapes per body
-and writes beyond its buffer, which crashes the process. A file holds any number: of convex bodies, one object each, or
-of triangles. Meshes stay exact; boxes lose their sharp edges (by a millimetre); cylinders and balls become bodies with
-flat faces, inside the round ones by at most half a per cent of the radius. As many of them as possible stay primitives.
+"""Links with more shapes than PyBullet accepts: the surplus goes into files.
+
+PyBullet has room for 16 shapes per body and writes beyond its buffer, which crashes the process. A file holds any
+number: of convex bodies, one object each, or of triangles. Meshes stay exact; boxes lose their sharp edges (by a
+millimetre); cylinders and balls become bodies with flat faces, inside the round ones by at most half a per cent of the
+radius. As many of them as possible stay primitives.
 """
 
 import itertools
@@ -35,8 +37,9 @@ class Part(NamedTuple):
 
 
 def gathered(parts, keep):
-    """Return a list of at most MOST_SHAPES Parts with the same collision geometry as ``parts``. ``keep(key, lines)``
-    returns the path of a file that holds the result of ``lines()``, cached under ``key``.
+    """Return a list of at most MOST_SHAPES Parts with the same collision geometry as ``parts``.
+
+    ``keep(key, lines)`` returns the path of a file that holds the result of ``lines()``, cached under ``key``.
     """
     if len(parts) <= MOST_SHAPES:
         return parts

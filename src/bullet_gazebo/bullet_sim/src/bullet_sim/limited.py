@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Work on untrusted files, in a separate process with limits. A library that hangs or takes all memory only ends that
-process, and the interpreter lock stays free for the physics. The limit is processor time, not wall time: a busy machine
-gets the same result later.
+process, and the interpreter lock stays free for the physics.
+
+The limit is processor time, not wall time: a busy machine gets the same result later.
 """
 
 import importlib
@@ -28,8 +29,9 @@ class LimitError(Exception):
 
 
 class LimitedProcess:
-    """Calls functions in a process that starts on demand and ends after some idle time. Any thread may call; calls run
-    one at a time.
+    """Calls functions in a process that starts on demand and ends after some idle time.
+
+    Any thread may call; calls run one at a time.
     """
 
     def __init__(self, processor_s=PROCESSOR_S, memory_bytes=MEMORY_BYTES, waiting_s=WAITING_S):

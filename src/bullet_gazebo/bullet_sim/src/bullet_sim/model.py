@@ -133,9 +133,10 @@ class Model(Body):
     def drive_position(self, index, position, max_effort, velocity=None):
         """Pull joints ``index`` (k,) to ``position`` (k,) with at most ``max_effort`` (k,).
 
-        Bullet solves the motor with the other constraints (implicitly), so a stiff drive is stable. ``position`` is the
-        set-point at the end of the step. With ``velocity`` (k,), the set-point's own velocity, a moving set-point is
-        followed without lag.
+        Bullet solves the motor with the other constraints (implicitly), so a stiff drive is stable.
+
+        ``position`` is the set-point at the end of the step. With ``velocity`` (k,), the set-point's own velocity, a
+        moving set-point is followed without lag.
         """
         self._drive_otherwise(index)
         self._stay_awake()
@@ -173,8 +174,10 @@ class Model(Body):
 
     def carry(self, index, position):
         """Put joints ``index`` (k,) at ``position`` (k,) and hold them there during the next step, with unlimited
-        force. They move without inertia: links before the joint feel no reaction, as with Gazebo's
-        ``Joint::SetPosition``. Links behind it, and touched bodies, do.
+        force.
+
+        They move without inertia: links before the joint feel no reaction, as with Gazebo's ``Joint::SetPosition``.
+        Links behind it, and touched bodies, do.
         """
         self._refuse_nan(index, position, "position")
         self._stay_awake()
@@ -187,8 +190,9 @@ class Model(Body):
         self.drive_velocity(index, np.zeros(len(index)), np.full(len(index), _RIGID_EFFORT))
 
     def drive_effort(self, index, effort):
-        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; call it again for every step. Efforts
-        are clamped to ``bounds.EFFORT``; raises BulletSimError for NaN.
+        """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; call it again for every step.
+
+        Efforts are clamped to ``bounds.EFFORT``; raises BulletSimError for NaN.
         """
         self._refuse_nan(index, effort, "effort")
         effort = np.clip(effort, bounds.EFFORT.low, bounds.EFFORT.high)
@@ -243,8 +247,9 @@ class Model(Body):
         self.lower[index], self.upper[index] = lower, upper
 
     def couple(self, joint, other, ratio):
-        """Couple two joints by a permanent gear: ``other`` moves ``ratio`` times as far as ``joint``. A drive on one of
-        them drives both. Another call for the same joints changes nothing.
+        """Couple two joints by a permanent gear: ``other`` moves ``ratio`` times as far as ``joint``.
+
+        A drive on one of them drives both. Another call for the same joints changes nothing.
         """
         pair = int(joint), int(other)
         if pair not in self._gears:
@@ -351,8 +356,9 @@ class Model(Body):
     # -- for World: when the physics has failed -----------------------------------------------------------------
 
     def fault(self):
-        """Return the Fault of the present state, or None if it is good; then it is kept as the last good one. Called
-        after every step, so one sum checks all numbers.
+        """Return the Fault of the present state, or None if it is good; then it is kept as the last good one.
+
+        Called after every step, so one sum checks all numbers.
         """
         if self.static:
             base, total = self._good[0], 0.0
@@ -376,8 +382,9 @@ class Model(Body):
         return None
 
     def _stop_at_limits(self, position, velocity):
-        """Put fast joints that passed their limits back to them; return the positions (n,). In the next step Bullet
-        stops them there, and the links on them feel the impact.
+        """Put fast joints that passed their limits back to them; return the positions (n,).
+
+        In the next step Bullet stops them there, and the links on them feel the impact.
         """
         through, = np.nonzero(((position < self.lower) | (position > self.upper)) & (np.abs(velocity) > _QUICK))
         if not len(through):

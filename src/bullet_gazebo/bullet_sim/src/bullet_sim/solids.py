@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Changes the collision shapes of some links. Descriptions contain shapes that only keep a controller at a distance,
-and then leave out the shape of the link inside.
+"""Changes the collision shapes of some links.
+
+Descriptions contain shapes that only keep a controller at a distance, and then leave out the shape of the link inside.
 """
 
 from __future__ import annotations

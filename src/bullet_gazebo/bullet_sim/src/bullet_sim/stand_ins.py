@@ -25,8 +25,10 @@ _UNKNOWN_RADIUS_M = 0.03
 
 def with_stand_ins(robot, mesh_files):
     """Return ``robot`` with a primitive for each missing mesh, and one line for the log; the same robot and "" if no
-    mesh is missing. A link's own other shapes are taken first, then a box with its inertia, then a rod or ball that
-    fits between the joints. ``mesh_files``: MeshFiles.
+    mesh is missing.
+
+    A link's own other shapes are taken first, then a box with its inertia, then a rod or ball that fits between the
+    joints. ``mesh_files``: MeshFiles.
     """
     told, links = [], {}
     for link in robot.links.values():

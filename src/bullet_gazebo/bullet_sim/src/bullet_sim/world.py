@@ -45,11 +45,12 @@ class World:
     :param time_step_s: length of a tick [s]
     :param gravity: (3,) [m/s^2]
     :param contact_ahead_m: distance below which two bodies get a contact, before they touch [m]. The default is the
-    distance that 2 m/s travel in a tick of 2 ms; with Bullet's default of 0.02 m, a folded arm beside its body costs
-    time for contacts that never happen. For small bodies it is at most a fiftieth of their size. :param seed: of
-    ``World.random``, for noise :param find_mesh: function from a mesh URI to a file path, or None when there is no such
-    file :param warn: function of one line of text, called after a repair :param error: function of one line of text,
-    called for a model that got an impossible state
+        distance that 2 m/s travel in a tick of 2 ms; with Bullet's default of 0.02 m, a folded arm beside its body
+        costs time for contacts that never happen. For small bodies it is at most a fiftieth of their size.
+    :param seed: of ``World.random``, for noise
+    :param find_mesh: function from a mesh URI to a file path, or None when there is no such file
+    :param warn: function of one line of text, called after a repair
+    :param error: function of one line of text, called for a model that got an impossible state
     """
 
     _contact_ahead_in_force_m = None
@@ -121,7 +122,9 @@ class World:
         self.solver_iterations = iterations
 
     def set_time_step(self, time_step_s):
-        """Set the length of a tick from the next one on [s]; the time is kept. Raises BulletSimError out of bounds.
+        """Set the length of a tick from the next one on [s]; the time is kept.
+
+        Raises BulletSimError out of bounds.
         """
         within(bounds.TIME_STEP, time_step_s, "the time step")
         self._step_since = self.tick, self.time_s
@@ -232,9 +235,10 @@ class World:
         self._watch.look()
 
     def make_anew(self, models, motions=None):
-        """Rebuild the multibodies of ``models``. ``motions``: {model: result of ``Model.motion`` or
-        ``Model.last_good``}. All bodies are removed before the first one is built, so that Bullet's search tree is
-        empty in between.
+        """Rebuild the multibodies of ``models``.
+
+        ``motions``: {model: result of ``Model.motion`` or ``Model.last_good``}. All bodies are removed before the first
+        one is built, so that Bullet's search tree is empty in between.
         """
         motions = {model: (motions or {}).get(model) or model.motion() for model in models}
         for model in models:
@@ -292,7 +296,9 @@ class World:
 
     def first_hits(self, starts, ends):
         """Cast rays as ``ray_test_batch`` does; return for each its first hit: ``(model's name, link's merged name)``,
-        or None. A ray that starts inside a convex shape does not hit that shape.
+        or None.
+
+        A ray that starts inside a convex shape does not hit that shape.
         """
         models = {model.body: model for model in self.models.values()}
         hits = pybullet.rayTestBatch(list(starts), list(ends), physicsClientId=self._client)
