@@ -14,9 +14,11 @@ class _Job:
 
 
 class TimedJobs:
-    """Payloads to apply at each tick, by target. A job acts in every tick that begins within its duration, counted from
-    the first tick at or after its start: 0.5 s are exactly 250 ticks of 2 ms, and a duration between zero and one tick
-    is one tick. A duration of zero does nothing, a negative one never ends.
+    """Payloads to apply at each tick, by target.
+
+    A job acts in every tick that begins within its duration, counted from the first tick at or after its start: 0.5 s
+    are exactly 250 ticks of 2 ms, and a duration between zero and one tick is one tick. A duration of zero does
+    nothing, a negative one never ends.
     """
 
     def __init__(self):

@@ -66,7 +66,9 @@ class ModelPlugin:
 
     def joints_set(self):
         """A service has moved the model's joints (set_model_configuration); targets should follow, so that nothing
-        moves until a new command comes. Messages that are in the queues now came before.
+        moves until a new command comes.
+
+        Messages that are in the queues now came before.
         """
 
     def reset(self):
@@ -79,7 +81,9 @@ class ModelPlugin:
 
     def restarted(self):
         """Return the plugin that replaces this one after it raised. It must start no motion, and moving joints come to
-        rest. By default: a new one of the same class, see :meth:`successor`.
+        rest.
+
+        By default: a new one of the same class, see :meth:`successor`.
         """
         return self.successor()
 
@@ -158,9 +162,10 @@ class PluginContext(NodeHandle):
         return tuple(self._host.plugins())
 
     def screen(self, link, place, size_m, pixels):
-        """Make a screen, a rectangle of the model that shows pictures; call it in the constructor. It is fixed to
-        ``link`` at ``place`` (4, 4): the frame of its centre, with x to the right and y up for a viewer in front of it.
-        ``size_m``: width and height; ``pixels``: columns and rows. Returns a
+        """Make a screen, a rectangle of the model that shows pictures; call it in the constructor.
+
+        It is fixed to ``link`` at ``place`` (4, 4): the frame of its centre, with x to the right and y up for a viewer
+        in front of it. ``size_m``: width and height; ``pixels``: columns and rows. Returns a
         :class:`world_picture.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """
         # It belongs to the model and is closed with it.

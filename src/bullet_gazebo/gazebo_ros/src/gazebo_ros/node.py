@@ -94,6 +94,7 @@ def main(argv=None):
 
 def _build(log, cleanup, line):
     """Build everything, from the parameters to a simulation that is ready to run; clean-up functions go on ``cleanup``.
+
     ``line``: :class:`CommandLine`, which overrides the parameters.
     """
     if line.ignored:

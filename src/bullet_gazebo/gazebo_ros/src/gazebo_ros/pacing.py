@@ -16,8 +16,10 @@ _LEAST_SLACK_NS = 1
 
 
 def ticks_between(rate, tick_rate):
-    """Number of ticks between two events at ``rate`` [Hz, simulation time]. 1 if the rate is above ``tick_rate`` [Hz];
-    rounded if the rate does not divide it. Raises ``ValueError`` for a rate that is not positive.
+    """Number of ticks between two events at ``rate`` [Hz, simulation time].
+
+    1 if the rate is above ``tick_rate`` [Hz]; rounded if the rate does not divide it. Raises ``ValueError`` for a rate
+    that is not positive.
     """
     if not rate > 0.0:
         raise ValueError("the rate is %g Hz, expected a positive number, at most the tick rate of %g Hz"

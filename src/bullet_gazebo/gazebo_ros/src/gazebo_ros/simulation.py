@@ -96,8 +96,10 @@ class Simulation:
         return self._step_s
 
     def set_step(self, step_s):
-        """Set the length of a tick from the next one on [s]; time and the real-time factor stay. Raises
-        ``BulletSimError`` if it is out of bounds, and ``ValueError`` if a plugin only works with the present step.
+        """Set the length of a tick from the next one on [s]; time and the real-time factor stay.
+
+        Raises ``BulletSimError`` if it is out of bounds, and ``ValueError`` if a plugin only works with the present
+        step.
         """
         keeping = [hosted for hosted in self.plugins if hosted.plugin.keeps_step]
         if keeping:

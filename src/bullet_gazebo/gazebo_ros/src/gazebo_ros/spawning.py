@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Spawning and deleting of models: from a description to a model in the world with its plugins. Slow work (parsing,
-importing plugins, finding files) happens in the thread of the request; the loop only makes the bodies.
+"""Spawning and deleting of models: from a description to a model in the world with its plugins.
+
+Slow work (parsing, importing plugins, finding files) happens in the thread of the request; the loop only makes the
+bodies.
 """
 import gc
 import itertools

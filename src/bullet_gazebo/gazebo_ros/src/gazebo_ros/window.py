@@ -62,6 +62,7 @@ class Window:
 
     def set_scene(self, bodies, values):
         """Draw these ``bodies``, as :meth:`SnapshotWriter.write_scene` lists them; bodies that exist already stay.
+
         ``values`` gives their poses, so that no body ever appears at another place.
         """
         wanted = {body["name"]: body for body in bodies}
