@@ -46,8 +46,9 @@ class NodeHandle:
         return self._opening(("subscription", name, msg_class, depth), make)
 
     def pending(self):
-        """Loop thread: the subscriptions that got messages since the last call, in the order they were opened. For
-        owners with so many subscriptions that polling each one at every tick takes time.
+        """Loop thread: the subscriptions that got messages since the last call, in the order they were opened.
+
+        For owners with so many subscriptions that polling each one at every tick takes time.
         """
         if not self._noted:
             return ()
@@ -61,8 +62,9 @@ class NodeHandle:
         return self._serving(self._ros.service, self.resolve(name), srv_class, handler)
 
     def service_in_thread(self, name, srv_class, handler):
-        """Advertise a slow service; ``handler(request)`` runs in a thread of its own. It may use the objects of the
-        loop through :meth:`call_in_loop` only.
+        """Advertise a slow service; ``handler(request)`` runs in a thread of its own.
+
+        It may use the objects of the loop through :meth:`call_in_loop` only.
         """
         return self._serving(self._ros.service_in_thread, self.resolve(name), srv_class, handler)
 
@@ -85,13 +87,15 @@ class NodeHandle:
 
     def withdraw(self, name):
         """Loop thread: close the service ``name`` and all subscriptions to the topic ``name``, of all owners,
-        permanently. For an owner that restricts what clients may do. Returns the service's handler, so that the caller
-        can still use it, or None if there is no such service.
+        permanently. For an owner that restricts what clients may do.
+
+        Returns the service's handler, so that the caller can still use it, or None if there is no such service.
         """
         return self._ros.withdraw(self.resolve(name))
 
     def survived(self, place, error):
         """Count an error that the owner has handled: it appears in /diagnostics and, at a limited rate, in the log.
+
         ``place``: the topic or service, or what the owner was doing, in words.
         """
         self._ros.faults.note(place, error)

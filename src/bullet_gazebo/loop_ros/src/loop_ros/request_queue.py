@@ -27,8 +27,9 @@ class RequestQueue:
         return future
 
     def call(self, function, *arguments):
-        """Any other thread: submit and wait; returns the function's result or raises its error. Raises
-        :class:`LoopEnded` if the loop stops first.
+        """Any other thread: submit and wait; returns the function's result or raises its error.
+
+        Raises :class:`LoopEnded` if the loop stops first.
         """
         try:
             return self.submit(function, *arguments).result()

@@ -97,8 +97,9 @@ class RosObjects:
         return list(self._services)
 
     def withdraw(self, name):
-        """Loop thread: close the service ``name`` and all subscriptions to the topic ``name``, of all owners. Returns
-        the service's handler, which from then on only the caller can use, or None if there is no such service.
+        """Loop thread: close the service ``name`` and all subscriptions to the topic ``name``, of all owners.
+
+        Returns the service's handler, which from then on only the caller can use, or None if there is no such service.
         """
         for subscription in self._subscriptions.get(name, ()):
             subscription.close()
@@ -110,6 +111,7 @@ class RosObjects:
 
     def call_in_loop(self, function, *arguments):
         """Any thread but the loop's: call ``function(*arguments)`` in the loop between two ticks and wait for it.
+
         Raises ``rospy.ServiceException`` if the loop ends first, which makes a service request fail cleanly.
         """
         try:

@@ -10,8 +10,9 @@ def _raise(error):
 
 
 class Subscription:
-    """Unread messages of a topic: any thread puts them in, the loop takes them out. Keeps the newest ``depth``
-    messages.
+    """Unread messages of a topic: any thread puts them in, the loop takes them out.
+
+    Keeps the newest ``depth`` messages.
     """
 
     #: Called once, when the subscription is closed.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """ROS for tests, without a master: publishers keep their messages, and tests put messages into subscriptions.
+
 ``test_fake_ros.py`` runs the same cases against this and the simulator's own code. Subscriptions, faults and the
 answers of services are the real code.
 """
@@ -147,8 +148,10 @@ class _Sent:
 
 class FakePublisher:
     """``messages``: the messages that a subscriber received, each deserialized from its bytes; one that cannot be
-    serialized raises. ``has_listeners`` may be set. Several publishers of a topic share both. ``keeps_last``: whether a
-    late subscriber gets the last message.
+    serialized raises.
+
+    ``has_listeners`` may be set. Several publishers of a topic share both. ``keeps_last``: whether a late subscriber
+    gets the last message.
     """
 
     def __init__(self, sent, msg_class, keeps_last, publishers, topic):
