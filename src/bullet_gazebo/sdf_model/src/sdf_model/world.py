@@ -26,8 +26,10 @@ _ASPHALT = (0.25, 0.25, 0.25, 1.0)
 
 @dataclass
 class SdfWorld:
-    """The content of a world file. None: not given. ``problems`` are parts that cannot be used, one line each; the
-    world is made without them. ``warning`` names what was not understood.
+    """The content of a world file. None: not given.
+
+    ``problems`` are parts that cannot be used, one line each; the world is made without them. ``warning`` names what
+    was not understood.
     """
 
     name: str
