@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Camera drivers: the topics of a sensor plugin. A driver is made from a :class:`SensorEntry`. The drawing thread asks
-whether it is due and makes it publish. ``config/camera_drivers.yaml`` maps plugin file names to drivers.
+"""Camera drivers: the topics of a sensor plugin.
+
+A driver is made from a :class:`SensorEntry`. The drawing thread asks whether it is due and makes it publish.
+``config/camera_drivers.yaml`` maps plugin file names to drivers.
 """
 import threading
 

@@ -43,7 +43,6 @@ class Body:
 
     def __init__(self, links, joints, screens=()):
         """``links``: list of (name, parts), parents first; ``joints``: one ``urdf_model.Joint`` per link but the first.
-
         """
         self.screens = screens
         self._joints = joints
