@@ -7,8 +7,9 @@ _TOLERANCE_S = 1e-6
 
 
 class Pace:
-    """Due every period after the first query; due at once when time has gone back. rate [Hz]: 0 means due at every
-    query.
+    """Due every period after the first query; due at once when time has gone back.
+
+    rate [Hz]: 0 means due at every query.
     """
 
     def __init__(self, rate):
