@@ -14,8 +14,9 @@ def parse_xml(text, most_bytes=bounds.DESCRIPTION_BYTES, repaired=None):
     """Return the root element of ``text`` (str or bytes), without comments; None where it holds none.
 
     ``repaired``: function called for an element whose end tag is missing, which then ends where its parent does;
-    without it such a text is refused. A text that breaks off is always refused. Raises XmlRefused for a text that is
-    not well-formed, declares entities, or is too large.
+    without it such a text is refused. A text that breaks off is always refused.
+
+    Raises XmlRefused for a text that is not well-formed, declares entities, or is too large.
     """
     data = text.encode() if isinstance(text, str) else text
     if len(data) > most_bytes:
