@@ -79,8 +79,9 @@ class DrawingCache:
 
 
 def write_parts(path, folder, triangles):
-    """Write the mesh at ``path`` into ``folder``, decimated: ``parts.json`` and the files that it lists. ``triangles``:
-    the number that a mesh of :data:`USUAL_M` keeps.
+    """Write the mesh at ``path`` into ``folder``, decimated: ``parts.json`` and the files that it lists.
+
+    ``triangles``: the number that a mesh of :data:`USUAL_M` keeps.
     """
     pieces = _read(path)
     total = sum(len(faces) for _, faces, _ in pieces)

@@ -116,8 +116,9 @@ def open_shared(path):
 
 
 def reserve(file, size, path):
-    """Reserve ``size`` bytes for an open file; raises :class:`SnapshotError`. Without it, a write while the machine's
-    memory is full would kill the process (SIGBUS).
+    """Reserve ``size`` bytes for an open file; raises :class:`SnapshotError`.
+
+    Without it, a write while the machine's memory is full would kill the process (SIGBUS).
     """
     try:
         os.posix_fallocate(file.fileno(), 0, size)
