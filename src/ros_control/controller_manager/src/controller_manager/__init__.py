@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers that share a robot's joints: what they are, and who may run. ROS-free.
+"""Controllers that share a robot's joints: their base class, and which of them may run. ROS-free.
 
 Only ``pid_tuning``, ``services``, ``controller_manager_interface`` and ``controller_lifetime`` know ROS.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a controller is, and what it is given. ROS-free; see docs/write_a_controller.md for one in full."""
+"""The base class of controllers, and their context. ROS-free; see docs/write_a_controller.md for a full example."""
 import math
 
 from .errors import ControllerError
@@ -22,11 +22,11 @@ class Controller:
         self.hardware = hardware
         self.context = context
         self.log = context.log
-        #: {hardware interface: list of joints that nobody else may command while this controller runs}
+        #: {hardware interface: list of joints that no other controller may command while this one runs}
         self.claims = {}
 
     def claim(self, interface, joints):
-        """Say that the controller commands ``joints`` (names) through ``interface`` (see :mod:`.interfaces`).
+        """Declare that the controller commands ``joints`` (names) through ``interface`` (see :mod:`.interfaces`).
 
         Returns the joints' indices, an int array (k,), for the arrays of the hardware. Raises :class:`ControllerError`
         for a joint that the hardware does not offer through this interface.
@@ -37,7 +37,7 @@ class Controller:
         return index
 
     def observe(self, interface):
-        """Say that the controller reads through ``interface``; nobody is kept from the joints by that."""
+        """Declare that the controller reads through ``interface``; this does not claim the joints."""
         self.claims.setdefault(interface, [])
 
     def starting(self, time_s):
@@ -48,7 +48,7 @@ class Controller:
         raise NotImplementedError
 
     def idle(self, time_s):
-        """One tick while the controller is loaded but does not run: answer requests, command nothing.
+        """One tick while the controller is loaded but not running: answer requests, command nothing.
 
         Called at every tick instead of ``update``, e.g. to reject the goals of an action.
         """
@@ -57,7 +57,7 @@ class Controller:
         """The controller stops running; the hardware keeps its last command."""
 
     def close(self):
-        """The controller is unloaded. The topics and services of its context are closed after this."""
+        """Called when the controller is unloaded, before the topics and services of its context are closed."""
 
 
 class ControllerContext:
@@ -106,7 +106,7 @@ class ControllerContext:
         return self.param(name), self.resolve(name)
 
     def required(self, name, expected):
-        """Value of a parameter that must be there; ``expected`` says in words what to give."""
+        """Value of a required parameter; ``expected`` describes a valid value for the error text."""
         value = self.param(name)
         if value is None:
             raise ControllerError("parameter %s is missing; give %s" % (self.resolve(name), expected))
@@ -153,7 +153,7 @@ class ControllerContext:
         """A subscription, which keeps the newest ``depth`` unread messages.
 
         ``handle(function)`` calls ``function(message)`` for each of them, oldest first, and drops and counts a message
-        on which that fails; ``guarded(function, ...)``: one such call. Unguarded: ``drain()`` -> list of them;
+        for which it raises; ``guarded(function, ...)``: one such call. Unguarded: ``drain()`` -> list of them;
         ``take()`` -> the newest or None.
         """
         return self._ros.subscription(self.resolve(topic), msg_class, depth)
@@ -163,7 +163,7 @@ class ControllerContext:
         return self._ros.service(self.resolve(name), srv_class, handler)
 
     def close(self):
-        """Close every topic and service that was opened here."""
+        """Close all topics and services of this context."""
         self._ros.close()
 
 

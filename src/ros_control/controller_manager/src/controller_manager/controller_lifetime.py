@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers that live as long as the process that spawned them."""
+"""Controllers that are loaded as long as the process that spawned them runs."""
 import os
 import queue
 import signal
@@ -21,23 +21,24 @@ from std_msgs.msg import Bool
 
 from rospy_limits.node import limit_ports
 
-# Between two looks at something that is not there yet [wall s].
+# Polling period [wall s].
 _POLL_S = 0.1
 _FAILED_LOAD_PAUSE_S = 1.0
-# How long a paused simulation may keep an ending process from ending, in one request and in all [wall s].
+# Longest delay of the process's end by a paused simulation, for one request and in all [wall s].
 _TAKE_DOWN_S = 2.0
 _END_S = 5.0
 
 
 class NotThere(Exception):
-    """What was waited for did not come; the text says what it was and how to get it."""
+    """A wait has failed; the text says what was missing and how to provide it."""
 
 
 def run_until_ended(node_name, work, clean_up):
-    """Be a node that runs ``work()`` in a thread until a signal or a shutdown request comes, then ``clean_up()``.
+    """Run ``work()`` in a thread until a signal or a shutdown request comes, then ``clean_up()``.
 
-    ``work`` returns None to go on until the end. Returns the exit code, 1 where it raised. rospy would clean up inside
-    the signal's handler, which interrupts the main thread anywhere, also where it holds a lock that cleaning up needs.
+    If ``work`` returns None, the node goes on until its end. Returns the exit code, 1 if it raised. rospy would clean
+    up inside the signal's handler, which interrupts the main thread anywhere, even while it holds a lock that the
+    clean-up needs.
     """
     try:
         limit_ports()
@@ -70,7 +71,7 @@ def run_until_ended(node_name, work, clean_up):
     code = events.get()
     cleaning = threading.Thread(target=clean_up, daemon=True)
     cleaning.start()
-    # In a paused simulation nobody answers; what is not taken down by now stays.
+    # In a paused simulation nobody answers; controllers that are still loaded stay.
     cleaning.join(_END_S)
     over.set()
     rospy.signal_shutdown("done")
@@ -78,7 +79,7 @@ def run_until_ended(node_name, work, clean_up):
 
 
 class ControllerLifetime:
-    """Loads and starts controllers through the services of one controller manager, and takes them down again."""
+    """Loads and starts controllers through the services of one controller manager, and unloads them at the end."""
 
     def __init__(self, namespace="", timeout_s=0.0):
         """Wait for the controller manager below ``namespace`` (relative to the node's own), at most ``timeout_s`` wall
@@ -104,7 +105,7 @@ class ControllerLifetime:
                 pass
             if rospy.is_shutdown():
                 raise rospy.ROSInterruptException()
-            # Simulated time that stands at 0 is a simulator that is not up yet.
+            # Simulated time 0 means that the simulator is not up yet.
             still_starting = rospy.get_param("/use_sim_time", False) and rospy.get_rostime().is_zero()
             if self._deadline is not None and time.monotonic() > self._deadline and not still_starting:
                 raise NotThere("no controller manager: service %s did not come within %g s; is the robot spawned, with "
@@ -124,7 +125,7 @@ class ControllerLifetime:
     @staticmethod
     def names_from(arguments):
         """Names of controllers; an argument that is an existing file is loaded to the parameter server, and its keys
-        are names. Raises :class:`NotThere` for a file that is not there or has none."""
+        are names. Raises :class:`NotThere` for a file that does not exist or has none."""
         names = []
         for argument in arguments:
             if not os.path.isfile(argument):
@@ -148,7 +149,7 @@ class ControllerLifetime:
         for name in names:
             if self._ending or rospy.is_shutdown():
                 return
-            # Before the answer: who ends while it is on its way takes the controller down too.
+            # Added before the response: a process that ends meanwhile must unload the controller too.
             self._loaded.append(name)
             if self._asked(self._load, name):
                 rospy.loginfo("loaded controller '%s'", name)
@@ -166,7 +167,8 @@ class ControllerLifetime:
                          "manager (/gazebo) for the reason", ", ".join(self._loaded))
 
     def take_down(self):
-        """Any thread: stop what was brought up and unload it, last one first. What is gone already does not matter."""
+        """Any thread: stop and unload the controllers that were brought up, the last one first. Missing ones are
+        skipped."""
         self._ending = True
         names = list(self._loaded)
         if not names:

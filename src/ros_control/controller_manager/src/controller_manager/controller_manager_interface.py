@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calls to a controller manager, for scripts. Service names are relative: the caller's namespace decides which robot.
+"""Calls to a controller manager, for scripts. Service names are relative: the caller's namespace selects the robot.
 
-Each function returns True where the controller manager did what was asked, prints one line to say so, and raises
-``rospy.ROSException`` when there is no controller manager.
+Each function returns True if the request succeeded, prints the result in one line, and raises ``rospy.ROSException``
+when there is no controller manager.
 """
 import rospy
 from controller_manager_msgs.srv import (

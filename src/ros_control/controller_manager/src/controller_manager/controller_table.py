@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which Python class stands behind the ``type`` of a controller. ROS-free."""
+"""Maps the ``type`` of a controller to its Python class. ROS-free."""
 import importlib
 
 from .controller import Controller
@@ -10,7 +10,7 @@ class ControllerTable:
     """Type string, such as ``position_controllers/JointPositionController`` -> ``"module:Class"``."""
 
     def __init__(self, entries):
-        """``entries``: mapping; a wrong entry matters when somebody asks for it."""
+        """``entries``: mapping; a wrong entry raises only when it is used."""
         self._entries = dict(entries)
         self._modules = {}
 
@@ -40,6 +40,6 @@ class ControllerTable:
         return found
 
     def reload(self):
-        """Import the modules again that were used so far, so that changed source takes effect."""
+        """Reload all modules used so far, so that changed source takes effect."""
         for name, module in list(self._modules.items()):
             self._modules[name] = importlib.reload(module)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What can go wrong; each text says what was found and what would be right."""
+"""The errors of this package; each text says what was found and what would be right."""
 
 
 class ControlError(Exception):
-    """Root of the errors of this package."""
+    """Base class of this package's errors."""
 
 
 class ControllerError(ControlError):
@@ -11,7 +11,7 @@ class ControllerError(ControlError):
 
 
 class HardwareError(ControlError):
-    """A description does not give a robot hardware that can be controlled."""
+    """A description defines no hardware that can be controlled."""
 
 
 class Refused(ControlError):

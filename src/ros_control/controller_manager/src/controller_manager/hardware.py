@@ -9,7 +9,7 @@ from .interfaces import COMMAND, JOINT_STATE, POSITION
 
 
 class SwitchResult(enum.Enum):
-    """How far the hardware is with a change of controllers."""
+    """Progress of the hardware in a change of controllers."""
 
     DONE = "done"
     ONGOING = "ongoing"
@@ -22,7 +22,7 @@ class RobotHardware:
     Attributes
     ----------
     position, velocity, effort :
-        The measured state, written in place before each update. Copy what you keep.
+        The measured state, written in place before each update. Copy values that you keep.
     command : dict
         {interface of ``interfaces.COMMAND``: array}. Only the entries of the joints that have the interface count.
     interface_joints : dict
@@ -30,7 +30,7 @@ class RobotHardware:
 
     sensors : dict
         {interface of a sensor: {name: sensor}}, empty unless the driver fills it. A sensor has ``frame`` and
-        ``read()``, called at each update, which returns what it measured, or None.
+        ``read()``, called at each update, which returns the measurement, or None.
 
     A driver derives from this, fills the state before and reads the commands after ``ControllerManager.update``.
     """
@@ -57,8 +57,8 @@ class RobotHardware:
         self.command = {interface: np.zeros(count) for interface in COMMAND}
 
     def index(self, interface, joints, asked_by):
-        """Indices (k,) of ``joints`` (names). Raises :class:`ControllerError` where one lacks ``interface``;
-        ``asked_by`` names the controller that needs them, for the text."""
+        """Indices (k,) of ``joints`` (names). Raises :class:`ControllerError` if one lacks ``interface``; ``asked_by``:
+        name of the controller, for the text."""
         offered = self.interface_joints.get(interface)
         if offered is None:
             raise ControllerError(
@@ -76,8 +76,8 @@ class RobotHardware:
     # -- a controller that has failed; claims as below ---------------------------------------------------------------
 
     def hold(self, claims):
-        """Have the joints of ``claims`` stay where they are, as far as commands can do that: positions as they are now,
-        velocity and effort 0. A driver that has brakes uses them."""
+        """Hold the joints of ``claims``, as far as commands can: their present positions, velocity and effort 0. A
+        driver that has brakes uses them."""
         for interface, joints in claims.items():
             if interface in COMMAND:
                 index = [self._index[joint] for joint in joints]
@@ -93,7 +93,7 @@ class RobotHardware:
         return True
 
     def do_switch(self, start, stop):
-        """Begin the change; called once, between two updates."""
+        """Start the change; called once, between two updates."""
 
     def switch_result(self, claims=None):
         """A :class:`SwitchResult` for the whole change, or for the resources of one controller's ``claims``."""

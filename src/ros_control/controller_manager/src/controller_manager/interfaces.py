@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names of the hardware interfaces, as they stand in ``controller_manager_msgs/ControllerState``."""
+"""Names of the hardware interfaces, as in ``controller_manager_msgs/ControllerState``."""
 
 JOINT_STATE = "hardware_interface::JointStateInterface"
 POSITION = "hardware_interface::PositionJointInterface"
@@ -9,6 +9,6 @@ EFFORT = "hardware_interface::EffortJointInterface"
 #: Interfaces that command a joint: a controller that uses a joint through one of these claims it.
 COMMAND = (POSITION, VELOCITY, EFFORT)
 
-#: Interfaces that only say something; of sensors, see ``RobotHardware.sensors``.
+#: Interfaces that are only read; for sensors, see ``RobotHardware.sensors``.
 IMU_SENSOR = "hardware_interface::ImuSensorInterface"
 FORCE_TORQUE_SENSOR = "hardware_interface::ForceTorqueSensorInterface"

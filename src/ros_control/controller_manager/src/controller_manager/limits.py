@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint limits: where they stand, and what they make of a command. ROS-free, all joints of an interface at once.
+"""Joint limits: reading them, and enforcing them on commands. ROS-free, all joints of an interface at once.
 
 The rules are joint_limits_interface's: saturation, or soft limits for joints whose URDF has a <safety_controller>.
 """
@@ -24,8 +24,8 @@ class SoftLimits:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """What one joint may do; infinite where there is no limit, which is not enforced then. ``soft``:
-    :class:`SoftLimits` or None; they need a limit of velocity."""
+    """Limits of one joint; infinite means no limit. ``soft``: :class:`SoftLimits` or None; they need a velocity
+    limit."""
 
     lower: float = -math.inf
     upper: float = math.inf
@@ -49,17 +49,17 @@ def limits_from_urdf(joint, soft=None):
 
 
 def without_idle_soft_limits(limits):
-    """``limits`` without soft ones that a missing limit of velocity leaves without a meaning."""
+    """``limits`` without soft limits if the velocity limit is missing, since they need it."""
     if limits.soft is not None and math.isinf(limits.velocity):
         return dataclasses.replace(limits, soft=None)
     return limits
 
 
 def with_parameters(limits, values, source):
-    """``limits`` with those replaced that the mapping ``values`` (a joint's entry under ``joint_limits``) names.
+    """``limits``, with those in the mapping ``values`` (a joint's entry under ``joint_limits``) replaced.
 
     ``has_position_limits``, ``has_velocity_limits``, ``has_acceleration_limits``, ``has_effort_limits``: true needs the
-    values (``min_position``, ``max_position``, ``max_velocity`` ...), false takes the limit away. ``source``: name of
+    values (``min_position``, ``max_position``, ``max_velocity`` ...), false removes the limit. ``source``: name of
     the parameter, for messages. Raises :class:`HardwareError`.
     """
     if not isinstance(values, dict):
@@ -119,9 +119,9 @@ class _Columns:
 
 
 class PositionLimiter:
-    """Position commands: no faster than the velocity limit from one command to the next, within the range.
+    """Position commands: within the range, and no faster than the velocity limit from one command to the next.
 
-    Open loop: counts from its own last command, not from the measured position.
+    Open loop: relative to its own last command, not to the measured position.
     """
 
     def __init__(self, limits):
@@ -130,7 +130,7 @@ class PositionLimiter:
         self._last = None
 
     def reset(self):
-        """Count from the measured position the next time."""
+        """Start from the measured position at the next call."""
         self._last = None
 
     def enforce(self, command, dt, position, velocity):
@@ -142,7 +142,7 @@ class PositionLimiter:
         if columns.has_soft:
             soft = columns.soft
             slowest, fastest = columns.soft_velocity_range(last[soft])
-            # Only a joint with a range has anything to keep clear of.
+            # Only a joint with a range has limits to keep.
             ranged = np.isfinite(columns.lower[soft]) & np.isfinite(columns.upper[soft])
             slowest = np.where(ranged, slowest, -columns.soft_velocity)
             fastest = np.where(ranged, fastest, columns.soft_velocity)
@@ -161,7 +161,7 @@ class VelocityLimiter:
         self._last = np.zeros(len(limits))
 
     def reset(self):
-        """Count accelerations from standstill."""
+        """Start from velocity zero at the next call."""
         self._last = np.zeros(len(self._last))
 
     def enforce(self, command, dt, position, velocity):
@@ -176,7 +176,7 @@ class VelocityLimiter:
             low[soft] = np.where(ranged, slowest, low[soft])
             high[soft] = np.where(ranged, fastest, high[soft])
         if self._accelerates:
-            # Soft limits count from the measured velocity, saturation from the last command.
+            # Soft limits use the measured velocity, saturation the last command.
             base = self._last
             if columns.has_soft:
                 base = base.copy()
@@ -188,13 +188,13 @@ class VelocityLimiter:
 
 
 class EffortLimiter:
-    """Effort commands: within the effort limit, and none that drives a joint further beyond its other limits."""
+    """Effort commands: within the effort limit, and never driving a joint further beyond its other limits."""
 
     def __init__(self, limits):
         self._columns = _Columns(limits)
 
     def reset(self):
-        """Nothing to forget."""
+        """Has no state to reset."""
 
     def enforce(self, command, dt, position, velocity):
         """What may be commanded (k,) of ``command`` (k,); ``position``, ``velocity`` (k,) are measured."""

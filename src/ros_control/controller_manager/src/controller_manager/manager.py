@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which controllers are loaded, which of them run, and how that changes. ROS-free; one thread only."""
+"""Loads, starts and stops controllers, and keeps their states. ROS-free; one thread only."""
 import contextlib
 from concurrent.futures import Future, InvalidStateError
 
@@ -8,7 +8,7 @@ from .errors import ControllerError, Refused
 from .hardware import SwitchResult
 from .interfaces import COMMAND
 
-# What a controller may raise without taking the others with it.
+# Exceptions of a controller that do not stop the others.
 _SURVIVED = (Exception, SystemExit)
 
 BEST_EFFORT = 1
@@ -45,7 +45,7 @@ class Loaded:
 
 
 class _Switch:
-    """A change that was agreed to and waits for the next update."""
+    """An accepted change that waits for the next update."""
 
     def __init__(self, start, stop, new, start_asap, timeout_s):
         self.start = start  # every controller whose starting() is due
@@ -117,11 +117,11 @@ class ControllerManager:
         self._close(loaded)
 
     def switch(self, start, stop, strictness=STRICT, start_asap=False, timeout_s=0.0):
-        """Agree to stop and start controllers (lists of names) within the next updates.
+        """Accept a request to stop and start controllers (lists of names) within the next updates.
 
-        Returns a ``Future`` that ends when that is done (also when a start was given up, see state ``aborted``).
-        Raises :class:`Refused` when the rules of the chosen strictness, a joint wanted by two controllers or the
-        hardware forbid it; nothing changes then. ``timeout_s``: how long the hardware may take, 0 for ever.
+        Returns a ``Future`` that is set when this is done (also when a start has failed, see state ``aborted``). Raises
+        :class:`Refused` if the strictness, two controllers on one joint or the hardware forbid it; nothing changes
+        then. ``timeout_s``: time limit of the hardware, 0 for none.
         """
         if self._switch is not None or self._closed:
             raise Refused("the controller manager has ended" if self._closed else "another switch is under way")
@@ -148,7 +148,7 @@ class ControllerManager:
         return self._switch.future
 
     def abandon_switch(self, future):
-        """Forget a change that nobody waits for any more; without effect when it is done."""
+        """Drop a change whose caller has given up; without effect when it is done."""
         if self._switch is not None and self._switch.future is future:
             for loaded in self._switch.start:
                 if loaded.state == WAITING:
@@ -156,7 +156,7 @@ class ControllerManager:
             self._switch = None
 
     def restart(self, time_s):
-        """Stop and start every running controller at control time ``time_s`` [s]: what they were about ends."""
+        """Stop and start every running controller at control time ``time_s`` [s]: their goals and commands end."""
         for loaded in self._running:
             try:
                 loaded.controller.stopping(time_s)
@@ -167,8 +167,8 @@ class ControllerManager:
     def update(self, time_s, dt, reset_controllers=False):
         """One tick. ``time_s``: control time [s], ``dt``: since the last update [s].
 
-        ``reset_controllers``: :meth:`restart` first. A controller that raises is reported and taken out (state
-        ``aborted``), and its joints are held where they are; it can be started again.
+        ``reset_controllers``: :meth:`restart` first. A controller that raises is logged and stopped (state
+        ``aborted``), and its joints are held; it can be started again.
         """
         if reset_controllers:
             self.restart(time_s)
@@ -190,7 +190,7 @@ class ControllerManager:
         if self._switch is not None:
             try:
                 self._go_on_switching(time_s)
-            except _SURVIVED as error:  # a driver is anybody's code, too
+            except _SURVIVED as error:  # a driver is user code, too
                 self._give_up_switch(error)
 
     def close(self):
@@ -299,7 +299,7 @@ class ControllerManager:
         self._sort()
 
     def _sort(self):
-        # In the order of loading, as updates have always been made.
+        # Updates run in the order of loading.
         self._running = [loaded for loaded in self._loaded.values() if loaded.state == RUNNING]
         self._idle = [loaded for loaded in self._loaded.values()
                       if loaded.state != RUNNING and type(loaded.controller).idle is not Controller.idle]
@@ -322,6 +322,6 @@ def _names(controllers):
 
 
 def _finish(future):
-    # The waiting caller may have given up and cancelled it.
+    # The caller may have cancelled it.
     with contextlib.suppress(InvalidStateError):
         future.set_result(None)

@@ -17,11 +17,11 @@ class Gains:
 
     @classmethod
     def from_params(cls, read, names):
-        """The gains that stand under ``names`` (k parameter names, e.g. ``"gains/joint_1"``).
+        """The gains under ``names`` (k parameter names, e.g. ``"gains/joint_1"``).
 
         ``read(name)`` -> (value or None, absolute name), e.g. ``ControllerContext.entry``. ``p`` is required.
-        ``i_clamp`` [output's unit] bounds the integral term both ways, ``i_clamp_min`` and ``i_clamp_max`` override
-        it. Raises :class:`ControllerError`.
+        ``i_clamp`` [unit of the output] bounds the integral term on both sides, ``i_clamp_min`` and ``i_clamp_max``
+        override it. Raises :class:`ControllerError`.
         """
         rows = [cls._row(read, name) for name in names]
         return cls(*zip(*rows, strict=True)) if rows else cls([], [], [], [], [], [])
@@ -72,7 +72,7 @@ class Pid:
         self._take(gains)
 
     def change(self, k, p, i, d, i_min, i_max, antiwindup):
-        """Other gains for joint ``k`` from now on; its past stays. Raises :class:`ControllerError`."""
+        """Set other gains for joint ``k``; its integral and last error stay. Raises :class:`ControllerError`."""
         if i_min > i_max:
             raise ControllerError("the lower end of the integral term, %g, is above its upper end, %g" % (i_min, i_max))
         gains = Gains.joined([self.gains])
@@ -98,7 +98,7 @@ class Pid:
         self._any_integral = bool(gains.i.any())
 
     def reset(self, index=slice(None)):
-        """Forget the past, of all joints or of those in ``index``. The error before the first update counts as 0."""
+        """Reset the state of all joints or of those in ``index``. The error before the first update counts as 0."""
         self.integral[index] = 0.0
         self.last_error[index] = 0.0
         self.last_error_dot[index] = 0.0
@@ -106,7 +106,7 @@ class Pid:
     def update(self, error, dt, error_dot=None):
         """Output (k,) for ``error`` (k,); ``error_dot`` (k,) is differentiated from the errors when not given.
 
-        0 when ``dt`` is not positive, and for joints whose error is not finite; these keep their past.
+        0 when ``dt`` is not positive, and for joints whose error is not finite; these keep their state.
         """
         if not dt > 0.0:
             return np.zeros(len(error))
@@ -122,7 +122,7 @@ class Pid:
             error_dot = (error - self.last_error) / dt
         output = gains.p * error + gains.d * error_dot
         if self._any_integral:
-            # A joint with a non-finite error adds nothing here: its error was replaced by 0.
+            # A non-finite error was replaced by 0, so it adds nothing here.
             self.integral += error * dt
             np.maximum(self.integral, self._low, out=self.integral)
             np.minimum(self.integral, self._high, out=self.integral)

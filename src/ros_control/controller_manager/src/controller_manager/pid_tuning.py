@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""PIDs that people watch and tune while they run: dynamic_reconfigure for the gains, control_msgs/PidState."""
+"""PIDs that users watch and tune at run time: dynamic_reconfigure for the gains, control_msgs/PidState."""
 import genpy
 from control_msgs.msg import PidState
 
@@ -7,7 +7,7 @@ from controller_manager.errors import ControllerError
 from loop_ros.reconfigure import Setting, SettingsServer
 from sim_time.stamps import stamp
 
-# How far a slider goes: gains, and ends of the integral term.
+# Ranges of the settings: gains, and ends of the integral term.
 _GAIN, _CLAMP = 1e5, 1e6
 
 
@@ -33,11 +33,12 @@ class TunablePids:
 
     @classmethod
     def of_controller(cls, context, pid, names):
-        """Of a controller whose gains stand under ``names``: ``publish_state`` beside the gains decides (false)."""
+        """For a controller with gains under ``names``; the parameter ``publish_state`` beside the gains (false) selects
+        the topics."""
         return cls(context, pid, names, [name for name in names if context.flag(name + "/publish_state", False)])
 
     def publish(self, time_s, dt, output):
-        """After an update of the PID: publish its state. ``output`` (k,): what it has returned."""
+        """After an update of the PID: publish its state. ``output`` (k,): its result."""
         for k, publisher in self._states:
             if publisher.has_listeners:
                 publisher.publish(self._state(k, time_s, dt, output))

@@ -28,21 +28,21 @@ from controller_manager.errors import ControlError, Refused
 from controller_manager.manager import BEST_EFFORT
 
 BASE_CLASS = "controller_interface::ControllerBase"
-# How much longer than its own time limit a switch may keep its caller waiting [wall s].
+# Additional time beyond a switch's own limit that its caller may wait [wall s].
 _GRACE_S = 1.0
 
 
 class ControllerManagerServices:
     """Serves ``<namespace>/controller_manager/...``, changes one after the other.
 
-    A switch ends with an update of the loop; while physics is paused it waits for one, and changes that come after it
-    wait behind it. Listing waits for nobody: it shows what is waited for.
+    A switch ends with an update of the loop; while physics is paused it waits for one, and later changes wait behind
+    it. Listing does not wait, and shows controllers that wait.
     """
 
     def __init__(self, manager, find_table, host, robot):
         """``host``: a ``loop_ros.node_handle.NodeHandle`` that has a ``log`` too. ``find_table()`` ->
-        :class:`ControllerTable`, asked at each request, from any thread. ``robot``: ``urdf_model.Robot`` that
-        controllers are told of."""
+        :class:`ControllerTable`, called at each request, from any thread. ``robot``: the ``urdf_model.Robot`` for
+        controllers."""
         self._manager = manager
         self._find_table = find_table
         self._host = host
@@ -81,7 +81,7 @@ class ControllerManagerServices:
         return self._host.call_in_loop(function, *arguments)
 
     def _succeeds(self, function, *arguments):
-        """Call and return True, or log what was refused and return False."""
+        """Call and return True, or log the refusal and return False."""
         try:
             function(*arguments)
         except ControlError as error:
@@ -115,7 +115,8 @@ class ControllerManagerServices:
     def _reload(self, request):
         return ReloadControllerLibrariesResponse(self._succeeds(self._do_reload, request.force_kill))
 
-    # -- what they do -----------------------------------------------------------------------------------------------
+    # -- the work of the services
+    # -----------------------------------------------------------------------------------------------
 
     def _states(self):
         return [ControllerState(loaded.name, loaded.state, loaded.kind,
@@ -165,12 +166,12 @@ class ControllerManagerServices:
             self._do_unload(name)
         try:
             self._find_table().reload()
-        except Exception as error:  # noqa: BLE001  (anybody's source)
+        except Exception as error:  # noqa: BLE001  (user code)
             raise Refused("cannot reload the controller libraries: %s: %s" % (type(error).__name__, error)) from error
 
 
 def _parameters(namespace):
-    # Of the master itself: rospy answers for "/" from a cache that holds next to nothing, once the node has logged.
+    # Read from the master itself: rospy answers "/" from a cache that is nearly empty once the node has logged.
     try:
         return rosgraph.Master(rospy.get_name()).getParam(namespace or "/")
     except rosgraph.MasterError:

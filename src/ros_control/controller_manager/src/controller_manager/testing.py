@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers without a master and without physics: topics as lists, a robot whose joints go where they are told."""
+"""Controllers without a master and without physics: topics as lists, a robot whose joints follow commands."""
 from loop_ros.node_handle import NodeHandle
 from loop_ros.testing import FakeLog, FakeRos
 
@@ -17,11 +17,11 @@ def fake_context(name="controller", parameters=None, root_namespace="/robot", ro
 
 
 class FakeHardware(RobotHardware):
-    """Joints that do what they are told, with faults to choose.
+    """Joints that follow commands, with optional faults.
 
     A position command is reached after ``lag`` (0: in the same tick, towards 1: slower), never beyond ``clip`` [rad];
-    ``frozen`` joints stay, whatever effort acts. A velocity command moves the joint at that velocity, an effort command
-    accelerates it with 1 kg m2 or 1 kg.
+    ``frozen`` joints never move. A velocity command moves the joint at that velocity, an effort command accelerates it
+    with 1 kg m2 or 1 kg.
     """
 
     def __init__(self, joint_interfaces, lag=0.0, clip=float("inf")):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which joints of a description can be controlled and how: <transmission> and <safety_controller>. ROS-free."""
+"""Reads which joints of a description can be controlled and how: <transmission> and <safety_controller>. ROS-free."""
 import math
 from dataclasses import dataclass
 
@@ -21,8 +21,8 @@ _TYPES = tuple("transmission_interface/" + name for name in (
 
 @dataclass(frozen=True)
 class ControlledJoint:
-    """A joint with a transmission. ``reduction`` and ``offset`` [rad or m] have no effect here: as in Gazebo, what is
-    commanded and measured is the joint, not its actuator."""
+    """A joint with a transmission. ``reduction`` and ``offset`` [rad or m] have no effect here: as in Gazebo, commands
+    and measurements are those of the joint, not of its actuator."""
 
     name: str
     interface: str

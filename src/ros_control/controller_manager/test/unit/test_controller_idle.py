@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers that have something to do while they do not run."""
+"""Controllers that work in idle() while they do not run."""
 from controller_manager import JOINT_STATE, Controller
 from controller_manager.manager import STRICT, ControllerManager
 from controller_manager.testing import FakeHardware, fake_context

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Limits: what a command becomes, and where limits are read."""
+"""Limits: how they change commands, and where they are read from."""
 import math
 
 import numpy as np
@@ -65,7 +65,7 @@ def test_soft_position_limits_slow_down_towards_their_ends():
     position.reset()
     assert enforce(position, 9.0, position=0.0) == pytest.approx([0.2])
     position.reset()
-    # Beyond the soft end the joint is led back, whatever is asked.
+    # Beyond the soft end the joint is led back, for any command.
     assert enforce(position, 9.0, position=0.9) == pytest.approx([0.85])
 
 
@@ -145,7 +145,7 @@ def test_of_an_effort_only_the_limits_that_there_are_are_enforced(limits, veloci
     assert enforce(limiter(EffortLimiter, limits), 900.0, velocity=velocity) == pytest.approx([allowed])
 
 
-# -- where limits stand ---------------------------------------------------------------------------------------------
+# -- sources of limits ---------------------------------------------------------------------------------------------
 
 URDF = """<robot name="r"><link name="base"/>%s%s</robot>"""
 JOINT = """<link name="l_%(name)s"/><joint name="%(name)s" type="%(kind)s"><parent link="base"/>

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who may run: one test for each rule of loading, unloading and switching."""
+"""Which controllers may run: one test for each rule of loading, unloading and switching."""
 import subprocess
 import sys
 
@@ -91,7 +91,7 @@ class SlowHardware(FakeHardware):
 
 
 class Robot:
-    """A manager on joints a, b (position), v (velocity), e (effort), and what tests ask it."""
+    """A manager on joints a, b (position), v (velocity), e (effort), and queries for the tests."""
 
     def __init__(self):
         self.hardware = SlowHardware({"a": (POSITION,), "b": (POSITION,), "v": (VELOCITY,), "e": (EFFORT,)})

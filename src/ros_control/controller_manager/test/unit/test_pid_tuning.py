@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gains that are set while a PID runs, and what it tells of itself."""
+"""Gains that are set while a PID runs, and its published state."""
 import numpy as np
 import pytest
 import rospy
