@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Finding controller managers in the ROS graph, and controllers by what they are."""
+"""Finds controller managers in the ROS graph, and filters controllers by their properties."""
 import rosgraph
 import rospy
 import rosservice
@@ -17,7 +17,7 @@ _TYPES = {
 
 
 def is_controller_manager(namespace):
-    """Whether all services of a controller manager, of the right types, stand in ``namespace``, e.g.
+    """Whether ``namespace`` has all services of a controller manager, of the right types, e.g.
     ``"/robot/controller_manager"``."""
     try:
         return all(rosservice.get_service_type("%s/%s" % (namespace.rstrip("/"), name))
@@ -27,8 +27,8 @@ def is_controller_manager(namespace):
 
 
 def get_controller_managers(namespace="/", initial_guess=None):
-    """Sorted list of the controller managers below ``namespace``. Those of ``initial_guess``, an earlier answer, that
-    are still advertised are taken without another look."""
+    """Sorted list of the controller managers below ``namespace``. Entries of ``initial_guess``, an earlier result, that
+    are still advertised are not checked again."""
     below = rosgraph.names.canonicalize_name(namespace).rstrip("/") + "/"
     services = {name for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[2]}
     marker = "/list_controllers"
@@ -83,7 +83,7 @@ def filter_by_hardware_interface(ctrl_list, hardware_interface, match_substring=
 
 def filter_by_resources(ctrl_list, resources, hardware_interface=None, match_any=False):
     """The controllers that claim all of ``resources`` (with ``match_any``: one of them), through that hardware
-    interface where one is given."""
+    interface if one is given."""
     wanted = set(resources)
     found = []
     for controller in ctrl_list:
@@ -97,7 +97,7 @@ def filter_by_resources(ctrl_list, resources, hardware_interface=None, match_any
 def get_rosparam_controller_names(namespace="/"):
     """Names on the parameter server below ``namespace`` that have a ``type``, as controllers do."""
     try:
-        # Of the master itself: rospy answers for "/" from a cache that may hold next to nothing.
+        # Read from the master itself: rospy answers "/" from a cache that may be nearly empty.
         tree = rosgraph.Master(rospy.get_name()).getParam(rospy.resolve_name(namespace))
     except rosgraph.MasterError:
         return []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers by what they are."""
+"""Controllers by their properties."""
 import pytest
 from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
 
