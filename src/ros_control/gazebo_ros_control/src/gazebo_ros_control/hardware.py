@@ -18,8 +18,8 @@ from controller_manager.limits import (
 from controller_manager.pid import Gains, Pid
 from controller_manager.transmissions import read_soft_limits, read_transmissions
 
-# Stands for "as strong as need be" [N m, N]: what Gazebo's position interface does is kinematic, and descriptions with
-# link inertias of 10 kg m2 and motors of 100 N m rely on it.
+# Practically unlimited effort [N m, N]: Gazebo's position interface is kinematic, and descriptions with link inertias
+# of 10 kg m2 and motors of 100 N m rely on it.
 _UNLIMITED = 1e9
 
 _LIMITERS = {POSITION: PositionLimiter, VELOCITY: VelocityLimiter, EFFORT: EffortLimiter}
@@ -31,9 +31,9 @@ class SimulatedHardware(RobotHardware):
     Commands act on the joint, as in Gazebo; mechanicalReduction and offset have no effect. Per interface:
 
     position
-        the joint is at the command after the step, whatever effort that takes. On a model that stands free the base
-        does not feel the motion, only the load: descriptions whose links weigh next to nothing rely on it, since in
-        Gazebo this interface is kinematic
+        the joint is at the command after the step, with unlimited effort. On a free-standing model only the load acts
+        on the base, not the reaction of the motion: in Gazebo this interface is kinematic, and descriptions with very
+        light links rely on it
     position with PID gains
         the effort is the PID's output of the position error, at most the effort limit
     velocity
@@ -46,7 +46,7 @@ class SimulatedHardware(RobotHardware):
 
     def __init__(self, model, robot, urdf_xml, limit_parameters=None, gain_parameters=None, namespace="", log=None):
         """``robot``, ``urdf_xml``: the description that names transmissions and limits. ``limit_parameters``,
-        ``gain_parameters``: {joint: ...} as they stand under ``joint_limits`` and ``gazebo_ros_control/pid_gains`` of
+        ``gain_parameters``: {joint: ...} the parameters under ``joint_limits`` and ``gazebo_ros_control/pid_gains`` of
         ``namespace``. ``log``: ``warn`` and ``error`` of one text. Raises :class:`HardwareError`.
         """
         joints, warnings = read_transmissions(urdf_xml, model.joint_names)
@@ -67,7 +67,7 @@ class SimulatedHardware(RobotHardware):
             self._add_group(interface, list(gains), limits, list(gains.values()))
         self._continuous = np.array([robot.joints[name].type == "continuous" for name in self.joint_names], dtype=bool)
         self._frozen = None
-        # (n,) whether joints are held by their brakes, which is seldom; where, and how strong those are.
+        # (n,) whether joints are held by their brakes (rare); the held positions; the strength of the brakes.
         self._held = None
         self._held_at, self._brakes = np.zeros(len(joints)), np.full(len(joints), _UNLIMITED)
         self.read()
@@ -94,7 +94,7 @@ class SimulatedHardware(RobotHardware):
             self._model.drive_position(self._model_index[held], self._held_at[held], self._brakes[held])
 
     def hold(self, claims):
-        """The joints of ``claims`` have brakes: they stay where they are, whatever acts on them."""
+        """Hold the joints of ``claims`` with brakes, against any load."""
         super().hold(claims)
         index = self._braked(claims)
         if index:
@@ -112,7 +112,7 @@ class SimulatedHardware(RobotHardware):
         self.hold(self.interface_joints)
 
     def joints_set(self):
-        """The joints were put elsewhere (at the start too): stay there, and count limits from there."""
+        """The joints were moved by a service, or spawned: hold them there, and apply limits from there."""
         self.read()
         self.command[POSITION][:] = self.position
         self.command[VELOCITY][:] = 0.0
@@ -129,7 +129,7 @@ class SimulatedHardware(RobotHardware):
         return [i for i, name in enumerate(self.joint_names) if name in joints]
 
     def stop(self, stopped):
-        """Emergency stop: while ``stopped``, joints stay where they were when it came, without effort or velocity."""
+        """Emergency stop: while ``stopped``, joints hold the positions that they had when it came."""
         if stopped and self._frozen is None:
             self._frozen = self.position.copy()
         elif not stopped:
@@ -201,7 +201,7 @@ class _Group:
         self._effort = effort
 
     def read(self):
-        """Correct what the model says of these joints, where it cannot know."""
+        """Correct the model's state of these joints where PyBullet does not know it."""
 
     def reset(self):
         self.limiter.reset()
@@ -213,19 +213,20 @@ class _PositionGroup(_Group):
         self._unlimited = np.full(len(self.index), _UNLIMITED)
 
     def drive(self, command, position, velocity, dt):
-        # The velocity that ends at the command; stable at any inertia because the solver finds the effort for it.
+        # The velocity that reaches the command in this step; stable at any inertia, because the solver computes the
+        # effort.
         self._model.drive_velocity(self._model_index, (command - position) / dt, self._unlimited)
 
 
 class _CarriedGroup(_Group):
-    """Position interface on a model that stands free."""
+    """Position interface on a free-standing model."""
 
     def __init__(self, *arguments):
         super().__init__(*arguments)
         self._velocity = np.zeros(len(self.index))
 
     def read(self):
-        # To the physics they stand still, wherever they are put.
+        # In the physics these joints have no velocity, since they are repositioned.
         self._hardware.velocity[self.index] = self._velocity
 
     def reset(self):

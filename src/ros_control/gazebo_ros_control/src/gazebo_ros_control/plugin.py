@@ -22,14 +22,14 @@ DEFAULT_SIM_TYPE = "gazebo_ros_control/DefaultRobotHWSim"
 MORE_TYPES = "~controller_types"
 
 
-#: Where the gains of joints that the simulator drives by a PID stand, below the robot's namespace.
+#: Parameter with the gains of joints that the simulator drives by a PID, below the robot's namespace.
 PID_GAINS = "gazebo_ros_control/pid_gains"
 
 
 class GazeboRosControl(ModelPlugin):
     """Elements: robotNamespace, robotParam, controlPeriod [s], eStopTopic, robotSimType; legacyModeNS has no effect.
 
-    A description that gives no hardware is one error in the log; the model stays, without controllers.
+    A description without hardware gives one error in the log; the model stays, without controllers.
     """
 
     def __init__(self, context):
@@ -75,7 +75,7 @@ class GazeboRosControl(ModelPlugin):
         if self._stop_messages is not None:
             self._stop_messages.handle(self._take_stop)
         last = self._last_update_s
-        # Half a nanosecond: multiples of a tick and of the period meet in rounding only.
+        # Half a nanosecond, for the rounding of multiples of a tick and of the period.
         if last is None or time_s - last >= self._period_s - 5e-10:
             restart, self._restart = self._restart, False
             self._manager.update(time_s, self._period_s if last is None else time_s - last, restart)
@@ -89,8 +89,8 @@ class GazeboRosControl(ModelPlugin):
         if self._hardware is None:
             return
         self._hardware.joints_set()
-        # Controllers begin anew from where the joints are now: what they were about led on from elsewhere. At once, so
-        # that a command counts that comes before the next tick.
+        # Controllers restart from the joints' new positions: their goals started from the old ones. At once, so that a
+        # command before the next tick is not lost.
         self._manager.restart(self.context.world.time_s)
 
     def reset(self):
@@ -98,7 +98,7 @@ class GazeboRosControl(ModelPlugin):
         self.joints_set()
 
     def restarted(self):
-        # The controllers that people have loaded stay: they begin anew from where the joints are, as after a reset.
+        # Loaded controllers stay: they restart from the joints' positions, as after a reset.
         self.reset()
         return self
 
@@ -113,14 +113,15 @@ class GazeboRosControl(ModelPlugin):
 
     def _take_stop(self, message):
         if self._stopped != message.data:
-            # A goal ends with the stop: its time goes on, and it would be reached by a joint that stands.
+            # A goal ends with the stop: its time goes on, and a stopped joint could appear to reach it.
             self._restart = True
         self._stopped = message.data
         self._hardware.stop(message.data)
 
     @staticmethod
     def _description(context):
-        """(robot, URDF text) that robotParam names, looked for upwards from the namespace; else what was spawned."""
+        """(robot, URDF text) that robotParam names, searched upwards from the namespace; else the spawned
+        description."""
         name = context.element_text("robotParam", "robot_description")
         namespace = context.namespace
         while not name.startswith("/"):
@@ -162,7 +163,7 @@ class GazeboRosControl(ModelPlugin):
 
 
 class _Types:
-    """The table of controller types: ros_controllers' file, and what the node's parameter adds to it by now."""
+    """The table of controller types: ros_controllers' file, with the present entries of the node's parameter."""
 
     def __init__(self):
         path = os.path.join(rospkg.RosPack().get_path("ros_controllers"), "config", "controllers.yaml")
@@ -183,7 +184,7 @@ class _Types:
 
 
 def _flat(tree, path=""):
-    """{"a/b": value} of {"a": {"b": value}}: the parameter server takes a slash in a key for a namespace."""
+    """{"a/b": value} of {"a": {"b": value}}: for the parameter server, a slash in a key separates namespaces."""
     flat = {}
     for key, value in tree.items():
         flat.update(_flat(value, path + key + "/") if isinstance(value, dict) else {path + key: value})

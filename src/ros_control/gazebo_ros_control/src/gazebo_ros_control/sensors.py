@@ -8,7 +8,7 @@ from urdf_model.transforms import quaternion_from_matrix
 
 
 class SimulatedImu:
-    """``read`` belongs before each step: what it says is of the step before. ``frame``: the link that it is on."""
+    """Call ``read`` before each step: its result is that of the previous step. ``frame``: the link that it is on."""
 
     def __init__(self, world, model, link):
         self._world, self._model, self.frame = world, model, link
@@ -16,7 +16,7 @@ class SimulatedImu:
 
     def read(self):
         """Quaternion (4,) in the world, turn rate (3,) [rad/s] and acceleration (3,) [m/s2] in the link's axes, gravity
-        upwards at rest; None where the step before was not looked at."""
+        upwards at rest; None if it was not called at the previous step."""
         linear, angular = (np.asarray(part) for part in self._model.link_twist(self.frame))
         last, self._last = self._last, (self._world.steps, linear)
         if last is None or last[0] != self._world.steps - 1:
@@ -44,7 +44,7 @@ class SimulatedForceTorque:
 
 def simulated_sensors(world, model):
     """{interface: {sensor's name: sensor}} of the ``<sensor type="imu">`` on links and the ``<sensor
-    type="force_torque">`` on joints of a description, by the names that stand there."""
+    type="force_torque">`` on joints of a description, by their names in the description."""
     found = {IMU_SENSOR: {}, FORCE_TORQUE_SENSOR: {}}
     for gazebo in model.robot.gazebo:
         where = gazebo.get("reference")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A robot of two joints in the running simulator, its controller manager, and what a test asks of them."""
+"""A robot of two joints in the running simulator, its controller manager, and helpers for tests."""
 import contextlib
 import os
 import signal
@@ -144,7 +144,7 @@ class ControlCase(unittest.TestCase):
 
     @contextlib.contextmanager
     def process(self, *command, namespace="/one"):
-        """Run a tool in a namespace; it is told to end afterwards and must do so."""
+        """Run a tool in a namespace; it gets SIGINT afterwards and must end."""
         process = subprocess.Popen(["rosrun", "controller_manager", *command], stdout=subprocess.PIPE, text=True,
                                    stderr=subprocess.STDOUT, env={**os.environ, "ROS_NAMESPACE": namespace},
                                    start_new_session=True)

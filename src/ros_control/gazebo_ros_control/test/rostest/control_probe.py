@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A controller of somebody's own that breaks when it is told to."""
+"""A user's controller that fails on request."""
 from std_msgs.msg import Empty
 
 from controller_manager import POSITION, Controller

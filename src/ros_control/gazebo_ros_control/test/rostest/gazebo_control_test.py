@@ -233,7 +233,7 @@ class GazeboControl(ControlCase):
 
     def test_gains_are_tuned_while_controllers_run(self):
         # The elbow has an effort interface here, the shoulder is kept by the simulator's own PID.
-        # The parameter would speak for the other robots.
+        # The parameter would apply to the other robots.
         urdf = self.urdf.replace("<eStopTopic>", "<robotParam>/none</robotParam><eStopTopic>")
         head, tail = urdf.rsplit("PositionJointInterface", 1)
         self.spawn("three", head + "EffortJointInterface" + tail)
@@ -403,7 +403,7 @@ class GazeboControl(ControlCase):
                 ('upper="2" velocity="3" effort="100"/>', 'upper="2" velocity="3" effort="100"/><safety_controller/>',
                  "<safety_controller> has k_velocity=None", "expected a number"))):
             name = "bad_%d" % number
-            # The parameter would speak for the good robot.
+            # The parameter would apply to the good robot.
             urdf = self.urdf.replace(old, new).replace("<eStopTopic>", "<robotParam>/none</robotParam><eStopTopic>")
             self.spawn(name, urdf)
             line = self.said("model '%s' has no controllers" % name, *words)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A vehicle on two driven wheels and a caster on the floor: it goes where its controller's odometry says."""
+"""A vehicle on two driven wheels and a caster on the floor: its pose agrees with its controller's odometry."""
 import math
 
 import numpy as np
@@ -89,6 +89,6 @@ def test_odometry_after_a_square_is_true_within_two_percent(vehicle):
         way += 1.25
     true, counted = vehicle.true_pose(), vehicle.odometry()
     assert np.hypot(true[0] - counted[0], true[1] - counted[1]) < 0.02 * way
-    # What the wheels slip sideways while it turns is the floor's doing, as on a real one.
+    # The wheels slip sideways in turns, as on a real vehicle.
     assert abs(math.remainder(true[2] - counted[2], 2.0 * math.pi)) < 0.02 * 2.0 * math.pi
     assert np.hypot(*true[:2]) < 0.3

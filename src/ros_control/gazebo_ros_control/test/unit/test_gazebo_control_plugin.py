@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the elements of the plugin mean, in a physics world without a master."""
+"""The elements of the plugin, in a physics world without a master."""
 from xml.etree import ElementTree
 
 import numpy as np

@@ -185,7 +185,7 @@ def test_a_wrong_limit_parameter_is_named(make):
 
 @pytest.mark.parametrize("interface", ["Position", "Velocity", "Effort"])
 def test_joints_without_limits_are_driven_without_limits(make, interface):
-    """As of the tutorials' own robot, whose continuous joints have no <limit>."""
+    """As the tutorials' robot, whose continuous joints have no <limit>."""
     arm = make(interface, limit="", kind="continuous", count=1, start=0.0)
     kind = {"Position": POSITION, "Velocity": VELOCITY, "Effort": EFFORT}[interface]
     arm.run(0.5, {"Position": 2.0, "Velocity": 4.0, "Effort": 20.0}[interface], kind)
@@ -237,7 +237,7 @@ ASLEEP_AFTER_S = 6.0
 
 @pytest.fixture
 def standing(make):
-    """Make an arm that stands free on the floor, long enough to fall asleep where nothing keeps it awake."""
+    """Make a free-standing arm on the floor, and wait long enough that Bullet may put it to sleep."""
 
     def stand(interface, mass, inertia, **options):
         arm = make(interface, mass=mass, inertia=inertia, start=0.0, free=True, **options)
@@ -267,14 +267,14 @@ def test_the_position_interface_leaves_a_free_base_where_it_stands(standing, mas
         velocities.append(arm.hardware.velocity.copy())
     after = arm.model.base_pose()
     assert arm.hardware.position - start == pytest.approx([0.5, 0.5], abs=1e-3)
-    # The command's own velocity, though the physics has not seen one.
+    # The command's own velocity, although the physics has none.
     assert np.array(velocities[10:]) == pytest.approx(0.5, abs=0.01)
     assert after.position == pytest.approx(before.position, abs=1e-3)
     assert after.quaternion == pytest.approx(before.quaternion, abs=2e-3)
 
 
 def test_a_free_robots_joints_carry_load_and_push(standing):
-    """The motion has no reaction, the load has: the arm presses itself off the floor."""
+    """Motion has no reaction, but loads have: the arm pushes itself off the floor."""
     arm = standing("Position", 1.0, 0.02)
     height = arm.model.base_pose().position[2]
     heights = []

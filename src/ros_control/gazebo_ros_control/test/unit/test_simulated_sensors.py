@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sensors of a description as hardware: what they say is known."""
+"""Sensors of a description as hardware, with known measurements."""
 import numpy as np
 import pytest
 
@@ -46,5 +46,5 @@ def test_a_turning_arm_feels_weight_and_pull(lab):
     np.testing.assert_allclose(wrench[0], (0.5 * 0.6 * 4.0, 0, -0.5 * 9.81), atol=0.02)
     world.step()
     world.step()
-    # Two steps since: not to be compared.
+    # Two steps since the last call: no difference is computed.
     assert imu.read() is None and wrist.read() is None
