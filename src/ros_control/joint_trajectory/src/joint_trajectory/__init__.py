@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectories of joints: made of points, sampled, replaced in flight, watched. Free of ROS; time is an argument."""
+"""Joint trajectories: made from points, sampled, replaced during execution, monitored. Free of ROS; time is an
+argument."""
 from .action_edge import (
     ErrorCode,
     GoalTolerances,

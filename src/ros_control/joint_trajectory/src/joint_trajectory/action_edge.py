@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Between control_msgs/FollowJointTrajectory and this package: rows of points and tolerances, codes of errors.
+"""Converts between control_msgs/FollowJointTrajectory and this package: rows of points and tolerances, error codes.
 
-Reads the fields of messages that it is given and imports none. Free of ROS.
+Reads fields of messages and imports none. Free of ROS.
 """
 import enum
 from typing import NamedTuple
@@ -30,7 +30,7 @@ _OF_OUTCOME = {
 
 
 class GoalTolerances(NamedTuple):
-    """What a goal asks for instead of the defaults, see :func:`joint_trajectory.merge_tolerances`.
+    """The goal's own tolerances, which override the defaults, see :func:`joint_trajectory.merge_tolerances`.
 
     path, goal: rows of (joint name, position, velocity, acceleration); goal_time_s [s].
     """
@@ -48,7 +48,7 @@ def code_of_outcome(outcome):
 def code_of_error(error, start_was_given=False):
     """Return the ErrorCode of a goal that is refused for ``error``, an exception or a text; a plain number.
 
-    ``start_was_given``: the goal's header has a stamp, which is to blame where all points are in the past.
+    ``start_was_given``: the goal's header has a stamp, which is the error if all points are in the past.
     """
     if isinstance(error, JointNamesError):
         return ErrorCode.INVALID_JOINTS.value

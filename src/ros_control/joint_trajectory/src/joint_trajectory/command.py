@@ -20,9 +20,9 @@ _FIELDS = ("positions", "velocities", "accelerations")
 
 
 def joint_indices(names, known, allow_partial=False):
-    """Where each of ``names`` stands in ``known``: (k,) int array.
+    """Indices of ``names`` in ``known``: (k,) int array.
 
-    Any order will do. Raises a :class:`JointNamesError` for names that are empty, repeated, unknown, or, unless
+    Any order is accepted. Raises a :class:`JointNamesError` for names that are empty, repeated, unknown, or, unless
     ``allow_partial``, incomplete.
     """
     if not names:
@@ -50,7 +50,7 @@ class Command:
     degrees : (m,) array
         Which of these count, see :mod:`.segment`.
     start_time : float or None
-        When the time from start begins [s]; None: as soon as possible.
+        Time at which the time from start begins [s]; None: as soon as possible.
     """
 
     def __init__(self, joint_names, points, start_time=None):

@@ -3,11 +3,11 @@
 
 
 class TrajectoryError(Exception):
-    """Root of the errors of this package."""
+    """Base class of this package's errors."""
 
 
 class JointNamesError(TrajectoryError):
-    """The joints of a trajectory are not those that are controlled. ``names``: what was found wrong."""
+    """The joints of a trajectory are not the controlled ones. ``names``: the wrong names."""
 
     def __init__(self, names, text):
         super().__init__(text)
@@ -22,21 +22,21 @@ class NoJointNames(JointNamesError):
 
 
 class UnknownJoints(JointNamesError):
-    """Joints that are not controlled."""
+    """The trajectory names joints that are not controlled."""
 
     def __init__(self, names, known):
         super().__init__(names, "unknown joint %s, expected %s" % (", ".join(names), ", ".join(known)))
 
 
 class RepeatedJoints(JointNamesError):
-    """Joints that are named more than once."""
+    """The trajectory names joints more than once."""
 
     def __init__(self, names):
         super().__init__(names, "joint_names has %s more than once" % ", ".join(names))
 
 
 class MissingJoints(JointNamesError):
-    """Joints that are not named, where all must be."""
+    """The trajectory must name all joints, and some are missing."""
 
     def __init__(self, names):
         super().__init__(names, "joint_names lacks %s; all joints must be named (allow_partial_joints_goal is false)"
@@ -44,7 +44,7 @@ class MissingJoints(JointNamesError):
 
 
 class NoPoints(TrajectoryError):
-    """A trajectory without points, where that does not mean anything."""
+    """The trajectory has no points, where it needs some."""
 
     def __init__(self):
         super().__init__("the trajectory has no points; give it at least one, with a time_from_start above 0")
@@ -59,21 +59,21 @@ class BeyondLimit(TrajectoryError):
 
 
 class BeyondPosition(BeyondLimit):
-    """A place [rad or m] that the joint cannot reach."""
+    """The joint cannot reach a position [rad or m]."""
 
     def __init__(self, joint, value, limit, time_s):
         super().__init__(joint, value, limit, time_s, "be at %f at %.3f s; its limit is %f")
 
 
 class BeyondVelocity(BeyondLimit):
-    """A way that the joint cannot make in the time given [rad/s or m/s]."""
+    """The joint cannot move this fast [rad/s or m/s]."""
 
     def __init__(self, joint, value, limit, time_s):
         super().__init__(joint, value, limit, time_s, "move at %f per s from %.3f s on; its limit is %f per s")
 
 
 class NoPositions(TrajectoryError):
-    """A point without positions."""
+    """A point has no positions."""
 
     def __init__(self, point):
         super().__init__("point %d has no positions; every point needs one for each joint" % point)
@@ -81,7 +81,7 @@ class NoPositions(TrajectoryError):
 
 
 class WrongSize(TrajectoryError):
-    """A field of a point whose length is not the number of joints."""
+    """The length of a point's field is not the number of joints."""
 
     def __init__(self, point, field, found, expected):
         optional = "" if field == "positions" else " or none"
@@ -90,7 +90,7 @@ class WrongSize(TrajectoryError):
 
 
 class NotFinite(TrajectoryError):
-    """NaN or infinity in a field of a point."""
+    """A field of a point has NaN or infinity."""
 
     def __init__(self, point, field):
         super().__init__("point %d has %s that are not finite numbers" % (point, field))
@@ -106,7 +106,7 @@ class TimesNotIncreasing(TrajectoryError):
 
 
 class AllPointsInPast(TrajectoryError):
-    """Nothing is left to do: ``dropped`` points, the last of them due ``late_s`` [s] ago."""
+    """All points are in the past: ``dropped`` points, the last one due ``late_s`` [s] ago."""
 
     def __init__(self, dropped, late_s):
         if late_s > 0.0:
@@ -118,7 +118,7 @@ class AllPointsInPast(TrajectoryError):
 
 
 class BeforeTrajectory(TrajectoryError):
-    """A time [s] that lies before the trajectory."""
+    """The time [s] is before the trajectory's start."""
 
     def __init__(self, time_s, start_time):
         super().__init__("the time asked for is %.6f s before the start of the trajectory" % (start_time - time_s))

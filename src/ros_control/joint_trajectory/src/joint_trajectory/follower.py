@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Follows one trajectory after the other and watches over the goal at hand."""
+"""Follows one trajectory after the other and monitors the active goal."""
 import math
 
 import numpy as np
@@ -13,27 +13,26 @@ _TURN = 2.0 * math.pi
 
 
 class Follower:
-    """What n joints shall do now. Times [s] are on any one clock that does not run backwards; one thread only.
+    """Desired state of n joints. Times [s] are of any one clock that never goes back; one thread only.
 
     Attributes
     ----------
-    trajectory : :class:`Trajectory`
-        What is being followed.
+    trajectory : :class:`Trajectory` The active trajectory.
     desired : (3, n) array
-        Position, velocity, acceleration that the last :meth:`update` asked for.
+        Desired position, velocity, acceleration of the last :meth:`update`.
     error : (3, n) array
         Desired minus actual of the last :meth:`update`; positions the shorter way round, accelerations 0.
     goal : object or None
-        What was passed with the command that is being watched.
+        The goal object of the active command.
     """
 
     def __init__(self, joint_names, continuous=None, stop_duration_s=0.0, allow_partial=False, smooth=False,
                  limits=None):
-        """``continuous`` (n,) bool: joints that turn without end; ``stop_duration_s`` [s]: how long a stop may take,
-        0: stand at once where the joints are; ``allow_partial``: commands need not name all joints; ``smooth``: see
-        :func:`.replace`; ``limits`` (:class:`Limits`): what goes beyond them is refused.
+        """``continuous`` (n,) bool: joints without position limits; ``stop_duration_s`` [s]: duration of a stop, 0:
+        hold the present positions at once; ``allow_partial``: commands need not name all joints; ``smooth``: see
+        :func:`.replace`; ``limits`` (:class:`Limits`): commands beyond them are refused.
 
-        Nothing may be asked of it before :meth:`start`.
+        Call :meth:`start` before any other method.
         """
         self.joint_names = list(joint_names)
         count = len(self.joint_names)
@@ -50,11 +49,11 @@ class Follower:
         self._ahead = np.zeros((3, count))
         self._ahead_of = None
         self._turns = np.zeros(count)
-        # Rows of the tables, so that no tick needs to make them.
+        # Views of the rows, so that no tick needs to make them.
         self._position_error, self._velocity_error = self.error[0], self.error[1]
 
     def start(self, time_s, position, velocity):
-        """Stand, or come to rest, from the measured ``position`` and ``velocity`` (n,). No goal."""
+        """Hold, or come to rest from, the measured ``position`` and ``velocity`` (n,). No goal."""
         self.goal = self._monitor = None
         self.desired[:] = position, velocity, np.zeros(len(position))
         self.error[:] = 0.0
@@ -64,8 +63,8 @@ class Follower:
         """Follow ``command`` from now on; returns the :class:`Replacement`, or None for a command without points.
 
         ``now`` [s]: the first time that can still be changed, so later than the last :meth:`update`; ``position``
-        (n,): measured. A command without points is a stop. With a ``goal`` (any object) the way is watched with
-        ``tolerances`` (:class:`Tolerances`). The goal before, if any, is forgotten: say so to its owner.
+        (n,): measured. A command without points is a stop. With a ``goal`` (any object), the motion is monitored with
+        ``tolerances`` (:class:`Tolerances`). A previous goal is forgotten: the caller must tell its owner.
 
         Raises :class:`TrajectoryError`; nothing has changed then.
         """
@@ -82,9 +81,9 @@ class Follower:
         return replacement
 
     def stop(self, now, position, goal=None):
-        """Come to rest: at once at the measured ``position`` (n,), or from what is desired within the stop duration.
+        """Come to rest: at once at the measured ``position`` (n,), or from the desired state within the stop duration.
 
-        With a ``goal`` it is reached when the joints should rest, whether they do or not.
+        A ``goal`` is reached at the end of the stop, even if the joints still move.
         """
         if self._stop_duration_s > 0.0:
             desired = self.trajectory.sample(now)
@@ -94,12 +93,12 @@ class Follower:
         self._watch(goal, None, np.full(len(self.joint_names), float(now)))
 
     def release(self):
-        """Forget the goal; go on along the trajectory."""
+        """Forget the goal; continue the trajectory."""
         self.goal = self._monitor = None
 
     def look_ahead(self, time_s):
-        """(3, n): what will be desired at ``time_s``, such as the next tick, if nothing comes between; overwritten by
-        the next call."""
+        """(3, n): desired state at ``time_s``, such as the next tick, if no command comes before; overwritten by the
+        next call."""
         self._ahead_of = self.trajectory, time_s
         return self.trajectory.sample(time_s, self._ahead)
 

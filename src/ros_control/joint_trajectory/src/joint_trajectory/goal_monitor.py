@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether a goal is reached, or missed."""
+"""Decides whether a goal is reached or missed."""
 import enum
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ class Outcome(enum.Enum):
 
 
 class Verdict(NamedTuple):
-    """The end of a goal. Where it failed: which ``joint``, by which ``quantity`` and ``error``, beyond which
+    """The end of a goal. After a failure: which ``joint``, by which ``quantity`` and ``error``, beyond which
     ``tolerance`` [rad or m, per s, per s^2]. ``text`` says it in words and is empty for success."""
 
     outcome: Outcome
@@ -32,7 +32,7 @@ class GoalMonitor:
     """Watches n joints while they follow one goal.
 
     From ``begins`` to ``ends`` a joint must keep the path tolerance; from ``ends`` on it has ``goal_time_s`` to come
-    within the goal tolerance once, which is enough. The goal succeeds when every joint has.
+    within the goal tolerance once. The goal succeeds when every joint has.
     """
 
     def __init__(self, joint_names, tolerances, begins, ends):
@@ -54,13 +54,13 @@ class GoalMonitor:
             return None
         size = np.abs(error, out=self._size)
         if self._all_from <= time_s < self._all_until:
-            # Most ticks of a goal: all joints are on their way.
+            # The usual case: all joints are still moving.
             if self._watches_path and not np.less_equal(size, self._tolerances.path, out=self._within).all():
                 return self._path_verdict(time_s, error, ~self._within)
             return None
         begun = time_s >= self._begins
         ended = begun & (time_s >= self._ends)
-        # Not "greater than": an error that is not a number is beyond every tolerance.
+        # Not "greater than", so that NaN counts as beyond every tolerance.
         off_path = ~(size <= self._tolerances.path) & (begun & ~ended)
         if off_path.any():
             return self._path_verdict(time_s, error, off_path)

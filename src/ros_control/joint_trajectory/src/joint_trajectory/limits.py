@@ -4,16 +4,16 @@ import numpy as np
 
 from .errors import BeyondPosition, BeyondVelocity
 
-# Where the curve between two points is compared with the limits: shares of the time between them.
+# Samples between two points that are checked against the limits: shares of the time between them.
 _PLACES = np.linspace(0.0, 1.0, 9)
 
 
 class Limits:
     """Bounds of n joints: ``lower``, ``upper`` (n,) [rad or m], ``velocity`` (n,) [per s]; inf where there is none.
 
-    ``slack`` [rad or m] is how far beyond a position limit a trajectory may lead, and by how much a joint may lag
-    behind when the way between two points is too fast for it. Positions that were measured need some: joints rest a
-    little beyond their limits, and readings that were recorded at one rate and played back at another go in steps.
+    ``slack`` [rad or m] is the tolerance beyond a position limit, and the lag that a joint may have if a segment is too
+    fast for it. Recorded positions need some: joints rest slightly beyond their limits, and readings that are played
+    back at another rate have steps.
     """
 
     def __init__(self, joint_names, lower, upper, velocity, slack=0.0):
@@ -23,15 +23,15 @@ class Limits:
         self._slack = slack
 
     def check(self, trajectory, begin_s, zero_s):
-        """Look at a :class:`Trajectory` from ``begin_s`` [s] on; errors count their times from ``zero_s`` [s].
+        """Check a :class:`Trajectory` from ``begin_s`` [s] on; times in errors are relative to ``zero_s`` [s].
 
-        A joint that is beyond its limit to begin with may stay so, but go no farther.
-        Raises :class:`BeyondPosition`, :class:`BeyondVelocity`.
+        A joint that starts beyond its limit may stay there, but not go farther. Raises :class:`BeyondPosition`,
+        :class:`BeyondVelocity`.
         """
         first = max(int(np.searchsorted(trajectory.starts, begin_s, side="right")) - 1, 0)
         begins = np.maximum(trajectory.starts[first:-1], begin_s)
         duration = trajectory.starts[first + 1:] - begins
-        # Piece, place, joint.
+        # Piece, sample, joint.
         s = (begins - trajectory.starts[first:-1])[:, None] + duration[:, None] * _PLACES
         position = np.einsum("mpi,mik->mpk", s[:, :, None] ** np.arange(6), trajectory.coefficients[first:-1])
         if not len(position):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How a new command takes the place of the trajectory that is being followed."""
+"""Replaces the active trajectory by a new command."""
 import math
 from typing import NamedTuple
 
@@ -10,13 +10,13 @@ from .errors import AllPointsInPast
 from .segment import CUBIC, LINEAR, QUINTIC, constant, shifted, smooth_velocities, splines
 from .trajectory import Trajectory
 
-# How close to half a turn two ways round count as equally short [rad].
+# Near half a turn, within this margin, both directions count as equally short [rad].
 _HALF_TURN_TOLERANCE = 1e-9
 
 
 class Replacement(NamedTuple):
-    """``trajectory``; ``begins`` (n,): from when on [s] each joint follows the command; ``dropped``: how many points
-    were left out because their time has passed; ``late_s``: how long ago the first of them was due [s]."""
+    """``trajectory``; ``begins`` (n,): time [s] from which each joint follows the command; ``dropped``: number of
+    points left out because their time has passed; ``late_s``: time since the first of them was due [s]."""
 
     trajectory: Trajectory
     begins: np.ndarray
@@ -28,16 +28,16 @@ def replace(current, command, now, joint_names, continuous, allow_partial=False,
     """Follow ``current`` until ``command`` begins, then the command: a :class:`Replacement`.
 
     ``current``: :class:`Trajectory` of ``joint_names``; ``command``: :class:`Command` with points; ``now`` [s]: the
-    first time that can still be changed, not before the start of ``current``; ``continuous`` (n,) bool: joints that
-    turn without end.
+    first time that can still be changed, not before the start of ``current``; ``continuous`` (n,) bool: joints without
+    position limits.
 
     Points at or before ``now`` are left out. A bridge leads from the current trajectory, at the start of the command
     or ``now``, whichever is later, to the first point that is left. Continuous joints take the shorter way round: all
     their points are shifted by whole turns. Joints that the command does not name stay on their current trajectory.
 
-    ``smooth``: for joints that must not be jerked. Points without velocities get some, so that the curve has no kinks
-    and does not overshoot; the last point is one of rest, whatever it says; and a point due at the very start of the
-    command is taken for the place where the joints are then.
+    ``smooth``: for joints that must not be jerked. Points without velocities get some, so that the curve is smooth and
+    does not overshoot; the last point gets velocity and acceleration zero; and a point due at the very start of the
+    command is replaced by the joints' position then.
 
     Raises :class:`JointNamesError` and :class:`AllPointsInPast`.
     """
@@ -87,7 +87,7 @@ def _smoothed(times, positions, velocities, accelerations, degrees):
 def whole_turns(position, target):
     """What to add to ``target`` [rad], a multiple of a full turn, so that it is nearest to ``position``.
 
-    Where both ways round are equally long, the way keeps the sign of ``target - position``.
+    If both directions are equally long, it keeps the sign of ``target - position``.
     """
     way = math.remainder(target - position, 2.0 * math.pi)
     if abs(abs(way) - math.pi) < _HALF_TURN_TOLERANCE:

@@ -19,8 +19,9 @@ def splines(times, positions, velocities, accelerations, degrees):
     """The m - 1 polynomials through m points: (m - 1, 6, k).
 
     ``times`` (m,) [s], strictly increasing; ``positions``, ``velocities``, ``accelerations`` (m, k); ``degrees`` (m,)
-    of LINEAR, CUBIC, QUINTIC says which of the fields of a point count. The poorer end of a segment decides for it.
-    The coefficients solve position, velocity and acceleration at both ends (cubic, quintic Hermite interpolation).
+    of LINEAR, CUBIC, QUINTIC says which of the fields of a point count. The end with fewer fields decides the degree of
+    a segment. The coefficients solve position, velocity and acceleration at both ends (cubic, quintic Hermite
+    interpolation).
     """
     duration = np.diff(times)[:, None]
     degree = np.minimum(degrees[:-1], degrees[1:])

@@ -8,7 +8,7 @@ import numpy as np
 class Tolerances(NamedTuple):
     """Bounds on position, velocity and acceleration error, arrays (3, n) [rad or m, per s, per s^2]; inf: no bound.
 
-    ``path`` holds on the way, ``goal`` at the end; ``goal_time_s`` is how much later the end may be reached [s].
+    ``path`` applies during the motion, ``goal`` at the end; ``goal_time_s`` is the allowed delay of the end [s].
     """
 
     path: np.ndarray
@@ -31,11 +31,11 @@ def bounds(count, position=0.0, velocity=0.0, acceleration=0.0):
 
 
 def merge_tolerances(defaults, joint_names, path=(), goal=(), goal_time_s=0.0):
-    """A new :class:`Tolerances`: ``defaults`` with what a goal says.
+    """A new :class:`Tolerances`: ``defaults`` with a goal's own values.
 
-    ``path`` and ``goal``: rows of (joint name, position, velocity, acceleration). A positive number takes the place of
-    the default, a negative one lifts the bound, 0 keeps the default; the same for ``goal_time_s`` [s], where a
-    negative one means no time at all. Rows of other joints are left aside.
+    ``path`` and ``goal``: rows of (joint name, position, velocity, acceleration). A positive number replaces the
+    default, a negative one removes the bound, 0 keeps the default; the same for ``goal_time_s`` [s], where a negative
+    one means no time at all. Rows of other joints are ignored.
     """
     if goal_time_s == 0.0:
         goal_time_s = defaults.goal_time_s

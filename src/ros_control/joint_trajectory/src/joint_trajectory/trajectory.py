@@ -9,7 +9,7 @@ from .segment import QUINTIC, constant, splines
 
 
 class Trajectory:
-    """n joints over time; before its start and after its end they stand still.
+    """n joints over time; they rest before its start and after its end.
 
     Attributes
     ----------
@@ -73,8 +73,8 @@ def hold(time_s, position):
 def stop(time_s, position, velocity, duration_s):
     """Come to rest within ``duration_s`` [s] from ``position``, ``velocity`` (n,); a hold when that is 0.
 
-    The way is half of the quintic that goes out and comes back with the velocity mirrored: at its turning point, after
-    ``duration_s``, the velocity is 0 (as in joint_trajectory_controller).
+    The path is the first half of a quintic that goes out and returns with the mirrored velocity: at its turning point,
+    after ``duration_s``, the velocity is 0 (as in joint_trajectory_controller).
     """
     if duration_s <= 0.0:
         return hold(time_s, position)

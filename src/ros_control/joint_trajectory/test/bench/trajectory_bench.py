@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a tick of trajectory following costs, and what a new command costs.
+"""Times of a tick of trajectory following, and of a new command.
 
     ./baxter.sh sim src/ros_control/joint_trajectory/test/bench/trajectory_bench.py [--joints 6] [--points 100]
 """

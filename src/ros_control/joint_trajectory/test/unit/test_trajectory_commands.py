@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a command may look like, and how it takes the place of the trajectory before."""
+"""Valid commands, and how a command replaces the previous trajectory."""
 import math
 
 import numpy as np
@@ -190,7 +190,7 @@ def test_quintics_cut_by_partial_commands_stay_what_they_are():
         np.testing.assert_allclose(cut.sample(time)[:, 1:], old.sample(time)[:, 1:], atol=1e-9)
 
 
-# -- joints that turn without end -----------------------------------------------------------------------------------
+# -- continuous joints -----------------------------------------------------------------------------------
 
 @pytest.mark.parametrize("position, target, expected", [
     (0.0, 1.0, 1.0),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Smooth ways between points, and limits that a way may not go beyond."""
+"""Smooth curves between points, and limits of a trajectory."""
 import numpy as np
 import pytest
 
@@ -50,7 +50,7 @@ def test_the_last_point_is_one_of_rest_whatever_it_says():
 
 
 def test_a_first_point_due_at_the_start_is_where_the_joints_are():
-    """Also when the start lies ahead: nothing may jump there."""
+    """Also when the start is in the future: nothing may jump there."""
     trajectory = smooth([(0.0, [0.3, 0.3], [], []), (2.0, [1.0, 1.0], [], [])], start_time=3.0)
     _, states = samples(trajectory, 2.9, 3.1)
     assert np.abs(np.diff(states[:, 0], axis=0)).max() < 1e-3
@@ -104,7 +104,7 @@ def test_beyond_a_position_limit_names_joint_value_limit_and_time(place, limit):
 
 
 def test_beyond_a_limit_between_the_points():
-    """The points are within, but the velocities asked for lead out between them."""
+    """The points are within, but with the given velocities the curve leaves the limits between them."""
     with pytest.raises(BeyondPosition):
         accept([(2.0, [0.9, 0.0], [1.4, 0.0], []), (4.0, [0.9, 0.0], [], [])])
 
