@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A vehicle that is steered at its front and driven at its rear."""
+"""A vehicle with front steering and rear drive."""
 import math
 
 from controller_manager import POSITION, VELOCITY
@@ -7,14 +7,14 @@ from ros_controllers.vehicle import VehicleController
 
 
 class AckermannSteeringController(VehicleController):
-    """One wheel drives, one joint steers, as on a bicycle; a car's other wheels follow by their own axles.
+    """One wheel drives, one joint steers, as on a bicycle; a car's other wheels roll passively.
 
-    As in ros_controllers, the turn about z of ``cmd_vel`` is the angle that the front is to be steered to [rad], and
-    its limits below ``angular/z`` are of that angle.
+    As in ros_controllers, the rotation about z of ``cmd_vel`` is the steering angle [rad], and the limits below
+    ``angular/z`` apply to that angle.
 
     Parameters besides those of :class:`VehicleController`: ``rear_wheel`` (velocity interface) and ``front_steer``
-    (position interface), joints, by default rear_wheel_joint and front_steer_joint; ``wheel_separation_h`` [m], how far
-    front and rear axle are apart, and ``wheel_radius`` [m], else as the description has them;
+    (position interface), joints, by default rear_wheel_joint and front_steer_joint; ``wheel_separation_h`` [m], the
+    distance of front and rear axle, and ``wheel_radius`` [m], by default from the description;
     ``wheel_separation_h_multiplier``, ``wheel_radius_multiplier`` and ``steer_pos_multiplier`` (1).
     """
 
@@ -48,7 +48,7 @@ class AckermannSteeringController(VehicleController):
         return distance, self._turn(distance, self._last[1][0])
 
     def _turn(self, distance, angle):
-        """How far it turns [rad] over ``distance`` [m], steered to ``angle`` [rad]: the bicycle model."""
+        """Change of heading [rad] over ``distance`` [m] at steering angle ``angle`` [rad]: the bicycle model."""
         return distance * math.tan(self._steering * angle) / self._base
 
     def _drive(self, linear, angular):

@@ -10,8 +10,8 @@ from sim_time.stamps import stamp
 
 class DiffDriveController(VehicleController):
     """Parameters besides those of :class:`VehicleController`: ``left_wheel``, ``right_wheel``, required: a joint, or a
-    list of them; ``wheel_radius`` and ``wheel_separation`` [m], else as the description has them (the wheels' collision
-    shapes, the joints' places); ``wheel_separation_multiplier``, ``left_wheel_radius_multiplier``,
+    list of them; ``wheel_radius`` and ``wheel_separation`` [m], by default from the description (the wheels' collision
+    shapes, the joints' positions); ``wheel_separation_multiplier``, ``left_wheel_radius_multiplier``,
     ``right_wheel_radius_multiplier`` (or ``wheel_radius_multiplier`` for both), all 1;
     ``publish_wheel_joint_controller_state`` (false).
     """

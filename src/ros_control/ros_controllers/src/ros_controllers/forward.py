@@ -23,7 +23,7 @@ class ForwardController(Controller):
         self._subscription = context.subscription("command", self.msg_class)
 
     def starting(self, time_s):
-        self._subscription.take()  # what came before the start was not meant for now
+        self._subscription.take()  # drop commands from before the start
         if self.interface == POSITION:
             self._command = self.hardware.position[self.index]
         else:

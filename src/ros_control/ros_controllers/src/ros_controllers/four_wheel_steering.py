@@ -7,7 +7,7 @@ import numpy as np
 from controller_manager import POSITION, VELOCITY, ControllerError
 from ros_controllers.vehicle import VehicleController
 
-# Slower than this [m/s] it stands, wheels straight, as with ros_controllers: it cannot turn on the spot.
+# Below this speed [m/s] it stops with straight wheels, as in ros_controllers: it cannot turn on the spot.
 _STANDS = 1e-3
 _CORNERS = ((1, 1), (1, -1), (-1, 1), (-1, -1))  # (front or rear, left or right) of each wheel
 
@@ -17,8 +17,8 @@ class FourWheelSteeringController(VehicleController):
 
     Parameters besides those of :class:`VehicleController`: ``front_wheel``, ``rear_wheel`` (velocity interface),
     ``front_steering``, ``rear_steering`` (position interface), required: a left and a right joint each; ``wheel_base``
-    [m], how far the axles are apart, ``track`` [m], the left and right wheels, and ``wheel_radius`` [m], else as the
-    description has them. Of the topic ``cmd_vel`` alone; there is no ``cmd_four_wheel_steering``.
+    [m], the distance of the axles, ``track`` [m], that of left and right wheels, and ``wheel_radius`` [m], by default
+    from the description. Only the topic ``cmd_vel`` is supported, not ``cmd_four_wheel_steering``.
     """
 
     def _configure(self):
@@ -29,7 +29,7 @@ class FourWheelSteeringController(VehicleController):
                                     "the wheels' radius (their collision is no cylinder and no sphere)")
         track = self._length("track", lambda: self._apart(wheels[0], wheels[1], 1), "how far left and right are apart")
         base = self._length("wheel_base", lambda: self._apart(wheels[0], wheels[2], 0), "how far its axles are apart")
-        # How far a wheel is outside of the joint that steers it.
+        # Distance of a wheel from the axis of its steering joint.
         beside = None if self.context.robot is None else self._apart(wheels[0], steering[0], 1)
         self._beside = np.array([side * (beside or 0.0) for _, side in _CORNERS])
         self._pivots = np.array([(end * base / 2.0, side * track / 2.0) for end, side in _CORNERS])
@@ -56,8 +56,8 @@ class FourWheelSteeringController(VehicleController):
         angles = self.hardware.position[self._steering]
         along = np.stack([np.cos(angles), np.sin(angles)], axis=1)
         places = self._pivots + self._beside[:, None] * np.stack([-along[:, 1], along[:, 0]], axis=1)
-        # Each wheel says two things: how far it went along itself, and that it did not slip sideways. The motion (x, y,
-        # turn) that fits the eight of them best.
+        # Each wheel gives two equations: its rolled distance, and no sideways slip. The motion (x, y, turn) is the
+        # least-squares fit of the eight equations.
         rows = np.zeros((8, 3))
         rows[0::2, 0], rows[1::2, 1] = 1.0, 1.0
         rows[0::2, 2], rows[1::2, 2] = -places[:, 1], places[:, 0]
@@ -67,7 +67,7 @@ class FourWheelSteeringController(VehicleController):
     def _drive(self, linear, angular):
         speeds, angles = np.zeros(4), np.zeros(4)
         if abs(linear) > _STANDS:
-            # Where each joint that steers goes; the wheel looks along it, forwards or backwards.
+            # Target of each steering joint; the wheel rolls forwards or backwards along it.
             x, y = linear - angular * self._pivots[:, 1], angular * self._pivots[:, 0]
             sign = math.copysign(1.0, linear)
             angles = np.arctan2(sign * y, np.maximum(sign * x, 0.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A gripper of one joint that opens, closes, and notices that it holds something."""
+"""A gripper of one joint that opens, closes, and detects that it holds something."""
 import math
 
 import numpy as np
@@ -13,10 +13,10 @@ from loop_ros.action_server import ActionServer
 class GripperController(Controller):
     """control_msgs/GripperCommand on the action ``gripper_cmd``: position [m or rad], max_effort [N or Nm].
 
-    Parameters: ``joint``, required; ``goal_tolerance`` (0.01) of the position; ``max_effort`` (0), which counts until
+    Parameters: ``joint``, required; ``goal_tolerance`` (0.01) of the position; ``max_effort`` (0), which applies until
     the first goal and while holding; ``stall_velocity_threshold`` (0.001) and ``stall_timeout`` (1 s): slower than the
     one for longer than the other is a stall. A goal succeeds within the tolerance and is aborted in a stall; the drive
-    goes on as before. Base of the classes below.
+    continues. Base of the classes below.
     """
 
     interface = None
@@ -83,9 +83,9 @@ class GripperController(Controller):
             handle.cancel(text=why)
 
     def _watch(self, time_s):
-        """End the goal where the joint is there, or moves no more."""
+        """End the goal if the joint has arrived, or does not move any more."""
         position = self.hardware.position[self.index[0]]
-        # A reset may have put time back.
+        # Time may have gone back in a reset.
         self._moved_s = min(self._moved_s, time_s)
         if abs(self._target - position) < self._tolerance:
             handle, self._goal = self._goal, None

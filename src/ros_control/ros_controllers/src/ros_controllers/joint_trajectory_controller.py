@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Moves joints along trajectories: the action, topics and service of joint_trajectory_controller.
 
-What a trajectory means is decided in the package ``joint_trajectory``; here its messages meet the joints.
+The package ``joint_trajectory`` has the core; this module connects it with messages and joints.
 """
 
 import numpy as np
@@ -41,8 +41,7 @@ class JointTrajectoryController(Controller):
     Further parameters, with their defaults:
 
     ``constraints/goal_time`` 0.0 s
-        how much later than planned a goal may be reached
-    ``constraints/stopped_velocity_tolerance`` 0.01 rad/s or m/s
+        allowed delay at a goal ``constraints/stopped_velocity_tolerance`` 0.01 rad/s or m/s
         the velocity below which a joint has stopped, at a goal
     ``constraints/<joint>/trajectory``, ``constraints/<joint>/goal`` 0 rad or m
         position error allowed on the way and at a goal; 0: any
@@ -70,7 +69,7 @@ class JointTrajectoryController(Controller):
         self._time_s = 0.0  # control time of the last update
         self._uptime = 0.0
         self._dt = 0.0
-        self._began = 0.0  # uptime at which the last command was taken up
+        self._began = 0.0  # uptime at which the last command was accepted
         self._position = np.zeros(len(self._joints))
         self._velocity = np.zeros(len(self._joints))
         self._next = None
@@ -113,7 +112,7 @@ class JointTrajectoryController(Controller):
     # -- life -------------------------------------------------------------------------------------------------------
 
     def starting(self, time_s):
-        self._commands.take()  # what came before the start was not meant for now
+        self._commands.take()  # drop commands from before the start
         self._time_s, self._uptime, self._began = time_s, 0.0, 0.0
         self._measure()
         self._follower.start(0.0, self._position, self._velocity)
@@ -131,7 +130,7 @@ class JointTrajectoryController(Controller):
             self._conclude(verdict)
         self._server.spin(time_s)
         self._commands.handle(self._on_command)
-        # Commands act until the next tick, so the joints shall go where they should be then.
+        # A command acts until the next tick, so it is the desired state at that tick.
         self._next = follower.look_ahead(self._uptime + dt)
         self._write(dt)
         self._publish(time_s)
@@ -165,7 +164,7 @@ class JointTrajectoryController(Controller):
         before = self._follower.goal
         try:
             tolerances = merge_tolerances(self._tolerances, self._joints, *tolerances_of(goal))
-            # A joint that keeps up is still moving when the end is reached: it was told to stand only in this cycle.
+            # A joint without lag is still moving at the end: its velocity command became zero only in this cycle.
             tolerances = tolerances._replace(goal_time_s=tolerances.goal_time_s + self._dt)
             self._follow(goal.trajectory, handle, tolerances)
         except TrajectoryError as error:
@@ -177,7 +176,7 @@ class JointTrajectoryController(Controller):
             self._feedback_pace.restart()
 
     def _reject(self, handle, error):
-        """Turn a goal down; ``error``: an exception or a text."""
+        """Reject a goal; ``error``: an exception or a text."""
         text = str(error)
         self.log.error("%s: goal rejected: %s" % (self.context.namespace, text))
         handle.reject(FollowJointTrajectoryResult(code_of_error(error), text), text)
@@ -201,7 +200,7 @@ class JointTrajectoryController(Controller):
     def _follow(self, message, handle=None, tolerances=None):
         """Follow a ``trajectory_msgs/JointTrajectory``; raises :class:`TrajectoryError`."""
         now, start_time = self._next_cycle, None
-        # On the topic, no points stop the joints whatever the names are.
+        # On the topic, a message without points stops the joints, with any names.
         if message.points or handle is not None:
             joint_indices(message.joint_names, self._joints, self._allow_partial)
         if message.header.stamp:
@@ -223,7 +222,8 @@ class JointTrajectoryController(Controller):
             self.log.error("%s: goal aborted: %s" % (self.context.namespace, verdict.text))
             handle.abort(result, verdict.text)
 
-    # -- what is told -----------------------------------------------------------------------------------------------
+    # -- publications and queries
+    # -----------------------------------------------------------------------------------------------
 
     def _publish(self, time_s):
         if _take(self._state_pace, self._uptime) and self._state.has_listeners:
@@ -251,17 +251,17 @@ class JointTrajectoryController(Controller):
             raise rospy.ServiceException(str(error)) from error
         return QueryTrajectoryStateResponse(self._joints, *state.tolist())
 
-    # -- what a subclass does with the desired state -----------------------------------------------------------------
+    # -- for subclasses: use of the desired state -----------------------------------------------------------------
 
     def _make_adapter(self):
-        """Read what else it needs from the parameters."""
+        """Read further parameters."""
 
     def _start_adapter(self):
         """Give the command for the tick in which the controller starts."""
         raise NotImplementedError
 
     def _write(self, dt):
-        """Give the command for this tick: ``self._next`` is where the joints should be at its end."""
+        """Give the command for this tick: ``self._next`` is the desired state at its end."""
         raise NotImplementedError
 
 
@@ -279,7 +279,7 @@ class PositionJointTrajectoryController(JointTrajectoryController):
 
 class _PidTrajectoryController(JointTrajectoryController):
     """Command = ``velocity_ff/<joint>`` * desired velocity + PID(position error, velocity error), the PID of each joint
-    in ``gains/<joint>``, where it can be tuned at run time."""
+    in ``gains/<joint>``, which can be tuned at run time."""
 
     def _make_adapter(self):
         names = ["gains/%s" % joint for joint in self._joints]
@@ -311,5 +311,5 @@ class EffortJointTrajectoryController(_PidTrajectoryController):
 
 
 def _take(pace, time_s):
-    """Whether it is due; a rate of 0 Hz means never here."""
+    """Whether it is due; here, a rate of 0 Hz means never."""
     return pace.rate > 0.0 and pace.take(time_s)

@@ -17,9 +17,9 @@ STATE_EVERY = 10
 class PidController(Controller):
     """Base of the classes below: k joints, each with a PID from the error to a command of ``interface``.
 
-    The command topic carries one value per joint; what is not finite or of the wrong length is reported and left out.
+    The command topic carries one value per joint; invalid values or lengths are logged and ignored.
     The gains can be tuned at run time (:mod:`controller_manager.pid_tuning`).
-    Subclasses say how an error is made of command and state, and what the command is at the start.
+    Subclasses define the error from command and state, and the command at the start.
     """
 
     interface = EFFORT
@@ -35,7 +35,7 @@ class PidController(Controller):
         self._subscription = context.subscription("command", self.msg_class)
 
     def starting(self, time_s):
-        self._subscription.take()  # what came before the start was not meant for now
+        self._subscription.take()  # drop commands from before the start
         self._command = self._limited(self._start_command())
         self.pid.reset()
 
@@ -56,13 +56,13 @@ class PidController(Controller):
             self._command = self._limited(values)
 
     def _read_limits(self):
-        """Subclasses that heed limits read them here."""
+        """Subclasses with limits read them here."""
 
     def _limited(self, command):
         return command
 
     def _after(self, time_s, dt, error, output):
-        """What a subclass has to tell after an update."""
+        """Hook for a subclass's publications after an update."""
 
 
 class _Single:
@@ -115,7 +115,7 @@ class _Position:
         return self.hardware.position[self.index]
 
     def _error(self):
-        # Command and position of a joint with a range lie within it, and so does the straight way between them.
+        # Command and position of a joint with a range lie within it, and so do all values between them.
         error = self._command - self.hardware.position[self.index]
         if self._around.any():
             error = np.where(self._around, np.remainder(error + math.pi, 2.0 * math.pi) - math.pi, error)

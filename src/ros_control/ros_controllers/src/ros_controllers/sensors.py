@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Controllers that publish what the robot's sensors measure."""
+"""Controllers that publish the measurements of the robot's sensors."""
 from geometry_msgs.msg import Quaternion, Vector3, Wrench, WrenchStamped
 from sensor_msgs.msg import Imu
 
@@ -36,7 +36,7 @@ class _SensorController(Controller):
         self._pace.restart()
 
     def update(self, time_s, dt):
-        # At each tick: a sensor compares one with the next.
+        # Read at each tick: a sensor computes differences between ticks.
         readings = [(sensor.read(), sensor, publisher) for sensor, publisher in self._sensors
                     if publisher.has_listeners]
         readings = [reading for reading in readings if reading[0] is not None]
@@ -47,7 +47,7 @@ class _SensorController(Controller):
                 publisher.publish(message)
 
     def message(self, values):
-        """The message of what the sensor has read."""
+        """The message of a measurement."""
         raise NotImplementedError
 
 

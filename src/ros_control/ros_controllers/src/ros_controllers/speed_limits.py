@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How fast a commanded speed may be, and how fast it may change: velocity, acceleration and jerk. ROS-free."""
+"""Limits of a commanded speed: velocity, acceleration and jerk. ROS-free."""
 import math
 from dataclasses import dataclass
 
@@ -18,9 +18,9 @@ class SpeedLimits:
     jerk: tuple = (-math.inf, math.inf)
 
     def limit(self, wanted, last, before, dt):
-        """What may be commanded of ``wanted``, where ``last`` and ``before`` were the commands one and two ticks ago.
+        """The command ``wanted``, limited; ``last`` and ``before`` are the commands one and two ticks ago.
 
-        First the change of acceleration is bounded, then the acceleration, then the velocity, which so holds always.
+        Jerk is bounded first, then acceleration, then velocity; so the velocity limit always holds.
         """
         change, change_before = wanted - last, last - before
         low, high = (bound * dt * dt for bound in self.jerk)

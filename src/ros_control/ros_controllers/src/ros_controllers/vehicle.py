@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What controllers of vehicles share: the command and its time-out, limits, odometry and tf."""
+"""Base of vehicle controllers: the command and its time-out, limits, odometry and tf."""
 import math
 
 import numpy as np
@@ -16,12 +16,12 @@ from urdf_model import Cylinder, Sphere
 
 
 class VehicleController(Controller):
-    """Base of the controllers below. Listens to geometry_msgs/Twist on ``cmd_vel``, of which x [m/s] and the turn about
-    z [rad/s] count; publishes nav_msgs/Odometry on ``odom`` and the same as a transform.
+    """Base of the controllers below. Subscribes to geometry_msgs/Twist on ``cmd_vel``, of which x [m/s] and the
+    rotation about z [rad/s] are used; publishes nav_msgs/Odometry on ``odom`` and the same as a transform.
 
     Parameters, all optional: ``publish_rate`` (50 Hz), ``cmd_vel_timeout`` (0.5 s: an older command is a stop),
-    ``base_frame_id`` (base_link), ``odom_frame_id`` (odom), ``enable_odom_tf`` (true), ``open_loop`` (false: true
-    counts commands instead of wheels), ``velocity_rolling_window_size`` (10), ``pose_covariance_diagonal`` and
+    ``base_frame_id`` (base_link), ``odom_frame_id`` (odom), ``enable_odom_tf`` (true), ``open_loop`` (false; if true,
+    odometry uses commands instead of wheels), ``velocity_rolling_window_size`` (10), ``pose_covariance_diagonal`` and
     ``twist_covariance_diagonal`` (six numbers each, zeros), ``publish_cmd`` (false: the limited command on
     ``cmd_vel_out``), and the limits below ``linear/x`` and ``angular/z``, see :mod:`.speed_limits`.
     """
@@ -54,11 +54,11 @@ class VehicleController(Controller):
         raise NotImplementedError
 
     def _note_wheels(self):
-        """Remember where the wheels are, to count from there."""
+        """Store the wheels' positions as the start of odometry."""
         raise NotImplementedError
 
     def _driven(self):
-        """How far the wheels say that it went since they were asked last: (distance [m], turn [rad])."""
+        """Motion by the wheels since the last call: (distance [m], turn [rad])."""
         raise NotImplementedError
 
     def _commanded(self, dt):
@@ -166,7 +166,7 @@ class VehicleController(Controller):
         return [value] if isinstance(value, str) and value else self.context.texts(name, what)
 
     def _length(self, name, measured, what):
-        """A length [m] that is a parameter, or what ``measured()`` finds in the description."""
+        """A length [m] from a parameter, or from ``measured()`` in the description."""
         if self.context.param(name) is not None:
             return self._positive(name, 1.0, "m")
         length = measured() if self.context.robot is not None else None
@@ -176,7 +176,7 @@ class VehicleController(Controller):
         return length
 
     def _wheel_radius(self, joint):
-        """Radius [m] of the wheel behind a joint by the shape that it collides with, or None."""
+        """Radius [m] of the wheel behind a joint by its collision shape, or None."""
         robot = self.context.robot
         if joint not in robot.joints:
             return None
@@ -186,7 +186,8 @@ class VehicleController(Controller):
         return None
 
     def _place(self, joint):
-        """Where a joint is (3,) [m] in the base's frame, all joints at zero, or None where there is no such joint."""
+        """Position (3,) [m] of a joint in the base's frame, with all joints at zero, or None if there is no such
+        joint."""
         robot, frame = self.context.robot, np.eye(4)
         while joint is not None:
             if joint not in robot.joints:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a vehicle on wheels has got to, by how far its wheels have turned. ROS-free."""
+"""Pose of a vehicle from the rotation of its wheels. ROS-free."""
 import math
 from collections import deque
 
-# Less than this turn [rad] in a tick is driven straight: the arc's radius would be lost in rounding.
+# A smaller turn [rad] in a tick counts as straight: the arc's radius would be lost in rounding.
 _STRAIGHT_RAD = 1e-6
 
 
@@ -14,13 +14,13 @@ class WheelOdometry:
     """
 
     def __init__(self, window=10):
-        """``window``: how many ticks the speeds are averaged over."""
+        """``window``: number of ticks in the average of the speeds."""
         self.x = self.y = self.heading = 0.0
         self._linears, self._angulars = deque(maxlen=window), deque(maxlen=window)
         self.rest()
 
     def rest(self):
-        """It stands still where it is."""
+        """The vehicle rests."""
         self.linear = self.angular = 0.0
         self._linears.clear()
         self._angulars.clear()

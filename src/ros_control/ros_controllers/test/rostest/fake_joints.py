@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""A controller manager on joints without physics, at 500 Hz of wall time, with faults to choose.
+"""A controller manager on joints without physics, at 500 Hz of wall time, with optional faults.
 
 Below the namespace /robot: the services of the controller manager, and one std_srvs/SetBool for each fault: ``lag``
-(every tick covers only 2 % of the way), ``clip`` (nothing beyond 0.5 rad), ``freeze`` (no motion at all). The joints
-have a position interface, those in the parameter ``effort_joints`` an effort interface.
+(every tick covers only 2 % of the distance), ``clip`` (nothing beyond 0.5 rad), ``freeze`` (no motion at all). The
+joints have a position interface, those in the parameter ``effort_joints`` an effort interface.
 """
 import math
 import os

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What clients see of the gripper controllers, both of them: Debian's action client, joints with faults, no physics."""
+"""Both gripper controllers as clients see them: Debian's action client, joints with faults, no physics."""
 import unittest
 
 import actionlib
@@ -80,7 +80,7 @@ class GripperControllerTest(unittest.TestCase):
             self.assertEqual((result.reached_goal, result.stalled), (False, True))
 
     def begin_what_does_not_end(self, name):
-        """A goal on its way that neither succeeds nor stalls soon: frozen, with seconds to go, or drifting."""
+        """An active goal that neither succeeds nor stalls soon: frozen, with seconds to go, or drifting."""
         freeze(name == "position_gripper")
         client = self.clients[name]
         client.send_goal(goal(1e6, 0.01))

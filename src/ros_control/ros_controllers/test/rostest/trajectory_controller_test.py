@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What clients see of a trajectory controller: Debian's action clients on joints with faults, no physics."""
+"""A trajectory controller as clients see it: Debian's action clients on joints with faults, no physics."""
 import sys
 import unittest
 
@@ -78,7 +78,7 @@ class TrajectoryControllerTest(unittest.TestCase):
         for fault in ("lag", "clip", "freeze"):
             service("/robot/" + fault, SetBool, False)
         self.go(goal((0.05, [0.0, 0.0])))
-        # A state from before would still show the motion of the test before.
+        # An old state would still show the previous test's motion.
         type(self).state = None
         wait_until(lambda: self.state is not None and not any(self.state.desired.velocities), "rest")
 
@@ -96,7 +96,7 @@ class TrajectoryControllerTest(unittest.TestCase):
                    "joints at %s" % (positions,))
 
     def assert_stands(self):
-        """The joints are at rest, and somewhere on the way from (0, 0) to (1, 1)."""
+        """The joints are at rest, somewhere between (0, 0) and (1, 1)."""
         wait_until(lambda: not any(self.state.desired.velocities) and not any(self.state.actual.velocities), "rest")
         self.assertTrue(all(0.0 <= position < 0.9 for position in self.state.actual.positions), self.state.actual)
 
@@ -120,7 +120,7 @@ class TrajectoryControllerTest(unittest.TestCase):
         self.wait_at(0.1, 0.3)
 
     def test_future_start_is_waited_for(self):
-        # Later than this test can be at its next lines, and taken back then.
+        # Later than this test needs for its next lines, and cancelled then.
         self.client.send_goal(goal((0.1, [0.3, 0.3]), start=rospy.Time.now() + rospy.Duration(60.0)))
         self.wait_active()
         active = self.state.header.stamp
@@ -187,7 +187,7 @@ class TrajectoryControllerTest(unittest.TestCase):
         self.assert_ended(ended, GoalStatus.ABORTED, R.GOAL_TOLERANCE_VIOLATED)
         self.assertRegex(ended[1].error_string,
                          r"^elbow goal error 0\.2\d+ \(position, tolerance 0\.01\) 0\.00\d s after the end$")
-        # Unlike a cancelled goal, a failed one leaves the joints on their way.
+        # Unlike after a cancelled goal, the joints continue after a failed one.
         service("/robot/clip", SetBool, False)
         self.wait_at(0.0, 0.7)
 
@@ -200,7 +200,7 @@ class TrajectoryControllerTest(unittest.TestCase):
         tight.path_tolerance = [JointTolerance("elbow", 0.05, 0.0, 0.0)]
         self.assert_ended(self.go(tight), GoalStatus.ABORTED, R.PATH_TOLERANCE_VIOLATED)
 
-    # -- goals that are taken back --------------------------------------------------------------------------------
+    # -- goals that are cancelled --------------------------------------------------------------------------------
 
     def ended_by(self, act, state=GoalStatus.PREEMPTED):
         """Start a long goal, ``act()``, and see that the goal ends so."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The gripper controllers on a finger that does as it is told, or does not."""
+"""The gripper controllers on a finger that follows its commands, or does not."""
 import pytest
 from actionlib_msgs.msg import GoalID, GoalStatus
 from control_msgs.msg import GripperCommandActionGoal

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sensors are published by their names, at the rate that was asked for."""
+"""Sensors are published by their names, at the requested rate."""
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint states, forwarding and PID controllers on joints that do as they are told."""
+"""Joint states, forwarding and PID controllers on joints that follow commands."""
 from pathlib import Path
 
 import pytest
@@ -264,7 +264,7 @@ def test_unknown_and_broken_entries_are_named():
 def test_a_command_that_a_controller_fails_on_is_dropped(kind, interface, parameters):
     running = Running(kind, interface, parameters)
     running.run(3)
-    running.send(object())  # as if something in it were of a kind that nobody thought of
+    running.send(object())  # as if an unexpected exception came from inside
     before = running.command(interface)
     running.run()
     (place, error), = running.ros.faults.noted

@@ -32,7 +32,7 @@ NS = "/robot/arm"
 
 
 class Arm:
-    """A started controller on fake joints, and the clients it does not know are fake."""
+    """A started controller on fake joints, with fake clients."""
 
     def __init__(self, controller_class=PositionJointTrajectoryController, start=True, lag=0.0, **parameters):
         self.hardware = FakeHardware(dict.fromkeys(JOINTS, (controller_class.interface,)), lag=lag)
@@ -430,7 +430,7 @@ def test_stopping_cancels_the_goal():
     np.testing.assert_allclose(arm.hardware.position, [0.5, 0.5], atol=0.01)
 
 
-# -- what is told -----------------------------------------------------------------------------------------------------
+# -- publications -----------------------------------------------------------------------------------------------------
 
 def test_state_says_desired_actual_and_error_of_the_same_tick():
     arm = Arm(lag=0.9)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Vehicles on wheels that turn as they are told: commands, limits, time-outs, odometry."""
+"""Vehicles on wheels that follow commands: commands, limits, time-outs, odometry."""
 import math
 from pathlib import Path
 
