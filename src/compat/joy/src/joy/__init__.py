@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joysticks of Linux, without ROS: events as the kernel writes them, and when a message about them is due."""
+"""Joysticks of Linux, without ROS: the kernel's events, and when a message about them is due."""
 from .device import Device, DeviceLost
 from .outgoing import Outgoing
 from .readings import Readings

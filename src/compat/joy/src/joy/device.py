@@ -14,11 +14,11 @@ _HINTS = {errno.ENOENT: "plug one in, or set ~dev", errno.ENODEV: "plug one in, 
 
 
 class DeviceLost(Exception):
-    """There is no such device, or there is none any more; the text says why in one line."""
+    """The device does not exist, or is gone; the text says why in one line."""
 
 
 class Device:
-    """An open joystick. Attributes: `axes`, `buttons`, how many it says it has (0 where it does not say).
+    """An open joystick. Attributes: `axes`, `buttons`, their numbers (0 if the device does not report them).
 
     Raises DeviceLost when it cannot be opened.
     """
@@ -33,7 +33,7 @@ class Device:
         self.axes, self.buttons = self._count(_AXES), self._count(_BUTTONS)
 
     def read(self, timeout_s):
-        """Return what has come in within a time [s] as bytes, empty for nothing. Raises DeviceLost."""
+        """Return the bytes that arrive within a time [s]; may be empty. Raises DeviceLost."""
         try:
             if not select.select([self._file], [], [], timeout_s)[0]:
                 return b""
@@ -53,6 +53,6 @@ class Device:
         found = array.array("B", [0])
         try:
             fcntl.ioctl(self._file, request, found)
-        except OSError:  # a pipe or a terminal that stands in for a joystick
+        except OSError:  # a pipe or a terminal in place of a joystick
             return 0
         return found[0]

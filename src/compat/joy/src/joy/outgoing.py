@@ -7,7 +7,7 @@ class Outgoing:
     """Times are [s] of any one clock.
 
     coalesce_s: how long a message waits for other sticks to move too [s], 0 to 1; repeat_hz: how often the last one is
-    sent again [Hz], 0 (never) to 1000. Raises ValueError for what is out of range.
+    sent again [Hz], 0 (never) to 1000. Raises ValueError for values out of range.
     """
 
     def __init__(self, coalesce_s=0.001, repeat_hz=0.0):
@@ -20,7 +20,7 @@ class Outgoing:
         self._due_s = math.inf
 
     def changed(self, now_s, at_once):
-        """Something has moved; at_once: it was a button, which does not wait."""
+        """Note a change; at_once: it was a button, which does not wait."""
         self._due_s = min(self._due_s, now_s + (0.0 if at_once else self._coalesce_s))
 
     def is_due(self, now_s):
@@ -31,9 +31,9 @@ class Outgoing:
         return max(0.0, self._due_s - now_s)
 
     def sent(self, now_s):
-        """A message went out."""
+        """Note that a message was sent."""
         self._due_s = now_s + self._period_s
 
     def cancel(self):
-        """There is no joystick any more: nothing is repeated."""
+        """Stop repeating: the joystick is gone."""
         self._due_s = math.inf

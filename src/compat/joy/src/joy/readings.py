@@ -12,7 +12,7 @@ LARGEST_DEADZONE = 0.9
 class Readings:
     """The present state: `axes`, list of -1..1, left and up positive; `buttons`, list of 0 or 1.
 
-    deadzone: share of a stick's way, 0 to 0.9, within which it reads 0. Raises ValueError for one out of range.
+    deadzone: share of a stick's travel, 0 to 0.9, within which it reads 0. Raises ValueError for one out of range.
     """
 
     def __init__(self, deadzone=0.05):
@@ -22,12 +22,12 @@ class Readings:
         self.restart(0, 0)
 
     def restart(self, axes, buttons):
-        """A device of so many axes and buttons, all at rest; the lists grow when an event names more."""
-        self._rest = b""  # of an event of which only a part was read
+        """Start with this many axes and buttons, all at rest; the lists grow when an event names more."""
+        self._rest = b""  # the start of an incomplete event
         self.axes, self.buttons = [0.0] * axes, [0] * buttons
 
     def take(self, data):
-        """Take bytes as they were read; events may be cut anywhere.
+        """Take the bytes read; events may be split anywhere.
 
         Returns (whether anything has changed, whether a button was pressed or released by hand).
         """

@@ -99,7 +99,7 @@ def test_rates_out_of_range(values):
 
 
 def test_a_device_that_is_not_there_says_what_to_do(tmp_path):
-    # In the user's language, as the system says it.
+    # In the user's language, as from the system.
     missing = os.strerror(errno.ENOENT)
     with pytest.raises(DeviceLost, match="no joystick at .*js7: %s; plug one in, or set ~dev" % missing):
         Device(str(tmp_path / "js7"))
