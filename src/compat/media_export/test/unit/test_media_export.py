@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What rviz asks at its start is answered without an error line."""
+"""rviz's query at its start gives no error line."""
 
 import subprocess
 
