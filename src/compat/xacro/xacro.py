@@ -4,7 +4,7 @@
 import os
 import sys
 
-# Python looks for modules in the folder of a script first, and there lies xacro.py.
+# Python searches a script's folder for modules first, and xacro.py is there.
 HERE = os.path.dirname(os.path.realpath(__file__))
 sys.path[:] = [folder for folder in sys.path if os.path.realpath(folder) != HERE]
 

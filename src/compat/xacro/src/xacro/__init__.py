@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """PyPI's xacro under its own name, with ``$(find PACKAGE)`` answered by rospack as ROS 1 does.
 
-``import xacro`` gives the installed engine itself, untouched but for that one look-up: PyPI's release is made for ROS 2
-and would ask ament. Because Python finds this module first, every way into the engine (the ``xacro`` command of the
-virtual environment included) resolves packages alike. Raises ImportError where the engine is not installed.
+``import xacro`` gives the installed engine itself, unchanged except for that one look-up: PyPI's release is made for
+ROS 2 and would ask ament. Because Python finds this module first, every way into the engine (the ``xacro`` command of
+the virtual environment included) resolves packages alike. Raises ImportError where the engine is not installed.
 """
 import functools
 import importlib
@@ -27,7 +27,7 @@ def _load_engine(folder):
     spec = importlib.util.spec_from_file_location(
         "xacro", str(folder / "__init__.py"), submodule_search_locations=[str(folder)])
     engine = importlib.util.module_from_spec(spec)
-    sys.modules["xacro"] = engine  # takes the place of the module that is being imported right now
+    sys.modules["xacro"] = engine  # replaces the module that is just being imported
     spec.loader.exec_module(engine)
     return engine
 
@@ -49,7 +49,7 @@ def _find(package):
 
 
 def _without_inorder(main):
-    """The engine's command, which knows one order only, without its warning about calls by that name."""
+    """The engine's command without its warning about --inorder, since it knows only this order."""
     @functools.wraps(main)
     def command():
         sys.argv[1:] = [word for word in sys.argv[1:] if word not in ("--inorder", "-i")]
@@ -57,7 +57,7 @@ def _without_inorder(main):
     return command
 
 
-# Elements of URDF that macros are named after, too; in these nothing is wrong.
+# URDF elements that are also names of macros; these need no warning.
 _OF_URDF = {"robot", "link", "joint", "inertial", "visual", "collision", "geometry", "box", "cylinder", "sphere",
             "mesh",
             "origin", "mass", "inertia", "material", "color", "texture", "axis", "limit", "dynamics", "mimic", "parent",
@@ -66,7 +66,7 @@ _OF_URDF = {"robot", "link", "joint", "inertial", "visual", "collision", "geomet
 
 
 def _with_word_on_prefix(handle_macro_call):
-    """The engine's function, which passes over a macro's name without ``xacro:``, as all since ROS melodic do; with a
+    """The engine's function, which ignores a macro's name without ``xacro:``, as all versions since ROS melodic; with a
     warning that names file and lines."""
     told = set()
 
@@ -84,7 +84,7 @@ def _with_word_on_prefix(handle_macro_call):
 
 
 def _places(name):
-    """Where an element stands in the files that are being read, as text."""
+    """Position of an element in the files that are being read, as text."""
     for path in reversed([path for path in _engine.filestack or () if path]):
         try:
             with open(path, encoding="utf-8") as file:

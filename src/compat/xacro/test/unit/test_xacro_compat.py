@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every way into xacro expands files alike and finds packages through ROS_PACKAGE_PATH."""
+"""Every way to call xacro expands files alike and finds packages through ROS_PACKAGE_PATH."""
 import os
 import subprocess
 import sys
