@@ -10,7 +10,7 @@ from baxter_model import SIDES, joint_names, poses, tip_of
 from lab_testing.waiting import stretched, wait_until
 from moveit_commander import MoveGroupCommander, PlanningSceneInterface, RobotCommander
 
-# How near to its goal a motion ends: the goal's tolerance and the last step of the fake controller.
+# Largest error at the end of a motion: the goal's tolerance and the last step of the fake controller.
 NEAR = 0.01
 
 
@@ -75,7 +75,7 @@ class DummyTest(unittest.TestCase):
         self.addCleanup(scene.clear)
         arm = self.arms["left"]
         before = arm.get_current_pose()
-        # Between where the hand is and where it goes: half a turn of the shoulder to the right.
+        # An obstacle between the hand and its goal, half a turn of the shoulder to the right.
         goal = arm.get_current_joint_values()
         goal[0] -= 1.0
         self.assertTrue(arm.go(goal))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SRDF, limits, planners and controllers agree with the robot; launch files load with the arguments that people use."""
+"""SRDF, limits, planners and controllers agree with the robot; launch files load with common arguments."""
 import itertools
 from pathlib import Path
 
