@@ -15,8 +15,6 @@ from traj_rostest_kit import DEADLINE_S, SERVER, Client, FakeRobotTest, wait_unt
 
 from baxter_traj_streamer.settings import arm_joint_names
 
-SERVER = "/traj_interpolator_as"
-
 # A client of the version without traj_id, as its packages would make it.
 OTHER_VERSION = """
 import genpy.dynamic, rospy, sys
