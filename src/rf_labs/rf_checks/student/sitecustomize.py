@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Run a judged program on simulated time: `time.sleep(1)` lasts one simulated second.
 
-lab_environment's sitecustomize runs this module when Python starts, because the judge puts its folder into PYTHONPATH
-right behind. A simulation that runs faster or slower than real time thus changes nothing for a program that waits with
-`time` rather than with rospy, nor for rospy's own time-outs. rf_checks/run_clock.py has the other side and the layout
-of the page.
+lab_environment's sitecustomize runs this module when Python starts, because the judge puts its folder right behind in
+PYTHONPATH. So a program that waits with `time` instead of rospy works with any speed of the simulation, and so do
+rospy's own time-outs. rf_checks/run_clock.py has the other side and the layout of the page.
 """
 import contextlib
 import ctypes
@@ -20,7 +19,7 @@ _PAGE = struct.Struct("<IIqqqq")  # as in run_clock.py
 _STEP_S = 0.01
 _FUTEX = {"x86_64": 202, "aarch64": 98}
 _FUTEX_WAIT = 0
-# A sleeper looks up this often, whatever happens [s].
+# A sleeper checks the clock at least with this period [s].
 _LOOK_UP_S = 0.5
 
 _real_sleep, _real_monotonic_ns = time.sleep, time.monotonic_ns
@@ -39,7 +38,7 @@ class _RunClock:
         self._libc.mmap.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_int, ctypes.c_int,
                                     ctypes.c_long)
         self._futex = _FUTEX[platform.machine()]
-        # Not by Python's mmap: the futex below needs the address, and of a page that only reads ctypes gives none.
+        # Not by Python's mmap: the futex below needs the address, and ctypes gives none for a read-only page.
         address = self._libc.mmap(None, mmap.PAGESIZE, mmap.PROT_READ, mmap.MAP_SHARED, descriptor, 0)
         if address == ctypes.c_void_p(-1).value:
             raise OSError(ctypes.get_errno(), "the clock's page cannot be read")
@@ -57,7 +56,7 @@ class _RunClock:
             _real_sleep(0)
 
     def elapsed_ns(self):
-        """Simulated time since the run's start; between two steps it grows ever more slowly, and never stands."""
+        """Simulated time since the run's start; between two steps it grows more and more slowly, but never stops."""
         _, _, simulated_ns, moved_at_ns, _, _ = self._read()
         since, step = max(0, _real_monotonic_ns() - moved_at_ns), _STEP_S * 1e9
         return simulated_ns + int(step * since / (since + step))
@@ -71,7 +70,7 @@ class _RunClock:
     def sleep(self, seconds):
         """`time.sleep`, in simulated time."""
         if not seconds > 0.0:
-            _real_sleep(seconds)  # yields, or says what is wrong
+            _real_sleep(seconds)  # yields, or raises for a wrong argument
             return
         sequence, _, now_ns, *_ = self._read()
         # Sleeps shorter than a step add up to one.
@@ -90,6 +89,6 @@ def _install(descriptor):
     time.monotonic = time.perf_counter = lambda: clock.monotonic_ns() * 1e-9
 
 
-# Where the page did not come along (a child that was started without it), the wall's clock has to do.
+# Without the page (a child that did not inherit it), wall time is used.
 with contextlib.suppress(KeyError, ValueError, OSError):
     _install(int(os.environ[_VARIABLE]))

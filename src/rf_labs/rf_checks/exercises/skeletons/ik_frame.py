@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 # exercise: ik_frame
-"""Find out by an experiment which frame the IK service takes poses in, and which frame it puts there.
+"""Find out by an experiment which reference frame the IK service uses, and which frame it moves to the pose.
 
 Prints, last, two lines:
 

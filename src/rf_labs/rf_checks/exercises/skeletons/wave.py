@@ -14,7 +14,7 @@ import baxter_interface
 
 
 def offset_at(time_s):
-    """How far from its middle a gripper is at a time [m]."""
+    """Offset of a gripper from its middle position at a time [m]."""
     # TODO: a sine of the time.
     return 0.0 * math.sin(time_s)
 

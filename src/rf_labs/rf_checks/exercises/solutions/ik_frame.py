@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Find out by an experiment which frame the IK service takes poses in, and which frame it puts there."""
+"""Find out by an experiment which reference frame the IK service uses, and which frame it moves to the pose."""
 import sys
 
 import numpy as np
@@ -24,7 +24,7 @@ def main():
     rospy.sleep(0.5)  # tf reports a little later than the joints
 
     def distance(reference, tip):
-        """How far `tip`, measured in `reference`, is from the point that was asked for [m]."""
+        """Distance of `tip`, measured in `reference`, from the requested point [m]."""
         try:
             found = buffer.lookup_transform(reference, tip, rospy.Time(0), rospy.Duration(1.0)).transform.translation
         except tf2_ros.TransformException:

@@ -41,7 +41,7 @@ def where_is(target, source):
 def rotated(orientation, axis, angle):
     """A quaternion x y z w turned about one of the moved frame's own axes."""
     x, y, z, w = orientation
-    # The turn stands on the right: about the gripper's axis, not about that of base.
+    # The rotation is multiplied from the right: about the gripper's axis, not about that of base.
     turned = quaternions.quat2mat([w, x, y, z]) @ axangles.axangle2mat(AXES[axis], angle)
     w, x, y, z = quaternions.mat2quat(turned)
     return [x, y, z, w]

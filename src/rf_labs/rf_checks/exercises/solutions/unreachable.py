@@ -16,7 +16,7 @@ NAMES = {getattr(IKVerdict, name): name for name in ("SOLVED", "OUT_OF_REACH", "
 
 
 def describe(verdict):
-    """One line: the verdict's name and what it rests on."""
+    """One line: the verdict's name and its reason."""
     name = NAMES[verdict.verdict]
     if verdict.verdict == IKVerdict.OUT_OF_REACH:
         return "%s: %.4f m and %.4f rad short" % (name, verdict.short_m, verdict.short_rad)
@@ -36,7 +36,7 @@ def main():
     pose = PoseStamped(header=Header(frame_id="base"), pose=Pose(Point(*numbers[:3]), Quaternion(*numbers[3:])))
     service(SolvePositionIKRequest(pose_stamp=[pose]))
     while True:
-        # The topic is latched: the first report may be that of somebody's earlier request.
+        # The topic is latched: the first report may belong to an earlier request.
         for verdict in reports.get(timeout=10.0).verdicts:
             position = verdict.target.pose.position
             if [position.x, position.y, position.z] == numbers[:3]:

@@ -18,7 +18,7 @@ def plan(limb):
     x, y, z = CENTRES[limb.name]
     path, seed = [], None
     steps = round(PERIOD_S * RATE_HZ)
-    # The solver is asked at every fifth step, and between them the angles are interpolated.
+    # IK runs at every fifth step; the angles between are interpolated.
     for k in range(0, steps, 5):
         offset = AMPLITUDE_M * math.sin(2.0 * math.pi * k / steps)
         # Each solution near the one before: the elbow must not change sides on the way.

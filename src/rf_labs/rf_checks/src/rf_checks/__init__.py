@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The labs' checks: what an exercise asks for, what a program did, and what to tell its author."""
+"""The labs' checks: the requirements of an exercise, the actions of a program, and the hint to its author."""

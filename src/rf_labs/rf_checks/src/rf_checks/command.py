@@ -27,7 +27,7 @@ def _listing():
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong, without the list of options in front of it."""
+    """A parser whose errors have no usage text in front."""
 
     def error(self, message):
         self.exit(WRONG_WORDS, "check: %s\n" % message)
@@ -87,7 +87,7 @@ def _program_and_exercise(parser, options):
 
 
 def _link_in(path):
-    """The first part of a path, as it was given, that is a link; or None."""
+    """The first part of a path, as given, that is a link; or None."""
     return next((part for part in [*reversed(path.parents), path] if part.is_symlink()), None)
 
 
@@ -109,7 +109,7 @@ def start(name):
 
 
 def write_report(path, text):
-    """Put `text` in place of a file, whole or not at all. A link of that name is replaced, not followed."""
+    """Replace a file by one with `text`, atomically. A link of that name is replaced, not followed."""
     with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.absolute().parent, prefix=".%s-" % path.name,
                                      delete=False) as draft:
         draft.write(text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is wrong with a program, told from one run of it: the first fault that explains the others. Free of ROS."""
+"""Diagnosis of a program from one run: the first fault that explains the others. Free of ROS."""
 import ast
 import re
 
@@ -13,13 +13,13 @@ from rf_checks.recording import RECORD_S, Fault
 #: More joint commands than this in FLOOD_WINDOW_S [sim s] are a flood; the robot's own limit is some 800 a second.
 FLOOD_COMMANDS = 1000
 FLOOD_WINDOW_S = 1.0
-# An arm that goes on moving this long before the end of a recording was left on its way [s].
+# An arm that moves within this time before the end of a recording was still moving at the end [s].
 _ON_ITS_WAY_S = 0.15
 
 PYTHON2 = ("print statement", "Missing parentheses in call to 'print'",
            "multiple exception types must be parenthesized")
 _THREAD = re.compile(r"^(?:Current thread|Thread) 0x", re.MULTILINE)
-#: An arm that holds still wavers by less than this in all of a run [rad].
+#: A resting arm moves by less than this during a run [rad].
 STRAY_RAD = 0.05
 _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
 
@@ -50,12 +50,12 @@ def line_of(program, traceback):
 def line_of_dump(program, dump):
     """Where `program` (Path) was when Python's fault handler wrote `dump`: the head of its outermost loop, or None.
 
-    Of a program that is in no loop it is the innermost line.
+    For a program outside of loops it is the innermost line.
     """
     for thread in _THREAD.split(dump):
         lines = [int(number) for path, number in _FRAME.findall(thread) if path.endswith(program.name)]
         if lines:
-            # Innermost first. In which line of its loop a program is caught is chance.
+            # Innermost first. The line inside the loop at which a program is stopped is random.
             found = [loop for line in lines[::-1] for loop in _loops_around(program, line)]
             return found[0] if found else lines[0]
     return None
@@ -72,7 +72,7 @@ def _loops_around(program, line):
 
 
 def is_flood(counts):
-    """Whether joint commands (n, 2), counted at each record, came faster than any robot reads them."""
+    """Whether joint commands (n, 2), counted at each record, came faster than the robot reads them."""
     total = counts.sum(axis=1) if len(counts) else np.zeros(0)
     width = round(FLOOD_WINDOW_S / RECORD_S)
     if len(total) <= width:
@@ -81,7 +81,7 @@ def is_flood(counts):
 
 
 def meddling(run):
-    """A Fault for a program that touched the world around the robot rather than the robot, or None."""
+    """A Fault for a program that changed the simulator or the ROS graph instead of moving the robot, or None."""
     changes = run.changes
     if run.ended == "simulator gone" or "/gazebo" in changes.missing_nodes:
         return Fault("killed_simulator", "the simulator ended while the program ran: it was shut down or killed "
@@ -112,7 +112,8 @@ def _few(names):
 
 
 def _moved_otherwise(run):
-    """A Fault for arms that something else than joint commands has moved, or None. Told from causes, not from jumps."""
+    """A Fault for arms that were moved by something other than joint commands, or None. It uses recorded causes, not
+    jumps."""
     recording = run.recording
     if not recording.records:
         return None
@@ -128,7 +129,8 @@ def _moved_otherwise(run):
 
 
 def behaviour(run, sides, limit_s):
-    """A Fault for how the program ran, whatever its exercise was, or None. sides: the arms that were to move."""
+    """A Fault of the program's behaviour that does not depend on the exercise, or None. sides: the arms that must
+    move."""
     if run.ended == "output":
         return Fault("output", "the program printed megabytes and was stopped; print what is asked for, and not in a "
                      "loop without a pause", 0.4)
@@ -203,7 +205,7 @@ def _about_end(run, sides, limit_s):
 
 
 def left_on_its_way(run, sides):
-    """A Fault for a program that ended while an arm was on its way to something it had been told, or None."""
+    """A Fault for a program that ended while an arm was still moving to its target, or None."""
     recording = run.recording
     end = recording.records[-1].get("exited") if recording.records else None
     if run.ended != "exited" or end is None or not sides:
@@ -227,7 +229,7 @@ def _last_words(run):
 
 
 def diagnose(run, exercise, call, robot, share):
-    """The fault of one run, or None when all is well. share: what its criteria gave, 0 to 1."""
+    """The fault of one run, or None when all is well. share: the result of its criteria, 0 to 1."""
     fault = meddling(run) or behaviour_that_hides(run, exercise.sides, call.limit_s)
     if fault:
         return fault

@@ -12,7 +12,7 @@ PASS_MARK = 80.0
 
 @dataclass(frozen=True)
 class Exercise:
-    """lab, name: as on the command line. words: what in a file's name speaks for it. sides: arms that are to move."""
+    """lab, name: as on the command line. words: parts of a file's name that indicate it. sides: arms that must move."""
 
     lab: str
     name: str
@@ -24,7 +24,7 @@ class Exercise:
 
 
 class UnknownExercise(Exception):
-    """Nothing tells which exercise is meant; the text says what can be said instead."""
+    """The exercise cannot be determined; the text says how to name it."""
 
 
 EXERCISES = (
@@ -42,7 +42,7 @@ EXERCISES = (
              "joint_command.py Q0 ... Q6", tasks.JointCommand(), ("joint", "command", "stream"), ("right",)),
 )
 LABS = tuple(dict.fromkeys(exercise.lab for exercise in EXERCISES))
-# What only programs of one exercise say, the most telling first.
+# Texts that only programs of one exercise contain, the most specific first.
 _TELLS = tuple((name, re.compile(pattern, re.IGNORECASE)) for name, pattern in (
     ("unreachable", "IKReport"), ("ik_frame", "commanded frame"), ("wave", r"\bsin\("),
     ("rotate_gripper", r"rotate_pose|axangle|[xyz]_rotation"), ("tf_listener", "lookup_transform")))
@@ -52,8 +52,8 @@ _MARK = re.compile(r"^\s*#\s*exercise\s*:\s*(\w+)", re.MULTILINE | re.IGNORECASE
 def choose(lab, name, file_name, text):
     """The Exercise for a lab, the name of an exercise or "", and the program. Raises UnknownExercise.
 
-    Without a name: what a line `# exercise: NAME` in the text says; else what the file's name says; else what only
-    programs of one exercise have in them.
+    Without a name: from a line `# exercise: NAME` in the text; else from the file's name; else from texts that only one
+    exercise's programs contain.
     """
     if lab not in LABS:
         raise UnknownExercise("there is no lab '%s'; labs are %s" % (lab, ", ".join(LABS)))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the ROS master of the judge's lab knows, and what of it is no longer as the lab left it.
+"""Registrations and parameters at the ROS master of the judge's lab, and their changes.
 
-The judge asks through rosgraph and is no node. Everybody who reaches a master may register, unregister and set
-parameters in anybody's name, so a node counts as gone when its process is, whichever process has its name by then.
+The judge uses rosgraph and is no node. Every process that reaches a master may register, unregister and set parameters
+in any node's name. So a node counts as gone when its process is gone, even if another process has its name.
 """
 import contextlib
 import time
@@ -13,19 +13,19 @@ import rosgraph
 from lab_environment import master_calls
 from rf_checks.recording import Changes
 
-#: Topics that programs publish on, too.
+#: Topics on which programs may publish.
 SHARED_TOPICS = frozenset(("/rosout", "/rosout_agg", "/tf", "/tf_static", "/diagnostics"))
 _CALLER = "/lab_judge"
-# How long a master may take to answer: one that was stopped never does.
+# Time limit for the master's response: a stopped one never answers.
 _ANSWER_S = 5.0
-# A node that is told to shut down ends within this time [s].
+# A node ends within this time after a shutdown request [s].
 _END_S = 5.0
 _NO_ANSWER = (OSError, xmlrpc.client.Error, rosgraph.MasterException)
 _KINDS = ("publisher", "subscriber", "service")
 
 
 class LabFailed(Exception):
-    """The judge's own lab does not come up or is gone; the text says why."""
+    """The judge's own lab does not start or has ended; the text says why."""
 
 
 class MasterSilent(LabFailed):
@@ -48,7 +48,7 @@ def flat(parameters, prefix=""):
 
 
 class Graph:
-    """The master at `uri`. What is there when `remember` is called belongs to the lab."""
+    """The master at `uri`. Everything registered when `remember` is called belongs to the lab."""
 
     def __init__(self, uri):
         self._uri = uri
@@ -70,14 +70,14 @@ class Graph:
         return {name for kind, name, _ in self.state() if kind == "service"}
 
     def remember(self, processes):
-        """Take what is there for the lab's own. processes: {node: function that tells whether its process lives}."""
+        """Store the present state as the lab's. processes: {node: function that returns whether its process lives}."""
         self._own = frozenset(self.state())
         self._own_parameters = self._parameters()
         self.own_nodes = frozenset(node for _, _, node in self._own)
         self._processes = {node: lives for node, lives in processes.items() if node in self.own_nodes}
 
     def changes(self, with_parameters=False):
-        """The Changes since `remember`; of parameters only if asked, since that takes longer. Raises LabFailed."""
+        """The Changes since `remember`; parameters only on request, since that takes longer. Raises LabFailed."""
         now = self.state()
         topics = {name for kind, name, _ in self._own if kind == "publisher"} - SHARED_TOPICS
         intruders = {}
@@ -98,19 +98,20 @@ class Graph:
         return {node for node, lives in self._processes.items() if not lives()}
 
     def _ending(self, nodes):
-        """Of nodes that lack a registration, those that are shutting down: they take all back before they end."""
+        """Of the nodes that lack a registration, those that are shutting down: they unregister everything before they
+        end."""
         deadline = time.monotonic() + _END_S
         while not nodes <= self._ended() and time.monotonic() < deadline:
             time.sleep(0.02)
         return nodes & self._ended()
 
     def is_as_it_was(self):
-        """Whether everything is there and as it was remembered, and nothing else. Raises LabFailed."""
+        """Whether the state equals the remembered one. Raises LabFailed."""
         return (self.nodes() == self.own_nodes and not self.changes(with_parameters=True)
                 and self._parameters().keys() == self._own_parameters.keys())
 
     def forget_strangers(self):
-        """Take nodes that are gone, and were not the lab's, off the master's lists, and their parameters."""
+        """Unregister ended nodes that were not the lab's, and delete their parameters."""
         with contextlib.suppress(LabFailed, *_NO_ANSWER):
             for kind, name, node in self.state():
                 if node in self.own_nodes:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The students' copy of the workspace: all of it, without solutions and without what reveals them. Free of ROS.
+"""The students' copy of the workspace: everything except solutions and files that reveal them. Free of ROS.
 
-`./baxter.sh handout FOLDER`. Needs no build: what is copied are the files that git knows, or, where there is no git,
-those that no build makes.
+`./baxter.sh handout FOLDER`. Needs no build: it copies the files that git tracks, or, without git, those that no build
+makes.
 """
 import json
 import os
@@ -13,15 +13,15 @@ from pathlib import Path
 
 from rf_checks import similarity
 
-#: What is left out: solutions, tests that hold them or their programs.
+#: Left out: solutions, and tests that contain them or their programs.
 LEFT_OUT = ("src/rf_labs/rf_checks/exercises/solutions", "src/rf_labs/rf_checks/test", "src/rf_labs/rf_lab2/test",
             ".git", ".ci")
-#: Finished nodes that are exercises, too: they stay as names, because packages are built from them.
+#: Finished nodes that are also exercises: they stay as empty files, because packages install them.
 STUBBED = {"src/rf_labs/rf_lab2/nodes/tf_listener.py": "tf_listener", "src/rf_labs/rf_lab2/nodes/wave.py": "wave"}
-#: Tag of a notebook's cell that solves an exercise.
+#: Tag of notebook cells that solve an exercise.
 SOLUTION_TAG = "solution"
 _YOUR_TURN = "# Your turn: this cell is an exercise."
-# What builds and runs leave in a workspace.
+# Files that builds and runs leave in a workspace.
 _MADE = frozenset((".baxter", ".venv", "build", "devel", "install", "logs", "src_overlay", "__pycache__", ".git",
                    ".ipynb_checkpoints", ".pytest_cache", ".ruff_cache", ".catkin_workspace"))
 _STUB = '''#!/usr/bin/env python3
@@ -57,7 +57,7 @@ def names(workspace):
 
 
 def emptied_notebook(text):
-    """A notebook (text) without outputs, and without the code of cells that are tagged as solutions."""
+    """A notebook (text) without outputs, and without the code of cells tagged as solutions."""
     notebook = json.loads(text)
     for cell in notebook["cells"]:
         if cell["cell_type"] != "code":
@@ -70,7 +70,7 @@ def emptied_notebook(text):
 
 
 def make(workspace, target):
-    """Copy the workspace into the folder `target`, which must not be there or be empty; returns how many files.
+    """Copy the workspace into the folder `target`, which must not exist or must be empty; returns the number of files.
 
     Raises HandoutFailed, OSError.
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells the recorder what the IK service was really asked and answered: an observer of position_kinematics.
+"""Sends the true requests and responses of the IK service to the recorder: an observer of position_kinematics.
 
-The topic IKReport, on which the node says the same, is open to everybody; the socket is in the lab's sandbox only.
+Any program can publish on the topic IKReport; the socket is in the lab's sandbox only.
 """
 import contextlib
 import json
@@ -10,9 +10,9 @@ import socket
 
 from rf_checks.recorder_names import REQUESTS, SOCKETS_VARIABLE
 
-#: Poses of one request that are told; a datagram holds many more.
+#: Largest number of poses sent of one request; a datagram holds many more.
 POSES_TOLD = 100
-# The recorder reads once in 10 ms of simulation, which may stand still for a while [s].
+# Longest wait for the recorder, which reads once in 10 ms of simulation; simulation may pause for a while [s].
 _PATIENCE_S = 2.0
 
 

@@ -3,8 +3,8 @@
 
 The whole check has a network namespace of its own, with a loopback and nothing else (`enter_network`). In it, the lab
 and the student's program each run in a sandbox (`command`): with own processes and own /dev/shm, with a home and a /tmp
-of limited size that are gone afterwards, and of the machine only what runs programs, read-only. No sandbox shows the
-solutions or the history of the workspace; a program's does not show the judge either.
+of limited size that are deleted afterwards, and with only those parts of the machine that programs need, read-only. No
+sandbox shows the solutions or the history of the workspace; a program's does not show the judge either.
 """
 import ctypes
 import errno
@@ -19,20 +19,20 @@ import sys
 from pathlib import Path
 
 HOME = "/home/student"
-#: What one folder of a sandbox that can be written holds [bytes].
+#: Size limit of a writable folder of a sandbox [bytes].
 FOLDER_BYTES = 64 << 20
-#: Below a workspace: what solves an exercise or tells how. No sandbox shows these.
+#: Paths below a workspace that contain or reveal solutions. No sandbox shows these.
 SOLVED = (".git", "src/rf_labs/rf_checks/exercises/solutions", "src/rf_labs/rf_checks/test",
           "src/rf_labs/rf_lab2/nodes/tf_listener.py", "src/rf_labs/rf_lab2/nodes/wave.py", "src/rf_labs/rf_lab2/test",
           "src/rf_labs/rf_lab2/notebooks")
-#: What a student's program has no use for: the judge itself.
+#: Paths that a student's program must not see: the judge itself.
 JUDGE = ("src/rf_labs/rf_checks",)
-# The same in an install space, which may be the workspace's or stand alone.
+# The same in an install space, which may be separate from the workspace.
 _INSTALLED = ("share/rf_checks/exercises/solutions", "lib/rf_lab2/tf_listener.py", "lib/rf_lab2/wave.py",
               "share/rf_lab2/notebooks")
 SOLVED += tuple(place + name for place in ("", "install/") for name in _INSTALLED)
 JUDGE += tuple(place + name for place in ("", "install/") for name in ("share/rf_checks", "lib/rf_checks"))
-# Of /etc, what programs need to start; a file with passwords is none of it.
+# Files of /etc that programs need to start; none with passwords.
 _ETC = ("alternatives", "fonts", "group", "host.conf", "hosts", "ld.so.cache", "ld.so.conf", "ld.so.conf.d",
         "localtime", "machine-id", "mime.types", "nsswitch.conf", "OpenCL", "passwd", "protocols", "python3", "ros",
         "services", "timezone", "vulkan", "glvnd", "catkin", "matplotlibrc")
@@ -51,13 +51,13 @@ _network_problem = ""
 
 
 class NotIsolated(Exception):
-    """This machine does not let us build the walls; the text says why, and what can be done."""
+    """This machine does not allow a sandbox; the text says why, and what can be done."""
 
 
 def enter_network():
     """Move this process into a network namespace that has a loopback and nothing else. Raises NotIsolated.
 
-    To be called before any thread starts; what this process starts afterwards is in there, too.
+    To be called before any thread starts; child processes that it starts later are in it, too.
     """
     global _network
     if _network is not None:
@@ -83,7 +83,7 @@ def enter_network():
 
 
 def try_to_enter_network():
-    """As `enter_network`; where that fails, `problem` says so from then on."""
+    """As `enter_network`; if that fails, `problem` returns the reason from then on."""
     global _network_problem
     try:
         enter_network()
@@ -108,7 +108,7 @@ def _switched_off(name, value):
 
 
 def _reason(what):
-    """Why namespaces are refused, and the way out."""
+    """Why namespaces are refused, and the remedy."""
     if _switched_off("kernel/apparmor_restrict_unprivileged_userns", "1"):
         return ("AppArmor of this Ubuntu forbids namespaces to ordinary users (%s). As root, once: sysctl -w "
                 "kernel.apparmor_restrict_unprivileged_userns=0, or load AppArmor's profile bwrap-userns-restrict "
@@ -123,7 +123,7 @@ def _reason(what):
 
 
 def problem():
-    """Why no sandbox can be made here: a sentence with the way out, or "" where all is well."""
+    """Why no sandbox can be made here: a sentence with the remedy, or "" without a problem."""
     return _network_problem or _bubblewrap_problem()
 
 
@@ -167,14 +167,14 @@ def _base():
 
 
 def workspaces(environment):
-    """Folders outside the system that programs are started from and read: the workspace, Python's, what is sourced."""
+    """Folders outside the system that programs need: the workspace, Python's, sourced workspaces."""
     found = [environment.get("LAB_ROOT", ""), sys.prefix, sys.base_prefix, os.path.dirname(sys.executable)]
     for name in _PATHS:
         found += environment.get(name, "").split(":")
     real = {os.path.realpath(path) for path in found if path and os.path.isdir(path)}
     roots = {str(Path(path).parent) if os.path.basename(path) in ("src", "devel") else path for path in real}
     roots = {path for path in roots if not _is_system(path)}
-    # Not twice: what lies in another one comes along with it.
+    # Folders inside another one are included with it.
     return sorted(path for path in roots if not any(path != other and path.startswith(other + "/") for other in roots))
 
 
@@ -195,10 +195,10 @@ def _hide(roots, names):
 
 
 def command(environment, binds=(), hidden=SOLVED, own_network=False):
-    """The words in front of a command that put it into a sandbox of its own.
+    """The command prefix that starts a command in a sandbox of its own.
 
-    environment: of the command, tells which workspace it needs. binds: (source, target, writable) of further files and
-    folders. hidden: names below the workspace that are not shown. own_network: for a process that has not called
+    environment: of the command; it shows which workspace is needed. binds: (source, target, writable) of further files
+    and folders. hidden: names below the workspace that are not shown. own_network: for a process that has not called
     `enter_network`. Raises NotIsolated.
     """
     if problem():
@@ -210,13 +210,13 @@ def command(environment, binds=(), hidden=SOLVED, own_network=False):
     options += _hide(roots, hidden)
     for source, target, writable in binds:
         options += ["--bind" if writable else "--ro-bind", str(source), str(target)]
-    # The folders that bubblewrap made on its way are in memory, and without a limit.
+    # Parent folders that bubblewrap makes are in memory, without a size limit.
     options += ["--remount-ro", "/dev", "--remount-ro", "/", "--chdir", HOME]
     return ["bwrap", *options, *(("--unshare-net",) if own_network else ()), "--"]
 
 
 def environment_of(environment):
-    """Of an environment, what a program in a sandbox gets: no token or agent of the user that runs the check."""
+    """The variables of an environment that a sandboxed program gets: no token or agent of the user."""
     kept = {name: value for name, value in environment.items()
             if name in _VARIABLES or name.startswith(("ROS_", "ROSCONSOLE_", "LC_"))}
     return {**kept, "HOME": HOME, "TMPDIR": "/tmp", "ROS_HOME": HOME + "/.ros", "ROS_LOG_DIR": HOME + "/log",
@@ -226,7 +226,7 @@ def environment_of(environment):
 def caches(environment, folder):
     """Copies of what numba has compiled, as `binds` for `command`: numba wants to write beside the source.
 
-    folder: where the copies go; theirs alone, so that nothing comes back from a sandbox.
+    folder: folder of the copies, used by nothing else, so that a sandbox cannot change the originals.
     """
     binds = []
     for root in workspaces(environment):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs a program as often as its exercise asks for, each time with the robot put back, and has it graded."""
+"""Runs a program as often as its exercise requires, each time with the robot reset, and grades it."""
 import os
 import time
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ from rf_checks.run_clock import RunClock
 from rf_checks.sandbox import CPU_S, Startup, Student, adopt_orphans
 from rf_checks.similarity import Library
 
-#: A check that is not done by then [s, wall] is given up, ungraded: the only limit in the time of the wall.
+#: A check that is not done within this time [s, wall] ends without a grade: the only limit in wall time.
 WALL_LIMIT_S = 900.0
-#: Faults that the next run of the same program would only show again.
+#: Faults that another run of the same program would repeat.
 REPEATED = ("not_enabled", "wrong_arm", "wrong_frame", "early_exit", "no_end", "quaternion_order", "degrees",
             "not_asked", "made_up")
-#: A world in which nothing happened for so long [s, as OwnTime counts] was paused.
+#: A world without records for this time [s, of OwnTime] counts as paused.
 PAUSED_S = 10.0
 _LOOK_S = 0.05
-#: How a run ended -> in the report's words; other words stay as they are.
+#: End of a run -> its text in the report; other values are used as they are.
 ENDS = {"sim time": "simulated time limit", "satisfied": "seen enough", "output": "wrote too much",
         "processes": "too many processes", "memory": "too much memory", "flood": "flood of commands",
         "busy": "computed without end", "paused": "simulation paused", "meddled": "lab meddled with"}
@@ -35,7 +35,8 @@ MASTER = "/rosout and with it the ROS master"
 
 @dataclass(frozen=True)
 class RunResult:
-    """One run: the program's words, its Criteria, its Fault or None; end: how_it_ended, None when it did not run."""
+    """One run: the program's arguments, its Criteria, its Fault or None; end: how_it_ended, None when it did not
+    run."""
 
     arguments: tuple
     criteria: tuple
@@ -50,7 +51,7 @@ class RunResult:
 
 @dataclass(frozen=True)
 class Result:
-    """What a check came to. not_graded: why there are no points, or ""."""
+    """The result of a check. not_graded: why there are no points, or ""."""
 
     exercise: object
     program: str
@@ -64,7 +65,7 @@ class Result:
 
     @property
     def points(self):
-        """0 to 100; None when it was not graded."""
+        """0 to 100; None if it was not graded."""
         return None if self.not_graded else float(np.mean([run.points for run in self.runs]))
 
     @property
@@ -77,10 +78,10 @@ class Judge:
     """Keeps one lab for any number of programs; a context manager."""
 
     def __init__(self, wall_limit_s=WALL_LIMIT_S, trusted=False):
-        """`wall_limit_s`: a check that takes longer is given up, ungraded [s]. `trusted`: where this machine allows no
-        sandbox, run programs without. Raises isolation.NotIsolated.
+        """`wall_limit_s`: a check that takes longer ends without a grade [s]. `trusted`: if this machine allows no
+        sandbox, run programs without one. Raises isolation.NotIsolated.
 
-        `isolation.try_to_enter_network` is for the caller to call, before any thread starts.
+        The caller must call `isolation.try_to_enter_network` before, while no other thread runs.
         """
         self._wall_limit_s = wall_limit_s
         self.has_walls = not isolation.problem()
@@ -129,7 +130,7 @@ class Judge:
             share = sum(one.share * one.weight for one in criteria) / 100.0
             found = diagnosis.diagnose(run, exercise, call, self.robot, share)
             results.append(RunResult(call.arguments, criteria, found, how_it_ended(run)))
-            # What went that wrong goes wrong again, and costs time: the other runs count as this one.
+            # Such a fault repeats and costs time: the other runs count as this one.
             if found and (found.cap < 0.9 or (found.key in REPEATED and share < 0.5)):
                 fault = found
                 not_run = (Criterion("as the run before", share, 100.0, "not run, for the fault below"),)
@@ -199,7 +200,7 @@ class Judge:
 
     @staticmethod
     def _watch(lab, observer, deadline):
-        """Wait for the end of a run, and end it where the records cannot: when there are none."""
+        """Wait for the end of a run, and end it if no more records come."""
         began = time.monotonic()
         while not observer.wait(_LOOK_S):
             excess = observer.student.excess()
@@ -221,11 +222,11 @@ class Judge:
 
     @staticmethod
     def _look_at_graph(lab, run, with_parameters=False):
-        """Whether something of the lab's is gone, or another node publishes its topics; `run.changes` says what."""
+        """Whether a part of the lab is gone, or another node publishes its topics; sets `run.changes`."""
         try:
             run.changes = lab.graph.changes(with_parameters)
         except MasterSilent:
-            # A busy machine answers late; a master that was halted or ended does not answer at all.
+            # A busy master answers late; a stopped one does not answer at all.
             if lab.has_stopped_master():
                 run.changes = Changes([MASTER])
         except LabFailed:
@@ -253,7 +254,7 @@ def _rounded(factor):
 
 
 def _with_exit(records):
-    """The records, the last of which knows when the program ended."""
+    """The records; the last one has the time of the program's end."""
     records = list(records)
     ends = [record["exited"] for record in records if "exited" in record]
     if ends:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A lab of the judge's own: master, simulator and the nodes around it, on a port that nobody uses.
+"""A lab of the judge's own: master, simulator and the nodes around it, on a free port.
 
-The judge itself is no ROS node: what the robot does comes through the recorder's socket, and who else is there from the
-master (graph.py).
+The judge itself is no ROS node: it gets the robot's motion through the recorder's socket, and the list of nodes from
+the master (graph.py).
 """
 import contextlib
 import functools
@@ -27,27 +27,27 @@ from rf_checks.graph import Graph, LabFailed
 from rf_checks.pacing import OwnTime, Watch, children_of, direct_children, is_running
 from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SERVED, SILENCED, SOCKETS_VARIABLE
 
-#: How long the lab may take to start, and to put the robot back [s], as OwnTime counts.
+#: Time limits for the lab to start, and to reset the robot [s, of OwnTime].
 START_TIMEOUT_S, RESET_TIMEOUT_S = 120.0, 30.0
 STOP_TIMEOUT_S = 20.0
 RECORD_S = 0.01
-# After it was put back the robot gets this many records to come to rest.
+# After a reset the robot gets this many records to come to rest.
 CALM_RECORDS = 20
 # The simulator sends its clock at most 500 times a wall second: a record must not be faster than that [s].
 _SHORTEST_RECORD_S = 0.0025
-#: Programs on whose answers a student's program waits, or that have yet to take in what it sent: time must not run away
-#: meanwhile either.
+#: Programs whose responses a student's program waits for, or that still process its messages: time must wait for them,
+#: too.
 HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserver")
-#: The node that puts the robot into the world, and ends then.
+#: The node that spawns the robot, and then ends.
 SPAWNER = "/urdf_spawner"
-#: How the IK nodes tell the recorder what they were asked.
+#: How the IK nodes report their requests to the recorder.
 OBSERVER = ("IK_OBSERVER", "rf_checks.ik_witness:Witness")
 _NAME = b"__name:="
 _DEAD_NODE = re.compile(r"\[([\w./-]+)\] process has died \[pid \d+, exit code -?[1-9]")
 
 
 class TooSlow(Exception):
-    """This machine, as busy as it is, did not get done before the deadline; the text says how slow it was."""
+    """This machine was too slow to finish before the deadline; the text gives its speed."""
 
 
 class Lab:
@@ -60,11 +60,11 @@ class Lab:
         self.graph = None
         self._walls = walls
         self.watch = Watch()
-        #: Called with each record (dict), in the thread that lets the world go on: until it returns, the world waits.
+        #: Called with each record (dict), in the thread that steps the world: the world waits until it returns.
         self.on_record = lambda record: None
-        #: The RunClock of the program that runs, or None.
+        #: The RunClock of the running program, or None.
         self.run_clock = None
-        #: False: at real time at most, because nobody needs more.
+        #: False: at most real time, because no program runs.
         self.is_hurried = False
         self.joint_names = ()
         self._description = description_xml
@@ -81,7 +81,7 @@ class Lab:
         self._calm = None
         self._own_time = OwnTime(self._pids)
         self._still_time = OwnTime(lambda: self.watch.helpers.roots)
-        # Records that came, and how many of them when stood_still_s looked last.
+        # Number of records, and that number at the last call of stood_still_s.
         self._heard = self._looked_at = 0
         self._is_held = False
         self._is_closed_world = False
@@ -94,7 +94,7 @@ class Lab:
 
     @property
     def folder(self):
-        """Where the lab keeps its files."""
+        """The folder of the lab's files."""
         return self._folder
 
     @property
@@ -103,7 +103,8 @@ class Lab:
         return not self._ended.is_set()
 
     def start(self, deadline=float("inf")):
-        """Start everything and wait until the robot stands. Raises LabFailed; TooSlow at `deadline` (monotonic, s)."""
+        """Start everything and wait until the robot is spawned. Raises LabFailed; TooSlow at `deadline` (monotonic,
+        s)."""
         self._folder = Path(tempfile.mkdtemp(prefix="lab-judge-"))
         port = free_port()
         self.uri = "http://localhost:%d" % port
@@ -121,7 +122,7 @@ class Lab:
             listener.listen(1)
             listener.settimeout(0.1)
             description = self._folder / "robot.urdf"
-            # First of the plugins, so that nothing looks at a message before the recorder has waited for it.
+            # First of the plugins, so that no plugin reads a message before the recorder has waited for it.
             description.write_text(re.sub(r"<robot\b[^>]*>", lambda tag: tag[0] + PLUGIN_ELEMENT, self._description,
                                           count=1), encoding="utf-8")
             self._run(["roslaunch", "-p", str(port), str(_share() / "launch" / "lab.launch"),
@@ -134,7 +135,7 @@ class Lab:
         self._await(self._all_there, "the nodes around the robot", deadline)
 
     def reset(self, posture, deadline=float("inf")):
-        """Disable the robot, put its arms into `posture` (dict of joint to rad), and stop the time until go_on().
+        """Disable the robot, set its arms to `posture` (dict of joint to rad), and stop time until go_on().
 
         Raises LabFailed; TooSlow at `deadline` (monotonic, s).
         """
@@ -152,7 +153,7 @@ class Lab:
                 raise TooSlow("the robot was still being put back")
         self._own_time.restart()
         while not self._is_closed_world:
-            # Services leave the master's lists a moment after they are closed.
+            # Closed services disappear from the master's lists a moment later.
             open_ways = {name for kind, name, _ in self.graph.state() if _changes_the_world(kind, name)}
             if open_ways and self._own_time.passed_s() > RESET_TIMEOUT_S:
                 self.go_on()
@@ -162,18 +163,18 @@ class Lab:
                 self.graph.remember(self._node_processes())
 
     def go_on(self):
-        """Let time pass again after reset()."""
+        """Continue time after reset()."""
         self._may_go.set()
 
     def stood_still_s(self):
-        """How long the simulator has had for the next record [s, as OwnTime counts]. Ask several times a second."""
+        """Time since the last record [s, of OwnTime]. Call it several times a second."""
         if self._is_held or self._heard != self._looked_at:
             self._looked_at = self._heard
             self._still_time.restart()
         return self._still_time.passed_s()
 
     def is_as_it_was(self):
-        """Whether another program can be judged here: everything alive and as it was, and nobody else there."""
+        """Whether another program can be judged here: the lab is complete and unchanged, without other nodes."""
         try:
             return self.is_alive and self.graph.is_as_it_was()
         except LabFailed:
@@ -189,7 +190,7 @@ class Lab:
         return found
 
     def has_stopped_master(self):
-        """Whether the ROS master is gone, or was halted by a signal."""
+        """Whether the ROS master has ended, or was stopped by a signal."""
         states = []
         for pid in self._pids():
             with contextlib.suppress(OSError):
@@ -199,12 +200,12 @@ class Lab:
         return not set(states) - {b"T", b"Z"}
 
     def log_tail(self):
-        """The last lines of what the lab's own processes wrote."""
+        """The last lines of the output of the lab's own processes."""
         lines = (self._folder / "output.txt").read_text(errors="replace").splitlines()
         return "\n".join(lines[-15:])
 
     def close(self):
-        """End every process, quickly: nothing of this lab is of use to anybody."""
+        """End every process, quickly: nothing of this lab is needed any more."""
         self._ended.set()
         self.go_on()
         if self._connection is not None:
@@ -216,20 +217,20 @@ class Lab:
                     os.killpg(process.pid, sign)
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     process.wait(timeout_s)
-        # Where roslaunch had to be killed its nodes are left.
+        # If roslaunch had to be killed, its nodes still run.
         for pid in self._pids():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
         self._processes = []
         if self._pacer is not None:
-            # It may be in the middle of a look at the processes.
+            # It may just be reading the list of processes.
             self.watch.gives_up = lambda: True
             self._pacer.join(STOP_TIMEOUT_S)
         self.watch.close()
         self._own_time.close()
         self._still_time.close()
         deadline = time.monotonic() + STOP_TIMEOUT_S
-        # What was killed may still be writing its last lines.
+        # Killed processes may still write their last lines.
         while self._folder is not None and self._folder.exists() and time.monotonic() < deadline:
             shutil.rmtree(self._folder, ignore_errors=True)
             time.sleep(0.005)
@@ -242,7 +243,7 @@ class Lab:
             command = [*isolation.command(os.environ, [(self._folder, self._folder, True), *binds],
                                           own_network=not isolation.has_own_network()), *command]
         with open(self._folder / "output.txt", "ab") as output:
-            # It ends with the judge, however that ends.
+            # It ends with the judge in any case.
             command = ["setpriv", "--pdeathsig", "INT", "--", *command]
             self._processes.append(subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=output,
                                                     stderr=subprocess.STDOUT, start_new_session=True))
@@ -250,7 +251,7 @@ class Lab:
     def _pids(self):
         """All processes of this lab."""
         roots = {process.pid for process in self._processes if process.poll() is None}
-        # What lost its parent is a child of the judge; a student's program does not have this variable.
+        # Orphans become children of the judge; a student's program does not have this variable.
         mark = ("%s=%s" % (SOCKETS_VARIABLE, self._folder)).encode()
         for pid in direct_children(os.getpid()) - roots:
             with contextlib.suppress(OSError):
@@ -258,7 +259,7 @@ class Lab:
         return children_of(roots)
 
     def _dead_nodes(self):
-        """Names of nodes of which roslaunch says that they ended with an error: nothing starts them again."""
+        """Names of nodes that ended with an error according to roslaunch: they are not restarted."""
         return _DEAD_NODE.findall((self._folder / "output.txt").read_text(errors="replace"))
 
     def _await(self, condition, what, deadline):
@@ -276,13 +277,13 @@ class Lab:
             time.sleep(0.05)
 
     def _node_processes(self):
-        """Of each node of the lab: a function that tells whether its process lives."""
+        """For each node of the lab, a function that returns whether its process lives."""
         named = {}
         for pid in self._pids():
             with contextlib.suppress(OSError):
                 words = Path("/proc/%d/cmdline" % pid).read_bytes().split(b"\0")
                 named.update((pid, "/" + word[len(_NAME):].decode()) for word in words if word.startswith(_NAME))
-        # A process that a node has forked bears its name, too.
+        # A process forked by a node has its name, too.
         return {name: functools.partial(is_running, pid) for pid, name in named.items()
                 if not any(named[other] == name and other != pid and pid in children_of((other,)) for other in named)}
 
@@ -291,11 +292,11 @@ class Lab:
         return (all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services
                     for side in SIDES)
                 and "/robot_state_publisher" in nodes and self.joint_names and self._has_time
-                # The spawner still waits for the answer of a service that the first reset withdraws.
+                # The spawner still waits for the response of a service that the first reset withdraws.
                 and SPAWNER not in nodes)
 
     def _pace(self, connection, ended):
-        """Read records, wait until the watched programs rest, let the world go on."""
+        """Read records, wait until the watched programs are idle, then step the world."""
         lines = connection.makefile("r", encoding="utf-8")
         calm_in = None
         try:
@@ -324,13 +325,13 @@ class Lab:
                 self._is_held = False
                 connection.sendall((json.dumps(order) if order else "").encode() + b"\n")
         except (OSError, ValueError, StopIteration):
-            pass  # the simulator has gone: that is what is_alive says
+            pass  # the simulator has ended; is_alive reports it
         finally:
             ended.set()
 
 
 def _changes_the_world(kind, name):
-    """Whether a registration is a way to change the world that a program under check must not have."""
+    """Whether a registration would let a checked program change the world."""
     if kind == "service":
         return (name.startswith("/gazebo/") and name not in SERVED
                 and not name.endswith(("logger_level", "loggers")))
@@ -348,12 +349,12 @@ def _share():
 
 
 def student_folder():
-    """Where Python finds what a program under judgement is started with."""
+    """The folder with the start-up modules of a checked program."""
     return _share() / "student"
 
 
 def robot_description():
-    """The URDF text of the robot that the lab has. Raises LabFailed."""
+    """The URDF text of the lab's robot. Raises LabFailed."""
     packages = rospkg.RosPack()
     command = [str(Path(packages.get_path("xacro")) / "xacro"),
                str(Path(packages.get_path("baxter_description")) / "urdf" / "baxter.urdf.xacro")]

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Numbers that say how well a motion was made. Free of ROS; SI units, radians."""
+"""Measures of the quality of a motion. Free of ROS; SI units, radians."""
 import math
 
 import numpy as np
 
 from urdf_model.transforms import rotation_angle
 
-# Below this speed of its fastest joint an arm stands [rad/s].
+# Below this speed of its fastest joint an arm counts as resting [rad/s].
 STANDS_RAD_S = 0.02
-# Only from here on it moves again: at a turning point the speed wavers about the bound above [rad/s].
+# Above this speed it moves again: at a turning point the speed oscillates about the bound above [rad/s].
 MOVES_RAD_S = 0.06
-# No joint of the robot turns faster than 4 rad/s: more than this between two records [rad] is no motion.
+# No joint of the robot turns faster than 4 rad/s: a larger step between two records [rad] is no motion.
 JUMP_RAD = 0.15
 
 
@@ -38,14 +38,14 @@ def moving_rows(times, positions):
 
 
 def halts(times, positions, window_s=0.05):
-    """How often an arm came to a stand between the beginning and the end of its motion."""
+    """Number of stops of an arm between the beginning and the end of its motion."""
     rows = moving_rows(times, positions)
     if rows is None:
         return 0
     speed = speeds(times, positions)[rows[0]:rows[1]]
     width = max(1, round(window_s / max(float(np.median(np.diff(times))), 1e-6)))
     smooth = np.convolve(speed, np.ones(width) / width, mode="valid") if len(speed) >= width else speed
-    # What lies between both bounds goes on with what was before.
+    # Between both bounds the previous state continues.
     clear = smooth[(smooth < STANDS_RAD_S) | (smooth > MOVES_RAD_S)]
     stands = clear < STANDS_RAD_S
     return int(np.count_nonzero(stands[1:] & ~stands[:-1]))
@@ -57,7 +57,7 @@ def largest_jump(positions):
 
 
 def path_length(positions):
-    """How far the joints went, the one that went farthest [rad]."""
+    """Path length of the joint that moved most [rad]."""
     return float(np.abs(np.diff(positions, axis=0)).sum(axis=0).max()) if len(positions) > 1 else 0.0
 
 
@@ -73,7 +73,7 @@ NO_SINE = SineFit(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def fit_sine(times, points, min_periods=1.5):
-    """The best sine in a path: times (n,), points (n, 3) [m]. The way to its start and from its end is left out.
+    """The best sine in a path: times (n,), points (n, 3) [m]. The motions to its start and from its end are left out.
 
     Fits offset + sine along the main direction of motion, in windows that leave out some of either end.
     """
@@ -89,7 +89,7 @@ def fit_sine(times, points, min_periods=1.5):
                 continue
             a, b = first + round(head * (last - first)), last - round(tail * (last - first))
             found = _fit_window(times[a:b:2], points[a:b:2])
-            # A longer stretch is worth a little unevenness.
+            # A longer window may fit slightly worse.
             if found.periods >= min_periods and _worth(found) > _worth(best):
                 best = found
     return best

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When a run is over: decided at each record, by simulated time and the program's processor time. Free of ROS."""
+"""Decides at each record whether a run is over, by simulated time and the program's processor time. Free of ROS."""
 import threading
 
 import numpy as np
@@ -8,20 +8,20 @@ from baxter_model import SIDES
 from rf_checks import diagnosis
 from rf_checks.recording import RECORD_S
 
-#: A program that hardly ever rests for so much of its own processor time computes without end [s]; this share of the
-#: records is hardly ever.
+#: A program that is almost never idle for this much processor time counts as an endless computation [s]; "almost never"
+#: is this share of the records.
 BUSY_S, BUSY_SHARE = 8.0, 0.3
-# After a program's end the robot is watched until it has stood for QUIET_S, and at most SETTLE_S [sim s].
+# After a program's end the robot is observed until it has rested for QUIET_S, at most SETTLE_S [sim s].
 SETTLE_S, QUIET_S, STILL_RAD = 1.5, 0.3, 1e-4
-# What costs more than a moment is looked at each so many records.
+# Period of expensive checks, in records.
 _LOOK_AT_GRAPH, _LOOK_AT_FAMILY = 25, 5
 
 
 class Observer:
-    """Takes the records of one run. When the run is over the world stands still until :meth:`release`."""
+    """Takes the records of one run. When the run is over the world waits until :meth:`release`."""
 
     def __init__(self, call, is_satisfied, look_at_graph):
-        """`is_satisfied(output)`: has the judge seen enough? `look_at_graph()`: was the lab meddled with?"""
+        """`is_satisfied(output)`: whether the judge has seen enough; `look_at_graph()`: whether the lab was changed."""
         self.records = []
         self.ended = ""
         self.student = None
@@ -32,7 +32,7 @@ class Observer:
         self._busy_since, self._busy_cpu_s = 0, 0.0
         self._exited_at = None
         self._over, self._released = threading.Event(), threading.Event()
-        # Records come in one thread, an end from outside in another: the first end counts.
+        # Records come in one thread, an external end in another: the first end counts.
         self._lock = threading.Lock()
 
     def on_record(self, record, cpu_s):
@@ -54,7 +54,7 @@ class Observer:
             self._over.set()
 
     def wait(self, timeout_s):
-        """Whether the run is over; waits so long for that."""
+        """Whether the run is over; waits at most this long for it."""
         return self._over.wait(timeout_s)
 
     def end(self, how):
@@ -65,14 +65,14 @@ class Observer:
                 self._over.set()
 
     def release(self):
-        """Let the world go on; to be called once the run is dealt with."""
+        """Let the world continue; call it when the run is processed."""
         self._over.set()
         self._released.set()
 
     def _end(self, record, cpu_s):
         count = len(self.records)
         if self.student.exit_code is not None:
-            # Once more: who ended at once may have done it by then.
+            # Check once more: a program that ended at once may have done it before.
             return "meddled" if self._look_at_graph() else "exited"
         if count % _LOOK_AT_GRAPH == 0 and self._look_at_graph():
             return "meddled"

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Let simulated time go on as soon as the watched programs are idle.
+"""Steps simulated time as soon as the watched programs are idle.
 
-So a simulation that runs many times faster than real time does not run away from the program in it, however slow or
-busy the machine is: what is counted is the processor time that processes got, never the time on the wall in which they
-waited for a processor. Free of ROS; Linux only (/proc).
+So a simulation that is many times faster than real time never gets ahead of the program, even on a slow or busy
+machine: only the processor time of processes counts, not the wall time in which they wait for a processor. Free of ROS;
+Linux only (/proc).
 """
 import contextlib
 import os
 import time
 
-#: Processor time per record [s] for which a program that does not rest holds the world up, and its helpers.
+#: Processor time per record [s] for which a busy program, and its helpers, delay the world.
 PROGRAM_ALLOWANCE_S = 0.04
 HELPERS_ALLOWANCE_S = 0.4
 _LOOK_AGAIN_S, _LOOK_AGAIN_AT_MOST_S = 0.0002, 0.004
@@ -40,7 +40,7 @@ def children_of(parents):
 
 
 def is_running(pid):
-    """Whether a process is there and has not ended: one that only waits to be asked for its exit status has."""
+    """Whether a process is running; a zombie is not."""
     try:
         with open("/proc/%d/stat" % pid, "rb") as file:
             text = file.read()
@@ -60,25 +60,25 @@ def cpu_time_s(pids):
 
 
 def last_process():
-    """The number of the newest process or thread on this machine: as long as it stays, there is no new one."""
+    """The number of the newest process or thread on this machine: while it does not change, there is no new one."""
     with open(_LOADAVG, "rb") as file:
         return file.read().split()[-1]
 
 
 class Tree:
-    """Some processes with all their descendants: what their threads do, and what they have used."""
+    """Some processes with all their descendants: states of their threads, and their processor time."""
 
     def __init__(self, roots=()):
         """`roots`: process ids."""
         self.roots = tuple(roots)
-        #: Processor time that was used since the beginning [s]; of processes that ended, what was last seen.
+        #: Processor time that was used since the beginning [s]; for ended processes, the last known value.
         self.used_s = 0.0
         self._seen_s = {}
         self._files = {}
         self._renewed_at = None
 
     def renew(self):
-        """Look which processes and threads there are, if there can be new ones."""
+        """Update the list of processes and threads, if there may be new ones."""
         newest = self.roots, last_process()
         if newest == self._renewed_at:
             return
@@ -119,9 +119,9 @@ class Tree:
         return False
 
     def rests(self):
-        """Whether nothing runs, nor ran while this looked."""
+        """Whether nothing runs, or ran during this check."""
         before = self.count()
-        # While threads wake each other one after the other, each may rest at the moment at which it is looked at.
+        # If threads wake each other in turn, each one may be idle at the moment of its check.
         return not self.runs() and self.count() == before
 
     def close(self):
@@ -134,12 +134,12 @@ class Tree:
 
 
 class Watch:
-    """Tells when a program and its helpers have nothing to do at this moment."""
+    """Detects when a program and its helpers are idle."""
 
     def __init__(self):
-        #: Helpers: processes on whose answers the program waits.
+        #: Helpers: processes whose responses the program waits for.
         self.program, self.helpers = Tree(), Tree()
-        #: Asked now and then; True ends a wait.
+        #: Called sometimes; True ends a wait.
         self.gives_up = lambda: False
 
     def wait_until_rest(self):
@@ -166,9 +166,9 @@ class Watch:
 
 
 class OwnTime:
-    """How long some processes have had to do something: wall time while they rest, else their processor time.
+    """Time that processes had for their work: wall time while they are idle, else their processor time.
 
-    On a machine that does nothing else that is wall time; where they wait for a processor, none passes.
+    On an otherwise idle machine this is wall time; while they wait for a processor, it stands still.
     """
 
     def __init__(self, roots):
@@ -178,14 +178,14 @@ class OwnTime:
         self.restart()
 
     def restart(self):
-        """Begin at zero."""
+        """Restart at zero."""
         self._passed_s = 0.0
         self._tree.roots = tuple(self._roots())
         self._tree.renew()
         self._used_s, self._looked_at = self._tree.count(), time.monotonic()
 
     def passed_s(self):
-        """To be asked several times a second."""
+        """Call it several times a second."""
         self._tree.roots = tuple(self._roots())
         self._tree.renew()
         now, used_s = time.monotonic(), self._tree.count()

@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A model plugin that tells the judge what the simulated robot does, and lets time pass only as the judge agrees.
+"""A model plugin that reports the simulated robot's state to the judge, and steps time only with the judge's consent.
 
-It sits in the simulator's loop: it sees joints and contacts themselves, which commands the robot was given, by whom,
-and whether it took them, and whether anything else put its joints somewhere. Nothing that it tells comes from a topic.
-The judge listens on a Unix socket in the folder that the environment variable LAB_JUDGE_SOCKETS names. Every
-RECORD_TICKS ticks one line of JSON goes out (`Recording` in recording.py reads them), and the loop waits for one line
-back: empty, or an order to put the robot back. That is at the beginning of a tick, before any other plugin looks at its
-messages: whatever the program answers to the last tick's time and joint states is there when the tick begins.
+It runs in the simulator's loop and reads joints and contacts directly. It also records the robot's commands, their
+nodes, whether they were accepted, and whether anything else moved the joints. None of its data comes from a topic. The
+judge listens on a Unix socket in the folder that the environment variable LAB_JUDGE_SOCKETS names. Every RECORD_TICKS
+ticks one line of JSON goes out (`Recording` in recording.py reads them), and the loop waits for one line in return:
+empty, or an order to reset the robot. This happens at the beginning of a tick, before any other plugin reads its
+messages: the program's reaction to the last tick's time and joint states has arrived by then.
 
-With the first order it takes from everybody else the services by which the world is changed: from then on the simulator
-serves what reads.
+The first order withdraws all services that change the world: from then on the simulator only serves those that read.
 """
 import json
 import os
@@ -24,7 +23,7 @@ from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from rf_checks.recorder_names import RECORDS, REQUESTS, SERVED, SILENCED, SOCKETS_VARIABLE
 
 RECORD_TICKS = 5  # 10 ms of simulation
-#: Commands written out in one record; beyond that the rest is only counted.
+#: Commands listed in one record; further ones are only counted.
 COMMANDS_TOLD = 3
 _DATAGRAM_BYTES = 1 << 18
 _RESET, _CONFIGURE = "/gazebo/reset_world", "/gazebo/set_model_configuration"
@@ -87,7 +86,7 @@ class Recorder(ModelPlugin):
             self._placed += 1
 
     def _watch_robot(self):
-        """Have the robot's plugin tell of its commands; it may be another object than before."""
+        """Subscribe to the commands of the robot's plugin, which may be a new object."""
         robot = next((plugin for plugin in self.context.plugins() if hasattr(plugin, "command_observers")), None)
         if robot is not self._robot and robot is not None:
             robot.command_observers.append(self._on_command)
@@ -100,7 +99,7 @@ class Recorder(ModelPlugin):
         self._accepted[side] += command is not None
         told = self._commands[side]
         told.append([side, message.mode, list(message.names), list(message.command), caller, command is not None])
-        # The last ones are what the robot obeys.
+        # The robot follows the last ones.
         del told[:-COMMANDS_TOLD]
 
     def _take_commands(self):
@@ -131,7 +130,7 @@ class Recorder(ModelPlugin):
             self._judge_has_gone()
 
     def _judge_has_gone(self):
-        """Nobody is left to end this lab."""
+        """The judge is gone, so nobody else ends this lab."""
         self.close()
         rospy.signal_shutdown("the judge has gone")
 
@@ -145,7 +144,7 @@ class Recorder(ModelPlugin):
         return json.loads(line) if line.strip() else None
 
     def _obey(self, order, time_s):
-        """Put the robot back, disabled: `names`, `positions` [rad] of the arms. Returns "", or why it cannot be."""
+        """Reset the robot, disabled: `names`, `positions` [rad] of the arms. Returns "", or why it failed."""
         self._close_world()
         if self._robot is None:
             return "the robot's plugin is gone"
@@ -160,7 +159,7 @@ class Recorder(ModelPlugin):
         return "" if answer.success else answer.status_message
 
     def _close_world(self):
-        """Withdraw what a program under check has no use for; the handlers of the services stay here."""
+        """Withdraw the services that a checked program must not use; keep their handlers."""
         for name in self.context.served():
             if name.startswith("/gazebo/") and name not in SERVED:
                 self._handlers[name] = self.context.withdraw(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a program did while it was watched, as plain data. Free of ROS."""
+"""The record of a program's run, as plain data. Free of ROS."""
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -11,7 +11,7 @@ RECORD_S = 0.01
 
 
 class Recording:
-    """What the robot did: one record (a dict as recorder.py writes it) each RECORD_S of simulation."""
+    """The robot's motion: one record (a dict as recorder.py writes it) each RECORD_S of simulation."""
 
     def __init__(self, joint_names, records=()):
         self.joint_names = tuple(joint_names)
@@ -40,50 +40,50 @@ class Recording:
         return any(record["enabled"] for record in self.records)
 
     def contacts(self):
-        """Pairs of links that came to touch: those of the first record do not count."""
+        """Pairs of links that started to touch; those of the first record do not count."""
         first = {tuple(pair) for pair in self.records[0]["contacts"]} if self.records else set()
         return sorted({tuple(pair) for record in self.records for pair in record["contacts"]} - first)
 
     def commands(self):
-        """Joint commands that were written out: list of (side, mode, names, values)."""
+        """The recorded joint commands: list of (side, mode, names, values)."""
         return [tuple(command[:4]) for record in self.records for command in record["commands"]]
 
     def commanders(self):
-        """The nodes that commanded the arms: sorted (node name, side, mode) of recorded commands that were obeyed."""
+        """The nodes that commanded the arms: sorted (node name, side, mode) of accepted commands."""
         return sorted({(command[4], command[0], command[1]) for record in self.records
                        for command in record["commands"] if command[5]})
 
     def accepted_count(self, side):
-        """How many joint commands the robot obeyed, of one arm, since the start."""
+        """Number of accepted joint commands of one arm since the start."""
         return self.records[-1]["accepted"][side] - self.records[0]["accepted"][side] if self.records else 0
 
     def placed_count(self):
-        """How often something but the robot's drives put its joints elsewhere: a service, or a reset."""
+        """How often a service or a reset moved the joints."""
         return self.records[-1]["placed"] - self.records[0]["placed"] if self.records else 0
 
     def path_without_cause(self):
-        """How far the arms' joints went, the one that went farthest [rad], before any command was obeyed."""
+        """Path length of the joint that moved most [rad] before any command was accepted."""
         first = self.records[0]["accepted"] if self.records else {}
         rows = next((row for row, record in enumerate(self.records) if record["accepted"] != first), len(self.records))
         arms = np.hstack([self.arm(side)[:rows] for side in SIDES])
         return float(np.abs(np.diff(arms, axis=0)).sum(axis=0).max()) if rows > 1 else 0.0
 
     def command_counts(self):
-        """(n, 2): how many joint commands had come by then, left and right, since the start."""
+        """(n, 2): number of joint commands until then, left and right, since the start."""
         counts = np.array([[record["counts"][side] for side in SIDES] for record in self.records]).reshape(-1, 2)
         return counts - counts[0] if len(counts) else counts
 
     def ik_requests(self):
-        """Poses that the IK service was asked for: list of (side, frame, xyz, xyzw, verdict)."""
+        """Requested poses of the IK service: list of (side, frame, xyz, xyzw, verdict)."""
         return [tuple(request) for record in self.records for request in record["ik"]]
 
 
 @dataclass(frozen=True)
 class Changes:
-    """What became of a lab's own things. All names sorted.
+    """Changes of the lab's own registrations. All names sorted.
 
     missing_nodes: ended, or no longer registered. intruders: dict of the lab's topics to other nodes that publish them.
-    withdrawn: what the lab's nodes no longer publish, hear or serve. parameters: changed or deleted.
+    withdrawn: lost publications, subscriptions and services of the lab's nodes. parameters: changed or deleted.
     """
 
     missing_nodes: list = field(default_factory=list)
@@ -99,9 +99,9 @@ class Changes:
 class Run:
     """One run of a program.
 
-    ended: how the run came to its end: "exited", "satisfied" (the judge had seen enough), "sim time", "busy", "flood",
-    "output", "processes", "paused", "simulator gone", "meddled". changes: what became of the lab. stuck_at: line of
-    the program where it was when the judge ended it. cpu_s: processor time that it used; wall_s: how long it took.
+    ended: how the run ended: "exited", "satisfied" (the judge had seen enough), "sim time", "busy", "flood",
+    "output", "processes", "paused", "simulator gone", "meddled". changes: Changes of the lab. stuck_at: the program's
+    line when the judge ended it. cpu_s: its processor time; wall_s: its wall time.
     """
 
     arguments: list
@@ -119,13 +119,13 @@ class Run:
 
     @property
     def simulated_s(self):
-        """How much simulated time passed."""
+        """Simulated time of the run [s]."""
         return len(self.recording.records) * RECORD_S
 
 
 @dataclass(frozen=True)
 class Criterion:
-    """One thing that counts: share of what it is worth (0 to 1), weight (points of 100), and what was found."""
+    """One criterion: achieved share (0 to 1), weight (points of 100), and a text about the result."""
 
     name: str
     share: float
@@ -135,7 +135,7 @@ class Criterion:
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong: a short key, and the sentence for the author. cap: no more than this share of all points."""
+    """A fault: a short key, and the sentence for the author. cap: largest share of all points."""
 
     key: str
     sentence: str

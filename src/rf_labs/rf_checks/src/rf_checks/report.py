@@ -11,7 +11,7 @@ def has_passed(result):
 
 
 def text(result):
-    """For people: a table of each run, then the sentence that helps."""
+    """As text for users: a table of each run, then the hint."""
     exercise = result.exercise
     lines = ["%s %s: %s" % (exercise.lab, exercise.name, exercise.title)]
     for run in result.runs:
@@ -49,7 +49,7 @@ def as_json(result):
 
 
 def as_junit(result):
-    """The same as JUnit XML: one case for each run; a failure says points and hint."""
+    """The same as JUnit XML: one case for each run; a failure has points and hint."""
     failed = sum(run.points < PASS_MARK for run in result.runs)
     name = "%s.%s" % (result.exercise.lab, result.exercise.name)
     ungraded = bool(result.not_graded)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the robot's frames are for given joint values. Free of ROS."""
+"""Poses of the robot's frames for given joint values. Free of ROS."""
 import numpy as np
 
 from baxter_model import BASE_FRAME, joint_names, poses, tip_of
 from baxter_sim_kinematics import Chain, ChainError, NoSolution, pose_from_quaternion, solve
 from urdf_model import parse_urdf
 
-# Where an inverse kinematics search starts: the middle of what the arm can do well.
+# Start of inverse kinematics: the middle of the arm's usual workspace.
 _START = "neutral"
 
 
@@ -65,7 +65,7 @@ class Robot:
         return self._chain(side).fk(recording.arm(side)[row])
 
     def solve(self, side, xyz, xyzw):
-        """What becomes of an IK request: joint values (7,) or the NoSolution, returned."""
+        """Solve an IK request: returns joint values (7,), or the NoSolution."""
         try:
             return solve(self._chain(side), pose_from_quaternion(xyz, xyzw), seed=self._start(side)).q
         except NoSolution as failure:

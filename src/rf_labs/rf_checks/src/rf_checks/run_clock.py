@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The clock of a program under judgement: simulated time in a page of memory that the program can read.
+"""The clock of a checked program: simulated time in a page of memory that the program can read.
 
-student/sitecustomize.py puts it in the place of Python's own clocks and of `time.sleep`. Free of ROS; Linux only.
+student/sitecustomize.py replaces Python's own clocks and `time.sleep` by it. Free of ROS; Linux only.
 """
 import ctypes
 import fcntl
@@ -19,13 +19,13 @@ PAGE = struct.Struct("<IIqqqq")
 _CONTENT = 8
 _FUTEX = {"x86_64": 202, "aarch64": 98}
 _FUTEX_WAKE, _EVERYBODY = 1, 2**31 - 1
-# linux/fcntl.h: a program that opens the page anew by its name in /proc can neither cut it, which would end the judge,
-# nor write to it.
+# linux/fcntl.h: a program that opens the page again by its name in /proc can neither truncate it, which would crash the
+# judge, nor write to it.
 _ADD_SEALS, _SEALS = 1033, 0x1 | 0x2 | 0x4 | 0x10  # seals, shrink, grow, future writes
 
 
 class RunClock:
-    """Stands still until it is told to advance. To be closed."""
+    """Advances only by :meth:`advance`. Must be closed."""
 
     def __init__(self):
         writable = os.memfd_create("run-clock", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
@@ -33,7 +33,7 @@ class RunClock:
             os.ftruncate(writable, mmap.PAGESIZE)
             self._page = mmap.mmap(writable, mmap.PAGESIZE)
             fcntl.fcntl(writable, _ADD_SEALS, _SEALS)
-            #: For the program: a descriptor that only reads.
+            #: For the program: a read-only descriptor.
             self.descriptor = os.open("/proc/self/fd/%d" % writable, os.O_RDONLY)
         finally:
             os.close(writable)
@@ -44,11 +44,11 @@ class RunClock:
 
     @property
     def environment(self):
-        """What the program's environment needs: dict."""
+        """Variables for the program's environment: dict."""
         return {VARIABLE: str(self.descriptor)}
 
     def advance(self, step_s):
-        """Simulated time went on by `step_s`; wake all sleepers."""
+        """Advance simulated time by `step_s` and wake all sleepers."""
         self._simulated_ns += round(step_s * 1e9)
         self._write()
         if platform.machine() in _FUTEX:
@@ -63,7 +63,7 @@ class RunClock:
 
     def _write(self):
         content = PAGE.pack(0, 0, self._simulated_ns, time.monotonic_ns(), *self._start)
-        # Not by struct.pack_into: that clears what it writes to first, and 0 is even.
+        # Not by struct.pack_into: it clears its target first, and 0 is even.
         word = ctypes.c_uint32.from_buffer(self._page)
         word.value += 1
         self._page[_CONTENT:PAGE.size] = content[_CONTENT:]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A student's program in a process of its own: limited, unable to reach the judge, and gone when it is told to go.
+"""A student's program in a process of its own: limited, unable to reach the judge, and ended reliably.
 
-It runs in a sandbox of bubblewrap's (isolation.py). Only where its author is trusted may it do without, on machines
-that allow no namespaces: there a session, limits and a search for descendants have to do. Free of ROS.
+It runs in a sandbox of bubblewrap (isolation.py). Only a trusted author's program may run without it, on machines
+without namespaces: then a session, limits and a search for descendants replace it. Free of ROS.
 """
 import collections
 import contextlib
@@ -22,9 +22,9 @@ from rf_checks import isolation, submission
 from rf_checks.pacing import children_of, direct_children
 
 CPU_S = 120
-#: Of addresses, each process; numpy alone reserves some.
+#: Limit of address space for each process; numpy alone reserves much.
 ADDRESS_BYTES = 8 << 30
-#: Of memory, all processes together.
+#: Limit of memory for all processes together.
 MEMORY_BYTES = 2 << 30
 FILE_BYTES = 20 << 20
 PROCESSES = 100
@@ -39,12 +39,12 @@ _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
 def adopt_orphans():
-    """Have processes whose parent ended become children of this one, where they can be found."""
+    """Make orphaned processes children of this one, so that they can be found."""
     ctypes.CDLL(None, use_errno=True).prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
 class Startup:
-    """What the judge has every program start with: a folder for PYTHONPATH, variables, and descriptors to inherit."""
+    """Start-up data of every checked program: a folder for PYTHONPATH, variables, and inherited descriptors."""
 
     def __init__(self, folder, environment, descriptors=()):
         """folder: path; environment: dict; descriptors: keep their numbers."""
@@ -52,7 +52,7 @@ class Startup:
 
     @staticmethod
     def python_path(folder, python_path):
-        """PYTHONPATH of a program: with `folder` in front of what it was, behind the lab's own environment.
+        """PYTHONPATH of a program: with `folder` in front, but behind the lab's own environment.
 
         Python runs the first sitecustomize.py of all folders. The lab's runs the next one after its own work.
         """
@@ -60,13 +60,13 @@ class Startup:
 
 
 class Student:
-    """A running program. `output`, `errors`: what it wrote so far; `wrote_too_much`: that it was too much."""
+    """A running program. `output`, `errors`: its output so far; `wrote_too_much`: whether that exceeds the limit."""
 
     def __init__(self, program, arguments, environment, walls=True, startup=None):
         """Start a Python program (path) with `arguments` (strings).
 
-        environment: what ROS and the workspace need of it is passed on. walls: in a sandbox; False for the programs of
-        authors who are trusted. startup: Startup or None. Raises isolation.NotIsolated, submission.BadSubmission,
+        environment: the variables that ROS and the workspace need are passed on. walls: in a sandbox; False for
+        programs of trusted authors. startup: Startup or None. Raises isolation.NotIsolated, submission.BadSubmission,
         OSError.
         """
         program = Path(program)
@@ -84,10 +84,10 @@ class Student:
     def _start(self, program, arguments, environment, walls, startup):
         home = isolation.HOME if walls else self.folder
         names = submission.copy(program, self.folder)
-        # The fault handler tells the judge where the program was when it is stopped.
+        # The fault handler reports the program's position when it is stopped.
         own = {"PYTHONFAULTHANDLER": "1", "PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1"}
         if walls:
-            # A package beside the program counts as one; each file would need its folders made first.
+            # A package beside the program is one entry; for single files, their folders would have to be made first.
             tops = sorted({name.split("/")[0] for name in names})
             binds = [(Path(self.folder) / top, "%s/%s" % (home, top), False) for top in tops]
             if startup is not None:
@@ -115,9 +115,9 @@ class Student:
 
     @property
     def exit_code(self):
-        """None while it runs; of a program that a signal ended, minus the signal's number."""
+        """None while it runs; minus the signal's number if a signal ended it."""
         code = self._process.poll()
-        # Bubblewrap says it as shells do.
+        # Bubblewrap reports signals as shells do.
         return 128 - code if self._has_walls and code is not None and 128 < code <= 192 else code
 
     @property
@@ -133,7 +133,7 @@ class Student:
         return any(stream.total > OUTPUT_BYTES for stream in self._streams)
 
     def family(self):
-        """Process ids of the program and of all that it started, orphans included."""
+        """Process ids of the program and of all its descendants, including orphans."""
         roots = direct_children(os.getpid()) - self._before
         # Once it has ended its number may be another process's.
         if self.exit_code is None:
@@ -141,7 +141,7 @@ class Student:
         return children_of(roots)
 
     def excess(self):
-        """What the program has too much of: "output", "processes", "memory", or "" when it keeps within its limits."""
+        """The limit that the program exceeds: "output", "processes", "memory", or ""."""
         if self.wrote_too_much:
             return "output"
         family = self.family()
@@ -150,7 +150,7 @@ class Student:
         return "memory" if _memory_bytes(family) > MEMORY_BYTES else ""
 
     def dump(self):
-        """Have Python say where it is, which also ends it; what it says is in `errors` afterwards."""
+        """Make Python write its traceback to `errors`, which also ends it."""
         before = self._streams[1].total
         for pid in self.family() - {self.pid}:
             with contextlib.suppress(ProcessLookupError):
@@ -166,8 +166,8 @@ class Student:
         time.sleep(0.05)
 
     def end(self):
-        """Kill what is left and count what outlived the program. To be called once."""
-        # What is left in a sandbox ends with it.
+        """Kill remaining processes and count those that outlived the program. Call it once."""
+        # Processes in a sandbox end with it.
         if self.exit_code is not None and not self._has_walls:
             self.survivors = len(self.family())
         for _ in range(_KILL_ROUNDS):
@@ -193,7 +193,7 @@ class Student:
 
 
 def _memory_bytes(pids):
-    """What processes hold in memory for themselves: pages that they share with files do not count."""
+    """Private memory of processes; pages that are shared with files do not count."""
     total = 0
     for pid in pids:
         with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/%d/statm" % pid, "rb") as file:
@@ -209,7 +209,7 @@ def _reap(pids):
 
 
 class _Stream:
-    """Reads a pipe to its end, whatever comes, and keeps its beginning and its end."""
+    """Reads a pipe completely, and keeps the beginning and the end of the data."""
 
     def __init__(self, pipe):
         self.total = 0
@@ -228,7 +228,7 @@ class _Stream:
                 else:
                     self._tail.append(chunk)
                 if self.total > OUTPUT_BYTES:
-                    time.sleep(0.01)  # it fills the pipe and waits, rather than a processor
+                    time.sleep(0.01)  # the program then waits at the full pipe instead of using a processor
 
     def text(self):
         return (bytes(self._head) + b"".join(list(self._tail))).decode(errors="replace")
@@ -239,5 +239,5 @@ class _Stream:
 
 
 def python():
-    """The interpreter for programs: the one this runs on."""
+    """The interpreter for programs: the one of this process."""
     return sys.executable

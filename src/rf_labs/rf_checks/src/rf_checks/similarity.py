@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much of a program's own code is also in a reference program. Free of ROS.
+"""Similarity of a program's own code to reference programs. Free of ROS.
 
-Programs are compared by fingerprints: every run of SPAN tokens, after what a copyist changes first is levelled (names
-that the program itself gives, numbers, texts, comments, docstrings, annotations, formatting, order of functions). Names
-of libraries and their methods stay. What everybody was handed out (skeletons, notebooks) counts on neither side, so
-that an untouched skeleton is no copy of the solution that was made from it.
+Programs are compared by fingerprints: every sequence of SPAN tokens, after normalization of what a copyist changes
+first (the program's own names, numbers, texts, comments, docstrings, annotations, formatting, order of functions).
+Names of libraries and their methods stay. Code that was handed out to all students (skeletons, notebooks) counts on
+neither side, so an untouched skeleton is no copy of the solution made from it.
 """
 import ast
 import functools
@@ -19,23 +19,24 @@ from pathlib import Path
 
 #: Tokens of a fingerprint: about two lines of code.
 SPAN = 14
-#: From this share of a program's own fingerprints, or of a reference's, on, it is called a copy.
+#: A program that shares this part of its own fingerprints, or of a reference's, is reported as a copy.
 COPY_SHARE = 0.5
-#: A program with fewer fingerprints of its own says nothing.
+#: A program with fewer own fingerprints is not judged.
 LEAST_OWN = 40
-#: Calls that run what cannot be read off the program, with the module that they belong to.
+#: Calls that run code which is not in the program, with their modules.
 _OPAQUE = {"": ("exec", "eval", "compile", "__import__"), "runpy": ("run_path", "run_module"),
            "importlib": ("import_module",), "util": ("spec_from_file_location",), "machinery": ("SourceFileLoader",),
            "subprocess": ("Popen", "run", "call", "check_call", "check_output", "getoutput"),
            "os": ("system", "popen", "execv", "execve", "execvp", "execl", "execlp", "posix_spawn", "spawnv", "spawnl"),
            "ctypes": ("CDLL", "PyDLL")}
-#: In a program's texts: where the judge and the solutions are.
+#: Texts in a program that name the judge or the solutions.
 _JUDGES_OWN = re.compile(r"rf_checks|exercises.solutions|lab-judge-|LAB_JUDGE|LAB_RUN_CLOCK")
 
 
 @dataclass(frozen=True)
 class Likeness:
-    """name: of the reference. of_program, of_reference: which share of either's own code is in the other (0 to 1)."""
+    """name: of the reference. of_program, of_reference: the share of each one's own code that is in the other (0 to
+    1)."""
 
     name: str
     of_program: float
@@ -47,7 +48,7 @@ class Likeness:
 
 
 class _Level(ast.NodeTransformer):
-    """Level what a copyist changes first. Names that come from imports count as what they stand for."""
+    """Normalize what a copyist changes first. Imported names are replaced by the full names of what they refer to."""
 
     def __init__(self, tree):
         self._own, self._imported = set(), {}
@@ -146,7 +147,7 @@ def fingerprints(text):
 def compare(text, references, handed_out):
     """Likenesses of a program to each reference, the most alike first.
 
-    text: the program. references: {name: text}. handed_out: texts that everybody has.
+    text: the program. references: {name: text}. handed_out: texts handed out to all students.
     """
     common = frozenset().union(*map(fingerprints, handed_out))
     own = fingerprints(text) - common
@@ -162,7 +163,7 @@ def compare(text, references, handed_out):
 
 
 def opaque_calls(text):
-    """(line, name) of calls that run code which is not in the program to be read."""
+    """(line, name) of calls that run code which is not in the program."""
     tree = _parsed(text)
     modules, functions = {}, {}
     for node in ast.walk(tree):
@@ -192,7 +193,7 @@ def judges_own(text):
 
 
 def _parsed(text):
-    """The tree of a program; an empty one for what Python cannot read."""
+    """The tree of a program; an empty one for invalid Python."""
     try:
         return ast.parse(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -215,7 +216,7 @@ def _is_python(text):
 
 
 class Library:
-    """The references and what is handed out, as a workspace has them; a students' copy has no references."""
+    """The references and handed-out texts of a workspace; a students' copy has no references."""
 
     def __init__(self, workspace):
         """workspace: its folder."""
@@ -230,7 +231,7 @@ class Library:
         self.handed_out += [notebook_code(path) for path in sorted(root.glob("src/*/*/notebooks/*.ipynb"))]
 
     def notes(self, texts):
-        """What an instructor should know about a program: a list of sentences. They change no points.
+        """Notes on a program for the instructor: a list of sentences. They change no points.
 
         texts: {name: text} of the program's files, the program itself first.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Slips that can be told from their effect, and where a lab sheet's own listing has them. Free of ROS."""
+"""Typical mistakes that can be recognized by their effect, also those in a lab sheet's own listing. Free of ROS."""
 import math
 
 import numpy as np
@@ -8,9 +8,9 @@ from baxter_model import joint_names
 from rf_checks.measures import pose_error
 from urdf_model.transforms import matrix_from_quaternion, rotation_angle
 
-# Near enough to say that a wrong answer is that wrong answer [m], [rad].
+# Tolerance to identify a known wrong answer [m], [rad].
 NEAR_M, NEAR_RAD = 0.02, 0.06
-# Near enough to say so where any two of the robot's frames may be meant [m].
+# The same, when any two of the robot's frames may be meant [m].
 SAME_M = 0.005
 
 SHEET_TF_LISTENER = "the sheet's own tf_listener listing has this slip, in the line that begins `quat = (q.x`"
@@ -23,16 +23,16 @@ SHEET_ROTATE = ("the sheet's listing of rotate_pose puts w first in the line tha
 
 
 def rotation_of(w, x, y, z):
-    """(3, 3) rotation of four numbers that are taken as a quaternion w x y z, of any length; NaN for length 0."""
+    """(3, 3) rotation of four numbers, read as a quaternion w x y z of any length; NaN for length 0."""
     try:
         return matrix_from_quaternion((x, y, z, w))
     except ValueError:
-        return np.full((3, 3), np.nan)  # near to nothing
+        return np.full((3, 3), np.nan)  # too short
 
 
 def quaternion_of(rotation):
     """x, y, z, w with w >= 0 of a (3, 3) rotation."""
-    # The eigenvector of Bar-Itzhack's matrix, which has no case that divides by nearly zero.
+    # The eigenvector of Bar-Itzhack's matrix, which never divides by nearly zero.
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
     matrix = np.array(((xx - yy - zz, xy + yx, xz + zx, zy - yz),
                        (xy + yx, yy - xx - zz, yz + zy, xz - zx),
@@ -58,20 +58,20 @@ def is_near(rotation, other):
 
 
 def is_xyzw_taken_as_wxyz(found, true):
-    """Whether a (3, 3) rotation is what comes of x y z w read as w x y z, once or on the way in and out."""
+    """Whether a (3, 3) rotation results from reading x y z w as w x y z, once, or at both input and output."""
     x, y, z, w = quaternion_of(true)
     return is_near(found, rotation_of(x, y, z, w))
 
 
 def wrong_rotations(start, axis, angle_rad):
-    """What slips make of "turn `start` (3, 3) about its own axis": list of (key, what was done, rotation)."""
+    """Results of known mistakes in "turn `start` (3, 3) about its own axis": list of (key, description, rotation)."""
     x, y, z, w = quaternion_of(start)
     scrambled = rotation_of(x, y, z, w)
     turn = about(axis, angle_rad)
     degrees = math.degrees(angle_rad)
 
     def read_back(rotation):
-        """The rotation when its quaternion w x y z is sent as if it were x y z w."""
+        """The rotation if its quaternion w x y z is sent as x y z w."""
         qx, qy, qz, qw = quaternion_of(rotation)
         return rotation_of(qz, qw, qx, qy)
 
@@ -93,10 +93,10 @@ def wrong_rotations(start, axis, angle_rad):
 
 
 def matrix_slip(found, robot, joints, pairs, preferred):
-    """What is wrong with a (4, 4) matrix that was to be the pose of one of `pairs`: (key, sentence) or None.
+    """The mistake in a (4, 4) matrix that should be the pose of one of `pairs`: (key, sentence) or None.
 
-    pairs: (target, source) each, those of the exercise that are missing. preferred: frames that are named first where
-    several are in the same place.
+    pairs: (target, source) each, those of the exercise that are missing. preferred: frames that are named first if
+    several coincide.
     """
     if np.allclose(found, np.eye(4)):
         return "identity", ("%s -> %s: the matrix printed is the identity: rotation and translation were not filled in"
@@ -115,7 +115,7 @@ def matrix_slip(found, robot, joints, pairs, preferred):
 
 
 def _another_pair(found, robot, joints, pairs, preferred):
-    """Which frames the matrix is about, if not about the exercise's: as it is, or with a slip in its rotation."""
+    """The other pair of frames that the matrix belongs to, directly or with a mistake in its rotation."""
     names = [*preferred, *(name for name in robot.frame_names if name not in preferred)]
     poses = {name: robot.frame(name, joints) for name in names}
     others = []
@@ -136,7 +136,7 @@ def _another_pair(found, robot, joints, pairs, preferred):
 
 
 def _rotation_slip(found, true, near_m):
-    """What was done to the rotation of a pose that stands in the right place: (key, sentence) or None."""
+    """The mistake in the rotation of a pose with the right position: (key, sentence) or None."""
     if np.linalg.norm(found[:3, 3] - true[:3, 3]) > near_m or is_near(found[:3, :3], true[:3, :3]):
         return None
     if is_xyzw_taken_as_wxyz(found[:3, :3], true[:3, :3]):
@@ -153,7 +153,7 @@ def _same(matrix, other):
 
 
 def command_slip(commands):
-    """What is wrong with joint commands, as a (key, sentence) or None. commands: (side, mode, names, values) each."""
+    """The mistake in joint commands: (key, sentence) or None. commands: (side, mode, names, values) each."""
     for _, _, names, values in commands:
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
@@ -164,7 +164,7 @@ def command_slip(commands):
         if len(names) != len(values):
             return "lengths", ("the joint command has %d names and %d values; each joint needs one of each"
                                % (len(names), len(values)))
-    # Of all commands the farthest: on the way there is no telling which is recorded.
+    # Use the farthest of all commands, since records contain only some of them.
     value, name = max(((value, name) for _, _, names, values in commands
                        for name, value in zip(names, values, strict=True)), key=lambda pair: abs(pair[0]),
                       default=(0.0, ""))

@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What belongs to a student's program: the file, and the modules beside it that it imports. Free of ROS."""
+"""The files of a student's program: the program, and the modules beside it that it imports. Free of ROS."""
 import ast
 import os
 import stat
 from pathlib import Path
 
-#: More than this is no exercise [bytes, files].
+#: Largest size of a program [bytes, files].
 LARGEST_BYTES, MOST_FILES = 1 << 20, 50
 
 
 class BadSubmission(Exception):
-    """The program cannot be taken; the text says why."""
+    """The program is refused; the text says why."""
 
 
 def read(path):
     """The bytes of a regular file that is no link. Raises BadSubmission, OSError."""
-    # A pipe must not be waited for, and a link could lead to what only the judge may read.
+    # Never wait for a pipe; and a link could lead to a file that only the judge may read.
     if os.path.islink(path):
         raise BadSubmission("%s is a link, to %s; a program is a file of its own" % (path, os.readlink(path)))
     descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -54,12 +54,12 @@ def files(program):
 
 
 def texts(program):
-    """As `files`, decoded; what is no UTF-8 is replaced."""
+    """As `files`, decoded; invalid UTF-8 is replaced."""
     return {name: content.decode("utf-8", errors="replace") for name, content in files(program).items()}
 
 
 def imported(source):
-    """Names of the modules that a program (bytes) imports, as far as they can be read off it."""
+    """Names of the modules that a program (bytes) imports, as far as its text shows them."""
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How each kind of exercise is graded: what counts, and what its own slips look like. Free of ROS.
+"""Grading of each kind of exercise: its criteria, and its typical mistakes. Free of ROS.
 
-A task has `calls(rng)`, the runs that make the check; `criteria(call, run, robot)`, what one run is worth;
-`slip(call, run, robot)`, a Fault or None; and `is_satisfied(call, run)`, whether the judge has seen enough of a program
-that goes on.
+A task has `calls(rng)`, the runs of the check; `criteria(call, run, robot)`, the grades of one run; `slip(call, run,
+robot)`, a Fault or None; and `is_satisfied(call, run)`, whether the judge has seen enough of a program that does not
+end.
 """
 import math
 from dataclasses import dataclass, field
@@ -18,13 +18,13 @@ from rf_checks.recording import Criterion, Fault
 # The lab's pose of the left gripper in `base`.
 LAB_POINT = (0.644, 0.0, 0.066)
 LAB_QUATERNION = (-0.381, 0.923, -0.015, 0.052)
-# A wave is due with 5 cm and three periods; the window that a sine is found in leaves out some of both.
+# A wave must have 5 cm and three periods; the window of the sine fit loses a part of both.
 AMPLITUDE_M, PERIODS = 0.045, 2.5
 
 
 @dataclass(frozen=True)
 class Call:
-    """One run of the program: its words, the arms' posture before, what is due [sim s], and what the answer is."""
+    """One run of the program: its arguments, the arms' posture before, the time limit [sim s], and the right answer."""
 
     arguments: tuple
     posture: dict
@@ -34,7 +34,7 @@ class Call:
 
 
 def postures(rng, spread=0.12):
-    """Both arms about neutral, each joint up to `spread` [rad] beside it."""
+    """Postures of both arms near neutral, each joint within `spread` [rad]."""
     return {name: round(float(angle + rng.uniform(-spread, spread)), 4)
             for side in SIDES for name, angle in poses().angles("neutral", side).items()}
 
@@ -48,7 +48,7 @@ def pose_matrix(point, quaternion_xyzw):
 
 
 def motion_criteria(run, sides, done_share, call, weights, halts_allowed):
-    """Smoothness, collisions, time: worth something in the measure in which the task was done (`done_share`)."""
+    """Smoothness, collisions, time: weighted by the solved share of the task (`done_share`)."""
     smooth, clear, quick = weights
     recording = run.recording
     stops = max(measures.halts(recording.times, recording.arm(side)) for side in sides) if len(recording.times) else 0
@@ -122,7 +122,7 @@ class RotateGripper:
 
     @staticmethod
     def _missed(run, robot, start, has_asked):
-        """What to say of an arm that is simply elsewhere."""
+        """The sentence for an arm that is at another place without a known mistake."""
         distance = measures.pose_error(robot.gripper("left", run.recording), start)[0]
         if distance < 0.05 or measures.path_length(run.recording.arm("left")) < 0.1:
             return None
@@ -222,13 +222,13 @@ class Wave:
                 side, fit.periods, 100 * fit.amplitude, 100 * max(0.0, fit.r_squared))
             found.append(moved if fit.periods else "%s: no wave" % side)
         together = self._together(fits)
-        # The windows that a sine was found in may begin and end a little apart.
+        # The windows of the two fits may begin and end at slightly different times.
         in_step = ramp(together, 0.8, 0.2)
         done = min(shares)
         return [Criterion("left wave", shares[0], 22.5, found[0]), Criterion("right wave", shares[1], 22.5, found[1]),
                 Criterion("at the same time", done * in_step, 15.0,
                           "%.0f %% of the time" % (100 * together)),
-                # A hand that waves stands at both ends of its path.
+                # A waving hand stops at both ends of its path.
                 *motion_criteria(run, SIDES, done, call, (15.0, 15.0, 10.0),
                                  4 + round(3 * max(fit.periods for fit in fits.values())))]
 

@@ -14,7 +14,7 @@ from rf_checks.recording import Criterion, Fault
 from rf_checks.tasks import LAB_POINT, LAB_QUATERNION, Call, pose_matrix, postures
 
 SHEET_PAIRS = (("base", "left_hand"), ("left_hand", "right_hand"), ("head_camera", "left_gripper_base"))
-# Frames that a wrong answer is looked for in first.
+# Frames that a wrong answer is compared with first.
 FRAMES = ("base", "head", "head_camera", "left_hand", "right_hand", "left_gripper", "right_gripper",
           "left_gripper_base", "right_gripper_base", "torso", "left_wrist", "right_wrist")
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
@@ -22,7 +22,7 @@ _NOT_ROW = re.compile(r"[^\s\d.,;\[\]()eE+-]")
 
 
 def matrices(text):
-    """Every 4 by 4 matrix in a text, as numpy, lists or plain rows write it: list of (4, 4) arrays."""
+    """All 4 by 4 matrices in a text, as printed by numpy, as lists or as plain rows: list of (4, 4) arrays."""
     found, rows = [], []
     for line in text.splitlines():
         if "[[" in line:
@@ -98,7 +98,7 @@ _VERDICT = re.compile("|".join(VERDICTS))
 
 
 class Unreachable:
-    """`unreachable.py X Y Z QX QY QZ QW`: prints the IK report's verdict of that pose, and why."""
+    """`unreachable.py X Y Z QX QY QZ QW`: prints the IK report's verdict on that pose, and its reason."""
 
     def calls(self, rng):
         down = pose_matrix((0, 0, 0), (0.0, 1.0, 0.0, 0.0))[:3, :3]
@@ -163,7 +163,8 @@ class Unreachable:
 
 
 class IkFrame:
-    """`ik_frame.py`: finds out by an experiment which frame poses are given in and which is put there; prints both."""
+    """`ik_frame.py`: finds out by an experiment the reference frame of poses and the frame that is moved there; prints
+    both."""
 
     def calls(self, rng):
         return [Call((), postures(rng), 40.0, None, 20.0)]
@@ -202,7 +203,7 @@ class IkFrame:
             if measures.path_length(recording.arm(side)) < 0.1:
                 continue
             target = pose_matrix(xyz, xyzw)
-            # Wherever the arm rested on its way.
+            # All poses in which the arm rested.
             rows = [*range(0, len(recording.times), 10), -1]
             poses = [robot.gripper(side, recording, row) for row in rows]
             distance = min(measures.pose_error(pose, target)[0] for pose in poses)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The judge at work, on one lab of its own for all programs of a suite: exercises, wrong, adversaries; slow, busy."""
+"""The judge, on one lab of its own for all programs of a suite: exercises, wrong, adversaries; slow, busy."""
 import contextlib
 import json
 import os
@@ -30,7 +30,7 @@ from lab_tests.quota import Quota, QuotaError  # noqa: E402
 
 # Keys of a report that hold times.
 TIMES = ("wall_s", "cpu_s", "simulated_s", "real_time_factor")
-# Program -> the key of its fault, and words of which its sentence must have one.
+# Program -> the key of its fault, and words, one of which its sentence must contain.
 WRONG = {
     "syntax_error": ("syntax", "line 7"),
     "infinite_loop": ("busy", "line 8"),
@@ -69,7 +69,7 @@ ADVERSARIES = {
 
 
 class Judged(unittest.TestCase):
-    """What all suites need: one judge."""
+    """Base of all suites: one judge."""
 
     @classmethod
     def setUpClass(cls):
@@ -80,7 +80,7 @@ class Judged(unittest.TestCase):
         cls.judge.close()
 
     def check(self, folder, name, seed=1):
-        # A name without suffix is that of a Python file; what Python cannot read goes without, for the linter's sake.
+        # A name without suffix is that of a Python file; invalid Python has another suffix, because of the linter.
         path = next((PACKAGE / folder).glob(name + ".*"))
         text = path.read_text(encoding="utf-8")
         for lab in LABS:
@@ -95,7 +95,7 @@ class Judged(unittest.TestCase):
 
 
 def graded(result):
-    """What must not depend on the machine: the report without times."""
+    """The part of the report that must not depend on the machine: without times."""
     def without_times(value):
         if isinstance(value, dict):
             return {key: without_times(one) for key, one in value.items() if key not in TIMES}
@@ -103,17 +103,17 @@ def graded(result):
 
     found = without_times(json.loads(report.as_json(result)))
     for run in found["runs"]:
-        # This criterion says how long it took.
+        # This criterion contains a time.
         run["criteria"] = [one for one in run["criteria"] if one["name"] != "time"] + \
             [one["points"] for one in run["criteria"] if one["name"] == "time"]
     return found
 
 
 class Loaded(unittest.TestCase):
-    """The same points on a machine that has something else to do, or none at all."""
+    """The same points on a busy machine, or no grade."""
 
     def judge_all(self, programs):
-        """Program -> what it was graded with: dict. Programs: (folder, name)."""
+        """Program -> its graded report: dict. Programs: (folder, name)."""
         judged = Judged()
         judged.judge = Judge(wall_limit_s=3600.0, trusted=True)
         try:
@@ -139,7 +139,7 @@ class Loaded(unittest.TestCase):
 
 @contextlib.contextmanager
 def other_labs(count):
-    """So many other labs at work, in real time."""
+    """Run this many other labs, in real time."""
     with contextlib.ExitStack() as stack:
         for _ in range(count):
             stack.enter_context(Lab(robot_description())).start()
@@ -201,7 +201,7 @@ class Adversaries(Judged):
         self.assertTrue(any("runpy.run_path" in note for note in result.notes), result.notes)
         if not self.judge.has_walls:
             skip(self, "no walls: %s" % isolation.problem())
-        # It would earn all.
+        # It would get all points.
         self.assertEqual(result.points, 0.0, report.text(result))
 
     def test_the_next_program_finds_the_lab_as_it_was(self):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The clocks of a check: simulated time in the place of the program's own, and limits that a busy machine does not
-shorten. No master, no simulator."""
+"""The clocks of a check: simulated time in place of the program's own, and limits that do not depend on the machine's
+load. No master, no simulator."""
 import os
 import subprocess
 import sys
@@ -82,7 +82,7 @@ def test_the_labs_own_environment_is_there_as_well(clock, tmp_path):
     (tmp_path / "rospy").mkdir()
     (tmp_path / "rospy/__init__.py").write_text("from .client import init_node\n")
     (tmp_path / "rospy/client.py").write_text("def init_node(name):\n    return name\n")
-    # Somebody's own must not be in the way of either.
+    # A user's own sitecustomize must not disturb either.
     (tmp_path / "sitecustomize.py").write_text("print('not this one')\n")
     text = ("import time, rospy, lab_environment.first_clock as first_clock\n"
             "print(rospy.init_node.__wrapped__.__module__, type(time.sleep).__name__, first_clock.time is time)")
@@ -123,7 +123,7 @@ def test_own_time_is_wall_time_at_rest_and_processor_time_in_computing():
 
 
 def test_own_time_does_not_pass_while_waiting_for_a_processor(monkeypatch):
-    # As the kernel shows it: runnable, and nothing used.
+    # As the kernel shows it: runnable, without processor time.
     with subprocess.Popen(["sleep", "1000"]) as sleeper:
         monkeypatch.setattr(pacing.Tree, "runs", lambda self: True)
         own_time = pacing.OwnTime(lambda: [sleeper.pid])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What `./baxter.sh check` answers to the words it gets, before any program runs."""
+"""Responses of `./baxter.sh check` to its arguments, before any program runs."""
 import ast
 import os
 from pathlib import Path
@@ -75,7 +75,7 @@ def test_links_are_not_followed(capsys):
         assert link in capsys.readouterr().err
     assert command.main(["--start", "wave"]) == command.WRONG_WORDS
     assert sorted(os.listdir("elsewhere")) == ["theirs.py"]
-    # One that was made only while the program ran is replaced.
+    # One that was made while the program ran is replaced.
     command.write_report(Path("report.json"), "{}")
     assert not Path("report.json").is_symlink()
     assert sorted(os.listdir("elsewhere")) == ["theirs.py"]

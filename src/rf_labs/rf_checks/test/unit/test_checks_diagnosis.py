@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is told from a recorded run, without a robot: the first fault that explains the others; points and reports."""
+"""Diagnosis of a recorded run, without a robot: the first fault that explains the others; points and reports."""
 import dataclasses
 import json
 import subprocess
@@ -24,8 +24,8 @@ ROTATE = next(exercise for exercise in EXERCISES if exercise.name == "rotate_gri
 
 def records(seconds=2.0, left=0.0, right=0.0, enabled=True, commands=0, names=JOINTS[:1], values=(0.1,), exited=None,
             placed=0):
-    """A trace: `left`, `right`: how far those arms' first joints go [rad]; `commands`: how many a record, left;
-    `placed`: how often something else put the joints somewhere. Arms that move obey somebody's command."""
+    """A trace: `left`, `right`: motion of those arms' first joints [rad]; `commands`: number per record, left;
+    `placed`: how often a service moved the joints. Moving arms follow a recorded command."""
     count = round(seconds / 0.01)
     result = []
     for k in range(count):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a program may do at the master of the judge's lab, and what it may not. The master is a real one."""
+"""What a program may do at the master of the judge's lab, and what not. The master is a real one."""
 import pytest
 from rosmaster.master import Master
 
@@ -12,7 +12,7 @@ PARAMETERS = {"use_sim_time": True, "gazebo": {"pose": "neutral", "none": {}}}
 
 
 class Node:
-    """What a node of that name asks of a master."""
+    """The requests of a node of that name to a master."""
 
     def __init__(self, name, uri):
         self.master = master_calls.master(name, uri, 10.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The students' copy of a small workspace: what it has, what it must not have, and when none is made."""
+"""The students' copy of a small workspace: its content, what it must not contain, and when no copy is made."""
 import json
 import subprocess
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The judge's own lab, as far as it needs no simulator: how a start that fails is told."""
+"""The judge's own lab, without a simulator: messages of a failed start."""
 import subprocess
 import sys
 import time

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Numbers about motions, and slips told from their effect."""
+"""Measures of motions, and mistakes recognized by their effect."""
 import math
 
 import numpy as np

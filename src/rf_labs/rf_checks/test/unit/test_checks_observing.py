@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""When a run is over: by simulated time, by the program's processor time, by what it did; never by the wall's clock."""
+"""When a run is over: by simulated time, by the program's processor time, by what it did; never by wall time."""
 import threading
 import time
 from types import SimpleNamespace

@@ -221,7 +221,7 @@ def test_a_watch_tells_work_from_rest(start):
     for _ in range(3):
         before = pacing.cpu_time_s(busy.family())
         assert not watch.wait_until_rest()
-        # However long it has to wait for a processor: what it gets is what counts.
+        # Waiting for a processor does not count: only the used processor time counts.
         assert pacing.cpu_time_s(busy.family()) - before > 0.9 * pacing.PROGRAM_ALLOWANCE_S
     watch.close()
 

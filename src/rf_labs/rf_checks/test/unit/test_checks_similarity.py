@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Copies are named, whatever was done to hide them; honest programs are not, whatever they have in common."""
+"""Disguised copies are reported; honest programs with similar structure are not."""
 import ast
 import re
 from pathlib import Path

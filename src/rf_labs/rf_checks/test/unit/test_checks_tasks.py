@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Grading of each kind of exercise, from traces that are made here: no simulator."""
+"""Grading of each kind of exercise, from synthetic traces: no simulator."""
 import itertools
 import math
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # exercise: joint_command
-"""Puts the joints a little nearer to the goal sixty times, each time by less than a jump; never enables the robot."""
+"""Sets the joints a little nearer to the goal sixty times, each time by less than a jump; never enables the robot."""
 import socket
 import struct
 import sys

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # exercise: joint_command
-"""Ends, but a child in a session of its own, with another environment, goes on."""
+"""Ends, but leaves a child in a session of its own, with another environment."""
 import os
 import subprocess
 import sys

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # exercise: tf_listener
-"""Leaves files that are to change the environment of the next program: variables, start-up modules, libraries."""
+"""Leaves files that would change the environment of the next program: variables, start-up modules, libraries."""
 import os
 import pathlib
 import site

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # exercise: joint_command
-"""Has the master forget, in the simulator's name, where the joint commands of the next program go."""
+"""Unregisters, in the simulator's name, its subscriptions to joint commands, so that the next program's commands are
+lost."""
 import time
 
 import rosgraph
