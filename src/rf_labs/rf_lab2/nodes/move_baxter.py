@@ -72,7 +72,7 @@ def solve_ik(arm, point, quaternion):
 def move_baxter(arm, point, quaternion):
     RobotEnable(CHECK_VERSION).enable()
     limbs = {side: Limb(side) for side in SIDES}
-    # Both arms leave their start pose, so that the one that works afterwards has room.
+    # Both arms leave their start pose, so that the moving arm has room afterwards.
     rospy.loginfo("moving both arms to neutral")
     move_to_neutral(list(limbs.values()))
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Print where one frame of the robot is in another, as vector, quaternion and matrices."""
+"""Print the pose of one frame of the robot in another, as vector, quaternion and matrices."""
 import argparse
 import sys
 
@@ -31,7 +31,7 @@ def parse_arguments(argv):
 
 
 def transform_known(buffer, target, source):
-    """Condition: tf can say where `source` is in `target`."""
+    """Condition: tf knows the pose of `source` in `target`."""
     def explain():
         return "%s (known frames: %s)" % (
             buffer.can_transform_core(target, source, rospy.Time())[1],

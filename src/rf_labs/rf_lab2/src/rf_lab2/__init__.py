@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Lab 2 of Robotics Foundations: the parts that its nodes share."""
+"""Lab 2 of Robotics Foundations: shared modules of its nodes."""

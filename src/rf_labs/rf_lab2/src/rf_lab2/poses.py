@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Positions, quaternions and homogeneous matrices. Free of ROS.
 
-Quaternions are x, y, z, w here, as in ROS. transforms3d, which does the work, has w first: the order changes in
-`rotation_matrix` and `quaternion`, and nowhere else.
+Quaternions are x, y, z, w here, as in ROS. transforms3d has w first: only `rotation_matrix` and `quaternion` change the
+order.
 """
 import math
 
@@ -59,7 +59,7 @@ def moved_pose(translation, quaternion_xyzw, axis="x", angle_rad=0.0, shift_m=(0
 
 
 def pose_difference(translation_a, quaternion_a_xyzw, translation_b, quaternion_b_xyzw):
-    """Return how far apart two poses are: (distance [m], angle [rad], 0 to pi)."""
+    """Return the difference of two poses: (distance [m], angle [rad], 0 to pi)."""
     distance = float(np.linalg.norm(np.subtract(translation_a, translation_b)))
     a, b = unit_quaternion(quaternion_a_xyzw), unit_quaternion(quaternion_b_xyzw)
     # q and -q are the same rotation. The half-angle formula keeps its precision near zero, where arccos loses it.

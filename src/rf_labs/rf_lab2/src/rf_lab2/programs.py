@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How the lab's programs begin and end."""
+"""Start and end of the lab's programs."""
 import os
 import sys
 
@@ -9,7 +9,7 @@ from baxter_interface import startup
 
 
 class ProgramFailed(Exception):
-    """The program's aim was not reached; the text says why."""
+    """The program did not reach its aim; the text says why."""
 
 
 def run(node_name, body):

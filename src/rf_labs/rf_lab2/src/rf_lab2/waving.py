@@ -27,9 +27,9 @@ class Swing:
     """Joint angles along a closed path, as a function of time."""
 
     def __init__(self, rows, period_s):
-        """`rows`: (n, joints) angles [rad] at even times within `period_s` [s]; the first one is where it begins.
+        """`rows`: (n, joints) angles [rad] at even times within `period_s` [s]; the first one is the start.
 
-        Raises ValueError for rows that are no path or a period that is none.
+        Raises ValueError for invalid rows or an invalid period.
         """
         rows = np.asarray(rows, dtype=float)
         if rows.ndim != 2 or len(rows) < 2 or not np.isfinite(rows).all() or not 0.0 < period_s < np.inf:
