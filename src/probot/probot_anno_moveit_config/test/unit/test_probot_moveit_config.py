@@ -75,7 +75,7 @@ def test_unchecked_pairs_are_the_adjacent_and_the_never_colliding_ones(robot, sr
 def distance(robot, tmp_path):
     """Return a function: angles, link, link -> distance between their shapes [m], or 0.01 where it is more."""
     file = rospkg.RosPack().get_path("probot_description") + "/urdf/probot_anno.xacro"
-    # PyBullet reads a thousand characters of a line at a time and puts a new line after each lot, also within words.
+    # PyBullet reads lines in blocks of a thousand characters and adds a line break after each block, even within words.
     (tmp_path / "arm.urdf").write_text(xacro.process_file(file).toxml().replace(">", ">\n"))
     client = pybullet.connect(pybullet.DIRECT)
     # PyBullet reads numbers in the locale of the process, which may write 0,5; the simulator does not read URDFs by it.
