@@ -21,7 +21,7 @@ FIGURES = {
     "joint_5": ("link_4", "link_5", (0.20585535, 0, 0), (0, 0, 0), (0, 0, 1), -0.7854, 3.9270),
     "joint_6": ("link_5", "link_6", (0, -0.042, 0), (1.5708, 0, 0), (0, 0, 1), -3.1416, 3.1416),
 }
-# The figures write right angles with four digits.
+# The data have right angles with four digits.
 ANGLE_DIGITS = 1e-5
 
 
