@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Bringup with MoveIt as it is printed: everything runs, and the arm goes where a program sends it."""
+"""Bringup with MoveIt as in the lab sheet: everything runs, and the arm follows a program's goals."""
 import os
 import signal
 import subprocess
@@ -42,7 +42,7 @@ class BringupTest(unittest.TestCase):
         client = actionlib.SimpleActionClient(
             "/probot_anno/arm_joint_controller/follow_joint_trajectory", FollowJointTrajectoryAction)
         self.assertTrue(client.wait_for_server(rospy.Duration(TIMEOUT_S)), "the controller is not there")
-        # Where MoveIt's clients look for the arm.
+        # The topic that MoveIt's clients read.
         state = rospy.wait_for_message("/joint_states", JointState, TIMEOUT_S)
         self.assertEqual(len(state.name), 6)
         self.assertIn("manipulator", rospy.get_param("/robot_description_semantic"))

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulated arm as the lab meets it: joint states, /tf, six joints by FollowJointTrajectory, what rostopic sees."""
+"""The simulated arm as the lab uses it: joint states, /tf, six joints by FollowJointTrajectory, topics in rostopic."""
 import os
 import subprocess
 import tempfile
@@ -22,7 +22,7 @@ from lab_testing.waiting import stretched, wait_until
 JOINTS = ["joint_%d" % number for number in range(1, 7)]
 ACTION = "/probot_anno/arm_joint_controller/follow_joint_trajectory"
 TIMEOUT_S = stretched(60.0)
-# All in one line, upwards: far from "home" in two joints, and the tip is known by hand.
+# All in one line, upwards: far from "home" in two joints, and the tip's pose is computed by hand.
 START = (0.0, 0.0, 1.5708, 0.0, 1.5708, 0.0)
 START_TIP_M = (0.0, 0.0, 0.487 + 0.22885535 + 0.055)
 ARRIVED_RAD = 1e-3
@@ -31,8 +31,8 @@ ARRIVED_RAD = 1e-3
 def trajectory(*points):
     """points: (positions, seconds from start, velocity of all joints if it is not zero).
 
-    Quintic, as planners send it: straight lines between positions would not end at rest, and the controller, which by
-    default grants no time after the end, would call that a violation.
+    Quintic, as planners send it: linear segments would not end at rest, and the controller, which by default allows no
+    time after the end, would report a violation.
     """
     return JointTrajectory(joint_names=JOINTS, points=[
         JointTrajectoryPoint(positions=positions, velocities=velocity * 6 or [0.0] * 6, accelerations=[0.0] * 6,

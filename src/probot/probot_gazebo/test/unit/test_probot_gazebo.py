@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The launch files start what they should where they should; the controllers' joints are the URDF's."""
+"""The launch files start the right nodes in the right namespaces; the controllers' joints are the URDF's."""
 from pathlib import Path
 
 import pytest
