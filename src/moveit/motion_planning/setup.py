@@ -8,6 +8,7 @@ PACKAGES = [
     "motion_planning.constraints",
     "motion_planning.exact",
     "motion_planning.kinematics",
+    "motion_planning.manipulation",
     "motion_planning.model",
     "motion_planning.planners",
     "motion_planning.scene",

@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Picking objects up and putting them down: which of many grasps or places will do, and how the arm gets there."""
+from motion_planning.manipulation.places import places_on
+from motion_planning.manipulation.planning import Fall, Manipulation, ManipulationFailure, Tools, plan_manipulation
+from motion_planning.manipulation.tasks import Candidate, PickTask, PlaceTask, Stage, Translation, hand_links
+
+__all__ = ["Candidate", "Fall", "Manipulation", "ManipulationFailure", "PickTask", "PlaceTask", "Stage", "Tools",
+           "Translation", "hand_links", "places_on", "plan_manipulation"]

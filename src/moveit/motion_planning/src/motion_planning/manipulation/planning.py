@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tries candidates until one of them works from beginning to end."""
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from motion_planning.cartesian import CartesianError, Steps, cartesian_path
+from motion_planning.errors import PlanningError
+from motion_planning.kinematics import KinematicsFailure, NoIkSolution, ik
+from motion_planning.manipulation.tasks import Stage, by_quality, moved
+from motion_planning.pipeline import Code, PlanningFailure
+from motion_planning.timing import time_path
+
+# Steps of the straight ways [m]; corners are cut by so much at most [rad or m]; states checked so far apart.
+_STEP_M, _CORNER, _RESOLUTION = 0.02, 0.001, 0.02
+# The hand goes on for so far at most where it shall come as near as it can [m].
+_CLOSEST_M = 1.0
+# Postures of the arm that a candidate is given up after: all, and those that touch nothing where the hand closes.
+_MOST_POSTURES, _MOST_FREE_POSTURES = 40, 6
+# Share of the time that is left which planning for one candidate may take while there are others.
+_SHARE = 0.5
+# Candidates whose fall a sentence tells.
+_NAMED = 8
+
+# Stages in which a candidate can fall, in their order.
+REACH, CONTACT, APPROACH, RETREAT, PLAN = "reach", "grasp pose", "approach", "retreat", "plan"
+_ORDER = (REACH, CONTACT, APPROACH, RETREAT, PLAN)
+_CODES = {REACH: Code.NO_IK_SOLUTION, CONTACT: Code.GOAL_IN_COLLISION, APPROACH: Code.PLANNING_FAILED,
+          RETREAT: Code.PLANNING_FAILED}
+
+
+class Fall(NamedTuple):
+    """Why a candidate will not do: its name, the stage that it got to, the reason, and a :class:`pipeline.Code`."""
+
+    candidate: str
+    stage: str
+    reason: str
+    code: int
+
+    def __str__(self):
+        return "'%s' falls at '%s': %s" % (self.candidate, self.stage, self.reason)
+
+
+class ManipulationFailure(PlanningFailure):
+    """No candidate works. falls: a :class:`Fall` for each that was tried, in their order."""
+
+    def __init__(self, code, text, falls=(), contacts=()):
+        super().__init__(code, text, contacts)
+        self.falls = list(falls)
+
+
+@dataclass(frozen=True, eq=False)
+class Tools:
+    """What is planned with. exact: ExactChecker; plan(scene, q (k,), seconds): returns a pipeline.Plan of the group
+    from the scene's state to ``q`` or raises PlanningError; clock: function that gives the time [s]; stop(): true ends
+    it all; scaling: (velocity, acceleration) 0 < f <= 1 of the straight ways."""
+
+    exact: Any
+    plan: Callable
+    clock: Callable
+    stop: Callable = field(default=lambda: False)
+    scaling: tuple = (1.0, 1.0)
+
+
+class Manipulation(NamedTuple):
+    """candidate: the Candidate that works; stages: [Stage, ...] in their order; falls: of those tried before it."""
+
+    candidate: Any
+    stages: list
+    falls: list
+
+
+class _Fallen(Exception):
+    def __init__(self, stage, reason, code=None):
+        super().__init__(reason)
+        self.stage, self.reason = stage, reason
+        self.code = _CODES[stage] if code is None else code
+
+
+def plan_manipulation(task, candidates, allowed_time, tools):
+    """Return a :class:`Manipulation` of the best Candidate that works.
+
+    task: PickTask or PlaceTask; candidates: list; allowed_time [s]. For each candidate, in the order of quality: a
+    posture of the arm that touches nothing it may not, the approach, the retreat with the object in the hand or
+    standing in its place, then a path to where the approach begins. Every state is checked by exact geometry.
+    Raises ManipulationFailure: none works, which tells where each fell; there are none; out of time; stopped.
+    """
+    if not candidates:
+        raise ManipulationFailure(Code.PLANNING_FAILED, "'%s' cannot be %s: the list of candidates is empty"
+                                  % (task.target, task.verb))
+    end = tools.clock() + allowed_time
+    falls, late = [], False
+    ordered = by_quality(candidates)
+    for number, candidate in enumerate(ordered):
+        left = end - tools.clock()
+        late = left <= 0.0
+        if late or tools.stop():
+            break
+        last = number + 1 == len(ordered)
+        try:
+            return Manipulation(candidate, _Attempt(task, candidate, tools, left if last else _SHARE * left).run(),
+                                falls)
+        except _Fallen as fallen:
+            falls.append(Fall(candidate.name, fallen.stage, fallen.reason, fallen.code))
+    if tools.stop():
+        raise ManipulationFailure(Code.PREEMPTED, "planning was stopped", falls)
+    raise _failure(task, len(candidates), falls, late)
+
+
+def _failure(task, count, falls, late):
+    told = "; ".join(map(str, falls[:_NAMED]))
+    if len(falls) > _NAMED:
+        told += "; and %d more" % (len(falls) - _NAMED)
+    if late:
+        return ManipulationFailure(
+            Code.TIMED_OUT, "'%s' cannot be %s: %d of %d candidates were tried in the time allowed%s"
+            % (task.target, task.verb, len(falls), count, ": " + told if told else ""), falls)
+    furthest = max(falls, key=lambda fall: _ORDER.index(fall.stage))
+    return ManipulationFailure(furthest.code, "'%s' cannot be %s, none of %d candidates works: %s"
+                               % (task.target, task.verb, count, told), falls)
+
+
+class _Attempt:
+    """One candidate on its way."""
+
+    def __init__(self, task, candidate, tools, seconds):
+        self.task, self.candidate, self.tools, self.seconds = task, candidate, tools, seconds
+        self.model = task.scene.model
+        self.group = self.model.groups[task.group]
+        self.begin = tools.clock()
+        self.tried = self.free = 0
+        self.fallen = None
+
+    def run(self):
+        """Return the stages. Raises _Fallen."""
+        if self.task.minimize_distance:
+            self.candidate = moved(self.candidate, self._closest())
+        scene = self.task.approaching(self.candidate)
+        approach, retreat, after = self._straight_ways(scene)
+        begin = approach[0]
+        try:
+            plan = self.tools.plan(self.task.on_the_way(), begin, max(0.05, self._left()))
+        except PlanningError as error:
+            raise _Fallen(PLAN, str(error), int(getattr(error, "code", Code.PLANNING_FAILED))) from None
+        at_begin = scene.state.with_q(begin, self.group.indices)
+        stages = [Stage("plan", plan.timed, {}, self.task.on_the_way())]
+        if self.candidate.before:
+            stages.append(Stage("pre_grasp", None, self.candidate.before, scene.with_state(at_begin)))
+        stages.append(Stage("approach", self._timed(approach, scene, APPROACH), {}, scene.with_state(at_begin)))
+        stages.append(Stage("grasp", None, self.candidate.after, after))
+        stages.append(Stage("retreat", self._timed(retreat, after, RETREAT), {}, after))
+        return stages
+
+    # -- where the hand closes ----------------------------------------------------------------------------------
+
+    def _straight_ways(self, scene):
+        """(approach (m, k), retreat (m, k), scene of the retreat) of the first posture that has both."""
+        found = []
+
+        def accept(q):
+            try:
+                found[:] = self._ways_through(scene, scene.state.with_q(q))
+            except _Fallen as fallen:
+                self._note(fallen)
+                return fallen.reason
+            return None
+
+        try:
+            ik(self.model, self.group, {self.task.link: self.candidate.pose}, scene.state, max(0.0, self._left()),
+               accept, self.tools.clock)
+        except (NoIkSolution, KinematicsFailure) as error:
+            raise self.fallen or _Fallen(REACH, str(error)) from None
+        return found
+
+    def _note(self, fallen):
+        """Keep the fall that got furthest; give up after enough of them."""
+        if self.fallen is None or _ORDER.index(fallen.stage) > _ORDER.index(self.fallen.stage):
+            self.fallen = fallen
+        self.tried += 1
+        self.free += fallen.stage != CONTACT
+        if self.tried >= _MOST_POSTURES or self.free >= _MOST_FREE_POSTURES or self.tools.stop():
+            raise self.fallen
+
+    def _ways_through(self, scene, state):
+        touching = self._contact(scene, state)
+        if touching:
+            raise _Fallen(CONTACT, touching)
+        pose = self.candidate.pose
+        approach = self.candidate.approach
+        back = self._straight(scene, state, -approach.vector(pose), approach, APPROACH)
+        after = self.task.retreating(self.candidate, state)
+        # What is touched where the hand has closed is told as such, and not as a retreat of length 0.
+        touching = self._contact(after, after.state)
+        if touching:
+            raise _Fallen(RETREAT, "at its begin %s" % touching)
+        retreat = self.candidate.retreat
+        away = self._straight(after, after.state, retreat.vector(pose), retreat, RETREAT)
+        return back[::-1], away, after
+
+    def _straight(self, scene, state, direction, way, stage):
+        """Joints (m, k) on the straight way from ``state``, as far as it goes."""
+        here = state.q[self.group.indices][None]
+        if not way.desired > 0.0:
+            return here
+        try:
+            path = self._line(scene, state, direction * way.desired, _STEP_M)
+        except CartesianError as error:
+            raise _Fallen(stage, str(error)) from None
+        gone = path.fraction * way.desired
+        if gone < way.least - 1e-9:
+            raise _Fallen(stage, "%.3f of at least %.3f m: %s" % (gone, way.least, path.reason))
+        return path.joints
+
+    def _line(self, scene, state, shift, step):
+        goal = np.array(self.model.frame_of(state.q, self.task.link, state.base))
+        goal[:3, 3] += shift
+
+        def accept(q):
+            return self._contact(scene, state.with_q(q, self.group.indices))
+
+        return cartesian_path(self.model, self.task.group, state, self.task.link, [goal],
+                              Steps(step, accept=accept, stop=self.tools.stop))
+
+    def _closest(self):
+        """The pose (4, 4) to which the hand can go on from the candidate's before it touches something."""
+        scene, pose = self.task.closing_in(self.candidate), self.candidate.pose
+        try:
+            q = ik(self.model, self.group, {self.task.link: pose}, scene.state, max(0.0, 0.2 * self._left()),
+                   lambda q: self._contact(scene, scene.state.with_q(q)), self.tools.clock)
+        except (NoIkSolution, KinematicsFailure):
+            return pose  # why it will not do is told by what comes next
+        state = scene.state.with_q(q)
+        path = self._line(scene, state, self.candidate.approach.vector(pose) * _CLOSEST_M, 0.2 * _STEP_M)
+        return self.model.frame_of(state.with_q(path.joints[-1], self.group.indices).q, self.task.link, state.base)
+
+    # -- checks -------------------------------------------------------------------------------------------------
+
+    def _contact(self, scene, state):
+        """None, or the sentence on what touches."""
+        if self.tools.exact.free(scene, state, self.task.group):
+            return None
+        return "; ".join(map(str, self.tools.exact.contacts(scene, state, self.task.group, 3)))
+
+    def _timed(self, path, scene, stage):
+        indices = self.group.indices
+        velocity = self.tools.scaling[0] * self.model.velocity[indices]
+        acceleration = self.tools.scaling[1] * self.model.acceleration[indices]
+        timed = time_path(path, velocity, acceleration, "time_optimal_trajectory_generation", tolerance=_CORNER)
+        if len(timed.times) > 1:
+            states = timed.sampled(timed.spaced(_RESOLUTION))[0]
+            blocked = self.tools.exact.first_blocked(scene, states, self.task.group)
+            if blocked is not None:
+                state = scene.state.with_q(states[blocked], indices)
+                raise _Fallen(stage, "the timed way is not free: %s" % self._contact(scene, state))
+        return timed
+
+    def _left(self):
+        return self.seconds - (self.tools.clock() - self.begin)
