@@ -67,9 +67,9 @@ class Context:
         except PlanningError as error:
             raise RequestError(MoveItErrorCodes.FRAME_TRANSFORM_FAILURE, str(error)) from None
 
-    def show_path(self, start, trajectory):
-        """Publish a RobotTrajectory that begins in a State as the planned path."""
-        self._paths.publish(DisplayTrajectory(self.model.name, [trajectory],
+    def show_path(self, start, *trajectories):
+        """Publish RobotTrajectories, of which the first begins in a State, as the planned path."""
+        self._paths.publish(DisplayTrajectory(self.model.name, list(trajectories),
                                               state_message(self.model, start, attached=True)))
 
 

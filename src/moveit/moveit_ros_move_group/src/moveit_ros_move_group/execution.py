@@ -55,11 +55,12 @@ class Executor:
         """End what is being executed, if anything is."""
         self._stop.set()
 
-    def execute(self, message, preempted=lambda: False, invalidated=lambda: None):
+    def execute(self, message, preempted=lambda: False, invalidated=lambda: None, from_anywhere=False):
         """Follow a RobotTrajectory to its end; return an Outcome.
 
         preempted(): whether the caller wants it to end; invalidated(): None, or the sentence why the rest of the way is
-        no longer free. Both are asked every few milliseconds.
+        no longer free. Both are asked every few milliseconds. from_anywhere: its first point need not be near where the
+        joints are, as with a hand that has something between its fingers.
         """
         trajectory = message.joint_trajectory
         if not trajectory.points:
@@ -75,16 +76,25 @@ class Executor:
                            "another trajectory is being executed; wait or stop it first")
         self._stop.clear()
         try:
-            return self._follow(trajectory, preempted, invalidated)
+            return self._follow(trajectory, preempted, invalidated, from_anywhere)
         except ControllerError as error:
             return Outcome(MoveItErrorCodes.CONTROL_FAILED, str(error))
         finally:
             self._busy.release()
 
-    def _follow(self, trajectory, preempted, invalidated):
+    def why_not(self, joints):
+        """None where there are controllers for all ``joints``, else the sentence that names what is missing."""
+        try:
+            choose(self._controllers, joints)
+        except ControllerError as error:
+            return str(error)
+        return None
+
+    def _follow(self, trajectory, preempted, invalidated, from_anywhere):
         chosen = choose(self._controllers, trajectory.joint_names, self._is_alive)
-        off = start_deviation(trajectory.joint_names, trajectory.points[0].positions, self._monitor.joint_values(),
-                              self._settings.start_tolerance, self._monitor.continuous)
+        off = None if from_anywhere else start_deviation(
+            trajectory.joint_names, trajectory.points[0].positions, self._monitor.joint_values(),
+            self._settings.start_tolerance, self._monitor.continuous)
         if off:
             return Outcome(MoveItErrorCodes.CONTROL_FAILED,
                            "Invalid Trajectory: start point deviates from current robot state more than the allowed "

@@ -31,8 +31,10 @@ _STATUS_NAMES = {value: name for name, value in vars(GoalStatus).items() if isin
 class Handles:
     """A handle for each controller, made when it is first asked for; controllers of one action share it."""
 
-    def __init__(self, controllers, initial=None):
-        """controllers: list of controllers.Controller. initial: {joint: value}, where fake controllers begin."""
+    def __init__(self, controllers, initial=None, limits=None):
+        """controllers: list of controllers.Controller. initial: {joint: value}, where fake controllers begin. limits:
+        {joint: (lowest, highest)}, for grippers that are told percents."""
+        self._limits = limits or {}
         self._made, self._fake_states = {}, None
         if any(controller.kind == FAKE for controller in controllers):
             # Latched: who shows the joints may come later than they are said to be somewhere.
@@ -48,7 +50,8 @@ class Handles:
             if controller.kind == FAKE:
                 self._made[key] = FakeHandle(controller, self._fake_states)
             else:
-                self._made[key] = (FollowHandle if controller.kind == FOLLOW else GripperHandle)(controller)
+                self._made[key] = (FollowHandle(controller) if controller.kind == FOLLOW
+                                   else GripperHandle(controller, self._limits))
         return self._made[key]
 
 
@@ -143,10 +146,12 @@ class FollowHandle(_ActionHandle):
 
 
 class GripperHandle(_ActionHandle):
-    """GripperCommand: the last point's position is the command."""
+    """GripperCommand: the last point's position is the command; with the option ``percent``, how much of the joint's
+    range that is, 0 at its lower limit and 100 at its upper."""
 
-    def __init__(self, controller):
+    def __init__(self, controller, limits):
         super().__init__(controller, GripperCommandAction)
+        self._limits = limits
 
     def _goal_of(self, trajectory):
         goal, options = GripperCommandGoal(), self.controller.options
@@ -156,10 +161,16 @@ class GripperHandle(_ActionHandle):
         else:
             name = options.get("command_joint", trajectory.joint_names[0])
             index = trajectory.joint_names.index(name) if name in trajectory.joint_names else 0
-            goal.command.position = point.positions[index]
+            goal.command.position = self._command(trajectory.joint_names[index], point.positions[index])
         effort = point.effort[0] if point.effort else options.get("max_effort", 0.0)
         goal.command.max_effort = float(effort)
         return goal
+
+    def _command(self, joint, position):
+        if not self.controller.options.get("percent") or joint not in self._limits:
+            return position
+        low, high = self._limits[joint]
+        return min(100.0, max(0.0, 100.0 * (position - low) / (high - low)))
 
     def error(self):
         allowed = self.controller.options.get("allow_failure") and self._status() == GoalStatus.ABORTED

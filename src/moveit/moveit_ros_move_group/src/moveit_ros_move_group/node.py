@@ -11,7 +11,7 @@ from motion_planning.errors import PlanningError
 from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshReader, PlanningModel
 from moveit_ros_move_group import settings
-from moveit_ros_move_group.capabilities import cartesian, kinematics, motion, planners, scene
+from moveit_ros_move_group.capabilities import cartesian, kinematics, motion, pick_place, planners, scene
 from moveit_ros_move_group.context import Context
 from moveit_ros_move_group.execution import Executor
 from moveit_ros_move_group.failures import Failures
@@ -56,7 +56,9 @@ def _executor(monitor):
     for text in complaints:
         rospy.logwarn("%s", text)
     rospy.loginfo("controllers: %s", ", ".join(map(str, controllers)) or "none; plans cannot be executed")
-    handles = Handles(controllers, settings.initial_positions(monitor.model))
+    model = monitor.model
+    limits = dict(zip(model.variables, model.bounds.tolist(), strict=True))
+    handles = Handles(controllers, settings.initial_positions(model), limits)
     return Executor(controllers, settings.execution_settings(), monitor, handles.of)
 
 
@@ -71,6 +73,7 @@ def _capabilities(context, wanted, description, may_execute):
         "MoveGroupKinematicsService": lambda: kinematics.Kinematics(context, timeouts),
         "MoveGroupExecuteTrajectoryAction": lambda: motion.ExecuteAction(context),
         "MoveGroupMoveAction": lambda: motion.MoveAction(context, planner, may_execute),
+        "MoveGroupPickPlaceAction": lambda: pick_place.PickPlace(context, planner, may_execute),
         "MoveGroupPlanService": lambda: motion.PlanService(context, planner),
         "MoveGroupQueryPlannersService": lambda: planners.Planners(context),
         "MoveGroupStateValidationService": lambda: scene.StateValidity(context),

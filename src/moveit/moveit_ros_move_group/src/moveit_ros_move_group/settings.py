@@ -12,12 +12,12 @@ from moveit_ros_move_group.execution import ExecutionSettings
 DEFAULT_CAPABILITIES = (
     "move_group/MoveGroupCartesianPathService", "move_group/MoveGroupKinematicsService",
     "move_group/MoveGroupExecuteTrajectoryAction", "move_group/MoveGroupMoveAction",
-    "move_group/MoveGroupPlanService", "move_group/MoveGroupQueryPlannersService",
-    "move_group/MoveGroupStateValidationService", "move_group/MoveGroupGetPlanningSceneService",
-    "move_group/ApplyPlanningSceneService", "move_group/ClearOctomapService")
+    "move_group/MoveGroupPickPlaceAction", "move_group/MoveGroupPlanService",
+    "move_group/MoveGroupQueryPlannersService", "move_group/MoveGroupStateValidationService",
+    "move_group/MoveGroupGetPlanningSceneService", "move_group/ApplyPlanningSceneService",
+    "move_group/ClearOctomapService")
 # Known by name; of these the node has the service for known trajectories alone.
-OTHER_CAPABILITIES = ("move_group/MoveGroupPickPlaceAction", "move_group/MoveGroupExecuteService",
-                      "move_group/TfPublisher",
+OTHER_CAPABILITIES = ("move_group/MoveGroupExecuteService", "move_group/TfPublisher",
                       "pilz_industrial_motion_planner/MoveGroupSequenceAction",
                       "pilz_industrial_motion_planner/MoveGroupSequenceService")
 # Adapters that decide how a path is timed; the last in the list that is there counts.

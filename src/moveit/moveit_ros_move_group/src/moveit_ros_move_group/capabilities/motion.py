@@ -117,11 +117,7 @@ class MoveAction:
         if request.start_state.joint_state.name and not request.start_state.is_diff:
             rospy.logwarn("move_group: the start state is for planning alone; the robot starts where it is")
         group = context.model.groups[request.group_name]
-        silent = [name for name in group.joints if name in context.monitor.missing_joints()]
-        if silent:
-            raise RequestError(MoveItErrorCodes.INVALID_ROBOT_STATE, "the complete state of the robot is not yet "
-                               "known: no joint state has come for %s on %s"
-                               % (", ".join(silent), context.monitor.joint_state_topic))
+        require_state(context, group)
         attempts = 1 + (max(0, options.replan_attempts or self._replan_attempts) if options.replan else 0)
         for attempt in range(attempts):
             self._changed.clear()
@@ -234,6 +230,15 @@ class StopEvent:
             self._executor.stop()
         else:
             rospy.logwarn("trajectory_execution_event knows 'stop', not '%s'", message.data)
+
+
+def require_state(context, group):
+    """Raise RequestError where no joint state has told of a joint of a Group."""
+    silent = [name for name in group.joints if name in context.monitor.missing_joints()]
+    if silent:
+        raise RequestError(MoveItErrorCodes.INVALID_ROBOT_STATE, "the complete state of the robot is not yet "
+                           "known: no joint state has come for %s on %s"
+                           % (", ".join(silent), context.monitor.joint_state_topic))
 
 
 def show(context, group, plan):
