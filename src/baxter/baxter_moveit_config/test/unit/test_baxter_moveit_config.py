@@ -146,14 +146,20 @@ def test_limits_are_within_the_urdfs(description):
         assert limit["max_velocity"] == (1.0 if "_w" in joint else 0.75) and limit["max_acceleration"] == 2.0
 
 
+def finger_of(side):
+    return side[0] + "_gripper_l_finger_joint"
+
+
 def test_controllers_are_the_robots_servers():
-    for controller in settings("baxter_controllers.yaml")["controller_list"]:
-        side = controller["name"].rpartition("/")[2]
-        assert controller == {"name": "/robot/limb/" + side, "action_ns": "follow_joint_trajectory",
-                              "type": "FollowJointTrajectory", "default": True, "joints": list(joint_names(side))}
-    assert len(settings("baxter_controllers.yaml")["controller_list"]) == len(SIDES)
-    assert {joint for one in settings("fake_controllers.yaml")["controller_list"] for joint in one["joints"]} == set(
-        ALL_JOINTS)
+    controllers = settings("baxter_controllers.yaml")["controller_list"]
+    for side in SIDES:
+        assert {"name": "/robot/limb/" + side, "action_ns": "follow_joint_trajectory", "type": "FollowJointTrajectory",
+                "default": True, "joints": list(joint_names(side))} in controllers
+        assert {"name": "/robot/end_effector/%s_gripper" % side, "action_ns": "gripper_action",
+                "type": "GripperCommand", "percent": True, "joints": [finger_of(side)]} in controllers
+    assert len(controllers) == 2 * len(SIDES)
+    assert {joint for one in settings("fake_controllers.yaml")["controller_list"] for joint in one["joints"]} == {
+        *ALL_JOINTS, *map(finger_of, SIDES)}
 
 
 def test_planners_of_every_arm_are_configured():
@@ -184,7 +190,8 @@ def test_the_tutorials_command():
     assert "left_neutral" in values["/robot_description_semantic"]
     assert values["/robot_description_planning/joint_limits/left_s0/max_velocity"] == 0.75
     assert values["/move_group/moveit_controller_manager"].startswith("moveit_simple_controller_manager/")
-    assert [one["name"] for one in values["/move_group/controller_list"]] == ["/robot/limb/right", "/robot/limb/left"]
+    assert [one["name"] for one in values["/move_group/controller_list"]][:2] == [
+        "/robot/limb/right", "/robot/limb/left"]
     assert values["/move_group/trajectory_execution/allowed_start_tolerance"] == 0.1
     assert values["/move_group/planning_pipelines/ompl/planning_plugin"] == "ompl_interface/OMPLPlanner"
     assert "/move_group/sensors" not in values
