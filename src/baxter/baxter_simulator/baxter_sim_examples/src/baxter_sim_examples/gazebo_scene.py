@@ -17,16 +17,22 @@ TABLE, BLOCK = "cafe_table", "block"
 
 
 class GazeboScene:
-    """Table and block for one Trial, in the world as long as a `with` lasts. Raises GazeboInterfaceError."""
+    """Table and block for one Trial, with other things on the table, in the world as long as a `with` lasts.
 
-    def __init__(self, trial):
-        self._trial = trial
+    Raises GazeboInterfaceError.
+    """
+
+    def __init__(self, trial, things=()):
+        """things: list of clutter.Things."""
+        self._trial, self._things = trial, list(things)
 
     def __enter__(self):
         self._remove()
         table = Path(rospkg.RosPack().get_path("model_files")) / "models" / TABLE / "model.sdf"
         self._spawn("sdf", TABLE, table.read_text(), Pose(Point(*TABLE_XY_M, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0)))
         self._spawn("urdf", BLOCK, block_urdf(self._trial.mass_kg, self._trial.friction), _pose(self._trial.source))
+        for thing in self._things:
+            self._spawn("urdf", thing.name, thing.urdf(), _pose(thing.spot))
         return self
 
     def __exit__(self, *_):
@@ -37,9 +43,19 @@ class GazeboScene:
 
     def distance(self, spot):
         """Distance [m] of the block's middle from a Spot."""
-        state = call(GAZEBO + "/get_model_state", GetModelState, BLOCK, "world")
-        here, there = state.pose.position, _pose(spot).position
-        return math.dist((here.x, here.y, here.z), (there.x, there.y, there.z))
+        return math.dist(_where(BLOCK), _point(_pose(spot)))
+
+    def height(self):
+        """Height [m] of the block's middle in `base`."""
+        return _where(BLOCK)[2] - BASE_HEIGHT_M
+
+    def touched(self, tolerance_m):
+        """A sentence on the first thing that has moved by more than `tolerance_m`, None where all stand still."""
+        for thing in self._things:
+            moved = math.dist(_where(thing.name), _point(_pose(thing.spot)))
+            if moved > tolerance_m:
+                return "'%s': it has moved by %.1f mm" % (thing.name, 1e3 * moved)
+        return None
 
     def _spawn(self, kind, name, xml, pose):
         answer = call("%s/spawn_%s_model" % (GAZEBO, kind), SpawnModel, name, xml, "/", pose, "world")
@@ -48,9 +64,21 @@ class GazeboScene:
 
     def _remove(self):
         there = call(GAZEBO + "/get_world_properties", GetWorldProperties).model_names
-        for name in (BLOCK, TABLE):
+        for name in (BLOCK, *(thing.name for thing in self._things), TABLE):
             if name in there:
                 delete_model_client(name, GAZEBO)
+
+
+def _where(model):
+    """x, y, z [m] of a model in the physics world."""
+    state = call(GAZEBO + "/get_model_state", GetModelState, model, "world")
+    if not state.success:
+        raise GazeboInterfaceError("where is model '%s'? %s" % (model, state.status_message))
+    return _point(state.pose)
+
+
+def _point(pose):
+    return pose.position.x, pose.position.y, pose.position.z
 
 
 def _pose(spot):

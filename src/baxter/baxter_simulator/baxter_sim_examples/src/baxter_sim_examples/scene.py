@@ -9,6 +9,7 @@ from .pick_and_place import Spot, start_angles
 BASE_HEIGHT_M = 0.93  # of the robot's frame `base` above the floor
 TABLE_XY_M = (1.0, 0.1)  # middle of the table, in `base`
 TABLE_TOP_M = 0.775  # above the floor
+TABLE_SIZE_M = 0.913  # of its square top
 BLOCK_SIZE_M = 0.04
 # Where the left arm takes and puts blocks: x and y [m] in `base`.
 NEAREST_M, FARTHEST_M = (0.60, -0.05), (0.75, 0.35)
