@@ -6,7 +6,7 @@ from baxter_model import SIDES
 
 from .picture import Picture, new_figure
 
-# Colours that stay apart on white paper, also for most colour-blind readers.
+# Distinguishable colours on white, also for most colour-blind readers.
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#333333", "#8c564b")
 
 
@@ -44,7 +44,7 @@ def figure_of(samples, unit="rad", title=""):
 
 
 def _side(label):
-    """left, right, or ~ for what belongs to no arm, which sorts last."""
+    """left, right, or ~ for joints of no arm, which sorts last."""
     side = label.partition("_")[0]
     return side if side in SIDES else "~"
 

@@ -29,16 +29,16 @@ class FrameMatrix:
 
 
 def angle_and_axis(rotation):
-    """Return (angle [rad, 0 to pi], unit axis (3,)) of a (3, 3) rotation; the axis is None where there is no turn."""
+    """Return (angle [rad, 0 to pi], unit axis (3,)) of a (3, 3) rotation; the axis is None for a zero rotation."""
     angle = rotation_angle(rotation)
     if angle < 1e-6:
         return 0.0, None
-    # The axis is what the rotation leaves alone.
+    # The axis is the vector that the rotation does not change.
     _, _, rows = np.linalg.svd(rotation - np.eye(3))
     axis = rows[2]
     skew = rotation - rotation.T
     twist = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
-    # At half a turn both directions are right: then the first component that is not zero is positive.
+    # At half a turn both directions are valid: make the first non-zero component positive.
     reference = float(twist @ axis) if np.linalg.norm(twist) > 1e-9 else float(axis[np.argmax(np.abs(axis) > 1e-9)])
     return angle, axis if reference >= 0.0 else -axis
 

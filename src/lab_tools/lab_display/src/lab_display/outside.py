@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The world from outside: a camera that stands beside the robot, and frames drawn into its picture. ROS-free."""
+"""The world from outside: a camera outside of the robot, and frames drawn into its picture. ROS-free."""
 import math
 
 import cv2
@@ -14,7 +14,7 @@ from world_picture.drawing import DrawingCache
 from world_picture.snapshot import SnapshotReader
 
 FIELD_OF_VIEW_RAD = 0.75
-# Where the camera stands when nobody says: seen from the middle of what is to be seen.
+# Default position of the camera, relative to the centre of the scene.
 DIRECTION = np.array([0.78, 0.48, 0.34])
 # Axes x, y, z as everywhere in ROS [red, green, blue].
 _AXIS_COLOURS = ((214, 39, 40), (34, 150, 60), (31, 90, 210))
@@ -23,7 +23,7 @@ _AXIS_COLOURS = ((214, 39, 40), (34, 150, 60), (31, 90, 210))
 def looking_at(eye, target):
     """Pose (4, 4) in the world of an optical frame (z ahead, x right, y down) at `eye` that looks at `target` [m].
 
-    Raises ValueError where the camera would look straight up or down.
+    Raises ValueError if the camera would look straight up or down.
     """
     ahead = np.subtract(target, eye).astype(float)
     right = np.cross(ahead, (0.0, 0.0, 1.0))
@@ -39,7 +39,7 @@ def looking_at(eye, target):
 
 
 def extent(mirror):
-    """(low, high): the box [m] around all that stands in the world, floors left out. The unit box where it is empty."""
+    """(low, high): the box [m] around all bodies except floors. The unit box if there are none."""
     corners = []
     for body in mirror.bodies.values():
         for parts, matrix in zip(body.parts, body.matrices, strict=True):
@@ -71,10 +71,10 @@ def draw_frame(pixels, pinhole, view, frame, length, name=""):
 
 
 class Outside:
-    """Draws the world of one snapshot folder. Belongs to the thread that made it."""
+    """Draws the world of one snapshot folder. Use it in the thread that made it."""
 
     def __init__(self, folder, warn):
-        """Raises world_picture.snapshot.SnapshotError where there is no snapshot."""
+        """Raises world_picture.snapshot.SnapshotError if there is no snapshot."""
         self._reader = SnapshotReader(folder)
         self._finder = ResourceFinder()
         self._mirror = Mirror(DrawingCache(), self._finder, warn)
@@ -87,7 +87,7 @@ class Outside:
         return self._reader.is_alive
 
     def follow(self):
-        """Move everything to where it is now; returns whether there is a world to be seen."""
+        """Update all poses from the snapshot; returns whether there is a world to draw."""
         snapshot = self._reader.read()
         if snapshot is None:
             return False
@@ -102,7 +102,7 @@ class Outside:
         return True
 
     def link_pose(self, link):
-        """Pose (4, 4) in the world of a model's link that other links do not hold rigidly; None if there is none."""
+        """Pose (4, 4) in the world of a link that is its own body; None if there is none."""
         for body in self._mirror.bodies.values():
             try:
                 return body.link_matrix(link)
@@ -111,10 +111,11 @@ class Outside:
         return None
 
     def look(self, width=640, height=480, eye=None, target=None, frames=None, length=0.12):
-        """The picture, uint8 (height, width, 3), of the world as :meth:`follow` found it.
+        """The picture, uint8 (height, width, 3), of the world as of the last :meth:`follow`.
 
-        `eye`, `target` [m, in the world, where the floor is at 0]: where the camera stands and looks; by default all of
-        the world is in view. `frames`: {name: (4, 4) pose in the world} to draw, with axes of `length` [m].
+        `eye`, `target` [m, in the world, where the floor is at 0]: position of the camera and the point it looks at; by
+        default the whole world is in view. `frames`: {name: (4, 4) pose in the world} to draw, with axes of `length`
+        [m].
         """
         if target is None or eye is None:
             low, high = extent(self._mirror)

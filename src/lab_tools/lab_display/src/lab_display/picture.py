@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 
 class Picture:
-    """A picture as PNG. The last line of a notebook's cell is shown: let it be one of these."""
+    """A picture as PNG. A notebook shows the value of a cell's last line: make it a Picture."""
 
     def __init__(self, png):
         self.png = bytes(png)
@@ -42,5 +42,5 @@ class Picture:
 
 
 def new_figure(width, height):
-    """A matplotlib figure of that size [inches at 80 dots], which belongs to nobody else."""
+    """A new matplotlib figure of that size [inches at 80 dots], outside of pyplot."""
     return Figure(figsize=(width, height), dpi=80, layout="constrained")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What notebooks and `rosrun lab_display show` show: asks ROS, hands on to the modules that draw.
+"""The functions of notebooks and `rosrun lab_display show`: they get data from ROS and pass it to the modules that
+draw.
 
-Every function belongs into a process that is a ROS node. What does not come within its time raises ShowError.
+Call them in a process that is a ROS node. They raise ShowError if data does not arrive in time.
 """
 import contextlib
 import threading
@@ -29,11 +30,11 @@ from .trees import Tree
 
 # Longest wait for a message or a picture [s, wall].
 TIMEOUT_S = 30.0
-# A frame whose name is wrong is not worth as much.
+# A shorter wait for a frame, since its name may be wrong.
 TRANSFORM_TIMEOUT_S = 10.0
 JOINT_STATES = "/robot/joint_states"
 
-# A renderer belongs to the thread that made it.
+# A renderer works only in the thread that made it.
 _outside = threading.local()
 
 
@@ -44,8 +45,9 @@ class ShowError(Exception):
 def picture(eye=None, target=None, frames=(), size=(640, 480), length=0.12):
     """The simulated world from outside, as a Picture; with the axes of tf frames in it (x red, y green, z blue).
 
-    `eye`, `target`: where the camera stands and where it looks [m, physics' world: the floor is at z = 0, Baxter's base
-    at 0.93]; by default everything is in view. `size`: width and height [pixels]. `length` of the axes [m].
+    `eye`, `target`: position of the camera and the point it looks at [m, physics' world: the floor is at z = 0,
+    Baxter's base at 0.93]; by default everything is in view. `size`: width and height [pixels]. `length` of the axes
+    [m].
     """
     view = _view()
     _wait("a picture of the world", view.follow, "the simulator has written none yet")
@@ -77,7 +79,7 @@ class JointLog:
         self._arrived = threading.Event()
 
     def __enter__(self):
-        """Returns once the first message is in, so that nothing of what follows is missed."""
+        """Returns after the first message, so that no later one is missed."""
         self._subscriber = rospy.Subscriber(self._topic, JointState, self._take)
         try:
             _wait(self._topic, self._arrived.is_set, "nobody publishes it; rostopic list shows the topics")
@@ -115,7 +117,7 @@ def plot(log, title="", unit="rad"):
 def robot(parameter="robot_description"):
     """The `urdf_model.Robot` on the parameter server."""
     try:
-        # rospy.get_param answers from a cache, which a new simulator would leave stale.
+        # rospy.get_param uses a cache, which would be stale after a new simulator.
         return parse_urdf(rosgraph.Master(rospy.get_name()).getParam(rospy.resolve_name(parameter)), source=parameter)
     except rosgraph.MasterError as error:
         raise ShowError("the parameter %s is not set: is a robot running?" % parameter) from error
@@ -128,7 +130,7 @@ def urdf_tree(parameter="robot_description", below=None):
 
 
 def tf_tree(below=None):
-    """Frames that tf knows, as a Tree. Joints that move are told from fixed ones by the robot's description."""
+    """Frames that tf knows, as a Tree. The robot's description tells which joints move."""
     description = robot()
     moving = {joint.child: joint.name for joint in description.joints.values() if joint.type != "fixed"}
     with _transforms() as buffer:
@@ -142,7 +144,7 @@ def tf_tree(below=None):
 
 
 def matrix(target, source):
-    """Where frame `source` is in frame `target`, as a FrameMatrix: print it, or use it as a (4, 4) array."""
+    """The pose of frame `source` in frame `target`, as a FrameMatrix: print it, or use it as a (4, 4) array."""
     with _transforms() as buffer:
         return FrameMatrix(target, source, _look_up(buffer, target, source))
 

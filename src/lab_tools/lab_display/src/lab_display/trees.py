@@ -8,7 +8,7 @@ _COLOURS = {"moves": "#c23b22", "fixed": "#5b7083"}
 
 
 class TreeError(ValueError):
-    """This is no tree; the text says why."""
+    """The frames form no tree; the text says why."""
 
 
 @dataclass
@@ -28,7 +28,7 @@ class Tree:
         return sorted({parent for parent, _, _ in self.edges.values()} - set(self.edges))
 
     def children(self, name):
-        """Names of the frames right below one, in the order in which they were given."""
+        """Names of the direct children of a frame, in their given order."""
         return [child for child, (parent, _, _) in self.edges.items() if parent == name]
 
     def below(self, name):
@@ -44,7 +44,7 @@ class Tree:
         return Tree({child: edge for child, edge in self.edges.items() if child in chosen})
 
     def rows(self):
-        """List of (depth, name, label, moves), depth first. Raises TreeError where parents form rings."""
+        """List of (depth, name, label, moves), depth first. Raises TreeError if parents form rings."""
         listed = []
 
         def add(name, depth):
@@ -61,7 +61,7 @@ class Tree:
         return listed
 
     def __str__(self):
-        """One line a frame, further in below its parent; the joint in brackets if it moves."""
+        """One line per frame, indented below its parent; the joint in brackets if it moves."""
         return "\n".join("%s%s%s" % ("  " * depth, "[%s] " % label if moves else "", name)
                          for depth, name, label, moves in self.rows())
 
@@ -97,7 +97,7 @@ class Tree:
         return figure
 
     def _places(self):
-        """{name: (depth, height)} and the number of leaves: a frame stands in the middle of what is below it."""
+        """{name: (depth, height)} and the number of leaves: a frame is centred above its leaves."""
         self.rows()  # a ring would never end below
         places, count = {}, 0
 

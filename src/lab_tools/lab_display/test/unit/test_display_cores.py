@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trees, plots, matrices, and the camera beside the robot: what they show is where it belongs."""
+"""Trees, plots, matrices, and the camera outside of the robot: their content and places."""
 import subprocess
 import sys
 
