@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# Runs at `catkin_make install`, after catkin has installed its setup files: they are to work wherever the space is moved.
+# Runs at `catkin_make install`, after catkin has installed its setup files: they must work after the space was moved.
 set(prefix "$ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}")
 
 # catkin's helper starts by the interpreter it was configured with, which is the workspace's; Debian's is always there.
@@ -10,7 +10,7 @@ if(EXISTS "${helper}")
   file(WRITE "${helper}" "${text}")
 endif()
 
-# setup.sh and local_setup.sh have the path of the first installation inside; put the search for their own before it.
+# setup.sh and local_setup.sh have the path of the first installation inside; replace it by a search for their own path.
 file(READ "${CMAKE_CURRENT_LIST_DIR}/own_place.sh" search)
 foreach(name setup.sh local_setup.sh)
   set(file "${prefix}/${name}")

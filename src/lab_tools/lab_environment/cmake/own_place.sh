@@ -1,5 +1,5 @@
-# Added by lab_environment: where does this file lie? bash and zsh know; of any other shell, the system knows which file of
-# this name it has opened last.
+# Added by lab_environment: find the folder of this file. bash and zsh know it; for other shells, the system lists the
+# file that the shell opened last.
 if [ -z "${_CATKIN_SETUP_DIR:-}" ]; then
   _lab_file=
   if [ -n "${BASH_VERSION:-}" ]; then

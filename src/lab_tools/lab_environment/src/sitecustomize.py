@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Read by every Python that starts in the lab's environment: has modules amended at the moment they are imported.
+"""Run by every Python that starts in the lab's environment: amends some modules when they are imported.
 
-Costs those that import none of them nothing: no module is imported here. docs/decisions/0008 says why it is done this
-way.
+It imports nothing itself, so other programs are not slowed down. docs/decisions/0008 says why it is done this way.
 """
 import os
 import sys
 
-# Module that is amended when somebody imports it -> ours, whose `amend(module)` is called then.
+# Module that is amended on import -> our module, whose `amend(module)` is called then.
 AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_environment.last_messages",
            "rospy.impl.tcpros_base": "lab_environment.refused_connections",
            "roslaunch.parent": "lab_environment.launch_guard"}
 
 
 class AmendingFinder:
-    """A finder for sys.meta_path: finds nothing itself, and has the modules of AMENDED amended once they are loaded."""
+    """A finder for sys.meta_path: it finds nothing itself, but amends the modules of AMENDED after they are loaded."""
 
     @staticmethod
     def find_spec(name, path=None, target=None):
@@ -34,7 +33,7 @@ def _amend_when_loaded(loader, amendment):
 
     def exec_module(module):
         load(module)
-        # A program must not fail over a convenience; without the amendment it runs as it does elsewhere.
+        # A program must not fail because of an amendment; without it, it runs as in plain ROS.
         try:
             __import__(amendment)
             sys.modules[amendment].amend(module)

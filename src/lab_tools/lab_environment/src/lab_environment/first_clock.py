@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Have rospy.init_node return only when simulated time runs.
+"""Makes rospy.init_node return only when simulated time runs.
 
-Under /use_sim_time rospy's time stands at 0 until the first message on /clock and jumps then, by minutes perhaps.
-Programs that wait "2 s from now" at that moment, as the vendor's SDK does, have waited long enough before anything
-could arrive.
+Under /use_sim_time rospy's time is 0 until the first message on /clock and then jumps, possibly by minutes. If a
+program waits for 2 s at that moment, as the vendor's SDK does, its wait ends before anything could arrive.
 """
 import functools
 import os
@@ -14,27 +13,27 @@ import time
 from . import master_calls, simulator_start
 from .waiting_line import WaitingLine
 
-# So long is /clock waited for if nobody publishes it and no simulator is on its way up [s, wall].
+# Longest wait for /clock if nobody publishes it and no simulator is starting [s, wall].
 NOBODY_S = 5.0
-# So long if somebody publishes it: a publisher that was stopped sends nothing [s, wall].
+# Longest wait if it has a publisher: a stopped publisher sends nothing [s, wall].
 SILENT_S = 30.0
-# A simulator that is visibly on its way up is waited for as long as it is, and never longer than this [s, wall].
+# Longest wait while a simulator is starting [s, wall].
 STARTING_S = 300.0
 # /use_sim_time is set a moment after roslaunch has started the master [s, wall].
 PARAMETER_S = 5.0
-# A start that is quicker than this passes without a word [s].
+# A shorter wait prints nothing [s].
 FIRST_NOTICE_S = 1.0
-# Period of looking up the clock's publishers at the master [s].
+# Period of queries for the clock's publishers at the master [s].
 LOOK_EVERY_S = 0.5
-# ROS's own command-line tools show what is there, which may be that there is no /clock.
+# ROS's own command-line tools do not wait: they show the present state, even without /clock.
 _TOOLS = re.compile(r"(/usr)?/bin/[^/]+|/opt/ros/[^/]+/bin/[^/]+")
 
 
 class ClockWait:
     """Decides how long init_node waits. Free of ROS; times are wall time [s].
 
-    Parameters: `watch` is a StartWatch; `wants_the_world`: go on waiting while models are put into the world.
-    Attributes: `what` names what is waited for; `complaint` says what is wrong, after a wait in vain.
+    Parameters: `watch` is a StartWatch; `wants_the_world`: go on waiting while models are spawned. Attributes: `what`
+    names the awaited thing; `complaint` is the error text after a failed wait.
     """
 
     def __init__(self, watch, wants_the_world, begin_s):
@@ -48,7 +47,7 @@ class ClockWait:
         self._starting = []
 
     def is_over(self, has_time, is_published, now_s):
-        """Whether init_node may return: `has_time`, a message has come; `is_published()`, there is a publisher."""
+        """Whether init_node may return: `has_time`: a message has come; `is_published()`: there is a publisher."""
         self.waited_s = now_s - self._begin_s
         if has_time and not self._wants_the_world:
             return True
@@ -79,7 +78,7 @@ class ClockWait:
 
 
 def amend(client):
-    """Put the waiting version of init_node into the module rospy.client."""
+    """Replace init_node in the module rospy.client by the waiting version."""
     client.init_node = _waiting(client.init_node)
 
 
@@ -109,7 +108,7 @@ def _is_tool(argv):
 
 
 def _is_of_a_launch(argv):
-    """Whether roslaunch has started this program: what it starts belongs to the start that is under way."""
+    """Whether roslaunch has started this program, which then belongs to the same start as the simulator."""
     return any(word.startswith("__name:=") for word in argv)
 
 
@@ -134,14 +133,14 @@ def _follow_late_parameter(rospy):
 
 
 def _wait(rospy):
-    """Wait for the first message on /clock, and for a simulator that is on its way up."""
+    """Wait for the first message on /clock, and for a starting simulator."""
     import rosgraph
 
     topic = rospy.resolve_name(simulator_start.CLOCK)
     if topic != simulator_start.CLOCK or rospy.topics.get_topic_manager().has_publication(topic):
         return
     is_of_a_launch = _is_of_a_launch(sys.argv)
-    # Those of a launch share its terminal, and its simulator's terminal says how far it is.
+    # Nodes of a launch share its terminal, where the simulator itself reports its progress.
     line = None if is_of_a_launch else WaitingLine()
     wait = ClockWait(simulator_start.StartWatch(rosgraph.get_master_uri(), rospy.get_name()),
                      wants_the_world=not is_of_a_launch, begin_s=time.monotonic())
@@ -149,7 +148,7 @@ def _wait(rospy):
     before = rospy.rostime._rostime_current
     try:
         while not rospy.is_shutdown():
-            # A world that is paused at its beginning sends 0.
+            # A world that starts paused sends 0.
             has_time = rospy.get_time() > 0.0 or rospy.rostime._rostime_current is not before
             if wait.is_over(has_time, lambda: _is_published(rospy, topic), time.monotonic()):
                 break

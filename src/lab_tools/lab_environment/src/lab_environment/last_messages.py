@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Have a program send all that it has published before it ends.
+"""Makes a program send all published messages before it ends.
 
-rospy hands messages of a publisher with a queue to a thread for each connection, and a program that ends takes these
-threads with it: a command that was the last line of a program got lost, or not, as the machine pleased.
+For a publisher with a queue, rospy sends in one thread per connection, and these threads end with the program: a
+command in a program's last line was lost at random.
 """
 import sys
 import time
 
-# So long may a reader that has stopped hold up the end of a program [s, wall].
+# Longest delay of a program's end by a stopped reader [s, wall].
 LONGEST_S = 2.0
 _LOOK_EVERY_S = 0.002
 
 
 def amend(core):
-    """Have the module rospy.core send what is queued before it shuts a node down."""
+    """Make the module rospy.core send queued messages before it shuts a node down."""
     core.add_preshutdown_hook(_before_shutdown)
 
 
 def _before_shutdown(reason):
-    # The user who presses Ctrl-C wants an end; and a signal may have come where a lock is held that is needed here.
+    # After Ctrl-C the user wants a quick end; and a signal may come while a needed lock is held.
     if not reason.startswith("signal"):
         await_sent(queued_connections())
 
@@ -33,7 +33,7 @@ def queued_connections():
 
 
 def await_sent(connections, longest_s=LONGEST_S):
-    """Wait until all connections' queues are handed to the system, at most ``longest_s`` [s]; returns whether."""
+    """Wait until all connections' queues are sent to the system, at most ``longest_s`` [s]; returns whether."""
     end_s = time.monotonic() + longest_s
     while not all(map(_is_sent, connections)):
         if time.monotonic() > end_s:
@@ -43,7 +43,7 @@ def await_sent(connections, longest_s=LONGEST_S):
 
 
 def _is_sent(connection):
-    """Whether a rospy QueuedConnection's thread has nothing left: it waits for messages then, with an empty queue."""
+    """Whether a rospy QueuedConnection's thread has sent everything: its queue is empty, and it waits for messages."""
     if connection.done:
         return True
     if not connection._lock.acquire(timeout=_LOOK_EVERY_S):

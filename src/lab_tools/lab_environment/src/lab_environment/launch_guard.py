@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Have roslaunch refuse a second simulator on a master, before it changes anything.
+"""Makes roslaunch refuse a second simulator on a master, before it changes anything.
 
-roslaunch sets parameters first and starts nodes in any order, and each node that bears the name of another shuts that
-one down. By the time the second simulator itself could refuse, the first lab has lost its nodes. So the launch file is
-read, and if there is a simulator in it, and one on the master or about to be, roslaunch ends there.
+roslaunch sets parameters first and starts nodes in any order, and each node shuts down an older node of the same name.
+Before the second simulator itself could refuse, the first lab would lose its nodes. So we read the launch file. If it
+contains a simulator, and another one runs or starts on the master, roslaunch ends at once.
 """
 import contextlib
 import sys
@@ -17,7 +17,7 @@ _PACKAGE, _TYPES = "gazebo_ros", ("gzserver", "gazebo")
 
 
 def amend(module):
-    """Have every ``ROSLaunchParent`` of the module roslaunch.parent look before it starts anything."""
+    """Make every ``ROSLaunchParent`` of the module roslaunch.parent check before it starts anything."""
     parent = module.ROSLaunchParent
     load_config, start_monitor = parent._load_config, parent._start_pm
 
@@ -34,7 +34,7 @@ def amend(module):
         if launch.simulators is not None:
             launch.pm.add_process_listener(launch.simulators)
 
-    parent.simulators = None  # as it stays for rostest, which loads its files itself and starts masters of its own
+    parent.simulators = None  # unchanged for rostest, which loads its files itself and starts its own masters
     parent._load_config, parent._start_pm = load_and_look, start_and_listen
 
 
@@ -48,7 +48,7 @@ class _Simulators(roslaunch.pmon.ProcessListener):
         self._claims = {name: Claim(name, self._master_uri) for name in self._nodes}
 
     def reason_against(self):
-        """What to tell the user where there is one already; "" where not, and then nobody else may start one."""
+        """The message to the user if there is a simulator already; else "", and this process then holds the claim."""
         for name, claim in self._claims.items():
             found = None
             with contextlib.suppress(OSError):  # no master yet: roslaunch starts one
@@ -61,7 +61,7 @@ class _Simulators(roslaunch.pmon.ProcessListener):
         return ""
 
     def process_died(self, process_name, exit_code):
-        """A simulator that has ended for good, in a launch that goes on, is in nobody's way."""
+        """Release the claim of a simulator that has ended while its launch goes on."""
         name = "/" + process_name.rpartition("-")[0]
         if name in self._claims and not self._nodes[name].respawn:
             self._claims[name].release()

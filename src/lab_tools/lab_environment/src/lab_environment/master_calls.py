@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """XML-RPC clients of ROS masters and nodes, with a deadline for each answer.
 
-ROS's own wait without end for a program that takes connections and was stopped.
+ROS's own clients wait for ever for a stopped program that still accepts connections.
 """
 import xmlrpc.client
 
@@ -12,8 +12,8 @@ def proxy(uri, answer_s):
 
 
 def master(caller, uri, answer_s):
-    """A ``rosgraph.Master`` at `uri`, asked in the name of the node `caller`; its calls time out as proxy()'s do."""
-    import rosgraph  # programs that start ask for a proxy alone
+    """A ``rosgraph.Master`` at `uri`, with the caller id `caller`; its calls time out as those of proxy()."""
+    import rosgraph  # imported late: most callers need only a proxy
 
     found = rosgraph.Master(caller, uri)
     found.handle = proxy(uri, answer_s)

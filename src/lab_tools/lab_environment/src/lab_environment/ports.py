@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ports of this machine for ROS masters of one's own."""
+"""Free ports of this machine for private ROS masters."""
 import contextlib
 import errno
 import random
 import socket
 
-# Below those (32768 up) that the kernel gives to clients: one of them could be taken before the master comes.
+# Below those (32768 up) that the kernel gives to clients: a client could get such a port before the master starts.
 PORTS = range(20000, 30000)
 
 
 def free_port(ports=None):
-    """Return a port of the loopback interface that nobody listens on: of `ports` the first, else any of PORTS.
+    """Return a free port of the loopback interface: the first free one of `ports` if given, else any of PORTS.
 
-    Raises OSError (EADDRINUSE) where none is free.
+    Raises OSError (EADDRINUSE) if none is free.
     """
     candidates = random.sample(PORTS, len(PORTS)) if ports is None else ports
     for port in candidates:

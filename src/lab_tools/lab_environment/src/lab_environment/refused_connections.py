@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Log once when a publisher refuses a subscriber.
 
-rospy writes that to the node's log file alone, where nobody looks: a program that subscribes with another type than
-the publisher's, or with another version of it, hangs without a word.
+rospy writes that only to the node's log file: a program that subscribes with another type or version than the
+publisher's waits for ever without a message.
 """
 import functools
 
-# A publisher that answers something else each time shall fill neither the memory nor the terminal.
+# A publisher with a new answer each time must fill neither memory nor terminal.
 MOST_LINES, LONGEST_REASON = 100, 300
 
 
 def amend(tcpros_base):
-    """Have rospy.impl.tcpros_base's subscribers log what publishers answer instead of data."""
+    """Make the subscribers of rospy.impl.tcpros_base log a publisher's refusal."""
     validate = tcpros_base.TCPROSTransport._validate_header
     told = set()
 
     @functools.wraps(validate)
     def validate_and_tell(self, header):
-        # Clients of services raise what they are answered.
+        # Service clients raise the answer themselves.
         reason = header.get("error", "")[:LONGEST_REASON]
         is_service = self.protocol.direction == tcpros_base.BIDIRECTIONAL
         key = (self.name, self.endpoint_id, reason)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tell whether a simulator is starting, from the ROS master and the roslaunch that starts it. Needs no rospy, no node.
+"""Detects whether a simulator is starting, from the ROS master and its roslaunch. Needs no rospy, no node.
 
-A start is visible as any of these:
+A simulator is starting if:
 
 - a roslaunch runs a process of the simulator, or one that spawns a model, which has not registered with the master yet;
 - the simulator's node is registered and does not publish /clock yet;
-- a node is putting a model into the world: gazebo_ros's spawn_model is registered as a publisher of SPAWNING meanwhile.
+- a node is spawning a model: gazebo_ros's spawn_model registers as a publisher of SPAWNING meanwhile.
 """
 import http.client
 import socket
@@ -18,20 +18,20 @@ from . import master_calls
 # Gazebo's own name, which launch files give its node.
 SIMULATOR = "/gazebo"
 CLOCK = "/clock"
-# A topic without messages; its registered publisher is at work.
+# A topic without messages; a registered publisher means that a spawn is in progress.
 SPAWNING = "/gazebo/spawning"
 # Longest wait for one answer [s].
 ANSWER_TIMEOUT_S = 2.0
-# All the ways in which a call can fail: nobody there, not XML-RPC, an answer that is an error.
+# All errors of a call: nobody there, not XML-RPC, an error response.
 NO_ANSWER = (OSError, http.client.HTTPException, xmlrpc.client.Error, xml.parsers.expat.ExpatError, ValueError)
 
 
 class SimulatorDied(OSError):
-    """A simulator that was on its way up is gone; the text says which and what to do."""
+    """A starting simulator has ended; the text says which and what to do."""
 
 
 class StartWatch:
-    """Watches a simulator come up, at the master `uri`; `caller` is the name under which the master is asked."""
+    """Watches the start of a simulator at the master `uri`; `caller` is the caller id for the master."""
 
     def __init__(self, uri, caller="/simulator_start"):
         self._uri = uri
@@ -39,7 +39,7 @@ class StartWatch:
         self._is_known = False
 
     def look(self):
-        """Return the names of what is on its way up, none if nothing is; raises SimulatorDied if it was and is gone."""
+        """Return the names of starting processes and nodes; raises SimulatorDied if one of them has ended."""
         try:
             graph = Graph(self._uri, self._caller)
         except NO_ANSWER as error:
@@ -60,7 +60,7 @@ class StartWatch:
 
 
 def starting(graph):
-    """The names of the processes and nodes that are on their way up, sorted."""
+    """The names of the processes and nodes that are starting, sorted."""
     names = {name for name in graph.processes() if name not in graph.nodes and _is_of_a_start(name)}
     if SIMULATOR in graph.nodes and not graph.published.get(CLOCK) and graph.is_alive(SIMULATOR):
         names.add(SIMULATOR)
@@ -73,7 +73,7 @@ def _is_of_a_start(process):
 
 
 class Graph:
-    """The master's view of one moment. Attributes: `published` {topic: [node]}, `nodes` {node}."""
+    """The state of the master at one moment. Attributes: `published` {topic: [node]}, `nodes` {node}."""
 
     def __init__(self, uri, caller):
         self._caller = caller
@@ -90,7 +90,7 @@ class Graph:
         except NO_ANSWER:
             return
         for uri in launches.values() if isinstance(launches, dict) else ():
-            # One that has ended leaves its parameter behind.
+            # An ended roslaunch leaves its parameter behind.
             try:
                 running, _ended = _value(master_calls.proxy(uri, ANSWER_TIMEOUT_S).list_processes())
                 names = ["/" + name.rpartition("-")[0] for name, _starts in running]
@@ -99,7 +99,7 @@ class Graph:
             yield from names
 
     def is_alive(self, node):
-        """Whether somebody listens at the address that the node has registered: it may be too busy to answer."""
+        """Whether the node's registered address accepts connections: the node may be too busy to answer."""
         try:
             address = urlparse(_value(self._master.lookupNode(self._caller, node)))
             socket.create_connection((address.hostname, address.port), timeout=ANSWER_TIMEOUT_S).close()

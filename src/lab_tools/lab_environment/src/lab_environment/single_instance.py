@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One simulator per ROS master.
 
-A node that registers under a name which is in use shuts the older one down. For a simulator that means a lab that dies
-without a word, so a second one looks first and stays out.
+A node that registers under a name which is in use shuts the older one down. For a simulator this would end a lab
+silently, so a second one checks first and does not start.
 """
 import contextlib
 import os
@@ -16,19 +16,19 @@ import rosgraph
 
 from lab_environment import master_calls
 
-# Until a connection is made, and from there to an answer [s]. A dead process refuses at once; a living one may be busy.
+# Time limits for a connection, and for an answer [s]. A dead process refuses at once; a living one may be busy.
 _CONNECT_S = 2.0
 _ANSWER_S = 10.0
-# How often and how far apart [s] one tries to take what nobody seems to have.
+# Number of tries, and time between them [s], to take a claim that seems free.
 _TRIES, _TRY_S = 20, 0.05
 _PEER = struct.Struct("3i")  # struct ucred: process, user, group
 
 
 def running_instance(node_name, caller_id="/gazebo_ros_look_up", master_uri=None):
-    """(URI, process id) of a node that is registered as ``node_name`` and alive, or None.
+    """(URI, process id) of a living node that is registered as ``node_name``, or None.
 
-    A registration that a dead node left behind does not count; a node that takes connections and does not answer does,
-    with None for the process. Raises ``OSError`` when there is no master.
+    A dead node's registration does not count. A node that accepts connections without answering counts, with None for
+    the process. Raises ``OSError`` when there is no master.
     """
     master = rosgraph.Master(caller_id, master_uri)
     try:
@@ -49,7 +49,7 @@ def running_instance(node_name, caller_id="/gazebo_ros_look_up", master_uri=None
     except TimeoutError:
         return uri, None
     except (OSError, xmlrpc.client.Error):
-        pass  # not every client library knows its name
+        pass  # not every client library returns its name
     try:
         code, _, pid = node.getPid(caller_id)
     except TimeoutError:
@@ -60,14 +60,14 @@ def running_instance(node_name, caller_id="/gazebo_ros_look_up", master_uri=None
 
 
 class Claim:
-    """This process's right to start the simulator ``node_name`` on a master, from before that is registered.
+    """This process's claim to start the simulator ``node_name`` on a master, held before the node is registered.
 
-    Held by a socket in Linux's abstract namespace, so that it ends with the process, however that ends. It is seen on
-    this machine only.
+    It is a socket in Linux's abstract namespace, so it ends with the process in any case. It is visible on this machine
+    only.
     """
 
     def __init__(self, node_name, master_uri):
-        """Nothing is taken yet."""
+        """Does not take the claim yet."""
         address = urlsplit(master_uri)
         host = address.hostname or ""
         if host in ("localhost", "::1") or host.startswith("127."):
@@ -76,7 +76,7 @@ class Claim:
         self._socket = None
 
     def take(self):
-        """Take it and return None, or the process [id] of this user that has it."""
+        """Take the claim and return None, or return the id of this user's process that holds it."""
         for _ in range(_TRIES):
             ours = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
             try:
@@ -89,11 +89,11 @@ class Claim:
                 return None
             with contextlib.suppress(OSError):
                 return self._holder()
-            time.sleep(_TRY_S)  # it is just being taken or given back
+            time.sleep(_TRY_S)  # it is just being taken or released
         return None
 
     def release(self):
-        """Give it back; twice is once."""
+        """Release the claim; may be called twice."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
@@ -102,19 +102,19 @@ class Claim:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
             probe.connect(self._name)
             pid, user, _ = _PEER.unpack(probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size))
-        # Other users cannot keep ours from starting; what they have on the master is seen there.
+        # Other users' claims cannot block ours; their running simulator is visible at the master.
         return pid if user == os.getuid() else None
 
 
 def refusal(node_name, uri, pid, master_uri=None):
-    """What to tell the user, in three lines, when an instance runs already."""
+    """The message, in three lines, when an instance runs already."""
     who = "process %d, %s" % (pid, uri) if pid else "%s, which does not answer at the moment" % uri
     return _refusal("A simulator is running on this ROS master", node_name, who, "rosnode kill %s" % node_name,
                     master_uri)
 
 
 def refusal_while_starting(node_name, launch_pid, master_uri=None):
-    """What to tell the user, in three lines, when another roslaunch is about to start an instance."""
+    """The message, in three lines, when another roslaunch is about to start an instance."""
     return _refusal("A simulator is being started on this ROS master", node_name,
                     "by roslaunch, process %d" % launch_pid, "kill -INT %d" % launch_pid, master_uri)
 

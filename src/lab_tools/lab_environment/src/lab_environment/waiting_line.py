@@ -3,15 +3,15 @@
 import sys
 import time
 
-# Where lines stay, the next one comes after this at the earliest [s].
+# Shortest time between two lines on a stream that is no terminal [s].
 AGAIN_AFTER_S = 30.0
 
 
 class WaitingLine:
-    """Says what a program waits for: on a terminal one line that counts the seconds, elsewhere one line that stays.
+    """Shows what a program waits for: on a terminal one line that counts the seconds, elsewhere one permanent line.
 
     Parameters: `stream` is a text stream, None for the standard error of the moment; `now` is a clock [s].
-    Attribute `again_after_s`: where lines stay, none follows another within this time [s].
+    Attribute `again_after_s`: shortest time between two permanent lines [s].
     """
 
     def __init__(self, stream=None, again_after_s=AGAIN_AFTER_S, now=time.monotonic):
@@ -23,7 +23,7 @@ class WaitingLine:
         self._last = ""
 
     def say(self, what, waited_s):
-        """Show that the program has waited for `what` for `waited_s` [s]; may be called as often as one likes."""
+        """Show that the program has waited for `what` for `waited_s` [s]; may be called at any rate."""
         stream = sys.stderr if self._stream is None else self._stream
         if stream.isatty():
             line = "waiting for %s: %.0f s" % (what, waited_s)
@@ -38,7 +38,7 @@ class WaitingLine:
             self._said_at_s, self._last = self._now(), what
 
     def end(self):
-        """The wait is over: take the line off the terminal."""
+        """The wait is over: erase the line from the terminal."""
         if self._shown:
             stream = sys.stderr if self._stream is None else self._stream
             stream.write("\r\033[K")

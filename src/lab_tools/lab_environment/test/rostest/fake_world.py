@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A simulator's /clock, and joint states that reach a subscriber half a second later, as on a busy machine.
 
-Parameters: ~start_s, the first time on /clock; ~paused, it stays there.
+Parameters: ~start_s, the first time on /clock; ~paused, whether time stays there.
 """
 import threading
 import time

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""rospy.init_node returns when simulated time runs, in programs that know nothing of it, whichever Python runs them."""
+"""rospy.init_node returns when simulated time runs, in unmodified programs, with any Python."""
 import os
 import pathlib
 import signal

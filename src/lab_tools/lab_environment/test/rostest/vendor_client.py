@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""A client as programs for the robot are: the node first, then 2 s of ROS time for the first joint states.
+"""A client like typical programs for the robot: the node first, then 2 s of ROS time for the first joint states.
 
-Knows nothing of the workspace's own packages; prints the time at which the joint states were there [s].
+It does not use the workspace's packages; prints the time at which joint states had arrived [s].
 """
 import sys
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How long init_node waits for simulated time and for a simulator that is on its way up."""
+"""How long init_node waits for simulated time and for a starting simulator."""
 import pytest
 
 from lab_environment import first_clock

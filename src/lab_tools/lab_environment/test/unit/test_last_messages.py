@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a publisher has queued is sent before a program ends, with rospy's own queues over pairs of sockets."""
+"""Queued messages of a publisher are sent before a program ends, with rospy's own queues over pairs of sockets."""
 import socket
 import threading
 

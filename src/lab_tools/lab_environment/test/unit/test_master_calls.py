@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Calls to a ROS master end, whatever it does."""
+"""Calls to a ROS master always end."""
 import socket
 import threading
 from xmlrpc.server import SimpleXMLRPCServer

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The setup files of an install space that was moved find their own place, in every shell there is here."""
+"""The setup files of an install space that was moved find their own place, in every installed shell."""
 
 import shutil
 import subprocess

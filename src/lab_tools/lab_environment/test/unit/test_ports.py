@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ports for masters of one's own."""
+"""Ports for private masters."""
 import errno
 import socket
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which registrations stand for a living simulator, and who has the right to start one."""
+"""Which registrations mean a living simulator, and which process may start one."""
 import contextlib
 import os
 import signal
@@ -92,7 +92,7 @@ time.sleep(600)
 
 @pytest.fixture
 def holder():
-    """Another process that has the claim for a master that is never there, in every spelling of its name."""
+    """Another process that holds the claim for a master that does not exist, in every spelling of its name."""
     node = "/gazebo_of_%d" % os.getpid()
     process = subprocess.Popen([sys.executable, "-c", TAKE_AND_STAY, node, "http://127.0.0.1:11499"],
                                stdout=subprocess.PIPE, text=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What every Python of the lab's environment reads at its start amends rospy, costs others nothing, hides nothing."""
+"""The start-up module of the lab's Python amends rospy, does not slow others down, and hides no other sitecustomize."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ def run(program, *folders):
 
 
 def a_rospy(folder):
-    """A package that looks as much like rospy as the hook reads."""
+    """A fake rospy with the attributes that the hook uses."""
     (folder / "rospy").mkdir()
     (folder / "rospy/__init__.py").write_text("from .client import init_node\n")
     (folder / "rospy/client.py").write_text("def init_node(name):\n    return name\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waiting is one line: it counts on a terminal, and stands alone in a log."""
+"""Waiting is one line: it counts on a terminal, and is permanent in a log."""
 import io
 
 from lab_environment.waiting_line import WaitingLine
