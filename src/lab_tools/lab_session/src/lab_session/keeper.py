@@ -2,8 +2,8 @@
 """`python3 keeper.py STATE_FILE COMMAND...`: runs a command for as long as its own standard input is open.
 
 The starting process holds the other end of that pipe, so that the command ends when its owner ends, in any way.
-Free of ROS. The state file is locked while the keeper lives; its first line says `running` or `ending`, the others what
-runs. With LAB_SESSION_AFTER naming another keeper's state file, the command outlives that keeper.
+Free of ROS. The state file is locked while the keeper lives; its first line is `running` or `ending`, the others are
+the command. With LAB_SESSION_AFTER naming another keeper's state file, the command outlives that keeper.
 """
 import contextlib
 import ctypes
@@ -29,7 +29,7 @@ def _write_state(file, state, command):
 
 
 def is_held(path):
-    """Whether a living keeper has locked this state file."""
+    """Whether a living keeper holds the lock of this state file."""
     try:
         with open(path, encoding="utf-8") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -52,7 +52,7 @@ def _own_children():
 
 
 def _end_everything():
-    """Kill what is left: as subreaper this process inherits every orphan below it."""
+    """Kill remaining processes: as subreaper this process inherits every orphan below it."""
     while True:
         children = _own_children()
         if not children:
@@ -90,8 +90,8 @@ def keep(state_path, command, after=None):
 
 
 if __name__ == "__main__":
-    # A Ctrl-C in the terminal is for the owner; the keeper hears of it when the owner is gone. Not SIG_IGN, which the
-    # command would inherit.
+    # A Ctrl-C in the terminal is for the owner; the keeper acts when the owner is gone. Not SIG_IGN, which the command
+    # would inherit.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda *_: None)
     sys.exit(keep(sys.argv[1], sys.argv[2:], os.environ.get("LAB_SESSION_AFTER")))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The labs by name: what starts each, and how to tell that it is there. ROS-free."""
+"""The labs by name: their launch files, and how to recognize a running one. ROS-free."""
 from typing import NamedTuple
 
 
@@ -13,7 +13,7 @@ class LabStart(NamedTuple):
 
     @property
     def command(self):
-        """What follows `roslaunch`."""
+        """The arguments of `roslaunch`."""
         return (self.package, self.launch_file, *self.arguments)
 
 

@@ -20,9 +20,9 @@ from lab_environment.ports import free_port
 from . import keeper
 from .labs import LABS
 
-# A simulator that another program has started may still be coming up; after this its robot is another one [s].
+# A simulator that another program has started may still be starting; after this time it counts as another robot's [s].
 FOUND_TIMEOUT_S = 20.0
-# A simulator of ours has this long, on a machine that has much else to do [s].
+# Time limit for the start of our own simulator, on a busy machine [s].
 START_TIMEOUT_S = 120.0
 # Ports of further labs beside the first one.
 FURTHER_PORTS = range(11411, 11500)
@@ -30,11 +30,11 @@ LOG_LINES_SHOWN = 12
 
 
 class LabError(Exception):
-    """There is no lab to work with; the text says why and what to do."""
+    """No lab is available; the text says why and what to do."""
 
 
 class Lab:
-    """What :func:`connect` returns. Printing it says what runs and how to stop it."""
+    """The result of :func:`connect`. Printing it shows what runs and how to stop it."""
 
     def __init__(self, command, topic):
         self._command = command
@@ -46,7 +46,7 @@ class Lab:
 
     @property
     def is_ours(self):
-        """Whether this process has started the simulator that it works with, and it still runs."""
+        """Whether this process has started the simulator, and it still runs."""
         return self._keeper is not None and self._keeper.poll() is None
 
     @property
@@ -61,7 +61,7 @@ class Lab:
     def run(self, *command):
         """Run a program beside the notebook, until :meth:`stop` or until the notebook's kernel ends.
 
-        One that runs already is not started again. Returns the file that its output goes to.
+        A running one is not started again. Returns the file with its output.
         """
         name = "-".join(word.rpartition("/")[2] for word in command[:3])
         log = _state_folder() / ("lab_session-%d-%s.log" % (os.getpid(), name))
@@ -75,7 +75,8 @@ class Lab:
         return log
 
     def stop(self):
-        """End what this process has started: programs and simulator. The master stays until this process ends."""
+        """End the programs and the simulator that this process has started. The master stays until this process
+        ends."""
         for command, program in self._programs.items():
             _closed(program)
             print("stopped: %s" % " ".join(command))
@@ -108,7 +109,7 @@ class Lab:
         return "%s\n%s\nThe same lab in a terminal: %s" % (running, stop, shell)
 
     def _ask_for(self, command):
-        """Have the next start be of `command`; one of ours that runs goes on."""
+        """Set `command` for the next start; our running simulator goes on."""
         if not self.is_ours:
             self._command = command
         elif command != self._command:
@@ -137,7 +138,7 @@ class Lab:
         condition = startup.topic_published(self._topic)
         met = Condition(condition.what, lambda: condition.is_met() or (ours and ours.poll() is not None),
                         condition.explain)
-        # Whether one of ours is still on its way, its keeper knows.
+        # The keeper knows whether our own simulator is still starting.
         wait_in_order([met], timeout_s, startup.LINE, (lambda: False) if ours else startup.simulator_is_coming())
         if ours and ours.poll() is not None:
             lines = Path(self._log).read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:]
@@ -153,10 +154,10 @@ _run_id = None
 def connect(name, *arguments):
     """Return the :class:`Lab` of that name (a key of :data:`lab_session.labs.LABS`), and make this process a ROS node.
 
-    Uses the simulator on the master that ROS_MASTER_URI names; where there is none, starts one there, with further
-    launch `arguments` such as "gui:=false"; where the robot there is another one, on a port of its own (ROS_MASTER_URI
-    follows). Calling it again is safe: it finds what the first call has started, or starts it again, with the arguments
-    that it is called with then.
+    Uses the simulator on the master that ROS_MASTER_URI names; if there is none, starts one there, with further launch
+    `arguments` such as "gui:=false"; if another robot runs there, starts one on a port of its own and sets
+    ROS_MASTER_URI. Calling it again is safe: it finds the lab of the first call, or starts it again with the present
+    arguments.
 
     Raises :class:`LabError` when no lab can be found or started.
     """
@@ -183,7 +184,7 @@ def _find_or_start(lab):
     port = _master_port()
     is_local = rosgraph.get_master_uri().split("://")[-1].startswith(("localhost:", "127."))
     state = _state_folder() / ("lab_session-%d" % port)
-    # What another notebook's kernel has left behind is on its way out, or still on its way up.
+    # A simulator of an ended notebook is shutting down, or still starting.
     if keeper.is_held(state) and state.read_text().startswith("ending"):
         wait_in_order([Condition("the simulator before this one to end", lambda: not keeper.is_held(state),
                                  lambda: "it still runs")], keeper.STOP_TIMEOUT_S + 10.0, startup.LINE)
@@ -209,7 +210,7 @@ def _holds(state, lab):
 
 
 def _become_node(name):
-    """rospy.init_node, once in a process; its master has to stay the same."""
+    """rospy.init_node, once in a process; its master must stay the same."""
     global _run_id
     run_id = rosgraph.Master("/lab_session").getParam("/run_id")  # roslaunch and roscore set it
     if not rospy.core.is_initialized():
@@ -237,7 +238,7 @@ def _keep(state, command, log, after=None):
 
 
 def _closed(process):
-    """Let a keeper end what it keeps, and wait for it; returns None, which is what remains."""
+    """Let a keeper end its command, and wait for it; returns None, to replace the keeper's reference."""
     if process is not None:
         with contextlib.suppress(OSError):
             process.stdin.close()

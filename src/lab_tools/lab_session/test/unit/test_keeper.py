@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The keeper ends what it keeps when its owner is gone, however that happened; and what the labs' names stand for."""
+"""The keeper ends its command when its owner is gone, in any way; and the labs behind the names."""
 import os
 import signal
 import subprocess
@@ -14,7 +14,7 @@ from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
 
 DEADLINE_S = 30.0
-# A child that ignores every polite signal, of a command that obeys Ctrl-C.
+# A child that ignores SIGINT and SIGTERM, of a command that ends on Ctrl-C.
 STUBBORN = """import signal, sys, time
 for number in (signal.SIGINT, signal.SIGTERM):
     signal.signal(number, signal.SIG_IGN)
@@ -39,7 +39,7 @@ def keep(state, *command):
 
 @pytest.fixture
 def kept(tmp_path):
-    """A keeper at work, its state file, and the folder that its command writes to."""
+    """A running keeper, its state file, and the folder that its command writes to."""
     (tmp_path / "stubborn.py").write_text(STUBBORN)
     (tmp_path / "command.py").write_text(COMMAND)
     process = keep(tmp_path / "state", sys.executable, str(tmp_path / "command.py"), str(tmp_path))

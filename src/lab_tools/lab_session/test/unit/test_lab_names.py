@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What connect() makes of its arguments, before it looks for anything."""
+"""How connect() handles its arguments, before it searches for a lab."""
 import contextlib
 
 import pytest
@@ -27,7 +27,7 @@ def test_no_master_is_said(monkeypatch):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """The commands of simulators that were asked for; the first one does not come up."""
+    """The commands of requested simulators; the first one does not start."""
     commands = []
 
     def find_or_start(lab):
