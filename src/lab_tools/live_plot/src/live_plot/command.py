@@ -49,7 +49,8 @@ def positive(text):
 
 
 def wait_for(done, deadline):
-    """Poll until done() or the deadline [s, time.monotonic]; return whether it was done. Ends early with the node."""
+    """Poll until done() or the deadline [s, time.monotonic]; return whether it was done. Returns early when the node
+    ends."""
     while not done():
         if time.monotonic() > deadline or rospy.is_shutdown():
             return False
@@ -58,7 +59,7 @@ def wait_for(done, deadline):
 
 
 def subscribe_all(subscriptions, paths, deadline):
-    """Raises PlotError, for a topic that is not there once the deadline is over."""
+    """Raises PlotError for a topic that does not exist at the deadline."""
     while True:
         try:
             types = topic_types()
@@ -116,7 +117,7 @@ def show_window(options):
         nonlocal is_over
         is_over = True
 
-    # An event loop that does not run yet cannot be quit: the end is only noted, and a timer of the loop looks for it.
+    # An event loop that does not run yet cannot be quit: set a flag, which a timer of the loop checks.
     for name in (signal.SIGINT, signal.SIGTERM):
         signal.signal(name, end)
     rospy.on_shutdown(end)
@@ -141,7 +142,7 @@ def show_window(options):
 
 
 def main(name):
-    """The command ``name``: reads the command line, ends the process with a line of its own where it cannot go on."""
+    """The command ``name``: reads the command line; exits with one line if it cannot go on."""
     options = parse(name, rospy.myargv()[1:])
     if not rosgraph.is_master_online():
         sys.exit("%s: no ROS master at %s; start roscore or a launch file" % (name, rosgraph.get_master_uri()))

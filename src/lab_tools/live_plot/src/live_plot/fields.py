@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What `/topic/field[0]:other` names: from text to curves that take their value out of a message. Knows no ROS.
+"""Parses `/topic/field[0]:other` to curves, which read their value from a message. Free of ROS.
 
 Message types are described by a function: type name -> {field: type}, types written as in .msg files.
 """
@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 NUMBERS = frozenset(
     "bool byte char int8 uint8 int16 uint16 int32 uint32 int64 uint64 float32 float64 time duration".split())
-# Times are plotted in seconds; their parts can be named, too.
+# Times are plotted in seconds; their parts can also be plotted.
 TIME_PARTS = {"time": {"secs": "uint32", "nsecs": "uint32"}, "duration": {"secs": "int32", "nsecs": "int32"}}
 _TOKEN = re.compile(r"(\w+)(?:\[(\d+)\])?", re.ASCII)
 _ARRAY = re.compile(r"(.+)\[(\d*)\]")
 
 
 class PlotError(Exception):
-    """What was asked for cannot be plotted; the text says what could."""
+    """The request cannot be plotted; the text says what can."""
 
 
 class UnknownTopic(PlotError):
@@ -31,7 +31,7 @@ class Curve:
     steps: tuple
 
     def value(self, message):
-        """Return the number as float; raises PlotError where this message's array is too short."""
+        """Return the number as float; raises PlotError if this message's array is too short."""
         for name, index in self.steps:
             message = getattr(message, name)
             if index is not None:
@@ -58,7 +58,7 @@ def expand(argument):
 
 
 def split(path, topics):
-    """Return (topic, field tokens) of a path; of several topics that begin it the longest. Raises UnknownTopic.
+    """Return (topic, field tokens) of a path; if several topics match, the longest one. Raises UnknownTopic.
 
     topics: names of all topics.
     """
@@ -73,10 +73,10 @@ def split(path, topics):
 
 
 def curves(topic, tokens, type_name, fields_of):
-    """Return the Curves that field tokens name in messages of a type; a message stands for all its numbers.
+    """Return the Curves for field tokens in messages of a type; a message means all its numbers.
 
-    Raises PlotError, which lists the fields that there are.
-    fields_of: function from the name of a message type to {field: type}.
+    Raises PlotError, which lists the existing fields. fields_of: function from the name of a message type to {field:
+    type}.
     """
     here, steps, label = type_name, (), topic
     for token in tokens:

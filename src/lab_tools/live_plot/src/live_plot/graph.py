@@ -2,12 +2,12 @@
 """Curves over time, drawn by PyQtGraph: the picture in the window and in the file."""
 import pyqtgraph
 
-# Easy to tell apart on white, for colour-blind readers, too; the seventh curve begins again, dashed.
+# Distinguishable on white, also for colour-blind readers; the seventh curve uses the first colour again, dashed.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#333333")
 
 
 class Graph(pyqtgraph.PlotWidget):
-    """draw() shows a recording; with `span_s` its last seconds, otherwise all of it or what the mouse has chosen."""
+    """draw() shows a recording; with `span_s` its last seconds, otherwise all of it, or the range chosen by mouse."""
 
     def __init__(self):
         super().__init__(background="w")
@@ -20,7 +20,7 @@ class Graph(pyqtgraph.PlotWidget):
         self._lines = {}
 
     def draw(self, recording, span_s=None):
-        """Draw a Recording. span_s: how much before the newest sample is shown [s]; None leaves the view alone."""
+        """Draw a Recording. span_s: time shown before the newest sample [s]; None keeps the view."""
         samples, begin_s = recording.samples(span_s)
         self._match_lines(samples)
         end_s = begin_s
@@ -39,7 +39,7 @@ class Graph(pyqtgraph.PlotWidget):
                 self._lines[label] = self.plot(name=label, pen=self._free_pen(), autoDownsample=True, clipToView=True)
 
     def _free_pen(self):
-        """The first combination of colour and dashes that no line has."""
+        """The first unused combination of colour and dashes."""
         taken = {(line.opts["pen"].color().name(), line.opts["pen"].style()) for line in self._lines.values()}
         style = pyqtgraph.QtCore.Qt.PenStyle
         for dashes in (style.SolidLine, style.DashLine, style.DotLine, style.DashDotLine):

@@ -4,14 +4,14 @@ import threading
 
 import numpy as np
 
-# At 50 Hz the last 20 minutes.
+# 20 minutes at 50 Hz.
 CAPACITY = 60_000
-# Stamps of several publishers may cross by less; a larger step back is a simulation that has started again.
+# Stamps of several publishers may be out of order by less; a larger step back means a restarted simulation.
 RESTART_STEP_S = 1.0
 
 
 class _Series:
-    """The last `capacity` samples, in order. The array is twice as long, so that old ones are moved out rarely."""
+    """The last `capacity` samples, in order. The array is twice as long, so that data is rarely moved."""
 
     def __init__(self, capacity):
         self._data = np.empty((2, 2 * capacity))
@@ -59,9 +59,9 @@ class Recording:
             self._series = {label: _Series(self._capacity) for label in self._series}
 
     def append(self, label, time_s, value):
-        """Add a sample; one of a curve that has been removed meanwhile is dropped.
+        """Add a sample; a sample of a removed curve is dropped.
 
-        A time that jumps back by more than RESTART_STEP_S starts the curve anew.
+        A time that jumps back by more than RESTART_STEP_S restarts the curve.
         """
         with self._lock:
             if label in self._series:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From topics to a recording: one subscriber for each topic, whatever number of its fields is plotted."""
+"""From topics to a recording: one subscriber for each topic, for all its plotted fields."""
 import threading
 
 import roslib.message
@@ -22,13 +22,13 @@ def _message_class(type_name):
 
 
 def topic_types():
-    """Return {topic: type} of all topics that somebody publishes or listens to with a known type."""
+    """Return {topic: type} of all topics with a publisher or subscriber of known type."""
     # '*' is a subscriber to any type, rostopic echo for example.
     return {name: kind for name, kind in rospy.get_master().getTopicTypes()[2] if kind != "*"}
 
 
 class Subscriptions:
-    """Opens and closes what is plotted.
+    """Opens and closes subscriptions of plotted topics.
 
     on_problem(text): called from another thread, once for each problem, if a message lacks the number.
     """
@@ -42,7 +42,7 @@ class Subscriptions:
         self._problems = set()
 
     def open(self, path, types):
-        """Subscribe to what a path of fields.expand names; return its labels. types: as from topic_types().
+        """Subscribe to the topic of a path from fields.expand; return its labels. types: as from topic_types().
 
         Raises PlotError, and UnknownTopic if the topic is not there yet.
         """
@@ -59,7 +59,7 @@ class Subscriptions:
         return [curve.label for curve in added]
 
     def close(self, label):
-        """Plot a curve no longer; nothing happens if it is not plotted."""
+        """Remove a curve; does nothing if it is not plotted."""
         with self._lock:
             for topic, known in list(self._curves.items()):
                 self._curves[topic] = tuple(curve for curve in known if curve.label != label)

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The live window: what to plot, autoscroll, pause, and the graph."""
+"""The live window: entry of curves, autoscroll, pause, and the graph."""
 from pyqtgraph.Qt import QtCore, QtWidgets
 
 from . import fields
 from .graph import Graph
 
 REDRAW_MS = 50
-# A long recording, shown whole, takes long to draw; then it is drawn less often.
+# Drawing a whole long recording is slow, so it is drawn less often.
 DRAWING_SHARE = 0.25
 RETRY_MS = 1000
 
 
 class PlotWindow(QtWidgets.QWidget):
-    """subscribe(path) -> labels (raises PlotError), unsubscribe(label): how curves get into the recording.
+    """subscribe(path) -> labels (raises PlotError), unsubscribe(label): add and remove curves of the recording.
 
-    A path whose topic is not there yet is tried again every second.
+    A path whose topic does not exist yet is tried again every second.
     """
 
     problem = QtCore.Signal(str)  # may be emitted from any thread
@@ -58,7 +58,7 @@ class PlotWindow(QtWidgets.QWidget):
             timer.start()
 
     def add(self, argument):
-        """Plot what an argument of the command line names. Return whether all is well; if not, the window says why."""
+        """Add the curves of a command line argument. Return whether it succeeded; if not, the window shows why."""
         try:
             self._waiting += fields.expand(argument)
         except fields.PlotError as error:

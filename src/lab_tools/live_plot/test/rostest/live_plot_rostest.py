@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""`rosrun live_plot plot` against a publisher: pictures without a display, answers to mistakes, the end."""
+"""`rosrun live_plot plot` against a publisher: pictures without a display, errors, the end."""
 import math
 import os
 import signal

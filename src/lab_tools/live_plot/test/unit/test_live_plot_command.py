@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("pyqtgraph", reason="./baxter.sh setup installs pyqtgraph")
 
-# What is to end the window happens while it is being made, when it asks which topics there are.
+# The end is requested while the window is being made, during its query for topics.
 SHOW = """import os, signal, rospy
 from live_plot import command
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From what people type to numbers of messages: syntax, topics, fields, arrays, times, and what each error says."""
+"""From users' input to numbers of messages: syntax, topics, fields, arrays, times, and all errors."""
 import subprocess
 import sys
 from types import SimpleNamespace

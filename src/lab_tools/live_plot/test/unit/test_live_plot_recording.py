@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Samples are kept in order, the newest ones only; time that starts again starts the curve again."""
+"""Samples are kept in order, the newest ones only; time that restarts also restarts the curve."""
 import threading
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The graph and the window on Qt's offscreen platform: curves are seen, topics come late, curves go."""
+"""The graph and the window on Qt's offscreen platform: curves are drawn, topics come late, curves are removed."""
 import locale
 import os
 
