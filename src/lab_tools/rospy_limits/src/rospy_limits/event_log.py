@@ -7,7 +7,7 @@ PERIOD_S = 60.0
 
 
 class EventLog:
-    """One line for the first event of a kind, then at most one a minute, with how many there have been since."""
+    """One line for the first event of a kind, then at most one a minute, with the count since then."""
 
     def __init__(self, write, clock=time.monotonic):
         """``write(text)`` takes a line; ``clock`` is replaceable for tests."""
@@ -17,7 +17,7 @@ class EventLog:
         self._kinds = {}
 
     def add(self, kind, text):
-        """Any thread: an event of ``kind`` (hashable) has happened, ``text`` says what and to whom."""
+        """Any thread: note an event of ``kind`` (hashable); ``text`` describes it."""
         now = self._clock()
         with self._lock:
             last, untold = self._kinds.get(kind, (None, 0))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Accepting connections and reading their handshake headers without waiting for any of them. ROS-free.
 
-One thread serves them all: a client that sends nothing, or a byte a second, holds up nobody. Each has a deadline, and
-each address a number of connections.
+One thread serves them all: a client that sends nothing, or a byte a second, delays nobody. Each connection has a
+deadline, and each address a maximum number of connections.
 """
 import collections
 import contextlib
@@ -17,11 +17,11 @@ from rospy_limits import limits
 
 _LENGTH = struct.Struct("<I")
 _NO_MORE_FILES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
-#: How long nothing is accepted after the process has run out of descriptors [s].
+#: Pause of accepting after the process has run out of descriptors [s].
 PAUSE_S = 0.2
-#: Connections that are accepted before those that are open already are read again.
+#: Number of connections accepted before open ones are read again.
 ACCEPTED_AT_ONCE = 32
-#: An open connection on which nothing comes is asked after this long [s], then every so many [s], so many times.
+#: TCP keep-alive: idle time [s], interval [s], number of probes.
 KEEPALIVE = (60, 10, 9)
 
 
@@ -36,7 +36,7 @@ class _Pending:
         self.wanted = _LENGTH.size
 
     def read(self):
-        """Take what is there; returns whether the header is complete. Raises ``OSError`` and ``HeaderRefused``."""
+        """Read available bytes; returns whether the header is complete. Raises ``OSError`` and ``HeaderRefused``."""
         while True:
             portion = self.socket.recv(min(self.wanted - len(self.data), 65536))
             if not portion:
@@ -56,11 +56,11 @@ class _Pending:
 
 
 class HeaderRefused(Exception):
-    """What a client sent can be no handshake header; the text says why."""
+    """A client's data is no valid handshake header; the text says why."""
 
 
 def _notice_lost_peers(connection):
-    """Have the kernel ask whether the other machine still is there, as rospy does where it is the one that connects."""
+    """Enable TCP keep-alive, as rospy does on connections that it makes."""
     with contextlib.suppress(OSError, AttributeError):
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         options = socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT
@@ -72,8 +72,8 @@ class HandshakeServer:
     """Serves one listening socket until :meth:`close`."""
 
     def __init__(self, listener, serve, events, clock=time.monotonic):
-        """``listener``: a listening socket, which stays the caller's. ``serve(connection, address, header)`` takes over
-        a connection with its header [bytes, from the length on]; it must not wait for the client. ``events``:
+        """``listener``: a listening socket, which the caller still owns. ``serve(connection, address, header)`` takes
+        over a connection with its header [bytes, from the length on]; it must not wait for the client. ``events``:
         :class:`EventLog`."""
         self._listener = listener
         self._serve = serve
@@ -92,7 +92,7 @@ class HandshakeServer:
 
     @property
     def pending(self):
-        """How many connections are in their handshake."""
+        """Number of connections in their handshake."""
         return len(self._pending)
 
     def close(self):
@@ -114,9 +114,9 @@ class HandshakeServer:
             self._waker.close()
 
     def turn(self, timeout_s=None):
-        """Wait until something comes in, a deadline has passed, or ``timeout_s`` [s]; and do what is to be done."""
+        """Wait for data, a deadline or ``timeout_s`` [s]; then handle it."""
         ready = self._selector.select(self._timeout() if timeout_s is None else timeout_s)
-        # First those that have sent something: connections closed to make room for others have not.
+        # First those with data: only silent connections may be closed to make room.
         for key, _ in ready:
             if key.data is not None:
                 self._read(key.data)
@@ -157,14 +157,14 @@ class HandshakeServer:
         self._read(pending, is_new=True)
 
     def _is_full(self, host):
-        """Counts what is open; sockets are held weakly, their new owner closes them."""
+        """Counts open sockets; they are held weakly, since their new owner closes them."""
         held = self._open[host]
         if len(held) >= limits.CONNECTIONS_PER_ADDRESS:
             held[:] = [reference for reference in held if (still := reference()) is not None and still.fileno() >= 0]
         return len(held) >= limits.CONNECTIONS_PER_ADDRESS
 
     def _read(self, pending, is_new=False):
-        """Most headers are there with their connection: those are never registered."""
+        """Most headers arrive together with the connection: those are never registered."""
         try:
             complete = pending.read()
         except (BlockingIOError, InterruptedError):
@@ -172,7 +172,7 @@ class HandshakeServer:
                 self._wait_for(pending)
             return
         except OSError:
-            self._drop(pending)  # dropped by the client, which is its right
+            self._drop(pending)  # the client has closed it, which is no error
             return
         except HeaderRefused as error:
             self._drop(pending)
@@ -232,7 +232,7 @@ class HandshakeServer:
                          "of more than %d without" % (host, limits.HANDSHAKE_S, limits.HANDSHAKES_PER_ADDRESS))
 
     def _make_room(self, error):
-        """Without descriptors the listener would be ready all the time, and nothing could be done about it."""
+        """Without free descriptors the listener would be ready all the time, and accepting would always fail."""
         self._events.add("files", "no connection can be accepted: %s; those without a handshake are closed"
                          % error.strerror)
         for pending in list(self._pending.values()):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parse untrusted JSON objects from messages, within limits. ROS-free.
 
-Python's own reader fails in its own ways on what JSON allows: brackets a thousand deep, integers of any length.
+Python's own reader raises other errors on some valid JSON: brackets a thousand deep, integers of any length.
 """
 import json
 import re
@@ -18,13 +18,13 @@ _BRACKETS = {"{": 1, "[": 1, "}": -1, "]": -1}
 
 
 class JsonRefused(ValueError):
-    """A text is no JSON object, or one beyond the limits; says what was found and what is allowed."""
+    """The text is no JSON object, or exceeds a limit; the message says what was found and what is allowed."""
 
 
 def read_object(text):
-    """The JSON object in ``text`` as a dict, an empty one where there is nothing but white space.
+    """The JSON object in ``text`` as a dict, an empty one for white space.
 
-    NaN and Infinity are read, as Python writes them. Raises :class:`JsonRefused`.
+    NaN and Infinity are accepted, as Python writes them. Raises :class:`JsonRefused`.
     """
     if not text.strip():
         return {}

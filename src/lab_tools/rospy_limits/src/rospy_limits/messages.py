@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages and requests that announce too large a size are refused by that, before they are read."""
+"""Messages and requests with a too large announced size are refused before they are read."""
 import contextlib
 import struct
 
@@ -14,17 +14,17 @@ _known = []
 
 
 class MessageTooLarge(TransportTerminated):
-    """A message announces more bytes than are taken; rospy does not take such a connection up again."""
+    """A message announces more bytes than allowed; rospy does not reconnect after this error."""
 
 
 def largest_message_bytes():
-    """The longest message or request that this node takes [bytes]: its parameter, asked for once, or the default."""
+    """The longest message or request that this node takes [bytes]: its parameter, read once, or the default."""
     if _known:
         return _known[0]
     value = limits.MESSAGE_BYTES
     try:
         value = rospy.get_param(limits.SIZE_PARAMETER, value)
-    except Exception:  # noqa: BLE001  (no master for the moment: it is asked again the next time)
+    except Exception:  # noqa: BLE001  (no master at the moment: read again at the next call)
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 1 <= value < 2**32:
         rospy.logerr("%s is %r, expected a number of bytes from 1 to %d; taking %d",

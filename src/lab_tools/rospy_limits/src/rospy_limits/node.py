@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Putting the limits in force."""
+"""Installs the limits."""
 import contextlib
 import resource
 
@@ -15,7 +15,8 @@ _installed = []
 
 
 def limit_ports():
-    """Put the limits in force in this process. Before ``rospy.init_node``, which opens the ports; twice is once."""
+    """Install the limits in this process. Call it before ``rospy.init_node``, which opens the ports; a second call does
+    nothing."""
     if _installed:
         return
     events = EventLog(rospy.logwarn)
@@ -31,7 +32,7 @@ def limit_ports():
 
 
 def _ask_for_files():
-    """As many descriptors as the system lets this process have, up to what is ever of use."""
+    """Raise the limit of open files as far as the system allows, up to the useful maximum."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = limits.OPEN_FILES if hard == resource.RLIM_INFINITY else min(limits.OPEN_FILES, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What takes the place of rospy's way to serve one connection of a service."""
+"""Replaces rospy's code that serves one connection of a service."""
 import collections
 import select
 import threading
@@ -11,7 +11,7 @@ from rospy_limits.messages import MessageTooLarge
 
 
 class _Counts:
-    """How many connections each address has."""
+    """Number of connections of each address."""
 
     def __init__(self):
         self._lock = threading.Lock()
@@ -32,7 +32,7 @@ class _Counts:
 
 
 def connection_server(events):
-    """What to put in the place of ``rospy.impl.tcpros_service.ServiceImpl.handle``. Runs in the connection's thread."""
+    """The replacement of ``rospy.impl.tcpros_service.ServiceImpl.handle``. Runs in the connection's thread."""
     counts = _Counts()
 
     def handle(service, transport, header):
@@ -80,7 +80,7 @@ def _serve(service, transport, is_persistent, caller, events):
 
 
 def _forget_unsent(buffer):
-    """Drop the half of an answer that could not be written: it would go out in front of the next one."""
+    """Drop a partly serialized response: it would be sent in front of the next one."""
     if buffer.tell():
         buffer.seek(0)
         buffer.truncate()
@@ -94,7 +94,7 @@ def _reject(service, transport, caller, error, events):
 
 
 def _has_come(transport, timeout_s):
-    """Whether a first byte is there in time; the end of the connection counts as one."""
+    """Whether a first byte arrives in time; the end of the connection counts as one."""
     poller = select.poll()
     try:
         poller.register(transport.socket, select.POLLIN)
@@ -104,7 +104,7 @@ def _has_come(transport, timeout_s):
 
 
 def _refuse(service, transport, text):
-    """Tell the client, who gets it as the text of a ServiceException, and close."""
+    """Send the reason, which the client gets as the text of a ServiceException, and close."""
     try:
         service._write_service_error(transport, text)
         _read_away(transport.socket)
@@ -114,7 +114,8 @@ def _refuse(service, transport, text):
 
 
 def _read_away(connection, most_bytes=1 << 20, wait_s=0.5):
-    """Take a part of what was sent: closing on unread bytes would reset the connection before the answer is read."""
+    """Read some of the sent bytes: closing with unread bytes would reset the connection before the client reads the
+    answer."""
     connection.settimeout(wait_s)
     while most_bytes > 0:
         portion = connection.recv(65536)

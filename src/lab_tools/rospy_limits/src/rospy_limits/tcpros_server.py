@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What takes the place of rospy's server for topics and services."""
+"""Replaces rospy's server for topics and services."""
 import threading
 
 import rosgraph.network
@@ -8,12 +8,12 @@ from rospy.core import is_shutdown_requested
 
 from rospy_limits.handshakes import HandshakeServer
 
-#: Connections that the kernel holds until they are accepted. rospy asks for 5; beyond, clients wait for a second.
+#: Connections that the kernel holds until they are accepted. rospy uses 5; beyond, clients wait for a second.
 BACKLOG = 128
 
 
 def limited_server(events):
-    """The class to put in the place of ``rospy.impl.tcpros_base.TCPServer``."""
+    """The replacement of the class ``rospy.impl.tcpros_base.TCPServer``."""
 
     class LimitedTCPServer(tcpros_base.TCPServer):
         def __init__(self, inbound_handler, port=0):
@@ -32,7 +32,7 @@ def limited_server(events):
 
 
 def connection_handler(events):
-    """What to put in the place of ``TCPROSServer._tcp_server_callback``: it gets the header that has been read."""
+    """The replacement of ``TCPROSServer._tcp_server_callback``: it gets the header that has been read."""
 
     def take(server, connection, address, data):
         try:
@@ -55,7 +55,7 @@ def connection_handler(events):
 
 
 def _answer(handler, connection, address, header, events):
-    """Have rospy take the connection over, or send its reason why not and close it."""
+    """Let rospy take over the connection, or send rospy's reason of refusal and close it."""
     try:
         reason = handler(connection, address, header)
         if not reason:

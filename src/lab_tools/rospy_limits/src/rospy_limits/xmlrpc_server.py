@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A node's XML-RPC server with a deadline for each connection and a number of them for each address."""
+"""A node's XML-RPC server with a deadline for each connection and a maximum number for each address."""
 import collections
 import contextlib
 import errno
@@ -12,14 +12,14 @@ import rosgraph.xmlrpc
 from rospy_limits import limits
 
 _NO_MORE_FILES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
-#: How long the server sleeps after it has run out of descriptors [s]; otherwise it would ask without end.
+#: Sleep of the server after it has run out of descriptors [s]; otherwise it would loop at full speed.
 PAUSE_S = 0.2
 
 
 class Connections:
     """The open connections of a server, each with the time at which it is closed. Any thread.
 
-    A connection that is closed for what it did not do is shut down only: the thread that waits for it closes it.
+    An idle connection is only shut down: the thread that waits for it closes it.
     """
 
     def __init__(self, events, clock=time.monotonic):
@@ -30,7 +30,7 @@ class Connections:
         self._deadlines = collections.OrderedDict()  # {socket: (address, deadline)}, the longest unchanged first
 
     def add(self, connection, host):
-        """A new connection of address ``host``. Where it is one too many, the one that has waited longest is closed."""
+        """Add a connection of address ``host``. If there are too many, the longest idle one is closed."""
         with self._lock:
             of_host = [other for other, (its_host, _) in self._deadlines.items() if its_host == host]
             if len(of_host) >= limits.XMLRPC_PER_ADDRESS:
@@ -38,7 +38,7 @@ class Connections:
             self._deadlines[connection] = host, self._clock() + limits.XMLRPC_FIRST_S
 
     def allow(self, connection, time_s):
-        """The connection has done something and is left open for another ``time_s`` [s]."""
+        """The connection was active: keep it open for another ``time_s`` [s]."""
         with self._lock:
             if connection in self._deadlines:
                 host, _ = self._deadlines.pop(connection)
@@ -50,7 +50,7 @@ class Connections:
             self._deadlines.pop(connection, None)
 
     def expire(self):
-        """Close those whose time is over."""
+        """Close the expired ones."""
         now = self._clock()
         with self._lock:
             for connection, (host, deadline) in list(self._deadlines.items()):
@@ -58,7 +58,7 @@ class Connections:
                     self._end(connection, host)
 
     def make_room(self, reason):
-        """Close the quarter that has waited longest."""
+        """Close the quarter that was idle longest."""
         self._events.add("xmlrpc files", "no XML-RPC connection can be accepted: %s; those that have waited longest "
                          "are closed" % reason)
         with self._lock:
@@ -82,7 +82,7 @@ class _RequestHandler(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler):
         except ValueError:
             length = -1
         if not 0 <= length <= limits.MESSAGE_BYTES:
-            # What follows is not read, so that nothing after it can be.
+            # The rest is not read, so no later request can be read.
             self.close_connection = True
             self.send_error(413 if length >= 0 else 411, explain="Content-Length is %r, expected 0 to %d bytes"
                             % (self.headers.get("Content-Length"), limits.MESSAGE_BYTES))
@@ -92,7 +92,7 @@ class _RequestHandler(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler):
 
 
 def limited_server(events):
-    """The class to put in the place of ``rosgraph.xmlrpc.ThreadingXMLRPCServer``."""
+    """The replacement of the class ``rosgraph.xmlrpc.ThreadingXMLRPCServer``."""
 
     class LimitedXMLRPCServer(rosgraph.xmlrpc.ThreadingXMLRPCServer):
         def __init__(self, addr, log_requests=1):

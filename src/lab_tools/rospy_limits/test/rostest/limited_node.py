@@ -7,7 +7,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from rospy_limits.node import limit_ports
 
-# More than a socket takes of a client that does not read.
+# More than a socket buffers for a client that does not read.
 LARGE_BYTES = 20_000_000
 HALF = "\udcff"
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What others do to the ports of a node from outside, and that its service and its topics go on working."""
+"""Attacks on the ports of a node; its service and its topics go on working."""
 import contextlib
 import os
 import re

@@ -26,7 +26,7 @@ def framed(data):
 
 
 class Scene:
-    """A server that the test turns, and clients of it."""
+    """A server whose turns the test calls, and its clients."""
 
     def __init__(self):
         self.clock = Clock()
@@ -60,7 +60,7 @@ def scene():
 
 
 def is_closed(client):
-    """Whether the server has closed the connection (and its answer is there by now)."""
+    """Whether the server has closed the connection (and sent its answer)."""
     try:
         client.setblocking(False)
         return client.recv(1) == b""
@@ -98,7 +98,7 @@ def test_five_hundred_silent_clients_hold_up_nobody_and_are_closed_in_time(scene
     scene.connect(framed(b"me"))
     scene.turn_until(lambda: scene.served, "the client that speaks")
     assert scene.server.pending == limits.HANDSHAKES_PER_ADDRESS
-    # The oldest have gone for the newest.
+    # The oldest were closed for the newest.
     wait_until(lambda: all(map(is_closed, silent[:500 - limits.HANDSHAKES_PER_ADDRESS])), "the oldest to be closed")
     assert not is_closed(silent[-1])
     scene.clock.now += limits.HANDSHAKE_S
@@ -171,7 +171,7 @@ def test_without_descriptors_the_silent_ones_go_and_serving_goes_on(scene):
     scene.turn_until(lambda: scene.server.pending == 1, "the silent client")
     scene.connect(framed(b"me"))
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    # No number below the highest is free, and none above it is allowed.
+    # No descriptor below the highest is free, and none above it is allowed.
     highest = max(int(name) for name in os.listdir("/proc/self/fd"))
     fillers = [os.dup(scene.listener.fileno())]
     while fillers[-1] < highest:

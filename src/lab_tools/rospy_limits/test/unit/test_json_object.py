@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""JSON that comes in by message: what is read, and that nothing costs more than an error."""
+"""JSON from messages: what is accepted, and that everything else gives only an error."""
 import math
 import time
 
