@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Goals that would be good but for one random fault."""
+"""Goals that are valid except for one random fault."""
 import math
 
 KINDS = ("number", "time", "size", "limit", "velocity", "start", "joints", "empty", "too_long")
-# What the server's text must hold, by kind.
+# Texts that the server's message must contain, by kind.
 WORDS = {"number": "not a finite number", "time": "time_from_start must increase", "size": "expected",
          "limit": "is beyond its limit", "velocity": "rad/s is beyond its limit", "start": "start_tolerance",
          "joints": "joint_names has", "empty": "no points", "too_long": "max_duration_s"}
 
 
 def spoilt_goal(source, number, limits, here):
-    """(kind, joint names, rows (time, positions), the rows before they were spoilt), the fault of the kind's turn.
+    """(kind, joint names, rows (time, positions), the rows without the fault), with a fault of the next kind in turn.
 
     ``source``: random.Random; ``limits``: {joint: JointLimit}; ``here``: {joint: angle [rad]}.
     """

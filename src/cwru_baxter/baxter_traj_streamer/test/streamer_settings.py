@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings as the nodes read them, without ROS."""
+"""The nodes' settings, read without ROS."""
 import pathlib
 
 import yaml

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The library of Case Western's notes on Baxter for C++: poses of the arms, paths turned into trajectories.
 //
-// Vectors of seven go from torso to tool flange [rad]. Arrival times come from traj_interpolator_as, where the limits and
-// the rule are: calls that need them wait for it, and say so. Everything throws std::runtime_error when ROS shuts down
-// while it waits, or when an argument cannot be used.
+// Vectors of seven go from torso to tool flange [rad]. Arrival times come from traj_interpolator_as, where the limits
+// and the rule are: calls that need them wait for it, and say so. Everything throws std::runtime_error when ROS shuts
+// down while it waits, or when an argument cannot be used.
 #ifndef BAXTER_TRAJ_STREAMER_BAXTER_TRAJ_STREAMER_H
 #define BAXTER_TRAJ_STREAMER_BAXTER_TRAJ_STREAMER_H
 
@@ -56,7 +56,7 @@ private:
     void cmd_pose(const std::string &side, const Vectorq7x1 &qvec);
 
     ros::NodeHandle nh_;
-    ros::CallbackQueue queue_;  // of our own, so that nobody needs to spin
+    ros::CallbackQueue queue_;  // own queue, so that the caller need not spin
     std::mutex mutex_;
     std::map<std::string, double> angles_;
     ros::AsyncSpinner spinner_;

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Trajectories for the arms of Baxter: judged, timed, streamed."""
+"""Trajectories for the arms of Baxter: checked, timed, streamed."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An action server for ``traj`` that knows its clients: which version they speak, and whether they are there."""
+"""An action server for ``traj`` that knows its clients: their version of the action, and whether they still run."""
 import actionlib
 import rospy
 from actionlib.status_tracker import StatusTracker
@@ -15,12 +15,13 @@ _HEADER_SIZE = 16
 
 
 class TrajServer(actionlib.ActionServer):
-    """``actionlib.ActionServer`` of one ``versions.Version``; who speaks another one is told so on both sides."""
+    """``actionlib.ActionServer`` of one ``versions.Version``; a client of the other version gets a log line on both
+    sides."""
 
     def __init__(self, name, version, goal_callback, cancel_callback):
         super().__init__(name, version.action, goal_callback, cancel_callback, auto_start=False)
         self._version = version
-        # Lets goals of another version in, so that they can be answered; tools still see the type that is served.
+        # Accepts goals of another version, so that they can be rejected with a reason; tools still see the served type.
         self.ActionGoal = type("GoalOfAnyVersion", (rospy.AnyMsg,), {
             "__slots__": [], "_type": version.action_goal._type})
         self._told = set()
@@ -31,7 +32,7 @@ class TrajServer(actionlib.ActionServer):
         return any(connection.callerid_pub == caller for connection in self._connections())
 
     def internal_goal_callback(self, message):
-        """Goals come in here, as bytes."""
+        """Receives goals as bytes."""
         header = message._connection_header
         if header["md5sum"] == self._version.md5sum:
             goal = self._version.action_goal()
@@ -40,7 +41,7 @@ class TrajServer(actionlib.ActionServer):
             if can_be_answered(goal.goal_id):
                 super().internal_goal_callback(goal)
             return
-        # Whatever the version, a goal begins with these two, and states of goals are the same in all.
+        # In every version a goal begins with these two, and goal states are the same.
         start = _HEADER_SIZE + len(Header().deserialize(message._buff).frame_id.encode())
         goal_id = GoalID().deserialize(message._buff[start:])
         if not can_be_answered(goal_id):
@@ -56,7 +57,7 @@ class TrajServer(actionlib.ActionServer):
             self.publish_status()
 
     def publish_status(self):
-        """Called a few times a second: a client of another version may never come as far as to send a goal."""
+        """Called a few times a second: a client of another version may never get to send a goal."""
         super().publish_status()
         for connection in self._connections():
             caller, version = connection.callerid_pub, connection.md5sum
@@ -72,5 +73,5 @@ class TrajServer(actionlib.ActionServer):
             caller, kind, md5sum, own.name, own.md5sum, what_now)
 
     def _connections(self):
-        # Only the implementation knows who is at the other end.
+        # Only rospy's implementation knows the node at the other end.
         return list(self.goal_sub.impl.connections) if self.goal_sub and self.goal_sub.impl else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the commands that move arms have in common."""
+"""Shared by the commands that move arms."""
 import sys
 
 import rospy
@@ -19,9 +19,9 @@ def add_wait_option(parser, default_s):
 
 
 def run(name, plan, wait_s):
-    """Send the trajectory ``plan(client)`` and wait for it; exits with a line on stderr where that fails.
+    """Send the trajectory ``plan(client)`` and wait for it; exits with a line on stderr after a failure.
 
-    ``plan`` returns None where there is nothing to send.
+    ``plan`` returns None if there is nothing to send.
     """
     what_now = "nothing was sent"
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The curve through the points of a goal: which polynomial, which times. Free of ROS."""
+"""The curve through the points of a goal: its polynomials and times. Free of ROS."""
 import numpy as np
 
 from joint_trajectory import Trajectory, smooth_velocities
@@ -16,9 +16,9 @@ def has_positions_only(points):
 def interpolate(times, points, start, interpolation):
     """The :class:`Trajectory` from ``start`` (k,) [rad], or from point 0 if that is None, through the points.
 
-    ``times`` (m,) [s], increasing. From a ``start`` the way sets out at rest, and a point at time 0 is taken for it.
-    ``interpolation``: fields (cubic or quintic by what the points give; cubics that rest at both ends and do not
-    overshoot where that is positions alone), linear, cubic or quintic (missing accelerations are 0).
+    ``times`` (m,) [s], increasing. From a ``start`` the curve begins at rest, and a point at time 0 is replaced by it.
+    ``interpolation``: fields (cubic or quintic by the given fields; for positions alone, cubics without overshoot that
+    rest at both ends), linear, cubic or quintic (missing accelerations are 0).
     """
     positions = np.array([point[1] for point in points], dtype=float)
     velocities, accelerations = (
@@ -50,7 +50,7 @@ def interpolate(times, points, start, interpolation):
 
 
 def joined(lead_in, way):
-    """``way`` begun at the end of ``lead_in``, both :class:`Trajectory` from time 0 on."""
+    """``way`` after ``lead_in``, both :class:`Trajectory` from time 0 on."""
     delay = lead_in.end_time
     return Trajectory(np.concatenate([lead_in.starts[:-1], way.starts + delay]),
                       np.concatenate([lead_in.coefficients[:-1], way.coefficients]), way.end_times + delay)

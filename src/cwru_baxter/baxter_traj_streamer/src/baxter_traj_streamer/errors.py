@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Why a goal is refused: a reason, and where it was found."""
+"""Errors: why a goal is refused, and where the fault is."""
 
 
 class GoalRefused(Exception):
-    """A goal that will not be followed.
+    """The goal is refused.
 
     ``reason``: one word (empty, joints, size, number, time, too_long, limit, velocity, start); ``point``, ``joint``,
-    ``value``, ``limit``: where and what was found, None where that makes no sense.
+    ``value``, ``limit``: place and value of the fault, None where not applicable.
     """
 
     def __init__(self, reason, text, point=None, joint=None, value=None, limit=None):

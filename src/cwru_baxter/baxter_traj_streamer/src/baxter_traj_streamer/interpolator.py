@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The action server ``trajActionServer``: glue between goals, judging and the robot's joint commands."""
+"""The action server ``trajActionServer``: connects goals, their checks and the robot's joint commands."""
 import numpy as np
 import rospy
 from baxter_core_msgs.msg import JointCommand
@@ -23,10 +23,10 @@ STOPPED_MEANWHILE = "the robot was disabled or stopped on the way; its arms have
 
 
 class Interpolator:
-    """Streams one goal after the other; call :meth:`run` in the thread that shall do so.
+    """Streams one goal after the other; call :meth:`run` in the streaming thread.
 
-    A goal that is refused disturbs nothing. An accepted one stops the goal before it, smoothly, and begins then.
-    version: what its clients speak, `versions.Version`.
+    A refused goal does not affect the active one. An accepted one stops the active goal smoothly, and then starts.
+    version: the clients' `versions.Version`.
     """
 
     def __init__(self, robot, limits, settings, version):
@@ -57,7 +57,7 @@ class Interpolator:
 
     def _on_goal(self, handle):
         try:
-            # While an arm moves nobody knows where this goal would begin; that is judged when it does.
+            # While an arm moves, the start of this goal is unknown; it is checked when the goal starts.
             self._goals.put(handle, lambda is_busy: self._judge(handle, None if is_busy else self._robot.angles()))
         except GoalRefused as refusal:
             rospy.logwarn("goal refused: %s", refusal)
@@ -94,7 +94,7 @@ class Interpolator:
         """
         now = rospy.get_time()
         motion = Motion(plan, now, self._settings.stop_deceleration)
-        # The time of a simulator that is gone stands still.
+        # After the end of a simulator, time stands still.
         ticker = Ticker(RosClock(gives_up=lambda: (
             rospy.is_shutdown() or self._robot.resets != resets or self._robot.is_gone())), self._settings.rate_hz)
         feedback_due = now
@@ -104,7 +104,7 @@ class Interpolator:
             if why := self._robot.why_not_ready():
                 return handle.set_aborted, why
             if why := self._why_elsewhere(now < before, resets, stops):
-                # What was commanded last is far from where the arms are now, and they follow it until it expires.
+                # The last command is far from the arms' present position, and they follow it until it expires.
                 self._command(plan.joint_names, np.zeros(len(plan.joint_names)), JointCommand.VELOCITY_MODE)
                 return handle.set_aborted, why
             left_alone = self._settings.stop_when_client_leaves and not self._server.has_client(handle)
@@ -119,7 +119,7 @@ class Interpolator:
                 settled_by = settled_by or now + self._settings.settle_time_s
                 late = self._farthest(plan.joint_names, target)
                 if late is None or now >= settled_by:
-                    # Without a stream the robot would hold where it happens to be.
+                    # Without further commands the robot would hold its position at that moment.
                     self._command(plan.joint_names, target, JointCommand.POSITION_MODE)
                     if motion.stopping:
                         stopped = "stopped at %d %% of the way" % motion.percent(now)
@@ -143,11 +143,11 @@ class Interpolator:
         return STOPPED_MEANWHILE if self._robot.stops != stops else ""
 
     def _is_unwanted(self):
-        """Whether the goal at hand was cancelled, or a newer one waits that may take over."""
+        """Whether the active goal was cancelled, or a newer one may replace it."""
         return self._settings.preemption and (self._goals.is_cancelled or self._goals.has_next)
 
     def _farthest(self, names, target):
-        """What is wrong with the joint that is farthest from its target; None if all are near."""
+        """A sentence about the joint that is farthest from its target; None if all are near."""
         angles = self._robot.angles()
         error = np.array([angles[name] for name in names]) - target
         joint = int(np.argmax(np.abs(error)))
@@ -164,5 +164,5 @@ class Interpolator:
                                                command=[values[i] for i in own]))
 
     def _result(self, handle):
-        """``return_val`` counts the goals that were followed, as the notes' server does."""
+        """``return_val`` counts the executed goals, as the notes' server does."""
         return self._version.make_result(self._count, handle.get_goal())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Judges a goal before anything moves. Free of ROS."""
+"""Checks a goal before anything moves. Free of ROS."""
 import functools
 import math
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from .settings import SIDES, arm_joint_names
 KNOWN_JOINTS = tuple(name for side in SIDES for name in arm_joint_names(side))
 RIGHT_ARM = tuple(arm_joint_names("right"))
 _FIELDS = ("positions", "velocities", "accelerations")
-# Where the curve between two points is compared with the limits: shares of the time between them.
+# Samples of the curve between two points that are checked against the limits: shares of the time between them.
 _PLACES = np.linspace(0.0, 1.0, 33)
 # Rounding must not refuse a curve that just touches a limit.
 _ROUNDING = 1e-6
@@ -30,7 +30,7 @@ class JointLimit(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What a goal that was accepted does: ``joint_names`` (k), ``trajectory`` from time 0 on, ``goal`` (k,) [rad]."""
+    """The plan of an accepted goal: ``joint_names`` (k), ``trajectory`` from time 0 on, ``goal`` (k,) [rad]."""
 
     joint_names: tuple
     trajectory: Trajectory
@@ -46,9 +46,9 @@ def judge(joint_names, points, limits, measured, settings):
 
     joint_names: any joints of the arms in any order; empty: the right arm from torso to tool flange.
     points: rows of (time from start [s], positions, velocities, accelerations), the latter two may be empty. With
-    positions only and all times 0 the times are up to us: as short as the limits allow.
-    limits: {joint: JointLimit}; measured: {joint: angle [rad]} or None: the robot may yet move, so leave the start
-    unjudged, from then on at the first point. settings: :class:`~.settings.StreamerSettings`.
+    positions only and all times 0 the server chooses the times: as short as the limits allow. limits: {joint:
+    JointLimit}; measured: {joint: angle [rad]} or None: the robot may still move, so do not check the start, and begin
+    at the first point. settings: :class:`~.settings.StreamerSettings`.
     """
     names = tuple(joint_names) or RIGHT_ARM
     if settings.joints == "right_arm":
@@ -76,7 +76,7 @@ def judge(joint_names, points, limits, measured, settings):
     if at_once and not near and not timeless and settings.start == "refuse":
         _refuse_start(positions[0], start, names, settings.start_tolerance)
     if timeless or (positions_only and settings.interpolation == "time_optimal"):
-        # A first point that is where the robot is stands for that; another is a place to go to.
+        # A first point at the robot's position means the start; another one is a target.
         rest = points[1:] if near and at_once and len(points) > 1 else points
         trajectory = fastest(start, rest, *_pace(names, bounds, settings))
         if trajectory.end_time > settings.max_duration_s:
@@ -100,7 +100,7 @@ def judge(joint_names, points, limits, measured, settings):
 
 
 def _pace(names, bounds, settings):
-    """Velocities [rad/s] and accelerations [rad/s^2] (k,) for ways whose times are up to us."""
+    """Velocities [rad/s] and accelerations [rad/s^2] (k,) for trajectories whose times the server chooses."""
     velocity, acceleration = ([table[name.rpartition("_")[2]] for name in names]
                               for table in (settings.max_velocity, settings.max_acceleration))
     return np.minimum(velocity, bounds[2]), np.array(acceleration)
@@ -148,7 +148,7 @@ def _judge_times(times, settings):
 
 
 def _start(names, first, limits, measured):
-    """(k,) [rad]: where the robot is, or, where that is unknown, the place within the limits nearest to ``first``."""
+    """(k,) [rad]: the robot's position, or, if that is unknown, the position within the limits nearest to ``first``."""
     for name in names:
         if name not in limits:
             raise GoalRefused("joints", "the robot's description gives no limits for %s" % name, joint=name)
@@ -161,7 +161,7 @@ def _start(names, first, limits, measured):
 
 
 def _bounds(names, limits, start, slack):
-    """(3, k): lower, upper, velocity; a joint that stands beyond its limit may stay as far out, but go no farther."""
+    """(3, k): lower, upper, velocity; a joint that is beyond its limit may stay there, but not go farther."""
     table = np.array([limits[name] for name in names]).T
     table[0] = np.minimum(table[0], start) - slack
     table[1] = np.maximum(table[1], start) + slack
@@ -190,7 +190,8 @@ def _refuse_start(first, start, names, tolerance):
 
 
 def _judge_curve(trajectory, names, bounds, first_point):
-    """Raise where the curve between the points, (pieces, places, joints), is too fast or leaves the limits."""
+    """Raise GoalRefused if the curve between the points, (pieces, samples, joints), is too fast or leaves the
+    limits."""
     duration = np.diff(trajectory.starts)
     coefficients = trajectory.coefficients[:-1]
     powers = np.arange(6)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Moves along a straight line, from where the arms are; apart from the other moves, as its imports take a second."""
+"""Moves along a straight line from the arms' present position. A separate module, because its imports take a second."""
 import numpy as np
 import rospy
 
@@ -16,7 +16,7 @@ from .traj_client import joint_trajectory
 class LineMove:
     """The tip along a straight line, its orientation kept: ``trajectory(side, displacement, speed)``.
 
-    Raises SettingsError without robot_description, ChainError or UrdfError where that has no gripper.
+    Raises SettingsError without robot_description, ChainError or UrdfError if it has no gripper.
     """
 
     def __init__(self, client):

@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 
-# Places at which the rest of the way is searched for its highest velocity.
+# Number of samples in the search for the highest velocity of the rest of the path.
 _PLACES = 200
 
 
 class Motion:
     """A :class:`~.judging.Plan` from ``start_time`` [s] on.
 
-    A stop keeps to the way that was judged: time along it slows down evenly, until it stands. The deceleration is then
+    A stop stays on the checked path: the time along it slows down evenly to zero. The deceleration is then
     at most ``stop_deceleration`` [rad/s^2] more than the trajectory's own acceleration.
     """
 
@@ -27,7 +27,7 @@ class Motion:
         return self.plan.trajectory.sample(self._way_time(time_s))[0]
 
     def stop(self, time_s):
-        """Come to rest from ``time_s`` on, which is not before the last time asked for."""
+        """Come to rest from ``time_s`` on, which must not be before the last queried time."""
         if self._stop_time is not None:
             return
         here = self._way_time(time_s)
@@ -42,19 +42,19 @@ class Motion:
         return self._stop_time is not None
 
     def is_at_rest(self, time_s):
-        """Whether nothing moves any more: the end was reached, or the stop is over."""
+        """Whether the motion is over: at its end, or after a stop."""
         if self.stopping and time_s >= self._stop_time + self._stop_duration_s:
             return True
         return self._way_time(time_s) >= self.plan.duration_s
 
     def percent(self, time_s):
-        """How much of the time along the way has passed, 0 to 100."""
-        # A goal where the robot already is lasts no time at all.
+        """Share of the path's time that has passed, 0 to 100."""
+        # A goal at the robot's position has the duration zero.
         share = self._way_time(time_s) / self.plan.duration_s if self.plan.duration_s > 0.0 else 1.0
         return int(math.floor(100.0 * min(1.0, share)))
 
     def _way_time(self, time_s):
-        """Time along the way [s], not below 0."""
+        """Time along the path [s], not below 0."""
         if self._stop_time is None:
             return max(0.0, time_s - self._start_time)
         since = min(time_s - self._stop_time, self._stop_duration_s)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A node around one kind of move: a service that answers when the move is over."""
+"""A node for one kind of move: a service that responds when the move is over."""
 import threading
 
 import rospy
@@ -8,14 +8,14 @@ import baxter_interface.startup
 
 from .traj_client import MoveFailed, TrajClient
 
-# What a request may ask for that cannot be (PlayfileError, SettingsError, LeavesReach are ValueErrors).
+# Errors of invalid requests (PlayfileError, SettingsError, LeavesReach are ValueErrors).
 REFUSALS = (MoveFailed, ValueError, OSError)
 
 
 def run(name, service, service_type, move_type, plan):
-    """Be the node ``name`` until it is shut down. ``plan(move, request)`` gives the trajectory for a request.
+    """Run as the node ``name`` until it is shut down. ``plan(move, request)`` returns the trajectory for a request.
 
-    A request that comes while another is at work is refused; trajActionServer/cancel stops the latter.
+    A request during another one is refused; trajActionServer/cancel stops the active one.
     """
     baxter_interface.startup.init_node(name)
     client = TrajClient()

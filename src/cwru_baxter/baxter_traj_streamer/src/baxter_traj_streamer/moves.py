@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Moves of the arms as trajectories from where they are: to a pose, along playfiles."""
+"""Moves of the arms as trajectories from their present position: to a pose, along playfiles."""
 
 from . import playfile
 from .ros_settings import read_limits
@@ -29,7 +29,7 @@ class PlayfileMove:
         self._limits = read_limits()
 
     def check(self, files):
-        """Judge {side: Playfile} as the server would. Raises PlayfileError."""
+        """Check {side: Playfile} as the server would. Raises PlayfileError."""
         playfile.check(files, self._limits, self._client.streamer.settings)
 
     def trajectory(self, files, time_optimal=False):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The fastest way through poses under limits on velocity and acceleration, by ruckig. Free of ROS."""
+"""The fastest trajectory through poses under limits on velocity and acceleration, by ruckig. Free of ROS."""
 import itertools
 import math
 
@@ -11,15 +11,15 @@ from joint_trajectory.segment import constant
 
 from .timing import arrival_times
 
-# Which shares of the reference velocity are tried at each pose between the ends; 0 is a stop there.
+# Shares of the reference velocity that are tried at each inner pose; 0 is a stop there.
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)
-# With more poses than this only the outer two are tried, so that thousands take a second.
+# With more poses than this only the outer two shares are tried, so that thousands of poses take a second.
 _MANY_POSES = 500
-# How far a joint may leave the span of a segment's ends [rad]: rounding.
+# Rounding tolerance of a joint beyond the span of a segment's ends [rad].
 _OVERSHOOT = 1e-6
-# Poses nearer together than this in each joint are one [rad].
+# Poses that differ by less than this in each joint count as one [rad].
 _SAME_POSE = 1e-9
-# Changes of acceleration nearer together than this are one [s].
+# Changes of acceleration within this time count as one [s].
 _SAME_TIME_S = 1e-9
 
 
@@ -28,9 +28,10 @@ def time_optimal(path, velocity, acceleration):
 
     ``velocity`` [rad/s], ``acceleration`` [rad/s^2]: limits (n,).
 
-    Between two poses each joint takes the fastest way from one velocity to the other and stays between the two; all
-    joints arrive together. The velocities at the poses are chosen over the whole path (dynamic programming) among
-    shares of one with which no joint needs to turn back. A joint that turns round rests where it does.
+    Between two poses each joint moves from one velocity to the other as fast as possible and stays between the two
+    positions; all joints arrive together. The velocities at the poses are chosen over the whole path (dynamic
+    programming), among shares of one with which no joint needs to reverse. A joint that reverses its direction rests at
+    that pose.
     """
     path = np.asarray(path, dtype=float)
     velocity, acceleration = np.asarray(velocity, dtype=float), np.asarray(acceleration, dtype=float)
@@ -48,7 +49,7 @@ def time_optimal(path, velocity, acceleration):
 
 
 def _fastest(path, velocity, acceleration):
-    """The ruckig trajectories of the segments, with the velocities at the poses for which they last shortest."""
+    """The ruckig trajectories of the segments, with the velocities at the poses that give the shortest time."""
     shares = _SHARES if len(path) <= _MANY_POSES else (_SHARES[0], _SHARES[-1])
     reference = _reference_velocities(path, velocity, acceleration)
     candidates = [np.unique(np.outer(shares, row), axis=0) for row in reference]
@@ -68,11 +69,11 @@ def _fastest(path, velocity, acceleration):
 
 
 def _reference_velocities(path, velocity, acceleration):
-    """(m, n): velocities at the poses, 0 at both ends, with which a segment may last however long without overshoot."""
+    """(m, n): velocities at the poses, 0 at both ends, with which a segment of any duration has no overshoot."""
     if len(path) < 3:
         return np.zeros_like(path)
     reference = smooth_velocities(np.array(arrival_times(path, velocity, 0.0)), path)
-    # Half of each segment is left for slowing down.
+    # Half of each segment is reserved for deceleration.
     shortest = np.minimum(np.abs(np.diff(path[:-1], axis=0)), np.abs(np.diff(path[1:], axis=0)))
     reference[1:-1] = np.clip(reference[1:-1], -np.sqrt(acceleration * shortest), np.sqrt(acceleration * shortest))
     return np.clip(reference, -velocity, velocity)
@@ -85,12 +86,12 @@ class _Solver:
         self._solver = ruckig.Ruckig(len(velocity))
         self._input = ruckig.InputParameter(len(velocity))
         self._input.max_velocity, self._input.max_acceleration = velocity.tolist(), acceleration.tolist()
-        # From rest to rest all joints keep their proportion: straight lines.
+        # From rest to rest all joints move in proportion: straight lines.
         self._input.synchronization = ruckig.Synchronization.Phase
         self._trial = ruckig.Trajectory(len(velocity))
 
     def duration(self, here, start_velocity, there, end_velocity):
-        """How long the segment lasts [s]; inf where there is none, or where a joint leaves the span of its ends."""
+        """Duration of the segment [s]; inf if there is none, or if a joint leaves the span of its ends."""
         if not self._calculate(here, start_velocity, there, end_velocity, self._trial):
             return math.inf
         low, high = np.minimum(here, there) - _OVERSHOOT, np.maximum(here, there) + _OVERSHOOT

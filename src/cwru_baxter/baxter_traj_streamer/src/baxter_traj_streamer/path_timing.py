@@ -14,7 +14,7 @@ SERVICE = "/baxter_traj_streamer/time_path"
 
 
 def serve(settings):
-    """Offer the service from now on. Unusable paths are refused with the library's words."""
+    """Offer the service from now on. Invalid paths are refused with the library's error text."""
     def answer(request):
         side = next((side for side in SIDES if request.path.joint_names == arm_joint_names(side)), None)
         if side is None:

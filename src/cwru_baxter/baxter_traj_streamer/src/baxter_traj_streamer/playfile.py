@@ -14,12 +14,12 @@ _COLUMNS = len(JOINTS) + 1
 
 
 class PlayfileError(ValueError):
-    """A playfile that cannot be used; the text names file, line, what was found and what would be right."""
+    """The playfile cannot be used; the text names file, line, what was found and what would be right."""
 
 
 class Playfile(NamedTuple):
     """``positions`` (m, 7) [rad] and ``times`` (m,) [s], increasing, not below 0, of one arm; ``source``: its name;
-    ``lines``: where in the source each row stands."""
+    ``lines``: line number of each row in the source."""
 
     positions: np.ndarray
     times: np.ndarray
@@ -37,7 +37,7 @@ class Playfile(NamedTuple):
 
     @classmethod
     def parse(cls, text, source="playfile"):
-        """Take the content of a file; empty lines and what follows a # are left aside. Raises PlayfileError."""
+        """Take the content of a file; empty lines and text after a # are ignored. Raises PlayfileError."""
         rows, lines = [], []
         for number, line in enumerate(text.splitlines(), start=1):
             fields = line.partition("#")[0].strip().rstrip(",")
@@ -54,7 +54,7 @@ class Playfile(NamedTuple):
         return cls(table[:, :-1], table[:, -1], source, tuple(lines))
 
     def text(self):
-        """The content of a file; the times are written to the ms, the angles to the microrad."""
+        """The content of a file; times are rounded to the ms, angles to the microrad."""
         return "".join("%s, %.3f\n" % (", ".join("%.6f" % angle for angle in row), time)
                        for row, time in zip(self.positions, self.times, strict=True))
 
@@ -64,10 +64,9 @@ class Playfile(NamedTuple):
 
 
 def merged(playfiles):
-    """(joint names, times (m,), positions (m, k)) of {side: Playfile}, each begun at its first row at time 0.
+    """(joint names, times (m,), positions (m, k)) of {side: Playfile}, each starting at its first row at time 0.
 
-    A row for each time at which any of the files has one; between its own rows an arm goes straight, after them it
-    rests.
+    It has a row for each time of any file; between its own rows an arm moves linearly, after them it rests.
     """
     times = np.unique(np.concatenate([file.times - file.times[0] for file in playfiles.values()]))
     names, columns = [], []
@@ -78,13 +77,13 @@ def merged(playfiles):
 
 
 def check(playfiles, limits, settings):
-    """Judge {side: Playfile} as the server would, its start left aside; arguments as for judging.judge.
+    """Check {side: Playfile} as the server would, but without the start; arguments as for judging.judge.
 
-    Raises PlayfileError, which names the file and the line where there is one.
+    Raises PlayfileError, which names the file and, if known, the line.
     """
     names, times, positions = merged(playfiles)
     if len(times) == 1:
-        # A pose, no way: only the joints' limits count.
+        # A single pose: only the joints' limits are checked.
         times = times + 1.0
     try:
         judge(names, [(time, row, (), ()) for time, row in zip(times, positions, strict=True)], limits, None, settings)

@@ -16,7 +16,7 @@ from baxter_model.readiness import STATES_KEPT, lost, why_not_ready
 class RobotLink:
     """Joint angles and the robot's state, kept up to date.
 
-    Joints are found by name in every message: robots leave some out, and change their order.
+    Joints are found by name in every message: robots omit some, and change their order.
     """
 
     def __init__(self):
@@ -34,7 +34,8 @@ class RobotLink:
             rospy.Subscriber("robot/joint_states", JointState, self._on_joint_states, queue_size=1, tcp_nodelay=True)]
 
     def wait(self):
-        """Wait for the robot as baxter_interface does. Raises OSError with errno ETIMEDOUT that says what lacks."""
+        """Wait for the robot as baxter_interface does. Raises OSError with errno ETIMEDOUT, which says what is
+        missing."""
         startup.wait_for_start([
             startup.message_arrives(self._topic, lambda: bool(self.angles())),
             startup.message_arrives(rospy.resolve_name("robot/state"), lambda: self._state is not None)])
@@ -46,7 +47,7 @@ class RobotLink:
 
     @property
     def resets(self):
-        """How often the robot was put elsewhere so far, which only a simulation does."""
+        """Number of resets of the simulated robot so far."""
         return self._resets.count
 
     @property
@@ -55,11 +56,11 @@ class RobotLink:
         return self._stops
 
     def is_gone(self):
-        """Whether no node is there any more that publishes joint angles. A paused simulation is not gone."""
+        """Whether no node publishes joint angles any more. A paused simulation is not gone."""
         return self._presence.is_gone()
 
     def why_not_ready(self):
-        """Why the arms will not move, in words; empty while they will."""
+        """Why the arms will not move, as text; "" if they will."""
         state = self._state
         if state is None:
             return "the robot does not report its state (/robot/state); is it running?"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings and joint limits from where ROS keeps them."""
+"""Reads settings and joint limits from files and the parameter server."""
 import pathlib
 
 import rospkg

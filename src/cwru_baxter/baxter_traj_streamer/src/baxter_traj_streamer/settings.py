@@ -7,7 +7,7 @@ from baxter_model import JOINTS, PoseError
 
 # The right arm comes first here, as in Case Western's notes.
 SIDES = tuple(reversed(baxter_model.SIDES))
-# What these settings may be; the first is the default.
+# Choices of these settings; the first is the default.
 _CHOICES = {"interpolation": ("fields", "linear", "cubic", "quintic", "time_optimal"),
             "start": ("refuse", "blend", "jump"), "joints": ("any", "right_arm")}
 _SWITCHES = ("check_limits", "feedback", "preemption", "stop_when_client_leaves")
@@ -16,7 +16,7 @@ _POSITIVE = ("min_segment_s", "rate_hz", "start_tolerance", "max_duration_s", "m
 
 
 class SettingsError(ValueError):
-    """A setting that cannot be used; the text says what was found and what would be right."""
+    """A setting is invalid; the text says what was found and what would be right."""
 
 
 def arm_joint_names(side):

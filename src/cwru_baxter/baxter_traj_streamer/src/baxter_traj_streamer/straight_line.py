@@ -9,20 +9,20 @@ from baxter_sim_kinematics import Budget, NoSolution, Reason, solve
 
 from .optimal import time_optimal
 
-# Distance between two solutions [m]: usually, and at least, where the joints turn fast or the reach ends.
+# Distance between two solutions [m]: default, and minimum where the joints turn fast or the reach ends.
 _STEP_M, _SHORTEST_STEP_M = 0.005, 0.0005
-# Nearer than this to a solution the next one must be, else it is on another branch [rad].
+# The next solution must be within this distance, else it is on another branch [rad].
 _SAME_BRANCH = 0.15
-# The solution next to the one before or none, and exact: the path is differentiated twice.
+# Only the solution next to the previous one, and very exact: the path is differentiated twice.
 _BUDGET = Budget(candidates=1, max_starts=1, tolerance_m=1e-8, tolerance_rad=1e-8)
-# A joint this near to a limit [rad] cannot go on.
+# A joint this near to a limit [rad] counts as at the limit.
 _STUCK = 1e-3
-# What the curvature of the path in joint space may take of the accelerations; the rest is for speeding up.
+# Share of the accelerations for the curvature of the path in joint space; the rest is for speeding up.
 _CURVATURE_SHARE = 0.5
 
 
 class LeavesReach(ValueError):
-    """A line that cannot be followed to its end: ``reached_m`` of ``length_m``; the text says why."""
+    """The line cannot be followed to its end: only ``reached_m`` of ``length_m``; the text says why."""
 
     def __init__(self, reached_m, length_m, why):
         super().__init__("the line leaves the arm's reach after %.3f m of %.3f m: %s" % (reached_m, length_m, why))
@@ -36,9 +36,9 @@ class StraightLine(NamedTuple):
     positions: np.ndarray
 
     def timed(self, velocity, acceleration, speed):
-        """(times (m,) [s], positions (m, n), velocities (m, n)): points that cubics join to an even, smooth move.
+        """(times (m,) [s], positions (m, n), velocities (m, n)): points that give a smooth move when joined by cubics.
 
-        The tip speeds up, goes on at ``speed`` [m/s], and slows down, all as fast as ``velocity`` [rad/s] and
+        The tip speeds up, continues at ``speed`` [m/s], and slows down, all as fast as ``velocity`` [rad/s] and
         ``acceleration`` [rad/s^2] (n,) allow along the whole line.
         """
         slope = np.gradient(self.positions, self.distances, axis=0, edge_order=min(2, len(self.distances) - 1))
@@ -59,8 +59,8 @@ class StraightLine(NamedTuple):
 def straight_line(chain, start, displacement):
     """The :class:`StraightLine` of the tip of ``chain`` from the posture ``start`` (n,) [rad].
 
-    ``displacement`` (3,) [m] is in the base frame of the chain. Each solution is sought from the one before, and must
-    be near it. Raises LeavesReach, and ValueError for a displacement that is no line.
+    ``displacement`` (3,) [m] is in the base frame of the chain. Each solution is searched from the previous one, and
+    must be near it. Raises LeavesReach, and ValueError for an invalid displacement.
     """
     displacement = np.asarray(displacement, dtype=float)
     length = float(np.linalg.norm(displacement)) if displacement.shape == (3,) else math.nan
@@ -72,11 +72,11 @@ def straight_line(chain, start, displacement):
     origin = pose[:3, 3].copy()
     distances = [0.0]
     usual = min(_STEP_M, length / 2.0)
-    # Why a pose has no solution however the arm is held, and where that was.
+    # The error of a pose without any solution, and its distance.
     beyond, beyond_m = "", math.inf
     step = usual
     while distances[-1] < length:
-        # No stub is left for the end.
+        # Avoid a very short last step.
         left = length - distances[-1]
         distance = length if left <= 1.5 * step else distances[-1] + step
         pose[:3, 3] = origin + displacement * (distance / length)
@@ -89,16 +89,16 @@ def straight_line(chain, start, displacement):
         if is_beyond:
             beyond, beyond_m = why, distance
         if step <= _SHORTEST_STEP_M:
-            # Near the end of its reach an arm turns fast, or has to be held otherwise, before it cannot go on: the
-            # latter says more.
+            # Near the end of its reach an arm first turns fast or needs another configuration, then has no solution:
+            # the latter is the better reason.
             raise LeavesReach(distances[-1], length, beyond if beyond_m - distances[-1] <= usual else why)
         step /= 2.0
     return StraightLine(np.array(distances), np.array(path))
 
 
 def _next(chain, pose, before):
-    """(the solution for ``pose`` or None, why it is none on the branch of the one ``before`` or "", whether there is
-    none on any)."""
+    """(the solution for ``pose`` or None, why there is none on the branch of ``before`` or "", whether there is none on
+    any branch)."""
     try:
         found = solve(chain, pose, before, budget=_BUDGET).q
     except NoSolution as error:

@@ -4,7 +4,7 @@ import numpy as np
 
 
 def transition_time(difference, velocity, scale=1.0):
-    """Shortest time [s] in which all joints can move by ``difference`` (n,) [rad], accelerations left aside.
+    """Shortest time [s] in which all joints can move by ``difference`` (n,) [rad], without acceleration limits.
 
     ``velocity`` (n,) [rad/s]: limits, multiplied by ``scale``. Raises ValueError for sizes that differ or numbers that
     are not finite.
@@ -19,7 +19,7 @@ def transition_time(difference, velocity, scale=1.0):
 
 
 def arrival_times(path, velocity, min_segment_s):
-    """When each of m poses ``path`` (m, n) [rad] is reached: list of m times [s], the first 0. Raises ValueError."""
+    """Arrival times at m poses ``path`` (m, n) [rad]: list of m times [s], the first 0. Raises ValueError."""
     times = [0.0]
     for here, there in zip(path[:-1], path[1:], strict=True):
         step = transition_time(np.subtract(there, here), velocity)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sends trajectories to trajActionServer, and waits for whatever is not up yet."""
+"""Sends trajectories to trajActionServer, and waits for server and robot."""
 import time
 
 import actionlib
@@ -15,12 +15,12 @@ from .interpolator import ACTION_NAME
 from .streamer import BaxterTrajStreamer
 from .versions import VERSIONS
 
-# How often is looked whether a goal is over [s, wall].
+# Polling period for the end of a goal [s, wall].
 _POLL_S = 0.01
 
 
 class MoveFailed(Exception):
-    """A goal that was not reached; the text says why. ``status``: of actionlib_msgs/GoalStatus."""
+    """The goal was not reached; the text says why. ``status``: of actionlib_msgs/GoalStatus."""
 
     def __init__(self, status, text):
         super().__init__("the goal ended as %s: %s" % (GoalStatus.to_string(status), text))
@@ -28,22 +28,23 @@ class MoveFailed(Exception):
 
 
 class SentGoal:
-    """A goal on its way. Looked at rather than waited on for events: an answer may be quicker than its question."""
+    """An active goal. It is polled instead of waiting for events, because a response may arrive before send()
+    returns."""
 
     def __init__(self, client, goal, feedback):
         self._client = client
         self._handle = client.send_goal(goal, feedback_cb=lambda _, message: feedback(message.fdbk))
 
     def cancel(self):
-        """Ask the server to stop it."""
+        """Cancel the goal."""
         self._handle.cancel()
 
     def is_active(self):
-        """Whether it is being followed."""
+        """Whether it is being executed."""
         return self._handle.get_comm_state() == actionlib.CommState.ACTIVE
 
     def is_over(self):
-        """Whether it has ended, one way or another."""
+        """Whether it has ended in any state."""
         return self._handle.get_comm_state() in (actionlib.CommState.DONE, actionlib.CommState.LOST)
 
     def wait(self, timeout_s=None):
@@ -77,7 +78,7 @@ class TrajClient:
         self._action = self._version = None
 
     def wait_until_ready(self):
-        """Wait for the server and for the robot to be enabled, whatever was started first, and say what for.
+        """Wait for the server and for the robot to be enabled, in any order, and print what it waits for.
 
         Raises ValueError for a server of another action, ROSInterruptException when ROS shuts down.
         """
@@ -88,7 +89,7 @@ class TrajClient:
             self._wait("the robot: %s" % why, lambda: not self.streamer.robot.why_not_ready())
 
     def _connect(self):
-        """Speak the server's version of the action; whether there is a server."""
+        """Use the server's version of the action; returns whether there is a server."""
         if self._action is None:
             kind = dict(rospy.get_published_topics()).get(rospy.resolve_name(ACTION_NAME + "/result"))
             self._version = next((each for each in VERSIONS.values() if kind == each.name + "ActionResult"), None)
@@ -114,14 +115,14 @@ class TrajClient:
     def send(self, trajectory, traj_id=1, feedback=lambda percent: None):
         """Send a JointTrajectory: a :class:`SentGoal`; ``feedback`` is called with the percent done.
 
-        The arms move on when this program ends; see the setting stop_when_client_leaves.
+        The arms continue when this program ends; see the setting stop_when_client_leaves.
         """
         return SentGoal(self._action, self._version.make_goal(trajectory, traj_id), feedback)
 
     def move(self, trajectory, timeout_s=None):
         """Send a JointTrajectory and wait [s, ROS time; None: until the end]: the result, or None after ``timeout_s``.
 
-        Raises MoveFailed, ROSInterruptException when ROS shuts down; the arms move on then.
+        Raises MoveFailed, ROSInterruptException when ROS shuts down; the arms then continue.
         """
         goal = self.send(trajectory)
         if not goal.wait(timeout_s):
@@ -143,7 +144,7 @@ def _raise_if_interrupted():
 
 
 def joint_trajectory(joint_names, times, positions, velocities=None):
-    """The message: ``times`` (m,) [s], or None to leave them to the server, ``positions``, ``velocities`` (m, k)."""
+    """The message: ``times`` (m,) [s], or None to let the server choose them, ``positions``, ``velocities`` (m, k)."""
     trajectory = JointTrajectory(joint_names=list(joint_names))
     for index, row in enumerate(positions):
         point = JointTrajectoryPoint(positions=list(row))

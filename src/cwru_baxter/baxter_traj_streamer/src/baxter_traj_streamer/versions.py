@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The two versions of the action ``traj`` that programs were written for.
+"""The two versions of the action ``traj`` that programs use.
 
-The notes' has a ``traj_id``. Case Western moved the action to another package in November 2015 and left ``traj_id``
-out; the book's ``baxter_trajectory_streamer/traj`` is the same on the wire. Only its clients have that package, so its
-messages are made from ours when the server or a client needs them.
+The notes' version has a ``traj_id``. Case Western moved the action to another package in November 2015 and left
+``traj_id`` out; the book's ``baxter_trajectory_streamer/traj`` is the same on the wire. Only its clients have that
+package, so its messages are made from ours when the server or a client needs them.
 """
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ class Version(NamedTuple):
 
     @property
     def md5sum(self):
-        """Of the goal, by which a server and its clients know that they speak of the same."""
+        """MD5 sum of the goal, by which server and clients check that they use the same version."""
         return self.action_goal._md5sum
 
     def make_goal(self, trajectory, traj_id):
@@ -53,7 +53,7 @@ def version(name):
 
 
 def of_goal(md5sum):
-    """The Version whose goals have this sum, or None."""
+    """The Version whose goals have this MD5 sum, or None."""
     return next((each for each in VERSIONS.values() if each.md5sum == md5sum), None)
 
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Messages there and back. What a trajectory is made of is decided in Python: docs/decisions/0005-cpp-client-library.md.
+// Sends and receives messages. Python computes the trajectories: docs/decisions/0005-cpp-client-library.md.
 #include "baxter_traj_streamer/baxter_traj_streamer.h"
 
 #include <functional>
@@ -53,7 +53,7 @@ Baxter_traj_streamer::Baxter_traj_streamer(ros::NodeHandle *nodehandle) : nh_(*n
 }
 
 Baxter_traj_streamer::~Baxter_traj_streamer() {
-    // No callback may find members that are gone.
+    // Callbacks must not use destroyed members.
     joint_states_.shutdown();
     spinner_.stop();
 }
@@ -129,7 +129,7 @@ void Baxter_traj_streamer::cmd_pose(const std::string &side, const Vectorq7x1 &q
     command.mode = baxter_core_msgs::JointCommand::POSITION_MODE;
     command.names = joint_names(side);
     command.command = to_list(qvec);
-    // What nobody hears yet is lost, and a latched command would move the next robot that comes up.
+    // Messages without a subscriber are lost, and a latched command would move the next robot that starts.
     wait_until([&] { return commands_[side].getNumSubscribers() > 0; }, "the robot to listen to " + commands_[side].getTopic());
     commands_[side].publish(command);
 }

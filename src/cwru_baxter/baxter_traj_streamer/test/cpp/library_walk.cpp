@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Calls every member function once and prints what it gives, for comparison with the Python library.
+// Calls every member function once and prints its result, for comparison with the Python library.
 #include <cstdio>
 
 #include <baxter_traj_streamer/baxter_traj_streamer.h>

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The server with the limitations of the notes, and one that stops goals whose sender is gone."""
+"""The server with the limitations of the notes, and one that stops goals whose sender has ended."""
 import pathlib
 import subprocess
 import sys
@@ -74,7 +74,7 @@ class AsInNotesTest(FakeRobotTest):
         finally:
             sender.kill()
             sender.wait(timeout=DEADLINE_S)
-        # The last of the stream may have made room for it.
+        # The queue may have dropped the stream's last command.
         held = self.wait_until_held("right_e1")
         self.assertLess(held - here[3], 0.35)
         stream = np.array([value for _, value in self.raw_stream("right_e1")] + [held])

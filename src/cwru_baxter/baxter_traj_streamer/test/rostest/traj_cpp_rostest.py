@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The C++ library against the Python one, and the notes' client on top of it."""
+"""The C++ library against the Python one, and the notes' client with it."""
 import pathlib
 import subprocess
 import tempfile

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""trajActionServer when the simulator dies in the middle of a goal, and the time with it."""
+"""trajActionServer when the simulator, and with it the clock, dies in the middle of a goal."""
 import os
 import signal
 import xmlrpc.client

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the rostests of trajActionServer share."""
+"""Shared code of the rostests of trajActionServer."""
 import functools
 import random
 import time
@@ -24,12 +24,12 @@ DEADLINE_S = 30.0
 
 
 wait_until = functools.partial(waiting.wait_until, timeout_s=DEADLINE_S)
-# As the launch files of the rostests call it.
+# The name in the launch files of the rostests.
 SERVER = "/traj_interpolator_as"
 
 
 class Client:
-    """One goal, with all that is told about it."""
+    """One goal, with all its feedback and states."""
 
     def __init__(self, action=NOTES):
         self._version = version(action)
@@ -57,9 +57,9 @@ class Client:
 class FakeRobotTest(unittest.TestCase):
     """Against the SDK's fake robot, enabled."""
 
-    # What the server speaks.
+    # The server's version of the action.
     action = NOTES
-    # What forget_commands moves.
+    # The joint that forget_commands moves.
     last_joints = ("right_w2", "left_w2")
 
     @classmethod
@@ -85,7 +85,7 @@ class FakeRobotTest(unittest.TestCase):
         self.forget_commands()
 
     def forget_commands(self):
-        """Clear the list of commands, when all that were sent until now have arrived.
+        """Clear the list of commands, after all commands sent so far have arrived.
 
         Results overtake commands, which have connections of their own; so a goal is sent whose last command is known.
         """
@@ -106,13 +106,13 @@ class FakeRobotTest(unittest.TestCase):
         self.client.feedback.clear()
 
     def set_enabled(self, enabled):
-        """Until this program and the server know of it."""
+        """Returns when this program and the server know of it."""
         self.enable.publish(Bool(data=enabled))
         wait_until(lambda: (self.streamer.robot.why_not_ready() == "") == enabled, "enabled to be %s" % enabled)
         wait_until(lambda: self.server_would_move() == enabled, "the server to know that enabled is %s" % enabled)
 
     def server_would_move(self):
-        """Ask by a goal that is refused in any case, the first time for the robot's state."""
+        """Query the robot's state in the server by a goal that is always refused."""
         self.asker.send([], [])
         state, text, _ = self.asker.end()
         self.assertEqual(state, GoalStatus.REJECTED, text)
@@ -123,12 +123,12 @@ class FakeRobotTest(unittest.TestCase):
         return np.array([found[name] for name in names])
 
     def wait_until_at(self, names, goal, within=0.01):
-        """What this program knows of the joints may be older than what the server knows."""
+        """This program's joint states may be older than the server's."""
         wait_until(lambda: np.abs(self.angles(names) - goal).max() < within,
                    lambda: "%s at %s; they are at %s" % (names, goal, self.angles(names)))
 
     def wait_until_held(self, joint):
-        """Results overtake commands: until the last one for the joint is in the mode that holds it; returns where."""
+        """Results overtake commands: wait until the joint's last command is in POSITION mode; returns its value."""
         def holding():
             last = [message for _, message in list(self.commands) if joint in message.names][-1:]
             return last if last and last[0].mode == JointCommand.POSITION_MODE else None
@@ -141,7 +141,7 @@ class FakeRobotTest(unittest.TestCase):
                 if message.mode == JointCommand.RAW_POSITION_MODE and joint in message.names]
 
     def inwards(self, names, by):
-        """Angles that far from where the joints are, towards the middle of their ranges: room there is on this side."""
+        """Angles at this distance from the joints, towards the middle of their ranges, where there is room."""
         middle = [0.5 * (self.limits[name].lower + self.limits[name].upper) for name in names]
         here = self.angles(names)
         return here + np.where(here < middle, by, np.negative(by))

@@ -40,13 +40,13 @@ class TrajStreamerTest(FakeRobotTest):
         self.wait_until_at(names, goal)
         self.assertEqual(self.client.feedback, sorted(self.client.feedback))
         self.assertGreaterEqual(len(self.client.feedback), 5)
-        # At last the goal itself, in the mode that holds.
+        # Finally the goal itself, in POSITION mode.
         self.assertEqual(self.wait_until_held("right_e1"), goal[1])
         stream = self.raw_stream("right_e1")
-        # A stream, not a jump, even where the machine is so busy that steps are left out.
+        # A stream, not a jump, even if a busy machine skips steps.
         steps = np.diff([value for _, value in stream])
         self.assertGreater(len(steps), 10)
-        # All one way.
+        # All in one direction.
         self.assertAlmostEqual(abs(steps.sum()), np.abs(steps).sum(), delta=1e-9)
         self.assertLess(np.abs(steps).max(), 0.15)
 
@@ -82,10 +82,10 @@ class TrajStreamerTest(FakeRobotTest):
         state, text, _ = self.client.end()
         self.assertEqual(state, GoalStatus.PREEMPTED, text)
         self.assertGreater(abs(goal[0] - self.angles(names)[0]), 0.02)
-        # The last of the stream may have made room for it.
+        # The queue may have dropped the stream's last command.
         held = self.wait_until_held("right_e1")
         stream = np.array([value for _, value in self.raw_stream("right_e1")] + [held])
-        # The last steps dwindle, none is a jump.
+        # The last steps get smaller, none is a jump.
         self.assertLess(np.abs(np.diff(stream)).max(), 0.15)
         self.assertLess(abs(stream[-1] - stream[-2]), 0.01)
 
@@ -181,7 +181,7 @@ class TrajStreamerTest(FakeRobotTest):
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertIn("the arm moves on", run.stdout + run.stderr)
         self.wait_until_at(arm_joint_names("right"), self.streamer.settings.pose("pre_pose", "right"))
-        # The goal outlives its client, and must not outlive this test.
+        # The goal continues after its client, and must not continue after this test.
         wait_until(lambda: self.commands[-1][1].mode == JointCommand.POSITION_MODE, "the stream to end")
 
     def test_an_interrupted_client_says_so_and_what_the_arm_does(self):

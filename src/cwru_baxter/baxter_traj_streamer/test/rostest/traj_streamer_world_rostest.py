@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The simulator: the notes' commands in another order than they print them, goals with faults, and stops on the way."""
+"""The simulator: the notes' commands in another order, goals with faults, and stops during motion."""
 import os
 import pathlib
 import random
@@ -28,9 +28,9 @@ DEADLINE_S = stretched(90.0)
 # The notes' goal, and the tolerance that is promised [rad].
 PRE_POSE_RIGHT = [-0.907528, -0.111813, 2.06622, 1.8737, -1.295, 2.00164, -2.87179]
 TOLERANCE = 0.01
-# How many goals with faults, and how far they may move anything [rad].
+# Number of goals with faults, and the largest motion that they may cause [rad].
 SPOILT, STILL = 500, 0.001
-# How far an arm may go on when the robot is stopped or disabled at 0.25 rad/s [rad].
+# Largest stopping distance when the robot is stopped or disabled at 0.25 rad/s [rad].
 COASTING = 0.05
 
 
@@ -57,7 +57,7 @@ class TrajInTheWorldTest(unittest.TestCase):
                           "--wait", "60")
         self.assertEqual(left.wait(timeout=DEADLINE_S), 0)
         self.arrives(lambda: robot.streamer.get_qvec_left_arm(), robot.streamer.settings.pose("pre_pose", "left"))
-        # The right arm has been left to itself meanwhile, and holds.
+        # The right arm had no commands meanwhile, and holds.
         self.arrives(lambda: robot.streamer.get_qvec_right_arm(), PRE_POSE_RIGHT)
 
     def test_2_goals_with_faults_are_rejected_each_for_its_reason_and_nothing_moves(self):
@@ -119,7 +119,7 @@ class TrajInTheWorldTest(unittest.TestCase):
         wait_until(ratio.get_num_connections, "the robot to listen")
         ratio.publish(0.05)
         begin = client.here(["left_e1"])[0]
-        # At 0.05 of 1.5 rad/s this would take 11 s, and 4 s are granted.
+        # At 0.05 of 1.5 rad/s this would take 11 s, and 4 s are allowed.
         goal = client.send(joint_trajectory(["left_e1"], [2.0], [[begin - 0.8]]))
         self.assertTrue(goal.wait(DEADLINE_S))
         status, text, _ = goal.outcome()

@@ -93,7 +93,7 @@ def test_limits_are_checked_or_not(points):
     assert reason(points, RIGHT_ARM) in ("limit", "velocity")
     plan = plan_for(points, RIGHT_ARM, check_limits=False)
     assert plan.trajectory.sample(points[0][0])[0] == pytest.approx(points[0][1])
-    # What is no number stays refused.
+    # Values that are not finite are still refused.
     assert reason([(1.0, moved(3, float("nan")))], RIGHT_ARM, check_limits=False) == "number"
 
 
@@ -111,7 +111,7 @@ def test_first_point_elsewhere_is_blended_in_when_asked():
     way = plan.trajectory
     assert way.sample(0.0)[0] == pytest.approx([0.0, 0.0])
     lead_s = plan.duration_s - 2.0
-    # At half the velocity of s0, 0.25 rad/s, as arrival times have it.
+    # At half the velocity of s0, 0.25 rad/s, as for arrival times.
     assert lead_s == pytest.approx(0.4 / 0.25 + 0.25 / 2.0)
     assert way.sample(lead_s)[0] == pytest.approx([0.4, -0.2])
     assert way.sample(plan.duration_s)[0] == pytest.approx([0.6, -0.2])
@@ -134,5 +134,5 @@ def test_any_joints_in_any_order_or_the_right_arm_only():
     assert plan_for([(1.0, [0.1, 0.2, 0.3])], mixed).joint_names == mixed
     assert plan_for([(1.0, [0.1] * 14)], tuple(reversed(KNOWN_JOINTS))).joint_names == tuple(reversed(KNOWN_JOINTS))
     assert reason([(1.0, [0.1, 0.2, 0.3])], mixed, joints="right_arm") == "size"
-    # Names are left aside, as in the notes.
+    # Names are ignored, as in the notes.
     assert plan_for([(1.0, [0.1] * 7)], tuple(reversed(RIGHT_ARM)), joints="right_arm").joint_names == RIGHT_ARM

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Time-optimal ways: limits on a 1 kHz grid, and how long they take."""
+"""Time-optimal trajectories: limits on a 1 kHz grid, and durations."""
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -36,7 +36,7 @@ def check_limits(path, velocity, acceleration):
     # The same without trusting the derivatives: positions and velocities do not jump.
     assert (np.abs(np.diff(grid[:, 0], axis=0)) <= 1e-3 * velocity * SLACK + 1e-9).all()
     assert (np.abs(np.diff(grid[:, 1], axis=0)) <= 1e-3 * acceleration * SLACK + 1e-7).all()
-    # Between the poses nobody leaves their span, so joint limits hold wherever the poses keep them.
+    # Between the poses no joint leaves their span, so joint limits hold if the poses are within them.
     assert (grid[:, 0] >= np.min(path, axis=0) - 2e-6).all() and (grid[:, 0] <= np.max(path, axis=0) + 2e-6).all()
     assert grid[0, 0] == pytest.approx(path[0], abs=1e-9) and grid[-1, 0] == pytest.approx(path[-1], abs=1e-9)
     assert grid[0, 1] == pytest.approx(np.zeros(path.shape[1]), abs=1e-9)
@@ -49,7 +49,7 @@ def check_limits(path, velocity, acceleration):
 def test_random_ways_keep_every_limit_on_a_1_khz_grid(seed, poses, step, joints):
     source = np.random.default_rng(seed)
     path = np.cumsum(source.uniform(-step, step, (poses, joints)), axis=0)
-    # Joints that rest, and others that go one way only.
+    # Joints that rest, and others that move in one direction only.
     path[:, source.random(joints) < 0.2] = 0.1
     path[:, source.random(joints) < 0.2] = np.linspace(0.0, step, poses)[:, None]
     check_limits(path, source.uniform(0.2, 2.0, joints), source.uniform(0.5, 5.0, joints))

@@ -29,7 +29,7 @@ def robot():
 
 @pytest.fixture(params=MIRROR)
 def arm(robot, request):
-    """The chain, and a posture that differs from arm to arm only by the mirror."""
+    """The chain, and a posture that is mirrored for the other arm."""
     return Chain.from_robot(robot, "base", "%s_gripper" % request.param), UNTUCKED * MIRROR[request.param]
 
 
@@ -50,7 +50,7 @@ def test_tip_goes_straight_and_does_not_turn_and_limits_hold(arm, displacement):
     assert np.linalg.norm(moved - np.outer(along, displacement / length), axis=1).max() < 2e-5
     assert np.abs(tips[:, :3, :3] - tips[0, :3, :3]).max() < 2e-5
     assert moved[-1] == pytest.approx(displacement, abs=1e-6)
-    # Never backwards, never faster than asked.
+    # Never backwards, never faster than requested.
     steps = np.diff(along[:-1]) / 2e-3
     assert steps.min() > -1e-6 and steps.max() < SPEED * 1.01
     assert np.abs(np.diff(positions, axis=0)).max() < 0.05
@@ -65,7 +65,7 @@ def test_line_that_leaves_reach_says_where_and_why(arm, displacement, reached_m,
     assert caught.value.reached_m == pytest.approx(reached_m, abs=0.02)
     assert "after %.3f m of %.3f m" % (caught.value.reached_m, caught.value.length_m) in str(caught.value)
     assert words in str(caught.value)
-    # Up to there it can be followed.
+    # It can be followed up to there.
     straight_line(chain, start, np.array(displacement) * (0.98 * caught.value.reached_m / caught.value.length_m))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Judging, timing and stopping, without a robot."""
+"""Checks of goals, timing and stopping, without a robot."""
 import math
 import pathlib
 import random
@@ -188,7 +188,7 @@ def test_while_the_robot_moves_all_but_the_start_is_judged():
     assert refusal([point(0.0, 1.0, 2.1), point(2.0, 1.0, 1.1)], measured=None).reason == "limit"
 
 
-# -- the way ----------------------------------------------------------------------------------------------------------
+# -- the path ----------------------------------------------------------------------------------------------------------
 
 def test_smooth_way_starts_and_ends_at_rest_and_hits_the_points():
     positions = ([0.0, 0.0], [0.3, 0.2], [0.5, -0.1])
@@ -197,7 +197,7 @@ def test_smooth_way_starts_and_ends_at_rest_and_hits_the_points():
         assert trajectory.sample(float(i))[0] == pytest.approx(expected)
     assert trajectory.sample(0.0)[1] == pytest.approx([0.0, 0.0])
     assert trajectory.sample(2.0 - 1e-9)[1] == pytest.approx([0.0, 0.0], abs=1e-6)
-    # w2 turns round at point 1.
+    # w2 reverses at point 1.
     assert max(trajectory.sample(t)[0][1] for t in np.linspace(0.0, 2.0, 200)) <= 0.2 + 1e-9
 
 
