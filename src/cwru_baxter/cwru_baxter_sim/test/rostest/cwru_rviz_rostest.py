@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The picture of the notes: rviz with the robot, and before it the points of the table and of the can."""
+"""The picture in the notes: rviz with the robot, and in front of it the points of the table and of the can."""
 import os
 import signal
 import subprocess
@@ -18,7 +18,7 @@ SCENE_COLUMNS = slice(380, 1150)  # right of the panels
 
 
 class Seen(NamedTuple):
-    """How many pixels of the picture show what."""
+    """Pixel counts of the picture by content."""
 
     table: int
     can: int
@@ -55,7 +55,7 @@ class CwruRvizTest(unittest.TestCase):
                     robot=np.count_nonzero((red > 100) & (green < 40) & (blue < 40)))
 
     def keep(self, picture):
-        """Leave the picture beside the test's other results, for the reader."""
+        """Save the picture beside the test's other results."""
         folder = os.environ.get("ROS_TEST_RESULTS_DIR")
         if folder:
             height, width, _ = picture.shape

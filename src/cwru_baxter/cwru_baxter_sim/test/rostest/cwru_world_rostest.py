@@ -70,7 +70,7 @@ class CwruWorldTest(unittest.TestCase):
         return np.hstack([signs + at - [0.0, 0.0, BASE_Z], np.ones((8, 1))])
 
     def assert_seen_where_it_projects(self, red, info, frame, at=AT):
-        """red: (height, width), where the cube is in the picture of the camera of sensor_msgs/CameraInfo `info`."""
+        """red: (height, width), mask of the cube in the picture of the camera of sensor_msgs/CameraInfo `info`."""
         optical = (self.corners(at) @ self.base_in(frame).T)[:, :3]
         pixels = optical @ np.array(info.K).reshape(3, 3).T
         pixels = pixels[:, :2] / pixels[:, 2:]
@@ -168,7 +168,7 @@ class CwruWorldTest(unittest.TestCase):
 
     def test_cameras_open_and_close_with_what_the_robot_has(self):
         opening, closing = service("/cameras/open", OpenCamera), service("/cameras/close", CloseCamera)
-        # Other tests look through them, whatever becomes of this one.
+        # Restored also after a failure, because other tests use them.
         self.addCleanup(service("/cameras/reset", Empty))
         cameras = service("/cameras/list", ListCameras)().cameras
         self.assertEqual(set(cameras), {"head_camera", "left_hand_camera", "right_hand_camera"})
@@ -186,7 +186,7 @@ class CwruWorldTest(unittest.TestCase):
             self.assertEqual(opening(camera, CameraSettings(123, 456, 20.0, [])).err, errno.EINVAL)
             self.assertEqual(closing(camera).err, 0)
             self.assertNotIn(topic, {name for name, _ in rospy.get_published_topics()})
-            # Of what is not open clients accept this answer and no other.
+            # For a closed camera, clients accept only this error code.
             self.assertEqual(closing(camera).err, errno.EINVAL)
         self.assertEqual(opening("nose_camera", CameraSettings(320, 200, 20.0, [])).err, errno.ENODEV)
         service("/cameras/reset", Empty)()
@@ -194,7 +194,7 @@ class CwruWorldTest(unittest.TestCase):
             self.assertEqual(wait_for_message("/cameras/%s/image" % camera, Image).width, 800)
 
     def test_the_screen_shows_its_picture_to_a_camera_that_looks_at_the_robot(self):
-        # 0.5 m before the glass and looking straight at it; where that is says tf, base stands upright in the world.
+        # 0.5 m in front of the glass, looking straight at it; its pose is from tf, and base is upright in the world.
         self.buffer.lookup_transform("base", "display", rospy.Time(), rospy.Duration(30.0))
         glass = np.linalg.inv(self.base_in("display"))
         tilt = np.radians(15.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages that show something: arrays out of them."""
+"""Arrays from messages with pictures and points."""
 import numpy as np
 
 from urdf_model.transforms import matrix_from_quaternion, rigid
@@ -19,7 +19,7 @@ def points_of(cloud):
 
 
 def is_red(colours):
-    """Where (..., 3) uint8 colours are those of a red thing, in light or shade."""
+    """Mask of (..., 3) uint8 colours of a red body, in light or shade."""
     r, g, b = (colours[..., k].astype(int) for k in range(3))
     return (r > 50) & (g < r // 3) & (b < r // 3)
 
