@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The SDK's Gripper on a bare arm, and after a client has said what tool it carries."""
+"""The SDK's Gripper on a bare arm, and after a client has described its tool."""
 
 import unittest
 
@@ -17,7 +17,7 @@ TOPIC = "/robot/end_effector/%s_gripper/"
 
 
 def announce(side):
-    """Say that an arm carries a custom tool, until the robot repeats it."""
+    """Describe a custom tool of an arm, until the robot publishes it."""
     publisher = rospy.Publisher(TOPIC % side + "rsdk/set_properties", EndEffectorProperties, queue_size=1)
     seen = []
     subscriber = rospy.Subscriber(TOPIC % side + "properties", EndEffectorProperties, seen.append)
@@ -29,7 +29,7 @@ def announce(side):
 
 class CustomTest(unittest.TestCase):
     def test_a_bare_arm_carries_something_passive(self):
-        """As on the robot, which does not know whether anything hangs there."""
+        """As on the physical robot, which does not know whether a tool is mounted."""
         gripper = Gripper("right")
         self.assertEqual((gripper.type(), gripper.hardware_id()), ("custom", 131073))
         self.assertFalse(gripper.ready() or gripper.calibrated() or gripper.gripping())

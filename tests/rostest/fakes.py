@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The same questions to the simulated robot and to the fakes of the SDK's tests: the answers are the same.
+"""Sends the same requests to the simulated robot and to the fakes of the SDK's tests, and compares the results.
 
-A question is a function of a prefix of names, "" for the robot and "/fake" for the fake; what it returns is compared.
+A request is a function of a name prefix, "" for the robot and "/fake" for the fake.
 """
 import sys
 import unittest
@@ -69,7 +69,7 @@ def cameras(prefix):
 
 
 def inverse_kinematics(prefix):
-    """Shape of the answers to a pose within reach, one beyond it, and one in an unknown frame."""
+    """Shape of the responses to a pose within reach, one beyond it, and one in an unknown frame."""
     def pose(x, frame="base"):
         stamped = PoseStamped()
         stamped.header.frame_id = frame
@@ -96,7 +96,7 @@ def switch(prefix):
         heard = []
         subscriber = rospy.Subscriber(prefix + "/robot/state", AssemblyState, heard.append)
         try:
-            # A request that changes nothing can only be told by time: of the robot's, 0.5 s.
+            # That a request changes nothing can only be seen after some time: 0.5 s of the robot's time.
             wait_until(lambda heard=heard: len(heard) > 50, "states of %s" % (prefix or "the robot"), DEADLINE_S)
         finally:
             subscriber.unregister()
@@ -146,7 +146,7 @@ def arms(prefix):
 
 
 def procedures(prefix):
-    """The status of a procedure before it is asked for, and once it is."""
+    """The status of a procedure before it is requested, and after."""
     enable = publisher(prefix, "/robustcontroller/left/Tare/enable", TareEnable)
     topic = prefix + "/robustcontroller/left/Tare/status"
 
@@ -164,21 +164,21 @@ def procedures(prefix):
 
 
 def updater(prefix):
-    """What an update that nobody knows is answered."""
+    """The response to an unknown update."""
     publisher(prefix, "/updater/start", String).publish("no such update")
     return wait_for_message(prefix + "/updater/status", UpdateStatus,
                             lambda message: message.status == UpdateStatus.STS_INVALID).status
 
 
 def enabled(prefix):
-    """Enable the robot, for what needs power."""
+    """Enable the robot, for requests that need power."""
     enable = publisher(prefix, "/robot/set_super_enable", Bool)
     wait_until(lambda: enable.publish(True) or wait_for_message(prefix + "/robot/state", AssemblyState).enabled,
                "the robot is enabled", DEADLINE_S)
 
 
 class Newest:
-    """The newest message on a topic, and how many have come."""
+    """The newest message on a topic, and their count."""
 
     def __init__(self, topic, kind):
         self.message, self.count = None, 0
@@ -189,7 +189,7 @@ class Newest:
         self.message, self.count = message, self.count + 1
 
     def wait_for(self, messages):
-        """Let so many more come: the only way to tell that a request changes nothing."""
+        """Wait for this many further messages: the only way to see that a request changes nothing."""
         until = self.count + messages
         wait_until(lambda: self.count >= until, "%d more messages" % messages, DEADLINE_S)
 
@@ -198,7 +198,7 @@ class Newest:
 
 
 def gripper(prefix):
-    """The electric gripper: what it says it is, and its state after each command, right and wrong."""
+    """The electric gripper: its properties, and its state after each command, valid and invalid."""
     enabled(prefix)
     name = prefix + "/robot/end_effector/left_gripper/"
     properties = wait_for_message(name + "properties", EndEffectorProperties)
@@ -224,7 +224,7 @@ def gripper(prefix):
 
 
 def channels(prefix):
-    """A light, a cuff, the fan and a navigator after commands and fingers, right and wrong."""
+    """A light, a cuff, the fan and a navigator after commands and presses, valid and invalid."""
     digital = publisher(prefix, "/robot/digital_io/command", DigitalOutputCommand)
     analog = publisher(prefix, "/robot/analog_io/command", AnalogOutputCommand)
     press = service(prefix, "/robot/sim/press", Press)
@@ -259,7 +259,7 @@ def channels(prefix):
 
 
 def head(prefix):
-    """Where the head turns, and that it nods."""
+    """The head's pan and nod."""
     enabled(prefix)
     pan = publisher(prefix, "/robot/head/command_head_pan", HeadPanCommand)
     nod = publisher(prefix, "/robot/head/command_head_nod", Bool)

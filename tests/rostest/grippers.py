@@ -18,7 +18,7 @@ from urdf_model.transforms import matrix_from_quaternion
 
 DEADLINE_S = 20.0  # [simulated s]
 BASE_HEIGHT_M = 0.93
-# It floats, so that a hand finds it where it was put.
+# It has no weight, so that a hand finds it in place.
 BOX = """<robot name="box"><link name="box">
   <inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>
   <collision><geometry><box size="0.04 0.04 0.04"/></geometry></collision></link>
@@ -26,7 +26,7 @@ BOX = """<robot name="box"><link name="box">
 
 
 class Box:
-    """A box in the world, its middle so far in front of an arm's tip, as long as a `with` lasts."""
+    """A box in the world, its centre at this distance in front of an arm's tip, inside a `with`."""
 
     def __init__(self, side, ahead_m):
         self._side, self._ahead_m = side, ahead_m

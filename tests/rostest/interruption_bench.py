@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A robot in a paused world that is advanced tick by tick, for tests that interrupt what it does."""
+"""A robot in a paused world that is advanced tick by tick, for tests that interrupt its motions."""
 import math
 import os
 import signal
@@ -19,8 +19,8 @@ from lab_testing.waiting import wait_until
 
 DEADLINE_S = 60.0  # [s, wall] for what takes a second on a machine with nothing else to do
 BEAT_TICKS, TICK_S = 5, 0.002
-# How long the world waits for a command after each beat [s, wall]: programs beside it shall keep up, and a program that
-# commands nothing any more shall not hold it up.
+# Longest wait for a command after each beat [s, wall]: external programs must keep up, and a program that sends no more
+# commands must not block the world.
 PATIENCE_S = 0.03
 
 
@@ -29,14 +29,14 @@ def joints(side):
 
 
 class Program:
-    """A program beside the world, in a group of its own, that ends with the test."""
+    """An external program in its own process group, which ends with the test."""
 
     def __init__(self, *command):
         self._process = subprocess.Popen(command, start_new_session=True, stdout=subprocess.PIPE,
                                          stderr=subprocess.STDOUT, text=True)
 
     def kill(self):
-        """End it without a word, as a crash does."""
+        """Kill it, as in a crash."""
         self._signal(signal.SIGKILL)
 
     def end(self):
@@ -57,7 +57,7 @@ class Program:
 
 
 class Bench:
-    """The robot, its world, and what a person can do to both. The world stands still except in :meth:`run`."""
+    """The robot, its world, and a person's actions on both. The world is paused except in :meth:`run`."""
 
     def __init__(self):
         self.state, self._joints, self.commands_heard = None, None, 0
@@ -100,8 +100,8 @@ class Bench:
     # -- time
 
     def run(self, seconds, before=None, patience_s=0.0):
-        """Let so much simulated time pass, in beats; ``before()`` is called before each, and after each a command is
-        waited for, for ``patience_s`` [s, wall] at most."""
+        """Advance simulated time by this much, in beats; ``before()`` is called before each beat, and after each it
+        waits for a command, at most ``patience_s`` [s, wall]."""
         for _ in range(max(1, round(seconds / TICK_S / BEAT_TICKS))):
             heard = self.commands_heard
             if before:
@@ -123,10 +123,10 @@ class Bench:
             self.run(BEAT_TICKS * TICK_S, before, PATIENCE_S)
         wait_until(test, what, PATIENCE_S)
 
-    # -- what can be seen
+    # -- observations
 
     def positions(self):
-        """{joint: angle [rad]} as the world stands now, or a state's period ago."""
+        """{joint: angle [rad]} in the present state of the world, or one period of the state earlier."""
         def is_new():
             behind = (self._time - self._joints.header.stamp).to_sec()
             return 0.0 <= behind < 0.025
@@ -134,14 +134,14 @@ class Bench:
         return dict(zip(self._joints.name, self._joints.position, strict=True))
 
     def farthest(self, before):
-        """(rad, joint) of the joint that is farthest from where it was in ``before``."""
+        """(rad, joint) of the joint that has moved most since ``before``."""
         now = self.positions()
         return max((abs(now[name] - before[name]), name) for name in now)
 
-    # -- what can be done
+    # -- actions
 
     def enabled(self, on):
-        """Enable or disable, and see that the robot says so."""
+        """Enable or disable, and check that the robot reports it."""
         self._until(lambda: self._enable.publish(Bool(on)), lambda: self.state.enabled == on, "enabled is %s" % on)
 
     def stop(self):
@@ -166,7 +166,7 @@ class Bench:
         assert answer.success, answer.status_message
 
     def respawn(self):
-        """Another robot in the place of this one, which is disabled, as any robot at its start."""
+        """Replace the robot by a new one, which is disabled, as every robot at its start."""
         state = self.state
         assert self._delete("baxter").success
         subprocess.run(["rosrun", "baxter_sim_hardware", "spawn_baxter", "neutral", "-urdf", "-param",
@@ -177,7 +177,7 @@ class Bench:
         self._press = self._service("/robot/sim/press", Press)
 
     def as_new(self):
-        """An enabled robot at the world's start that rests."""
+        """An enabled, resting robot at the world's start."""
         self.clear()
         self.call["reset_world"]()
         self.run(0.1)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every way to move the robot, interrupted in every way: nothing moves afterwards until a new command comes.
+"""Every kind of motion, interrupted in every way: nothing moves afterwards until a new command comes.
 
 The world is paused and advanced in beats of 10 ms, so that each interruption comes at the same place of the motion.
-Private parameters: ~motions, ~interruptions: names, separated by spaces; all where they are not given.
+Private parameters: ~motions, ~interruptions: names, separated by spaces; default: all.
 """
 import re
 import sys
@@ -17,17 +17,17 @@ from motions import POSITION, ActionMotion, ProgramMotion, Stream, all_motions
 
 from lab_testing.waiting import wait_until
 
-# A motion is interrupted when a joint is this far from its start, by which time all are on their way [rad, m].
+# A motion is interrupted when a joint is this far from its start; by then all joints move [rad, m].
 UNDER_WAY = {"gripper": 0.004}
 UNDER_WAY_RAD = 0.15
-# What brakes comes to rest within this distance; what the world puts elsewhere stays within it [rad, m]. Wrists are
+# Largest stopping distance of a joint, also after a reset [rad, m]. Wrists are
 # fast, and their torques are small: from full speed they need 0.35 (README of baxter_sim_hardware).
 BRAKING_RAD, WRIST_BRAKING_RAD = 0.15, 0.35
-# What holds moves by no more than this in HOLD_S [rad, m].
+# Largest motion of a holding joint in HOLD_S [rad, m].
 STILL_RAD, HOLD_S = 0.005, 1.0
 STILL = {"gripper": 0.0005}
-# A robot rests when nothing has moved by REST_RAD in REST_S, and it does so REST_DEADLINE_S after a motion's end at the
-# latest: a position that was commanded is still reached after its program is gone [s, simulated].
+# A robot rests when nothing has moved by REST_RAD in REST_S, at most REST_DEADLINE_S after a motion's end: a commanded
+# position is still reached after its program has ended [s, simulated].
 REST_RAD, REST_S, REST_DEADLINE_S = 1e-4, 0.3, 8.0
 
 ABORTED, PREEMPTED, SUCCEEDED = GoalStatus.ABORTED, GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED
@@ -35,12 +35,12 @@ ELSEWHERE = "put elsewhere|time went back"
 
 
 class Interruption:
-    """``brakes``: whether what moves stops at once, or goes on to where it was told to go; ``status``, ``text``: how
-    a goal ends, and what is said of it (an expression)."""
+    """``brakes``: whether moving joints stop at once, or continue to their target; ``status``, ``text``: final state of
+    a goal, and a regular expression for its text."""
 
     def __init__(self, do, brakes=True, status=None, text="", only=object, without=()):
         self.do, self.brakes, self.status, self.text, self.only = do, brakes, status, text, only
-        self.without = without  # kinds of motion that it says nothing of
+        self.without = without  # kinds of motion without an expectation
 
 
 def put_joints(bench, motion):
@@ -48,7 +48,7 @@ def put_joints(bench, motion):
 
 
 def pause(bench, motion):
-    """Let the world run by itself, and stand still, and go on."""
+    """Unpause the world, pause it, and continue."""
     bench.call["unpause_physics"]()
     try:
         before = bench._joints
@@ -111,7 +111,7 @@ class InterruptionsTest(unittest.TestCase):
                         before=motion.beat, most_s=60.0)
         interruption.do(bench, motion)
         if isinstance(motion, Stream):
-            motion.lose_client()  # from here on nobody commands
+            motion.lose_client()  # no commands from here on
         bench.run(0.004)
         here = bench.positions()
         if interruption_name not in ("killed_server", "lost_client"):
@@ -127,7 +127,7 @@ class InterruptionsTest(unittest.TestCase):
         if isinstance(motion, ActionMotion) and interruption.status is not None:
             self.assertEqual((motion.status, bool(re.search(interruption.text, motion.text))),
                              (interruption.status, True), motion.text)
-        # Whatever it was, the robot can be had back, and goes on from where it is.
+        # After every interruption, the robot can be enabled again, and continues from its position.
         bench.press("release")
         if not bench.state.enabled:
             bench.clear()
@@ -182,7 +182,7 @@ def chosen(parameter, table):
 
 
 def add_tests():
-    """A test for each motion that goes through its interruptions: its programs are started once."""
+    """Add a test for each motion, which runs all its interruptions; its programs are started once."""
     interruptions = chosen("interruptions", INTERRUPTIONS)
     for name in chosen("motions", all_motions.names):
         def test(self, name=name):

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""In sim mode the lab keeps to 127.0.0.1, apart from what docs/security.md names; and the doctor finds it healthy."""
+"""In sim mode the lab listens on 127.0.0.1 only, except for the ports in docs/security.md; and the doctor finds no
+problem."""
 
 import subprocess
 import sys
@@ -39,7 +40,7 @@ class LabNetwork(unittest.TestCase):
         rospy.wait_for_message("/robot/sim/started", Empty, timeout=40)
 
     def own_listeners(self):
-        """Open ports of this lab's processes alone: they were given this test's master."""
+        """Open ports of this lab's processes alone: known by this test's master."""
         uri = f"ROS_MASTER_URI={rosgraph.get_master_uri()}".encode().rstrip(b"/")
         listeners = probe.list_listeners()
         return [one for one in listeners if any(text.rstrip(b"/") == uri for text in environment_of(one.pid))]
@@ -47,7 +48,7 @@ class LabNetwork(unittest.TestCase):
     def test_only_the_named_nodes_are_open_to_other_machines(self):
         found = {one.process for one in self.own_listeners()}
         self.assertLessEqual(found, KNOWN_OPEN)
-        # robot_state_publisher is known to be: if it is not found, this test looks at the wrong processes.
+        # robot_state_publisher does: if it is not found, this test checks the wrong processes.
         self.assertIn("robot_state_publisher", found)
 
     def test_master_and_simulator_listen_on_loopback(self):

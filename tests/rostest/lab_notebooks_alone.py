@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The notebooks that start a simulator of their own, top to bottom, twice in one kernel; Jupyter; nothing is left."""
+"""The notebooks that start a simulator of their own, from top to bottom, twice in one kernel; Jupyter; no process is
+left."""
 import json
 import os
 import re
@@ -19,7 +20,7 @@ from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 from lab_tests import processes
 
-# Set for one server and all that it starts.
+# Set for one server and all its children.
 MARKER = "LAB_NOTEBOOK_TEST"
 
 
@@ -62,7 +63,7 @@ class LabNotebooksAloneTest(unittest.TestCase):
                 self.assertEqual(json.load(answer)["name"], tool.KERNEL)
             with self.assertRaises(urllib.error.HTTPError):
                 urllib.request.urlopen(base + "/api/kernels", timeout=CELL_TIMEOUT_S)
-            # A process shows no environment for the moment in which it becomes another program.
+            # During exec a process shows no environment.
             wait_until(lambda: len(processes.marked(run_id, MARKER)) > 2, "Jupyter and its kernel")
             server.send_signal(signal.SIGINT)
             server.wait(CELL_TIMEOUT_S)

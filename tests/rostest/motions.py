@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ways to set the robot in motion, for the tests that interrupt each of them.
+"""Kinds of motion of the robot, for the tests that interrupt each of them.
 
-A motion is begun by ``start``; while the program that makes it lives, ``beat`` is called every 10 ms of simulated time.
+``start`` begins a motion; while its program runs, ``beat`` is called every 10 ms of simulated time.
 """
 import actionlib
 import rospy
@@ -16,15 +16,15 @@ from baxter_model import ELECTRIC, JOINTS, SIDES
 from lab_testing.waiting import wait_until
 
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
-# Where a motion leads from the arms' start [rad], and how long it takes [s]: to be caught on the way.
+# Distance of a motion from the arms' start [rad], and its duration [s]: long enough to be interrupted.
 WAY = dict(zip(JOINTS, (0.5, -0.6, 0.4, 0.6, -0.6, 0.6, 0.8), strict=True))
 DURATION_S = 2.0
-# A command of another program, which interrupts [rad from where the arm is].
+# An interrupting command of another program [rad from the arm's position].
 ELSEWHERE = dict.fromkeys(JOINTS, 0.05)
 
 
 class Motion:
-    """side: which arm moves; ``has_ended()``: whether the program or the goal has come to its end."""
+    """side: which arm moves; ``has_ended()``: whether the program or the goal has ended."""
 
     title = ""
 
@@ -42,13 +42,13 @@ class Motion:
         self.goal = {name: self.here[name] + WAY[name[-2:]] for name in self.names}
 
     def beat(self):
-        """What the program does every 10 ms."""
+        """The program's action every 10 ms."""
 
     def lose_client(self):
-        """The program that makes the motion dies."""
+        """Kill the program of the motion."""
 
     def go_back(self):
-        """Command the way back; of parts that are moved by one command."""
+        """Command the motion back; for parts that move by one command."""
         raise NotImplementedError
 
     def has_ended(self):
@@ -98,14 +98,14 @@ class Stream(Motion):
 
 
 class ActionMotion(Motion):
-    """A goal of an action server beside the world. ``command``: what starts that server."""
+    """A goal of an external action server. ``command``: starts that server."""
 
     action, topic, command = None, "", ()
 
     def prepare(self):
         self._server = Program(*self.command)
         self._client = actionlib.ActionClient(self.topic, self.action)
-        # The client's own way to wait takes simulated time, which stands still.
+        # The client's own wait uses simulated time, which is paused.
         self.bench.run_until(lambda: self._client.pub_goal.get_num_connections() and self._client.last_status_msg,
                              "%s serves" % self.topic, most_s=300.0)
 
@@ -130,7 +130,7 @@ class ActionMotion(Motion):
         self._handle.cancel()
 
     def replace(self, goal):
-        """Send another goal, which takes the place of this one; returns its handle."""
+        """Send another goal, which replaces this one; returns its handle."""
         return self._client.send_goal(self.make_goal(goal))
 
     def kill_server(self):
@@ -148,7 +148,7 @@ class ActionMotion(Motion):
         return self._handle.get_goal_status_text() or getattr(self._handle.get_result(), "error_string", "")
 
     def succeeds(self, goal):
-        """Send a goal and see it succeed: the server is as good as before."""
+        """Send a goal and check that it succeeds: the server still works."""
         handle = self._client.send_goal(self.make_goal(goal))
         self.bench.run_until(lambda: handle.get_comm_state() == actionlib.CommState.DONE, "the next goal")
         state, text = handle.get_goal_status(), handle.get_goal_status_text()
@@ -231,7 +231,7 @@ class GripperMotion(Motion):
         self._say("go", '{"position": 20.0}')
 
     def go_back(self):
-        # Elsewhere, whether it has closed or is open: slowly, as it was told to be.
+        # To another position, whether it is closed or open, at the slow speed that was set.
         self._say("go", '{"position": 50.0}')
 
     def _say(self, command, arguments):
@@ -267,9 +267,9 @@ class HeadMotion(Motion):
 
 
 def all_motions(bench):
-    """Each way of moving; arms take turns, so that both are seen."""
+    """All kinds of motion; they alternate between the arms, so that both are tested."""
     left, right = SIDES
-    # The robots begin in neutral: move_to_neutral would be there already.
+    # The robot starts in neutral, so move_to_neutral would not move.
     move = "from baxter_interface import Limb, startup; startup.init_node('move'); limb = Limb('%s'); " \
         "limb.move_to_joint_positions({name: angle + 0.3 for name, angle in limb.joint_angles().items()})" % right
     return {

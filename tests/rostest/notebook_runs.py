@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests of the labs' notebooks share: run one twice in one kernel, and look at its pictures.
+"""Shared by the tests of the labs' notebooks: run one twice in one kernel, and check its pictures.
 
 The pictures go to .baxter/pictures, and with them those of docs/labs.md.
 """
@@ -25,7 +25,8 @@ CELL_TIMEOUT_S = 150
 WATCHING = ("1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro")
 MOVING = ("5_moving_baxter", "6_rotating_the_gripper", "7_waving")
 OWN_LAB = ("joint_states_and_trajectories", "ros_control")
-# What docs/labs.md shows, drawn by a cell after the last one: notebook -> (file, expression for a matplotlib figure).
+# The pictures of docs/labs.md, drawn by a cell after the last one: notebook -> (file, expression for a matplotlib
+# figure).
 DRAWN = {
     "1_transforms_and_tf": ("labs_tree.svg", "show.tf_tree(below='left_arm_mount').figure('left arm')"),
     "5_moving_baxter": ("labs_move.svg", "joint_plot.figure_of(log.samples, title='from neutral to the pose')"),
@@ -39,7 +40,7 @@ with matplotlib.rc_context({'svg.fonttype': 'none', 'svg.hashsalt': 'labs', 'pat
 
 
 def is_blank(png):
-    """Whether a picture shows one colour, or hardly anything else."""
+    """Whether a picture has almost only one colour."""
     pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR).reshape(-1, 3)
     colours, counts = np.unique(pixels, axis=0, return_counts=True)
     paper = colours[np.argmax(counts)].astype(int)
@@ -57,7 +58,7 @@ class Run:
                                      resources={"metadata": {"path": str(path.parent)}})
 
     def twice(self):
-        """Execute everything twice; returns what is wrong, a line each."""
+        """Execute everything twice; returns the errors, a line each."""
         faults = []
         with self.client.setup_kernel(env=self.environment):
             for number in (1, 2):
@@ -89,14 +90,14 @@ class Run:
 
 
 def prepare():
-    """Make the kernel known, by this process's environment, and the folder of the pictures."""
+    """Register the kernel through this process's environment, and make the folder of the pictures."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     tool.write_kernel(tool.STATE)
     os.environ.update(tool.environment(tool.STATE))
 
 
 def faults_of(*rows, environment=lambda: dict(os.environ)):
-    """Run rows of notebooks beside each other, those of a row in turn; returns what is wrong, a line each."""
+    """Run rows of notebooks in parallel, those of a row in turn; returns the errors, a line each."""
     def run(names):
         return [fault for name in names for fault in Run(tool.find(name), environment()).twice()]
 

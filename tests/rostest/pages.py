@@ -27,7 +27,7 @@ END_LIMIT_S = 30
 
 
 def wait_for_service(master_uri, name, process=None):
-    """Until a service is registered; ``process``: what is to bring it, which must not end before."""
+    """Until a service is registered; ``process``: the process that serves it, which must not end before."""
     master = xmlrpc.client.ServerProxy(master_uri)
 
     def is_there():

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Three robots in one world move at the same time, each by its own commands and nobody else's."""
+"""Three robots in one world move at the same time, each by its own commands only."""
 
 import unittest
 

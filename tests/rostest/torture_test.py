@@ -22,7 +22,7 @@ SEED = int(os.environ.get("TORTURE_SEED", random.SystemRandom().randrange(10**6)
 
 class Torture(unittest.TestCase):
     def torture(self, suite, seed, *options):
-        """Run a suite; returns its result. What failed, and how to repeat it, is the failure's text."""
+        """Run a suite; returns its result. The failure's text names the failed checks and how to repeat them."""
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, str(PROGRAM), suite, "--seed", str(seed), "--out", folder, *map(str, options)]
             done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

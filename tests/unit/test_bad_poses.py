@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A few of the poses of `bench verdict`: the cause is known by construction, and the verdict has to name it."""
+"""A few of the poses of `bench verdict`: the cause is known by construction, and the verdict must name it."""
 import importlib
 import sys
 from pathlib import Path
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.tree
 
 BENCH = Path(__file__).resolve().parents[1] / "bench"
 RIGHT = 0.95
-# Takes 20 s to build on an arm of seven joints: hardly a pose needs two of them.
+# Takes 20 s to build on an arm of seven joints: few poses need two of them.
 SLOW = "two joints' limits"
 
 
@@ -50,7 +50,7 @@ def test_verdict_names_the_cause(judged):
 
 
 def test_wrong_verdict_is_not_taken_for_right(judged):
-    """The judge itself: another cause, joint, pair or distance does not pass."""
+    """The judge itself must reject a wrong cause, joint, pair or distance."""
     builder, answers = judged
     for case, failure in answers:
         assert not builder.right(case, None)

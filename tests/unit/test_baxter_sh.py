@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""baxter.sh: how it is called, and which ROS variables a command then sees. Nothing here sets up or builds."""
+"""baxter.sh: its arguments, and the ROS variables of its commands. No test sets up or builds."""
 
 import fcntl
 import os
@@ -134,7 +134,7 @@ def test_unknown_option_and_unknown_host_are_refused():
 
 
 def copy_of_tools(folder):
-    """As much of the workspace as the scripts need to run, without a build."""
+    """The parts of the workspace that the scripts need, without a build."""
     folder.mkdir(parents=True)
     subprocess.run(["cp", "-r", str(ROOT / "baxter.sh"), str(ROOT / "tools"), str(folder)], check=True)
     for name in ("requirements.txt", "requirements-nodeps.txt"):
@@ -186,7 +186,7 @@ def test_set_up_is_stale_when_what_it_reads_has_changed(tmp_path):
 
 
 def test_the_lab_is_all_that_is_in_src():
-    """What is not in LAB_FOLDERS counts as somebody's own."""
+    """Packages outside of LAB_FOLDERS count as the user's own."""
     script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; printf "%s\\n" "${LAB_FOLDERS[@]}"'
     listed = subprocess.run(["bash", "-c", script, "x", str(ROOT)], capture_output=True, text=True, check=True).stdout
     tracked = subprocess.run(["git", "ls-files", "src"], cwd=ROOT, capture_output=True, text=True)
@@ -197,7 +197,7 @@ def test_the_lab_is_all_that_is_in_src():
 
 @pytest.fixture
 def set_up_copy(tmp_path):
-    """A workspace that is set up, as far as baxter.sh can see; builds of one's own packages are noted in `builds`."""
+    """A workspace that looks set up to baxter.sh; builds of the user's own packages are recorded in `builds`."""
     copy = copy_of_tools(tmp_path / "ws")
     for name in ("devel/setup.bash", ".baxter/build.stamp", ".venv/bin/python3"):
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
@@ -256,7 +256,7 @@ def test_a_set_up_in_another_shell_holds_up_nobody_while_nothing_has_changed(set
     with open(set_up_copy / ".baxter/lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         assert baxter("sim", "echo", "works", script=set_up_copy / "baxter.sh", timeout=60).stdout == "works\n"
-    # Nobody holds the lock: that set-up was cut off.
+    # Nobody holds the lock: that set-up was interrupted.
     assert "set-up was started" in baxter("sim", "true", script=set_up_copy / "baxter.sh").stderr
 
 
@@ -270,10 +270,10 @@ def test_ones_own_package_that_does_not_build_locks_nobody_out_and_is_tried_once
 
 
 def test_failing_set_up_leaves_the_earlier_build_usable_and_is_tried_once(tmp_path):
-    """A student's package that does not configure must not lock its author out, nor slow down every command."""
+    """A student's package that does not configure must not block its author, nor slow down every command."""
     copy = copy_of_tools(tmp_path / "ws")
     (copy / "tools" / "setup.bash").write_text('echo tried >>"$LAB_ROOT/tries"; exit 7\n')
-    assert baxter("sim", "true", script=copy / "baxter.sh").returncode == 7  # nothing to fall back on
+    assert baxter("sim", "true", script=copy / "baxter.sh").returncode == 7  # no earlier build
     for name in ("devel/setup.bash", ".baxter/build.stamp", ".venv/bin/python3"):
         (copy / name).parent.mkdir(parents=True, exist_ok=True)
         (copy / name).touch(mode=0o755)
@@ -282,7 +282,7 @@ def test_failing_set_up_leaves_the_earlier_build_usable_and_is_tried_once(tmp_pa
         assert (done.returncode, done.stdout) == (3, "works\n")
         assert "set-up has failed" in done.stderr
     assert (copy / "tries").read_text() == "tried\n" * 2
-    assert baxter("test", script=copy / "baxter.sh").returncode == 7  # tests of a stale build would say nothing
+    assert baxter("test", script=copy / "baxter.sh").returncode == 7  # tests of a stale build would be meaningless
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the bench makes of its figures: medians, ratios within a round, goals, table, JSON, pictures."""
+"""The bench's report: medians, ratios within a round, goals, table, JSON, pictures."""
 import ast
 import importlib
 import json
@@ -26,7 +26,7 @@ def report(modules):
 
 
 def rounds(report, tmp_path, *figures):
-    """What the rounds leave behind: each figure is (ours, peer's or None)."""
+    """The results of rounds: each figure is (ours, peer's or None)."""
     found = []
     for ours, peer in figures:
         one = report.Report()
@@ -76,7 +76,7 @@ def pooled_row(report, tmp_path, *shares, least=99.99):
 
 
 def test_a_miss_in_one_round_counts_among_all_samples(report, tmp_path):
-    """The median of these rounds is 100 %, and yet one of 6,000 was missed."""
+    """The median of these rounds is 100 %, although one of 6,000 was missed."""
     row = pooled_row(report, tmp_path, 100.0, 99.95, 100.0)
     assert row.figure == pytest.approx(100.0 - 100.0 / 6000)
     assert row.met is False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/cheat_sheet.md says what the robot's description, its interface and the packages say."""
+"""docs/cheat_sheet.md agrees with the robot's description, its interface and the packages."""
 import math
 import os
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics that keeps Baxter's arms off its body, with the simulator's own shapes and table of pairs."""
+"""Inverse kinematics that avoids collisions of Baxter's arms and body, with the simulator's own shapes and pairs."""
 import numpy as np
 import pytest
 import rospkg
@@ -29,7 +29,7 @@ def checker(robot):
 
 
 def locked(chain, q):
-    """``chain`` with next to no room around ``q``: what is wrong with q is wrong with every solution."""
+    """``chain`` with very narrow limits around ``q``, so that every solution has the same contacts as q."""
     rotations, offsets, _ = chain.arrays
     return Chain(chain.base, "tip", [
         *((name, "revolute", "l%d" % i, rigid(rotations[i], offsets[i]), (0, 0, 1), q[i] - 1e-4, q[i] + 1e-4)
@@ -45,7 +45,7 @@ def test_pair_that_touches_is_named(robot, checker, side):
     model = world.spawn(robot, "baxter", static=True, self_collision_pairs=self_collision_pairs(robot.links),
                         mesh_cuts=MESH_CUTS)
     index = model.index(chain.joint_names)
-    checker.set_posture(model.joint_names, model.read_joints()[0])  # the other arm as there
+    checker.set_posture(model.joint_names, model.read_joints()[0])  # the other arm as in that world
     right, built = 0, 0
     for q in np.random.default_rng(61).uniform(chain.lower, chain.upper, (300, 7)):
         model.set_joint_positions(index, q)
@@ -64,7 +64,7 @@ def test_pair_that_touches_is_named(robot, checker, side):
 
 
 def test_pose_that_a_clear_posture_reaches_gets_a_clear_one(robot, checker):
-    """Poses made from clear postures, of which the plain answer often is not clear."""
+    """Poses made from collision-free postures; the plain answer often collides."""
     chain = Chain.from_robot(robot, "base", "left_gripper")
     made = bent_around = found = 0
     for q in np.random.default_rng(62).uniform(chain.lower, chain.upper, (250, 7)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docker/Dockerfile builds, and a student's first commands run inside: tests/docker/run, where it can run."""
+"""docker/Dockerfile builds, and a student's first commands run inside: tests/docker/run, if this machine can run it."""
 
 import subprocess
 from pathlib import Path

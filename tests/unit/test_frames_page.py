@@ -15,7 +15,7 @@ LINE = re.compile(r" {4}( *)(?:\[(\w+)\] )?(\w+)(?: {2,}.*)?$")
 
 
 def drawn_tree():
-    """{child: (parent, joint that moves it or "")} of the page, both sides spelled out."""
+    """{child: (parent, joint that moves it or "")} of the page, with both sides expanded."""
     tree, above = {}, []
     drawing = PAGE.read_text().partition("<!-- tree:")[2].partition("\n##")[0]
     for line in drawing.splitlines():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An install space stands on its own: moved to another folder, it runs the lab without a look at where it came from."""
+"""An install space stands on its own: moved to another folder, it runs the lab without access to its original place."""
 
 import os
 import signal
@@ -10,12 +10,12 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = [pytest.mark.build, pytest.mark.long]
-# Root can hide the workspace from a command: an empty file system in its place, which nobody else sees.
+# Root can hide the workspace from a command: an empty file system in its place, in a private mount namespace.
 WITHOUT_SOURCES = ["unshare", "--mount", "sh", "-c", 'mount -t tmpfs tmpfs "$0" && exec "$@"', str(ROOT)]
 
 
 def installed(place, command, shell="bash"):
-    """A command in a clean environment that knows nothing but the install space; for root the workspace is away."""
+    """A command in a clean environment with only the install space; for root the workspace is hidden."""
     script = f'place=$1; shift; . "$place/setup.{shell}" && exec "$@"'
     environment = {key: os.environ[key] for key in ("HOME", "LANG", "TMPDIR") if key in os.environ}
     environment |= {"PATH": "/usr/bin:/bin", "ROS_MASTER_URI": "http://localhost:23511"}

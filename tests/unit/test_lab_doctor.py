@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The doctor's verdicts on faked environments, and its deadline."""
+"""The doctor's findings in fake environments, and its deadline."""
 
 import socket
 import threading
@@ -214,7 +214,7 @@ def test_questions_that_take_long_are_named_and_counted_as_open():
     def refuses():
         raise TimeoutError
 
-    # Long enough for a busy machine to answer what has no reason to wait.
+    # Long enough for immediate answers on a busy machine.
     answers, timed_out = answer_all({"quick": lambda: 1, "late": late, "refuses": refuses}, 3.0, said.append, 1.5)
     go_on.set()
     assert answers == {"quick": 1} and timed_out == {"late", "refuses"}

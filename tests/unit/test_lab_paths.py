@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The folders that the lab sheets name are there, also the one they spell in two ways."""
+"""The folders in the lab sheets exist, also the one that they spell in two ways."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`./baxter.sh test --busy`: which control group is made, what is written into it, what is said where none can be."""
+"""`./baxter.sh test --busy`: which control group is made, its settings, and the error if none can be made."""
 
 import errno
 import os
@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 class FakeMount:
-    """Folders and files as the kernel has them; a new folder has no files until something is written."""
+    """Folders and files as in the kernel; a new folder has no files until something is written."""
 
     def __init__(self, folder, own, files):
         self.mount, self.own = folder / "cgroup", folder / "own"

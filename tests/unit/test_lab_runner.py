@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The test runner must not miss a failure: discovery, selection, counting, and what a test leaves behind."""
+"""The test runner must not miss a failure: discovery, selection, counting, and left-over processes of a test."""
 
 import os
 import re
@@ -202,7 +202,7 @@ def test_a_test_may_take_what_its_file_says(tmp_path):
 
 
 def test_every_test_is_in_one_of_the_two_runs():
-    """The first run leaves out what is marked `tree`, the one under the second locale `build` and `once`."""
+    """The first run leaves out tests marked `tree`, the one under the second locale `build` and `once`."""
     marks = {path: set(re.findall(r"pytest\.mark\.(tree|once|build)\b", path.read_text(encoding="utf-8")))
              for folder in ("src", "tests") for path in (ROOT / folder).rglob("test_*.py") if path != Path(__file__)}
     assert {mark for found in marks.values() for mark in found} == {"tree", "once", "build"}

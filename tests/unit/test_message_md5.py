@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every message and service must have the MD5 sum that its peers on the wire expect.
+"""Every message and service must have the MD5 sum that its peers expect.
 
 A package states its sums in ``test/md5sums.yaml`` (sections ``msg``, ``srv`` and, for the messages that actions turn
 into, ``action``); this test finds them all. It computes them from the definition files, so neither a build nor a
@@ -17,7 +17,7 @@ import yaml
 SRC = Path(__file__).resolve().parents[2] / "src"
 TABLES = sorted(SRC.glob("**/test/md5sums.yaml"))
 
-# What actionlib makes of the three parts of an action: suffix of the name -> definition.
+# The messages that actionlib makes from the three parts of an action: suffix of the name -> definition.
 ACTION_MESSAGES = {
     "Goal": "{goal}",
     "Result": "{result}",
@@ -30,7 +30,8 @@ ACTION_MESSAGES = {
 
 
 def expected_sums(table):
-    """{("msg", "srv" or "action", type name): sum} of one package; scalars stay strings, whatever their digits are."""
+    """{("msg", "srv" or "action", type name): sum} of one package; scalars stay strings, even if they are all
+    digits."""
     sections = yaml.load(table.read_text(), Loader=yaml.BaseLoader)
     return {(kind, name): md5 for kind, sums in sections.items() for name, md5 in sums.items()}
 

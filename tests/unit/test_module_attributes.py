@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a module asks of another module of this workspace is there; a linter looks at one file at a time."""
+"""Attributes that a module uses of another module of this workspace exist; a linter checks only one file at a time."""
 import ast
 from functools import cache
 from pathlib import Path
@@ -28,7 +28,7 @@ def tree_of(path):
 
 @cache
 def names_of(path):
-    """All names that a module defines or imports, at whatever depth: more than it has, never less."""
+    """All names that a module defines or imports, at any depth: a superset of its attributes."""
     names = set(OF_ALL)
     for node in ast.walk(tree_of(path)):
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
@@ -41,7 +41,7 @@ def names_of(path):
 
 
 def unknown(path, tree):
-    """["line: module.name"] of what a module of ours is asked for and does not have."""
+    """["line: module.name"] of used attributes that the module does not have."""
     modules, taken = {}, set()
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom):

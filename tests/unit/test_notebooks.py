@@ -23,7 +23,7 @@ def test_there_is_a_notebook_for_every_part_of_the_courses():
 def test_in_git_without_outputs(path):
     name = path.relative_to(ROOT).as_posix()
     staged = subprocess.run(["git", "-C", ROOT, "show", f":{name}"], capture_output=True, text=True)
-    # Somebody's working copy may carry outputs; what goes into git may not. Outside git the file itself counts.
+    # A working copy may have outputs; committed files may not. Outside git the file itself is checked.
     content = json.loads(staged.stdout if staged.returncode == 0 else path.read_text(encoding="utf-8"))
     assert content["metadata"]["kernelspec"]["name"] == tool.KERNEL
     for cell in content["cells"]:
@@ -57,7 +57,7 @@ def test_kernel_is_the_workspaces_own(tmp_path):
     spec = json.loads((tmp_path / "kernels" / "baxter" / "kernel.json").read_text(encoding="utf-8"))
     script, *rest = spec["argv"]
     assert rest == ["-f", "{connection_file}"]
-    # What it starts sees the virtual environment, ROS and the workspace, whatever environment it was started from.
+    # What it starts sees the virtual environment, ROS and the workspace, from any environment.
     shown = subprocess.run([script, "--version"], env={"PATH": "/usr/bin:/bin"}, capture_output=True, text=True)
     assert shown.returncode == 0, shown.stderr
 

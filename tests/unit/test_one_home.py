@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot's facts have one home, baxter_model: nothing else writes down joint orders, mirror signs, poses, ids."""
+"""The robot's facts are in baxter_model only: no other file repeats joint orders, mirror signs, poses, ids."""
 
 import ast
 import itertools
@@ -17,15 +17,15 @@ pytestmark = pytest.mark.tree
 HOME = "src/baxter/baxter_common/baxter_model/"
 LIBRARY = "src/cwru_baxter/baxter_traj_streamer/src/cpp/baxter_traj_streamer.cpp"
 IK_LAUNCH = "src/baxter/baxter_simulator/baxter_sim_kinematics/launch/baxter_sim_kinematics.launch"
-#: They cannot import the package; tests below compare what they say.
+#: They cannot import the package; tests below compare their content.
 COPIES = (LIBRARY, IK_LAUNCH)
-#: Written out for people who read them by themselves; pages are prose.
+#: Written out for readers; pages are prose.
 FOR_READERS = ("src/rf_labs/rf_checks/exercises/", ".md", ".rst", ".ipynb", ".svg")
-#: Files that say what the robot itself has.
+#: Files about the physical robot's own data.
 DESCRIPTION = ("src/baxter/baxter_common/baxter_description/", "src/baxter/baxter_common/rethink_ee_description/")
 #: Parts of the workspace that know no Baxter: vehicles have left and right wheels.
 NO_BAXTER = ("src/bullet_gazebo/", "src/ros_control/", "src/probot/")
-#: What tests expect of the robot stands in them on purpose.
+#: Tests contain expected values on purpose.
 EXPECTATIONS = re.compile(r"src/.*/test/|tests/unit/|tests/rostest/(custom_gripper|grippers)\.py")
 
 ORDER = re.compile(r"\W+(?:left_|right_)?".join(JOINTS))
@@ -35,7 +35,7 @@ POSTURES = {
     **{name: tuple(baxter_model.poses().angles(name, side).values())
        for name, side in itertools.product(baxter_model.poses().names, SIDES)},
     **{name: tuple(angles.values()) for name, angles in baxter_model.null_space_postures("left").items()}}
-# Mirror images have the same sizes; zero is nobody's.
+# Mirror images have the same absolute values; all zeros does not count.
 SIZES = {tuple(map(abs, angles)): name for name, angles in POSTURES.items() if any(angles)}
 MIRRORED = {joint for joint, sign in baxter_model.MIRROR_SIGNS.items() if sign < 0}
 
@@ -60,7 +60,7 @@ def posture_in(numbers):
 
 
 def _constant(node):
-    """The value of a literal, signed numbers among them, or None."""
+    """The value of a literal, including signed numbers, or None."""
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
         value = _constant(node.operand)
         return -value if isinstance(value, int | float) and isinstance(node.op, ast.USub) else value
@@ -92,7 +92,7 @@ def _in_value(value):
 
 
 def facts_in_python(text):
-    """(line, fact) of what a program writes down; words and numbers in docstrings are prose."""
+    """(line, fact) of facts in a program; words and numbers in docstrings are prose."""
     nodes = list(ast.walk(ast.parse(text)))
     prose = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
     for node in nodes:
@@ -105,7 +105,7 @@ def facts_in_python(text):
 
 
 def facts_in_text(text):
-    """(line, fact) of what any other file writes down, such as YAML, C++ or a launch file."""
+    """(line, fact) of facts in any other file, such as YAML, C++ or a launch file."""
     for number, line in enumerate(text.split("\n"), 1):
         if ORDER.search(line):
             yield number, "the order of the joints"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Packages of other people: fetched from a git repository, refused when they are Python 2, built, preferred to ours."""
+"""Other people's packages: fetched from a git repository, refused if they are Python 2, built, preferred to ours."""
 
 import subprocess
 import sys

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who imports whom: only what package.xml names, and never upwards, so that no two packages need each other.
+"""Imports between packages: only those that package.xml names, and never upwards, so that no two packages depend on
+each other.
 
-Of packages outside of the workspace those of ROS and of Debian count; pip's are in requirements.txt.
+Among external packages, those of ROS and of Debian are checked; pip's are in requirements.txt.
 """
 
 import ast
@@ -14,7 +15,7 @@ import pytest
 from workspace_tree import ROOT, is_in_tests, is_python, own_files, packages
 
 PACKAGES = {**packages(), "lab_testing": Path("tests/lab_testing"), "workspace_tests": Path("tests")}
-#: Modules that Debian's packages bring under another name: what a manifest calls them.
+#: Modules whose Debian package has another name: the name in a manifest.
 RENAMED = {"PyKDL": "python3-pykdl", "PyQt5": "python3-pyqt5", "cv2": "python3-opencv", "lxml": "python3-lxml",
            "numpy": "python3-numpy", "yaml": "python3-yaml", "hypothesis": "python3-hypothesis",
            "rospkg": "python3-rospkg"}
@@ -35,7 +36,7 @@ def imported(text):
 
 
 def owners():
-    """Python package to the package of the workspace that brings it."""
+    """Python package -> the workspace's package that contains it."""
     found = {**RENAMED, **{name: name for name in PACKAGES}}
     for name, folder in PACKAGES.items():
         found |= {module.parent.name: name for module in (ROOT / folder / "src").glob("*/__init__.py")}
@@ -43,7 +44,7 @@ def owners():
 
 
 def named(package):
-    """(packages that the package needs, those that only its tests need besides), by its package.xml."""
+    """(packages that the package depends on, further ones of its tests), by its package.xml."""
     root = ElementTree.parse(ROOT / PACKAGES[package] / "package.xml").getroot()
     needed = {tag.text.strip() for tag in root if re.fullmatch(r"(build_|exec_|run_|build_export_)?depend", tag.tag)}
     return needed, {tag.text.strip() for tag in root if tag.tag == "test_depend"}
@@ -51,12 +52,12 @@ def named(package):
 
 @cache
 def of_ros(module):
-    """The installed ROS package that brings a module, or None."""
+    """The installed ROS package that contains a module, or None."""
     return module if any((share / module / "package.xml").is_file() for share in SHARES) else None
 
 
 def uses():
-    """(package, file, package that the file imports) for each pair of packages, the second one anybody's."""
+    """(package, file, package that the file imports) for all imports of a package."""
     owner = owners()
     folders = sorted(((str(folder) + "/", name) for name, folder in PACKAGES.items()), reverse=True)
     for file in own_files():
@@ -108,7 +109,7 @@ def test_no_two_packages_need_each_other():
 
 
 def test_a_package_below_imports_none_above():
-    """What stands at the bottom of the house, and what must not be needed for a physical robot."""
+    """The lowest packages, and packages that a physical robot must not need."""
     product = {(package, needed) for package, file, needed in USES if not is_in_tests(file)}
     assert {needed for package, needed in product if package == "baxter_model"} & set(PACKAGES) <= {"urdf_model"}
     for low, below in (("loop_ros", {"rospy_limits", "sim_time"}), ("world_picture", {"bullet_sim", "urdf_model"}),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docker/package_mirror.pl: sources of base images, with whatever addresses, end up at the mirror asked for."""
+"""docker/package_mirror.pl: sources of base images with any addresses are changed to the given mirror."""
 import os
 import shutil
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Paths that pages, comments and tools name exist, and each package lies where docs/architecture.md says."""
+"""Paths in pages, comments and tools exist, and each package is in the folder that docs/architecture.md gives."""
 
 import re
 import subprocess
@@ -13,17 +13,17 @@ pytestmark = pytest.mark.tree
 TOPS = "src|docs|tests|tools|docker|rosinstall"
 PATTERN = r"(?<![\w./~$}{*+-])((?:%s)/[\w./-]*[\w/])"
 PATH = re.compile(PATTERN % TOPS)
-# A package's README also names what lies in its own folder.
+# A package's README may also use paths relative to its own folder.
 README_PATH = re.compile(PATTERN % (TOPS + "|test|nodes|scripts|launch|config|urdf"))
-# A reader's own package, which pages speak of.
+# A reader's own package in the pages.
 READERS_OWN = "src/my_lab"
-# Names that stand for any file or folder of their kind.
+# Placeholders for any file or folder of their kind.
 GENERAL = {"rosinstall/FILE", "test/unit", "test/rostest"}
 NOT_READ = (".rst", ".ipynb", ".png", ".jpg", ".svg", ".stl", ".dae", ".rosinstall")
 
 
 def stale_paths(name, text):
-    """(line, path) of what the text of file `name` says and is not there: from the root, its folder or its package."""
+    """(line, path) of missing paths in the text of file `name`, relative to the root, its folder or its package."""
     bases = [ROOT, *(ROOT / name).parents[:3]]
     pattern = README_PATH if name.endswith("/README.md") else PATH
     found = []
@@ -38,7 +38,7 @@ def stale_paths(name, text):
 
 
 def ignored(paths):
-    """Those of the paths that git ignores: what set-up makes."""
+    """Those of the paths that git ignores, because set-up makes them."""
     done = subprocess.run(["git", "-C", str(ROOT), "check-ignore", "--stdin"], input="\n".join(paths), text=True,
                           capture_output=True)
     return set(done.stdout.split("\n"))
@@ -63,7 +63,7 @@ def test_a_stale_path_is_noticed():
 
 
 def house():
-    """Package name to folder, as the drawing on the architecture page has it: `folder/  packages`."""
+    """Package name -> folder, from the drawing on the architecture page: `folder/ packages`."""
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     found, groups = {}, [(0, Path("src"))]  # groups: (indentation, folder), from the outermost in
     for line in page.partition("\n    src/\n")[2].partition("\n\n")[0].split("\n"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One run of the pick and place benchmark, and what becomes of it without friction and with too much weight."""
+"""One run of the pick and place benchmark, and the same without friction and with too much weight."""
 
 import dataclasses
 import sys
@@ -33,7 +33,7 @@ def test_block_arrives(carry):
 
 
 def test_a_block_without_friction_is_not_lifted(carry):
-    """Nothing but friction holds it: 2 x 6 N on a weight of 0.5 N and more."""
+    """Only friction holds it: 2 x 6 N on a weight of 0.5 N and more."""
     with pytest.raises(BlockLost, match="nothing is between the fingers after it was lifted"):
         carry(dataclasses.replace(Trial.from_seed(SEED), friction=0.01))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""No module is imported for a side effect, and no function takes a crowd of parameters."""
+"""No module is imported for a side effect, and no function has too many parameters."""
 
 import ast
 from pathlib import Path
@@ -19,7 +19,7 @@ def product_code():
 
 
 def test_no_module_is_imported_for_its_side_effects():
-    """ruff finds imports that nobody uses; nobody may silence it."""
+    """ruff finds unused imports; no comment may silence it."""
     assert [name for name, text in product_code() if "noqa: F401" in text] == []
 
 

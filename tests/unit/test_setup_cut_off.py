@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Set-up that is killed, interrupted or out of disk at any of its steps: what it says, and that the next run mends it.
+"""Set-up that is killed, interrupted or out of disk at any of its steps: its messages, and the next run repairs it.
 
-The commands of the steps are stand-ins here, which can be told to hang half-way or to fail; test_setup_for_real.py has
-the real ones.
+The commands of the steps are fakes here, which can hang half-way or fail; test_setup_for_real.py has the real ones.
 """
 
 import os
@@ -100,7 +99,7 @@ whole_work "$@"
 
 @pytest.fixture
 def workspace(tmp_path):
-    """(folder of a workspace as far as set-up reads it, folder of the stand-ins for all commands)."""
+    """(folder of a workspace with the files that set-up reads, folder of the fake commands)."""
     root, fakes = tmp_path / "ws", tmp_path / "fakes"
     for folder in ("src/baxter/baxter_common/baxter_description/urdf", "src/cwru_baxter/cwru_baxter_sim",
                    "src/baxter/baxter_common/rethink_ee_description", "src/compat/xacro"):
@@ -146,7 +145,7 @@ def wait_for(path, process):
 
 
 def assert_whole(root):
-    """Nothing half is left, and everything is there."""
+    """No half-written file is left, and everything exists."""
     assert list(root.rglob("half*")) == []
     description = root / "src/baxter/baxter_common/baxter_description"
     assert (description / "meshes/torso/a.dae").exists()
@@ -310,6 +309,6 @@ def test_a_disk_without_room_is_the_cause_whatever_the_log_says(tmp_path):
 
 def test_nothing_can_be_written_at_all(workspace):
     root, _ = workspace
-    (root / ".baxter").touch()  # in the way of the folder
+    (root / ".baxter").touch()  # a file in place of the folder
     status, said = finish(start(root))
     assert status == 1 and f"cannot write to {root}/.baxter: a file there is not writable" in said

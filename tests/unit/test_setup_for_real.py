@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Set-up in a clone of this workspace with the real commands: without network, killed at each step, and out of disk.
 
-The step that installs Debian packages has nothing to do here; docs/platforms.md says how that one was tried.
+The step that installs Debian packages has nothing to do here; docs/platforms.md says how that step was tested.
 """
 
 import os
@@ -22,11 +22,11 @@ pytestmark = [
     pytest.mark.skipif(os.geteuid() != 0, reason="taking the network away and filling a disk need root"),
 ]
 LIMIT_S = 1200
-# How long each step may work before it is killed [s]: into the middle of those that take long.
+# Time until each step is killed [s]: in the middle of the long ones.
 KILL_AFTER_S = {"venv": 1.0, "pip": 12.0, "meshes": 0.0, "overlay": 0.0, "build": 12.0, "urdf": 0.5, "kernels": 4.0}
 # Free disk at the start [kB], too little for the step; baxter.urdf needs hardly more than the logs of set-up do.
 FREE_KB = {"venv": 6000, "pip": 200000, "meshes": 6000, "overlay": 6000, "build": 12000, "urdf": 32, "kernels": 200}
-# Of the overlay's package; it is fetched packed, and then laid out.
+# Size of the overlay's package; it is downloaded compressed, and then unpacked.
 OVERLAY_BYTES = 10_000_000
 TITLES = {
     "venv": "virtual environment", "pip": "Python packages", "meshes": "Baxter's meshes", "build": "catkin_make",
@@ -36,7 +36,7 @@ PORT = 23911
 
 
 def clean_environment():
-    """What a fresh shell has: nothing of the workspace that runs this test."""
+    """The environment of a fresh shell: nothing of the workspace that runs this test."""
     keep = ("HOME", "LANG", "TMPDIR", "PIP_CERT", "PIP_FIND_LINKS", "PIP_INDEX_URL", "SSL_CERT_FILE")
     return {**{name: os.environ[name] for name in keep if name in os.environ}, "PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
 
@@ -61,7 +61,7 @@ def assert_failed(said, folder, step, cause):
 
 
 def kill_in(folder, step, words):
-    """Start set-up, and kill it with all it has started while ``step`` is at work."""
+    """Start set-up, and kill it with all its children during ``step``."""
     log = folder / ".baxter" / "logs" / f"{step}.log"
     log.unlink(missing_ok=True)
     process = subprocess.Popen([folder / "baxter.sh", "setup", *words], cwd=folder, env=clean_environment(),

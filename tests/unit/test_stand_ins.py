@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Packages that stand in for missing ones step aside where the installed ROS has them."""
+"""Packages that replace missing ones are hidden if the installed ROS has them."""
 
 import subprocess
 from pathlib import Path

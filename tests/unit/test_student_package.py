@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A student's own package as the lab sheet makes it, in a shell that was open before the package was there.
+"""A student's own package as in the lab sheet, in a shell that was open before the package was created.
 
 Runs in a scratch workspace that holds a copy of lab_environment and uses this workspace's virtual environment.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Torture's invariants: each finds what it is for, and nothing else."""
+"""Torture's invariants: each finds its own violation, and nothing else."""
 import json
 import math
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Torture's messages: their bytes are what genpy reads, the same seed gives the same, no boundary is forgotten."""
+"""Torture's messages: genpy reads their bytes, the same seed gives the same messages, and all boundary values occur."""
 import collections
 import io
 import json
@@ -90,7 +90,7 @@ def test_json_arguments_are_deep_and_huge(modules):
 
 
 def test_plausible_commands_pass_for_valid_ones(modules):
-    """What only ever fails the first check of a handler tests no more than that."""
+    """Messages that always fail a handler's first check would test only that check."""
     valid = [value for style, value, _ in draws(modules, JointCommand, 500)
              if style == "plausible" and not modules.commands.is_refused("left", value)]
     assert len(valid) > 20
@@ -150,6 +150,6 @@ def test_garbage_is_bytes_of_many_kinds(modules, is_xmlrpc):
 
 
 def test_deep_json_is_too_deep_for_pythons_own_reader():
-    """The generator's depth is one at which careless code fails."""
+    """The generator's depth is large enough to break careless code."""
     with pytest.raises(RecursionError):
         json.loads('{"a":' * 5000 + "1" + "}" * 5000)

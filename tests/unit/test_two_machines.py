@@ -71,7 +71,7 @@ class Machine:
         return ["ip", "netns", "exec", self.namespace, *clean, str(ROOT / "baxter.sh"), *self.mode, *command]
 
     def run(self, *command):
-        """Output of a command that has to succeed."""
+        """Output of a command that must succeed."""
         done = subprocess.run(self._command(command), capture_output=True, text=True, timeout=COMMAND_LIMIT_S)
         assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
         return done.stdout
@@ -151,7 +151,7 @@ def test_a_trajectory_across_the_cable(lab):
 
 
 def speeds(watch, seconds):
-    """What `watch` prints in so much wall time [rad/s]."""
+    """Output of `watch` during this wall time [rad/s]."""
     deadline = time.monotonic() + seconds
     found = []
     while time.monotonic() < deadline:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""docs/architecture.md follows a joint command and an IK request from function to function. The code is as it says."""
+"""docs/architecture.md follows a joint command and an IK request from function to function. The code agrees with the
+page."""
 
 import ast
 import re
@@ -13,7 +14,7 @@ ROW = re.compile(r"\| (\d+) \| \[[^]]+\]\(\.\./([^)]+)\), `([\w.]+)` \| (\d+|sta
 
 
 def steps(title):
-    """[(number, file, name, number of the step that reaches it or 0)] of the table below a heading."""
+    """[(number, file, name, number of the calling step or 0)] of the table below a heading."""
     section = PAGE.read_text(encoding="utf-8").split("## %s\n" % title)[1].split("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("| ") and not line.startswith("| |")]
     rows = [ROW.fullmatch(line) for line in lines]
@@ -45,7 +46,7 @@ def names_in(node):
 
 
 def faults(rows, read):
-    """What is wrong with rows of :func:`steps`; ``read(file)``: its text."""
+    """Errors in the rows of :func:`steps`; ``read(file)``: its text."""
     nodes = {}
     for place, (number, file, name, origin) in enumerate(rows, 1):
         nodes[number] = definition(read(file), name)

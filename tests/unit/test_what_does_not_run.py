@@ -122,7 +122,7 @@ def test_long_rostests_of_what_was_named_are_left_out():
 
 
 def files_that_say(*words):
-    """Names of the test files in which one of the words stands."""
+    """Names of the test files that contain one of the words."""
     command = ["git", "-C", str(ROOT), "ls-files", "*.py", "*.test"]
     names = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
     paths = [ROOT / name for name in names if "/test/" in name or name.startswith("tests/")]

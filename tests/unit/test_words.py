@@ -9,7 +9,7 @@ from workspace_tree import ROOT, own_files
 pytestmark = pytest.mark.tree
 
 LIST, HERE = "CONTRIBUTING.md", "tests/unit/test_words.py"
-#: File to words in it that others chose: names on the wire, a part of the machine.
+#: File -> words in it that others chose: names in messages, a part of the machine.
 OF_OTHERS = {
     "src/baxter/baxter_common/baxter_core_msgs/msg/AssemblyState.msg": {"brain"},
     "src/baxter/baxter_simulator/baxter_sim_hardware/src/baxter_sim_hardware/robot_state.py": {"brain"},

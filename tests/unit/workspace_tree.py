@@ -21,7 +21,7 @@ def packages():
 
 
 def is_in_tests(name):
-    """Whether a file belongs to tests: those make up files and figures of their own."""
+    """Whether a file belongs to tests, which may contain invented files and numbers."""
     return name.startswith("tests/") or "/test/" in name
 
 

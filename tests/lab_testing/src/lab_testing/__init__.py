@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests of several packages share."""
+"""Shared code of the tests of several packages."""

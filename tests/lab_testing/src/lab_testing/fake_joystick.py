@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A joystick without hands."""
+"""A fake joystick for tests."""
 import os
 import struct
 import tempfile
@@ -8,7 +8,8 @@ _BUTTON, _AXIS, _INITIAL = 1, 2, 0x80  # linux/joystick.h
 
 
 class FakeJoystick:
-    """A named pipe that says what a joystick's device would. Attribute `path`: of it; nothing is there until plug_in.
+    """A named pipe that sends the events of a joystick's device. Attribute `path`: its path; it does not exist until
+    plug_in.
 
     sticks, buttons: what each reads at rest, -1..1 and 0 or 1, left and up positive.
     """
@@ -21,7 +22,7 @@ class FakeJoystick:
         self._file = None
 
     def plug_in(self):
-        """Returns when somebody reads it."""
+        """Create the pipe; returns when a reader has opened it."""
         os.mkfifo(self.path)
         self._file = os.open(self.path, os.O_WRONLY)
         self._write(_INITIAL)
@@ -34,7 +35,7 @@ class FakeJoystick:
             self._file = None
 
     def release(self):
-        """Let go of everything."""
+        """Release all controls."""
         self._write(0)
 
     def push(self, stick, value):
@@ -44,7 +45,7 @@ class FakeJoystick:
         os.write(self._file, self._event(_BUTTON, button, 1))
 
     def close(self):
-        """Unplug it for good."""
+        """Unplug it permanently."""
         self.unplug()
         self._folder.cleanup()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Descriptions and meshes that nobody writes but by mistake or to do harm: too large, endless, or not what they say."""
+"""Descriptions and meshes that are written by mistake or to do harm: too large, endless, or inconsistent."""
 import struct
 
 import numpy as np
@@ -9,7 +9,8 @@ _COLLADA = """<?xml version="1.0"?><!DOCTYPE c [%s]>
 
 
 def write_ball(path, across, announced=None, radius=1.0):
-    """Write a ball of 2 * ``across`` ** 2 triangles as a binary STL, whose header says ``announced`` where given."""
+    """Write a ball of 2 * ``across`` ** 2 triangles as a binary STL, whose header gives the count ``announced`` if
+    set."""
     u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, across + 1), np.linspace(0.01, 3.13, across + 1))
     points = np.stack([np.cos(u) * np.sin(v), np.sin(u) * np.sin(v), np.cos(v)], axis=-1).reshape(-1, 3)
     i = (np.arange(across)[:, None] * (across + 1) + np.arange(across)).ravel()
@@ -29,7 +30,7 @@ def write_entity_bomb(path):
 
 
 def chain(links):
-    """A URDF of so many links, all fixed to the first."""
+    """A URDF with this many links, all fixed to the first."""
     return "<robot name='m'>%s%s</robot>" % ("".join("<link name='l%d'/>" % k for k in range(links)), "".join(
         "<joint name='j%d' type='fixed'><parent link='l0'/><child link='l%d'/></joint>" % (k, k)
         for k in range(1, links)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which processes live. The dead that nobody has buried yet (zombies) do not, though a signal still reaches them."""
+"""Which processes are alive. Zombies are not, although they still accept signals."""
 import contextlib
 from pathlib import Path
 

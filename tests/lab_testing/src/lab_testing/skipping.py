@@ -8,9 +8,9 @@ from xml.etree import ElementTree
 
 
 def skip(case, reason):
-    """End the test of a ``unittest.TestCase``, from the test itself or ``setUp``: this machine lacks what it needs.
+    """End the test of a ``unittest.TestCase``, from the test itself or ``setUp``: this machine lacks a requirement.
 
-    reason: what it lacks. `./baxter.sh test` finds it in rostest's folder of results, counts and prints it.
+    reason: the missing requirement. `./baxter.sh test` finds it in rostest's folder of results, counts and prints it.
     """
     folder = os.environ.get("ROS_TEST_RESULTS_DIR")
     if folder:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A screen that nobody sees, and what is on it."""
+"""A virtual screen, and the picture on it."""
 import os
 import shutil
 import struct
@@ -33,7 +33,7 @@ class VirtualScreen:
     def __init__(self):
         self._folder = tempfile.TemporaryDirectory()
         reader, writer = os.pipe()
-        # Xvfb picks a free display by itself and says which.
+        # Xvfb picks a free display by itself and prints its number.
         self._server = subprocess.Popen(
             ["Xvfb", "-displayfd", str(writer), "-screen", "0", "%dx%dx24" % (WIDTH, HEIGHT), "-nolisten", "tcp",
              "-fbdir", self._folder.name], pass_fds=[writer], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -46,7 +46,7 @@ class VirtualScreen:
                             "QT_X11_NO_MITSHM": "1", "XDG_RUNTIME_DIR": self._folder.name}
 
     def picture(self):
-        """What is on the screen now: (HEIGHT, WIDTH, 3) uint8, red first."""
+        """The present picture: (HEIGHT, WIDTH, 3) uint8, red first."""
         data = (Path(self._folder.name) / "Xvfb_screen0").read_bytes()
         fields = struct.unpack(">%dI" % _XWD_FIELDS, data[:4 * _XWD_FIELDS])
         header_size, bytes_per_line, colours = fields[0], fields[12], fields[19]
@@ -57,7 +57,7 @@ class VirtualScreen:
     def wait_until_still(self, part, timeout_s, still_s=2.0):
         """Return the picture once `part(picture)` has been the same array for still_s [s].
 
-        part: function that picks what counts out of a picture, or returns None while it is not there yet.
+        part: function that returns the relevant part of a picture, or None while it does not exist yet.
         Raises AssertionError after timeout_s.
         """
         deadline = time.monotonic() + timeout_s

@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Waiting for something with a deadline: the one place where a test's clock ticks."""
+"""Waits with a deadline: the only place where tests use wall time."""
 import os
 import threading
 import time
 
 POLL_S = 0.01
-# `./baxter.sh test --busy` gives the tests a part of one core, and says by how much more time they need.
+# `./baxter.sh test --busy` gives the tests a part of one core, and sets the factor of their time limits.
 STRETCH = float(os.environ.get("LAB_TEST_STRETCH", "1"))
 
 
 def stretched(seconds):
-    """``seconds`` for what waits by itself (rospy, subprocess): STRETCH times as long."""
+    """``seconds`` times STRETCH, for time-outs of rospy, subprocess and the like."""
     return seconds * STRETCH
 
 
 def wait_until(condition, what="the condition", timeout_s=20.0, interval_s=POLL_S):
-    """Ask ``condition()`` every ``interval_s`` [s] of wall time and return its first true answer.
+    """Call ``condition()`` every ``interval_s`` [s] of wall time and return its first true result.
 
-    what: what is awaited, for the error; a function is called then, to say how far it has come.
-    Raises AssertionError after ``timeout_s`` [s] of wall time; the last question is asked after the deadline, so that a
-    process that stood still meanwhile is not blamed. Under `./baxter.sh test --busy` it waits STRETCH times as long.
+    what: description of the condition, for the error; a function is called then, to report the progress. Raises
+    AssertionError after ``timeout_s`` [s] of wall time; the last call is after the deadline, so that a stopped process
+    does not fail. Under `./baxter.sh test --busy` it waits STRETCH times as long.
     """
     timeout_s *= STRETCH
     deadline = time.monotonic() + timeout_s
@@ -34,7 +34,8 @@ def wait_until(condition, what="the condition", timeout_s=20.0, interval_s=POLL_
 
 
 def wait_for_publishers(subscriber, *nodes, timeout_s=20.0):
-    """Until ``subscriber`` (a ``rospy.Subscriber``) hears these nodes, by their absolute names; others do not count.
+    """Wait until ``subscriber`` (a ``rospy.Subscriber``) is connected to these nodes, by their absolute names; others
+    do not count.
 
     Raises AssertionError after ``timeout_s`` [s] of wall time.
     """
