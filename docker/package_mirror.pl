@@ -1,12 +1,12 @@
 #!/usr/bin/perl
 # SPDX-License-Identifier: BSD-3-Clause
-# Point a Debian or Ubuntu at another package mirror, whatever addresses its sources name:
+# Point a Debian or Ubuntu at another package mirror, for any addresses in its sources:
 #
 #     perl package_mirror.pl CODENAME MIRROR FILE...      e.g. bookworm http://mirror.example/debian /etc/apt/sources.list
 #
 # Both forms of sources are read (one line each, and deb822 stanzas). Changed are those of the distribution's own suites, which are
 # CODENAME, CODENAME-updates and so on with the component main; an address that ends in "-security" becomes MIRROR-security.
-# What other people offer in sources of their own stays. Perl, because a minimal image has no Python yet. Exits with 1 and one line
+# Sources of other providers are not changed. Perl, because a minimal image has no Python yet. Exits with 1 and one line
 # if no source was changed.
 use strict;
 use warnings;
@@ -28,7 +28,7 @@ sub address {
     return $old =~ m{-security/*$} ? "$mirror-security" : $mirror;
 }
 
-# Whether suites and components, as they stand in a source, are the distribution's own.
+# Whether suites and components of a source are the distribution's own.
 sub ours { return $_[0] =~ /(^|\s)\Q$codename\E(-\S+)?(\s|$)/ && $_[1] =~ /(^|\s)main(\s|$)/ }
 
 sub one_line {
