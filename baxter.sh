@@ -45,7 +45,7 @@ enter() {
     fi
 }
 
-# needs_no_lab WORDS…: do these words for the check only ask for a skeleton, the list or the help?
+# needs_no_lab WORDS…: do these arguments of the check only request a skeleton, the list or the help?
 needs_no_lab() {
     local word
     for word; do
@@ -65,10 +65,10 @@ main() {
             exec bash "$LAB_ROOT/tools/setup.bash" "$@"
             ;;
         doctor)
-            # Reports on a workspace that may be half built, so it sets nothing up.
-            # A host that does not resolve, or has no route, is for the doctor to name.
+            # Works on a half-built workspace, so it sets nothing up. The doctor itself reports a host that does not
+            # resolve or has no route.
             if [[ $# -gt 0 ]]; then use_robot "$1" 2>/dev/null || export ROS_MASTER_URI=http://$1:11311; fi
-            # What programs get that are started elsewhere.
+            # The Python of programs that are started outside of this environment.
             LAB_USERS_PYTHON=$(command -v python3)
             export LAB_USERS_PYTHON
             use_build_if_there
@@ -85,7 +85,7 @@ main() {
             exec python3 "$LAB_ROOT/tools/run_tests.py" "$@"
             ;;
         check)
-            # A skeleton, or the list of exercises, is no reason to wait for a set-up where there is a build.
+            # With a build, a skeleton or the list of exercises needs no set-up.
             { needs_no_lab "$@" && has_earlier_build; } || bring_up_to_date || exit
             use_loopback
             use_build || exit

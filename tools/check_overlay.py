@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Refuse Python 2 among other people's packages, with file and line, before it is built.
+"""Refuse Python 2 in other people's packages, with file and line, before the build.
 
     python3 tools/check_overlay.py FOLDER
 """
@@ -24,7 +24,7 @@ def is_python(path: Path) -> bool:
 
 
 def findings(folder: Path):
-    """(path, line, what) of each file that Python 3 cannot read."""
+    """(path, line, error) of each file that Python 3 cannot parse."""
     for path in sorted(folder.rglob("*")):
         if ".git" in path.parts or not path.is_file() or not is_python(path):
             continue

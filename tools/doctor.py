@@ -9,7 +9,7 @@ from pathlib import Path
 from lab_doctor.checks import Level, examine
 from lab_doctor.probe import gather
 
-# The questions of probe.gather, as people call them.
+# The questions of probe.gather, in the words of users.
 QUESTIONS = {"python": "Python's imports", "topics": "messages of the robot", "master": "the ROS master",
              "is_fresh": "reading the packages", "listeners": "the list of open ports",
              "other_masters": "other ROS masters", "users_python": "your own Python"}

@@ -2,7 +2,7 @@
 # The workspace's environment, as functions. Sourced by baxter.sh; LAB_ROOT names the workspace.
 
 DEFAULT_MASTER_URI=http://localhost:11311
-# The folders of src whose packages are the lab's; all others are somebody's own.
+# The folders of src whose packages are the lab's; all others are the user's own.
 LAB_FOLDERS=(baxter bullet_gazebo compat cwru_baxter lab_testing lab_tools moveit overlay probot rf_labs ros_control workspace_tests)
 
 # host_of URI: the host in http://host:port/
@@ -39,7 +39,8 @@ use_public() {
         address=$ROS_IP
     fi
     if [[ -z $address ]]; then
-        # The route to any address elsewhere names our own; no packet is sent. Without one, the first address there is.
+        # The route to any external address shows our own address; no packet is sent. Without a route, the first
+        # address.
         address=$(ip -4 route get 192.0.2.1 2>/dev/null | sed -n 's/.* src \([0-9.]*\).*/\1/p')
         [[ -n $address ]] || address=$(ip -4 -o address show scope global | sed -n '1s/.* inet \([0-9.]*\).*/\1/p')
     fi
@@ -67,7 +68,7 @@ use_robot() {
         return 2
     fi
     export ROS_MASTER_URI=http://$host:11311
-    # A loopback name is left over from sim mode, and no robot could call it.
+    # A loopback name is a left-over of sim mode; no robot could connect to it.
     if [[ -n ${ROS_HOSTNAME:-} ]] && is_loopback "$ROS_HOSTNAME"; then unset ROS_HOSTNAME; fi
     if [[ -n ${ROS_IP:-} ]] && is_loopback "$ROS_IP"; then unset ROS_IP; fi
     if [[ -n ${ROS_IP:-}${ROS_HOSTNAME:-} ]]; then
@@ -91,7 +92,7 @@ own_folders() {
     done
 }
 
-# What a build of somebody's own packages reads, as one hash; empty where there are none.
+# A hash of everything that a build of the user's own packages reads; empty if there are none.
 own_fingerprint() {
     local folders
     mapfile -t folders < <(own_folders)
@@ -101,8 +102,8 @@ own_fingerprint() {
         -o -path '*/env-hooks/*' \) -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)
 }
 
-# Everything whose change makes an earlier set-up stale, as one hash; packages of one's own do not. The workspace's own path
-# counts too: virtual environments and catkin build folders cannot be moved.
+# A hash of everything whose change makes an earlier set-up stale; the user's own packages do not count. The workspace's
+# own path counts too: virtual environments and catkin build folders cannot be moved.
 fingerprint() {
     local folder folders=()
     for folder in "${LAB_FOLDERS[@]}"; do
@@ -119,8 +120,8 @@ fingerprint() {
     } | sha256sum
 }
 
-# is_set_up FINGERPRINT: is all there that the lab needs? A set-up at work in another shell, over nothing that has changed,
-# takes nothing away; one that was cut off may have.
+# is_set_up FINGERPRINT: does everything exist that the lab needs? A set-up that runs in another shell on unchanged
+# files removes nothing; an interrupted one may have removed files.
 is_set_up() {
     local state=$LAB_ROOT/.baxter
     [[ -f $state/done && -f $LAB_ROOT/devel/setup.bash && -x $LAB_ROOT/.venv/bin/python3 && $(<"$state/done") == "$1" ]] ||
@@ -128,7 +129,8 @@ is_set_up() {
     [[ ! -f $state/at_work ]] || ! flock -n "$state/lock" true
 }
 
-# bring_up_to_date [--strict] [COMMAND…]: all that COMMAND needs, of the lab and of packages of one's own.
+# bring_up_to_date [--strict] [COMMAND…]: build everything that COMMAND needs, of the lab and of the user's own
+# packages.
 bring_up_to_date() {
     local strict=()
     if [[ ${1:-} == --strict ]]; then strict=(--strict) && shift; fi
@@ -136,7 +138,7 @@ bring_up_to_date() {
     build_own ${strict[@]+"${strict[@]}"} "$@" || [[ ${#strict[@]} -eq 0 ]]
 }
 
-# names_own WORD…: does one of the words name a package of one's own, or a path into one?
+# names_own WORD…: does one of the words name a package of the user's own, or a path into one?
 names_own() {
     local word folder folders
     mapfile -t folders < <(own_folders)
@@ -149,8 +151,8 @@ names_own() {
     return 1
 }
 
-# build_own [--strict] [COMMAND…]: build the packages of one's own that have changed, and nothing else. A command that runs
-# one of the lab's does not wait for that; where another shell is building, only a command that names such a package does.
+# build_own [--strict] [COMMAND…]: build only the user's own packages that have changed. A command that runs one of the
+# lab's packages does not wait for that; while another shell builds, only a command that names such a package waits.
 build_own() {
     local strict="" state=$LAB_ROOT/.baxter now status=0 folders
     if [[ ${1:-} == --strict ]]; then strict=yes && shift; fi
@@ -181,9 +183,8 @@ build_own() {
     return "$status"
 }
 
-# set_up_the_lab [--strict]: set up what is missing or stale. Where an earlier build is there to work with, a failure
-# does not lock anybody out of it (a student's package that does not configure needs a shell to be mended in),
-# unless --strict asks for an error.
+# set_up_the_lab [--strict]: set up what is missing or stale. With an earlier build, a failure does not block its use (a
+# student needs a shell to repair a package that does not configure), unless --strict requires an error.
 set_up_the_lab() {
     local state=$LAB_ROOT/.baxter now status=0
     now=$(fingerprint)
@@ -193,7 +194,7 @@ set_up_the_lab() {
         bash "$LAB_ROOT/tools/setup.bash" >&2 </dev/null || status=$?
         if [[ $status -eq 0 ]]; then return 0; fi
         if [[ $status -eq 130 || ${1:-} == --strict ]] || ! has_earlier_build; then return "$status"; fi
-        # What failed once fails again; not every command has to wait for it.
+        # A failed set-up fails again; not every command should wait for it.
         printf '%s\n' "$now" >"$state/failed"
     fi
     echo "baxter.sh: set-up has failed; going on with the build from before. ./baxter.sh setup tries again." >&2
@@ -205,7 +206,7 @@ has_earlier_build() {
 
 # Take on the environment of the built workspace; its hooks put the virtual environment first in PATH.
 use_build() {
-    # What another workspace left behind would be chained in front of ours.
+    # Left-over settings of another workspace would be chained in front of ours.
     unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH PYTHONPATH PYTHONHOME ROS_DISTRO
     # shellcheck disable=SC1091
     source "$LAB_ROOT/devel/setup.bash"

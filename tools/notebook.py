@@ -24,12 +24,12 @@ FIRST_PORT = 8888
 START_TIMEOUT_S = 60.0
 # Settings of JupyterLab's own, as defaults: it would ask each new user whether to fetch news.
 SETTINGS = {"@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False}}
-# A simulator that a notebook has started is given as long to end as roslaunch may need.
+# Time for the end of simulators that notebooks have started: as long as roslaunch may need.
 STOP_TIMEOUT_S = 40.0
 
 
 class NotebookError(Exception):
-    """The notebook cannot be opened; the text says why and what could be."""
+    """The notebook cannot be opened; the text says why and lists valid ones."""
 
 
 def notebooks() -> list[Path]:
@@ -50,7 +50,7 @@ def find(name: str) -> Path:
 
 
 def write_kernel(folder: Path):
-    """Tell Jupyter, by a file below `folder`, about the kernel `Baxter lab`: tools/notebook_kernel.bash."""
+    """Register the kernel `Baxter lab` in Jupyter by a file below `folder`: tools/notebook_kernel.bash."""
     kernel = folder / "kernels" / KERNEL
     kernel.mkdir(parents=True, exist_ok=True)
     command = [str(ROOT / "tools" / "notebook_kernel.bash"), "-f", "{connection_file}"]
@@ -73,7 +73,7 @@ def environment(state: Path) -> dict[str, str]:
 
 
 def free_port(first: int) -> int:
-    """The first port from there on that nobody listens on. Raises NotebookError."""
+    """The first free port from there on. Raises NotebookError."""
     try:
         return ports.free_port(range(first, first + 100))
     except OSError as error:
@@ -105,12 +105,12 @@ def wait_for(url: str, server: subprocess.Popen):
 
 
 def serve(page: str, first_port: int) -> int:
-    """Run JupyterLab until Ctrl-C or until it ends; nothing that its notebooks have started outlives it."""
+    """Run JupyterLab until Ctrl-C or until it ends; all processes of its notebooks end with it."""
     port, token, run_id = free_port(first_port), secrets.token_urlsafe(24), uuid.uuid4().hex
     write_kernel(STATE)
-    # In the environment and not on the command line, which every user of the machine can read.
+    # In the environment and not on the command line, since every user of the machine can read the latter.
     marked = {**environment(STATE), "JUPYTER_TOKEN": token, processes.NOTEBOOK_MARKER: run_id}
-    # A session of its own: Ctrl-C reaches us alone, and we end it once.
+    # A session of its own: Ctrl-C reaches only this process, which then ends the server once.
     server = subprocess.Popen(command(port), env=marked, stdin=subprocess.DEVNULL, start_new_session=True)
     try:
         wait_for(f"http://127.0.0.1:{port}/api?token={token}", server)
@@ -121,7 +121,7 @@ def serve(page: str, first_port: int) -> int:
         print("ending ...", flush=True)
         return 0
     finally:
-        # One Ctrl-C is enough; a second one must not leave half of it behind.
+        # One Ctrl-C is enough; a second one must not interrupt the clean-up.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         if server.poll() is None:
             server.send_signal(signal.SIGTERM)
@@ -147,7 +147,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    # kill ends it like Ctrl-C.
+    # SIGTERM ends it like Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         sys.exit(main())

@@ -7,5 +7,5 @@ export LAB_ROOT
 source "$LAB_ROOT/tools/environment.bash"
 use_loopback
 use_build || exit
-# Errors only: on this machine alone, nobody but root can listen to the kernel, whatever it warns of.
+# Errors only: the kernel warns about open ports, but on this machine only root can read its traffic.
 exec python3 -m ipykernel_launcher --IPKernelApp.log_level=ERROR "$@"

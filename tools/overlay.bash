@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# Other people's packages beside ours, in src_overlay/: fetched from rosinstall files, checked, and preferred where a
-# package of theirs bears the name of one of ours. Sourced by set-up.
+# Other people's packages beside ours, in src_overlay/: fetched from rosinstall files, checked, and preferred to our
+# packages of the same name. Sourced by set-up.
 
 OVERLAY_MARK="made by set-up: src_overlay has this package"
 
-# import_overlay ROOT FILE: fetch what a .rosinstall or .repos file lists; what is there already is brought up to date.
+# import_overlay ROOT FILE: fetch what a .rosinstall or .repos file lists; existing ones are updated.
 import_overlay() {
     local root=$1 file=$2
     mkdir -p "$root/src_overlay" && vcs import --input "$file" "$root/src_overlay"
 }
 
-# drop_cut_off_clones ROOT: remove what git was killed over; it would take such a folder for a whole clone.
+# drop_cut_off_clones ROOT: remove incomplete clones of a killed git; git would take such a folder for a complete clone.
 drop_cut_off_clones() {
     local git
     for git in "$1"/src_overlay/*/.git; do
@@ -25,11 +25,11 @@ drop_cut_off_clones() {
 # name_of PACKAGE.XML
 name_of() { sed -n 's/.*<name>[[:space:]]*\([^<[:space:]]*\).*/\1/p' "$1" | head -n 1; }
 
-# manifests FOLDER: the package.xml files below it, without what is left out of the build
+# manifests FOLDER: the package.xml files below it, without those excluded from the build
 manifests() { find "$1" \( -name .git -o -name meshes -o -name __pycache__ \) -prune -o -name package.xml -print; }
 
-# leave_out_overlaid ROOT: let the build see the overlay, hide every package of ours that it has, and show again what it has
-# no more. Prints the names of the hidden ones. Fails where the overlay has one name twice.
+# leave_out_overlaid ROOT: include the overlay in the build, hide our packages of the same names, and show the others
+# again. Prints the names of the hidden ones. Fails if the overlay has a name twice.
 leave_out_overlaid() {
     local root=$1 manifest name
     local -A theirs=()

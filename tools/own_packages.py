@@ -4,8 +4,8 @@
 
     own_packages.py ROOT FOLDER…
 
-What has not changed since its last build is left alone, unless a package of one's own that it depends on was built.
-Exit code 0: all are built; 1: one is not, and the lines on standard error name it and its log.
+A package that has not changed since its last build is skipped, unless one of the user's own packages that it depends on
+was built. Exit code 0: all are built; 1: one is not, and the lines on standard error name it and its log.
 """
 
 import hashlib
@@ -17,14 +17,14 @@ from pathlib import Path
 from catkin_pkg.package import InvalidPackage
 from catkin_pkg.topological_order import topological_order
 
-# What a build reads; as in fingerprint() of environment.bash, and compiled code, which only make knows to be stale.
+# Files that a build reads; as in fingerprint() of environment.bash, plus compiled code, which only make can check.
 NAMES = ("package.xml", "CMakeLists.txt", "setup.py")
 ENDINGS = (".msg", ".srv", ".action", ".cfg", ".c", ".cc", ".cpp", ".cxx", ".h", ".hpp")
 LOG_LINES_SHOWN = 20
 
 
 def packages(root: Path, folders):
-    """(path, package) in the order in which they have to be built. Raises InvalidPackage, RuntimeError."""
+    """(path, package) in build order. Raises InvalidPackage, RuntimeError."""
     found = []
     for folder in folders:
         for path, package in topological_order(str(root / "src" / folder)):
@@ -55,7 +55,7 @@ def dependencies(package):
 
 
 def state_of(path: Path) -> str:
-    """A hash of all that a build of the package reads."""
+    """A hash of all files that a build of the package reads."""
     digest = hashlib.sha256()
     for file in sorted(path.rglob("*")):
         if file.is_file() and ".git" not in file.parts and (
@@ -67,12 +67,12 @@ def state_of(path: Path) -> str:
 def build(root: Path, path: Path, package, log: Path):
     """Configure and build one package. Raises CalledProcessError."""
     folder = root / ".baxter" / "own" / package.name
-    # Each configuration writes the setup files of the devel space anew, as if the package were a workspace of its own.
+    # Each configuration rewrites the setup files of the devel space, as if the package were a separate workspace.
     of_the_space = {file: file.read_bytes() for file in (root / "devel").iterdir() if file.is_file()}
     commands = (
         ["cmake", "-S", path, "-B", folder, f"-DCATKIN_DEVEL_PREFIX={root}/devel",
          f"-DCMAKE_INSTALL_PREFIX={root}/install", f"-DPYTHON_EXECUTABLE={root}/.venv/bin/python3"],
-        # Without -l: on a busy machine make would wait for the others to come to rest.
+        # Without -l: on a busy machine make would wait for other processes.
         ["cmake", "--build", folder, "--parallel", str(os.cpu_count() or 1)],
     )
     with log.open("wb") as output:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# Which system this is, and what is known about the workspace on it; docs/platforms.md has the long form. Sourced by set-up.
+# Detects the system, and what is known about the workspace on it; docs/platforms.md has the long form. Sourced by
+# set-up.
 
 OLDEST_PYTHON=3.10
 

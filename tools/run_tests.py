@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`./baxter.sh test`: lint, unit tests, unit tests under a comma-decimal locale, rostests.
 
-At the end stands what did not run and why, and one line of counts last.
+At the end it prints the tests that did not run, with reasons, and one line of counts.
 
 With --busy[=PERCENT] everything gets that share of one core, and without names the suites of the main flows run.
 """
@@ -28,11 +28,11 @@ ROOT = Path(__file__).resolve().parent.parent
 WORK = ROOT / ".baxter" / "tests"
 LINT_COMMANDS = {
     "ruff": [sys.executable, "-m", "ruff", "check", "--quiet", str(ROOT)],
-    # Offline: with rosdep's database its verdict would depend on whether somebody ran `rosdep update`.
+    # Offline: with rosdep's database the result would depend on an earlier `rosdep update`.
     "catkin_lint": ["catkin_lint", "--offline", "--strict", "--quiet", "-W1", str(ROOT / "src")],
 }
 PYTEST_NO_TESTS_COLLECTED = 5
-# What --busy runs without names, each the test of a main flow: it has to pass on a fifth of a two-core machine, too.
+# The tests of --busy without names, one for each main flow: they must also pass on a fifth of a two-core machine.
 MAIN_FLOWS = (
     "enable_robot.test",
     "tools_world.test",  # enabling and moving in the simulator
@@ -60,7 +60,7 @@ def run_linter(name: str) -> Tally:
 
 
 class UnitRun:
-    """One pytest process, which starts at once; its own output goes to the terminal, or into a file."""
+    """One pytest process, which starts at once; its output goes to the terminal, or into a file."""
 
     def __init__(self, title: str, targets, arguments, environment=None, output: Path | None = None,
                  leaves_out_long: bool = False):
@@ -102,7 +102,7 @@ class UnitRun:
 
 
 class FailedStart:
-    """Stands for a UnitRun that could not begin."""
+    """Replaces a UnitRun that could not start."""
 
     def __init__(self, detail: str):
         self._detail = detail
@@ -120,19 +120,20 @@ def start_unit_under_comma_locale(targets):
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", None) or ""
         return FailedStart(f"cannot make the locale {comma_locale.NAME}: {error}\n{detail}")
-    # What takes long or builds has nothing to do with decimal points. Two pytests share no cache.
+    # Long tests and builds do not depend on decimal points. Two pytests must not share a cache.
     arguments = ["-p", "lab_tests.comma_locale", "-p", "no:cacheprovider", "-m", "not long and not build and not once"]
     return UnitRun("unit-comma-locale", targets, arguments, environment, WORK / "unit-comma-locale.txt")
 
 
 def layers(selection, long: bool, stretch: float, ending: contextlib.ExitStack):
-    """(title, function that runs it) of everything chosen, fastest first. What `ending` holds ends with the tests."""
+    """(title, function that runs it) of everything chosen, fastest first. Objects in `ending` are ended with the
+    tests."""
     for name in selection.linters:
         yield name, functools.partial(run_linter, name)
     if selection.unit_targets:
-        # A single test that is named runs, long or not; a -m of the user's own comes later and wins.
+        # A test that is named runs even if it is long; the user's own -m comes later and takes precedence.
         is_single = any("::" in target for target in selection.unit_targets)
-        # The run under the second locale has what is marked as tree: each runs as long as the other.
+        # The run under the second locale has the tests marked as tree, so that both runs take the same time.
         elsewhere = ["--in-the-other-run=tree"] if selection.is_whole_suite else []
         runs = {"unit tests": UnitRun("unit", selection.unit_targets, elsewhere + selection.pytest_arguments,
                                       leaves_out_long=not (long or is_single))}
@@ -180,13 +181,13 @@ class Beside:
         return self._tallies[test].result()
 
     def end(self):
-        """Stop what runs, and run no more."""
+        """Stop the running test, and start no more."""
         self._ending.set()
         self._executor.shutdown(cancel_futures=True)
 
 
 def run_layers(selection, long: bool, stretch: float = 1.0) -> Tally:
-    """Run everything chosen and tell of each."""
+    """Run all selected tests and print each result."""
     total = Tally(long=[name for test in selection.left_out for name in rostests.names(test, ROOT)])
     with contextlib.ExitStack() as ending:
         for title, run in layers(selection, long, stretch, ending):
@@ -204,7 +205,7 @@ def run_layers(selection, long: bool, stretch: float = 1.0) -> Tally:
 
 
 def run_with_share(selection, options) -> Tally:
-    """Run everything chosen, with --busy on a share of one core. Raises ValueError, QuotaError."""
+    """Run all selected tests, with --busy on a share of one core. Raises ValueError, QuotaError."""
     if options.busy is None:
         return run_layers(selection, options.long)
     with Quota(options.busy):
@@ -223,7 +224,7 @@ def main() -> int:
     parser.add_argument("--busy", type=float, metavar="PERCENT")
     options, arguments = parser.parse_known_args(separate_busy(sys.argv[1:]))
     WORK.mkdir(parents=True, exist_ok=True)
-    # Started in the background of a script, Ctrl-C is ignored, by every child too; the tests press it.
+    # In a script's background job Ctrl-C is ignored, also by every child; but tests send it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         names = arguments or list(() if options.busy is None else MAIN_FLOWS)

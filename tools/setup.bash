@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Install and build what the workspace needs, step by step; what is there already is left alone.
+# Install and build what the workspace needs, step by step; finished steps are skipped.
 # Needs bash, apt and coreutils only: on a minimal Debian everything else is what this script installs.
 set -uo pipefail
 
@@ -25,7 +25,7 @@ GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
 STEPS=(apt venv pip meshes overlay build urdf kernels)
 # Python packages with compiled inner loops: `python3 -m NAME` fills their cache.
 COMPILED=(baxter_sim_kinematics baxter_sim_hardware motion_planning)
-# Robots whose first plan is not to wait until their shapes have been gone through.
+# Robots whose collision spheres are computed in advance, so that the first plan need not wait.
 PLANNED_FOR=("$DESCRIPTION/urdf/baxter.urdf.xacro" "$LAB_ROOT/src/probot/probot_description/urdf/probot_anno.xacro")
 declare -A TITLES=(
     [apt]="Debian packages"
@@ -60,7 +60,7 @@ missing_packages() {
     LC_ALL=C comm -23 <(printf '%s\n' "${wanted[@]}" | LC_ALL=C sort) <(LC_ALL=C sort <<<"$have")
 }
 
-# Before a gigabyte is fetched for nothing.
+# Checked before a gigabyte is downloaded in vain.
 require_python() {
     /usr/bin/python3 -c "import sys; sys.exit(sys.version_info < (${OLDEST_PYTHON/./, }))" 2>>"$step_log" ||
         refuse "what requirements.txt pins needs Python $OLDEST_PYTHON or newer; this is $(/usr/bin/python3 --version)"
@@ -77,15 +77,15 @@ step_apt() {
     command -v apt-get >/dev/null || refuse "this machine has no apt-get; install these yourself: ${missing[*]}"
     if [[ $EUID -ne 0 ]]; then
         command -v sudo >/dev/null || refuse "not root, and no sudo. As root: apt-get install ${missing[*]}"
-        # Ask for the password here, where it can be seen: the commands below write to the log.
+        # Ask for the password here, where the prompt is visible: the commands below write to the log.
         sudo -v || refuse "sudo was refused. As root: apt-get install ${missing[*]}"
         as_root=(sudo)
     fi
     as_root+=(env DEBIAN_FRONTEND=noninteractive)
-    # A service that a package starts must not hold set-up's lock for good.
+    # A service that a package starts must not keep set-up's lock.
     {
         run wait_for_apt
-        # Where an earlier installation was killed, apt refuses to go on by itself.
+        # After a killed installation, apt refuses to continue by itself.
         run "${as_root[@]}" sh -c 'dpkg --configure -a || echo "the rest is for --fix-broken"'
         run "${as_root[@]}" apt-get update
         mapfile -t missing < <(missing_packages)
@@ -95,7 +95,7 @@ step_apt() {
     note="${#missing[@]} asked for"
 }
 
-# Until no other program installs packages: an update in the background, or what a killed set-up has left running.
+# Wait until no other program installs packages: a background update, or a process of a killed set-up.
 wait_for_apt() {
     local file inodes=()
     for file in /var/lib/dpkg/lock-frontend /var/lib/dpkg/lock /var/lib/apt/lists/lock; do
@@ -128,9 +128,9 @@ step_venv() {
 make_venv() {
     require_python
     rm -f "$STATE/pip.stamp"
-    # Always Debian's Python: rospy is installed for that one, whatever comes first in PATH.
+    # Always Debian's Python: rospy is installed for that one, not the first one in PATH.
     run /usr/bin/python3 -m venv --clear --system-site-packages "$VENV"
-    # Packages that pip was killed over are gone with it.
+    # This also removes packages that a killed pip left incomplete.
     mended pip
 }
 
@@ -138,7 +138,7 @@ step_pip() {
     local key
     key=$(hash_of requirements.txt requirements-nodeps.txt)
     if [[ $cut_off_step == pip ]]; then make_venv; fi
-    # Comes in with somebody's own `pip install`, and hides Debian's: requirements-nodeps.txt says what breaks.
+    # A user's own `pip install` may bring it, and it hides Debian's: requirements-nodeps.txt says what breaks.
     if compgen -G "$VENV/lib/python3*/site-packages/rospkg" >/dev/null; then
         run "$VENV/bin/python3" -m pip uninstall -y rospkg
     fi
@@ -148,7 +148,7 @@ step_pip() {
     fi
     run "$VENV/bin/python3" -m pip install --progress-bar off -r requirements.txt
     run "$VENV/bin/python3" -m pip install --progress-bar off --no-deps -r requirements-nodeps.txt
-    # PyPI's xacro command knows neither --inorder nor where ROS 1 packages lie; ours does, and is what people call.
+    # PyPI's xacro command knows neither --inorder nor the paths of ROS 1 packages; users must get ours.
     if [[ -f src/compat/xacro/xacro ]]; then
         run ln -sf ../../src/compat/xacro/xacro "$VENV/bin/xacro"
     fi
@@ -183,7 +183,7 @@ step_meshes() {
     stamp "$key"
 }
 
-# With --with FILE: fetch. In any case: check what lies in src_overlay, and let it win over packages of ours.
+# With --with FILE: fetch. In any case: check the packages in src_overlay, and prefer them to ours.
 step_overlay() {
     local file hidden
     if was_cut_off overlay; then run drop_cut_off_clones "$LAB_ROOT"; fi
@@ -199,14 +199,14 @@ step_overlay() {
     note="none"
     if [[ -d src_overlay ]]; then note="$(manifests src_overlay | wc -l) in src_overlay"; fi
     if [[ -n $hidden ]]; then note+=", instead of ours: ${hidden//$'\n'/ }"; fi
-    # What a package of the same name has left in the build would still be found.
+    # Files that a package of the same name left in the build would still be found.
     if ! stamp_is "$hidden"; then
         [[ -f $STATE/overlay.stamp || -n $hidden ]] && run rm -rf build devel
         stamp "$hidden"
     fi
 }
 
-# Relays in devel to scripts that are gone: catkin_make leaves them, and one in devel/bin hides the system's program.
+# Relays in devel to deleted scripts: catkin_make keeps them, and one in devel/bin hides the system's program.
 remove_dead_relays() {
     local relay
     { grep -rlsE "^python_script = '" devel/bin devel/lib || true; } | while IFS= read -r relay; do
@@ -216,11 +216,11 @@ remove_dead_relays() {
 
 step_build() {
     local key
-    # Without the workspace's own CMakeLists.txt, which catkin_make puts there.
+    # Without the workspace's own CMakeLists.txt, which catkin_make writes.
     key="$LAB_ROOT $(cd src && find -L . -mindepth 2 \( -name meshes -o -name .git \) -prune -o -type f \( -name package.xml -o -name CMakeLists.txt \
         -o -name setup.py -o -name '*.msg' -o -name '*.srv' -o -name '*.action' -o -name '*.cfg' \
         -o -name CATKIN_IGNORE -o -path '*/env-hooks/*' \) -print0 | LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)"
-    # What a killed compiler has half written looks finished to make.
+    # make takes a file that a killed compiler has half written as finished.
     if was_cut_off build; then
         run rm -rf build devel
         mended build
@@ -233,7 +233,7 @@ step_build() {
     if [[ -f build/CMakeCache.txt ]] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$LAB_ROOT/src" build/CMakeCache.txt; then
         run rm -rf build devel
     fi
-    # -j without -l, which catkin_make would add: on a busy machine make waits then until the others have come to rest.
+    # -j without -l, which catkin_make would add: on a busy machine make would then wait for other processes.
     # With the virtual environment's Python, installed executables get a first line that finds its packages.
     run catkin_make "-DPYTHON_EXECUTABLE=$VENV/bin/python3" "-j$(nproc)"
     remove_dead_relays
@@ -241,7 +241,7 @@ step_build() {
     note="$(find src -name CATKIN_IGNORE -prune -o -name package.xml -print | wc -l) packages"
 }
 
-# The labs print and name these files; nothing at run time reads them.
+# The lab sheets mention these files; nothing reads them at run time.
 step_urdf() {
     local targets=("$DESCRIPTION/urdf/baxter.urdf" src/cwru_baxter/cwru_baxter_sim/cwru_baxter.urdf) target key
     if [[ ! -f ${targets[0]}.xacro || ! -d src/compat/xacro ]]; then
@@ -260,14 +260,14 @@ step_urdf() {
     stamp "$key"
 }
 
-# Compiling takes some ten seconds; left to the first launch, that launch would look as if it hung.
+# Compiling takes about ten seconds; without this, the first launch would seem to hang.
 step_kernels() {
     local package
-    # What is in the cache already is not compiled again: numba sees to that.
+    # numba does not compile again what is in the cache.
     for package in "${COMPILED[@]}"; do
         run bash -c 'source "$1/tools/environment.bash" && use_build && python3 -m "$2"' compile "$LAB_ROOT" "$package"
     done
-    # Nor are the spheres by which collisions are looked for: they are kept beside the compiled code.
+    # The collision spheres are cached in the same way, beside the compiled code.
     run bash -c 'source "$1/tools/environment.bash" && use_build && shift &&
         rosrun motion_planning prepare_robots "$@"' prepare "$LAB_ROOT" "${PLANNED_FOR[@]}"
 }
@@ -312,7 +312,7 @@ fi
 
 start_run
 started=$SECONDS
-# What changes from here on is not part of this set-up. The note of the one before holds as long as nothing has changed.
+# Later changes are not part of this set-up. The fingerprint of the previous one is valid while nothing has changed.
 fingerprint_at_start=$(fingerprint) own_at_start=$(own_fingerprint)
 if [[ -f $STATE/done && $(<"$STATE/done") != "$fingerprint_at_start" ]]; then rm -f "$STATE/done"; fi
 rm -f "$STATE/failed"
@@ -328,7 +328,7 @@ for index in "${!STEPS[@]}"; do
     printf '[%d/%d] %s: %s (%d s)\n' $((index + 1)) ${#STEPS[@]} "${TITLES[$step_name]}" "${note:-done}" \
         $((SECONDS - step_started))
 done
-# Some steps alone do not make a set-up.
+# A run of only some steps is no complete set-up.
 if [[ ${#chosen[@]} -eq 0 ]]; then
     cut_off_step=""
     write "$STATE/done" "$fingerprint_at_start"

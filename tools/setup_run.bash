@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# How set-up runs the commands of its steps: output to the step's log, what went wrong in words, and what an earlier run
-# that was cut off has left half done. Sourced by setup.bash; LAB_ROOT, STATE and TITLES are its.
+# How set-up runs the commands of its steps: output to the step's log, errors in words, and repair of steps that an
+# interrupted run left incomplete. Sourced by setup.bash; LAB_ROOT, STATE and TITLES are its.
 
 LOGS=$STATE/logs
 # Less than this is free [kB]: the disk counts as full.
@@ -9,14 +9,14 @@ step_name="" step_log="" note="" watcher=""
 # The step in which the run before this one was killed or ran out of disk; "?" if even that could not be written down.
 cut_off_step=""
 
-# start_run: one set-up at a time; learn whether the one before came to an end.
+# start_run: one set-up at a time; find out whether the previous one was completed.
 start_run() {
     if ! { mkdir -p "$LOGS" && exec 9>>"$STATE/lock"; } 2>/dev/null; then
         echo "Set-up cannot start: it cannot write to $STATE: $(disk_note "a file there is not writable for $(id -un)")" >&2
         exit 1
     fi
-    # A launch and a node started together on a fresh clone must not both build. The lock passes on to the commands of the
-    # steps: what goes on after set-up itself was killed is waited for.
+    # A launch and a node started together on a fresh clone must not both build. The commands of the steps inherit the
+    # lock: set-up waits for commands that go on after a killed set-up.
     if ! flock -n 9; then
         echo "another set-up is running in this workspace; waiting for it to finish"
         flock 9
@@ -31,20 +31,20 @@ start_run() {
     trap interrupted INT
 }
 
-# was_cut_off STEP: may an earlier run have left this step half done?
+# was_cut_off STEP: may an earlier run have left this step incomplete?
 was_cut_off() { [[ $cut_off_step == "$1" || $cut_off_step == "?" ]]; }
 
 # start_step NAME
 start_step() {
     step_name=$1 step_log=$LOGS/$1.log note=""
-    # Until the step that was cut off has been through, it stays the one to be mended.
+    # An interrupted step stays marked until it has succeeded.
     if [[ -z $cut_off_step ]]; then write "$STATE/at_work" "$step_name"; fi
     write "$step_log" "# ${TITLES[$step_name]}, $(date)"
 }
 
 end_step() { mended "$step_name"; }
 
-# mended STEP: nothing half done of it is left; from here on it is this run's own step that may be cut off
+# mended STEP: its left-overs are repaired; from here on only this run's own step may be interrupted
 mended() {
     if [[ $cut_off_step == "$1" ]]; then
         cut_off_step=""
@@ -52,14 +52,14 @@ mended() {
     fi
 }
 
-# write FILE TEXT: all of it or none.
+# write FILE TEXT: write atomically.
 write() {
     if ! { printf '%s\n' "$2" >"$1.part" && mv "$1.part" "$1"; } 2>/dev/null; then
         refuse "cannot write $1: $(disk_note "it is not writable for $(id -un)")"
     fi
 }
 
-# run COMMAND…: run it with all output in the step's log; on failure say what went wrong and leave.
+# run COMMAND…: run it with all output in the step's log; on failure print the error and exit.
 run() {
     printf '\n$ %s\n' "$*" >>"$step_log"
     local status=0
@@ -74,7 +74,7 @@ run() {
     fi
 }
 
-# The last line of the log, kept up to date on the terminal: somebody is waiting.
+# Show the last line of the log on the terminal: a user is waiting.
 watch_log() {
     exec 9>&-
     trap 'exit 0' TERM
@@ -95,7 +95,7 @@ stop_watching() {
 
 # fail STATUS COMMAND
 fail() {
-    # An interrupted command ends with 130, and so does set-up: its trap has its say.
+    # An interrupted command ends with 130, and so does set-up, through its trap.
     if [[ $1 -eq 130 ]]; then interrupted; fi
     local cause
     cause=$(cause_of "$1")
@@ -109,7 +109,7 @@ fail() {
         tail -n 20 "$step_log" | sed 's/^/  | /'
         echo "Mend the cause and run ./baxter.sh setup again; what is done is not done again."
     } >&2
-    # A command that ran to its own end has tidied up; one that was killed or found no room may not have.
+    # A command that ended by itself has cleaned up; a killed one, or one without disk space, may not have.
     if [[ $1 -le 128 && $cause != "the disk is full"* ]]; then nothing_half_done; fi
     exit "$1"
 }
@@ -139,7 +139,7 @@ interrupted() {
     exit 130
 }
 
-# full_disks: the folders that set-up writes to and whose disk has no room
+# full_disks: the folders that set-up writes to and whose disk is full
 full_disks() {
     local folder free
     for folder in "$LAB_ROOT" "${TMPDIR:-/tmp}" /var "${HOME:-/}"; do
@@ -159,10 +159,10 @@ disk_note() {
     fi
 }
 
-# first_line PATTERN: the first line of the log that the (extended, caseless) pattern meets
+# first_line PATTERN: the first line of the log that matches the (extended, case-insensitive) pattern
 first_line() { grep -aiEm 1 "$1" "$step_log" 2>/dev/null | sed 's/^[[:space:]]*//' | cut -c 1-200; }
 
-# cause_of STATUS: what most likely went wrong, in words. The line of the log that says so comes with it.
+# cause_of STATUS: the most likely error, in words, with the line of the log that shows it.
 cause_of() {
     local line
     line=$(first_line 'no space left on device|disk quota exceeded|enough free space|not enough space in')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# Packages of ours that stand in for what Debian's ROS lacks. Sourced by set-up.
+# Our replacements for packages that Debian's ROS lacks. Sourced by set-up.
 
 STAND_INS=(
     src/bullet_gazebo/gazebo_msgs

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`./baxter.sh doctor`: facts about the lab (probe.py), what is wrong and the fix (checks.py). Imports no ROS."""
+"""`./baxter.sh doctor`: facts about the lab (probe.py), findings and their fixes (checks.py). Imports no ROS."""

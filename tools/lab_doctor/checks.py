@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From facts to findings: one function for each thing that goes wrong in a lab. Pure: no clock, no network, no ROS."""
+"""From facts to findings: one function for each kind of problem in a lab. Pure: no clock, no network, no ROS."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -11,7 +11,7 @@ from lab_doctor.facts import Facts
 MAX_CLOCK_OFFSET_S = 0.25
 # Topics that exactly one node may publish: two simulators, or a simulator on the robot's own master.
 SIMULATOR_TOPICS = ("/clock", "/robot/joint_states")
-# So many processes are named in a line.
+# Largest number of processes named in a line.
 NAMES_SHOWN = 3
 ERROR_LEVEL = 2  # of a diagnostic_msgs/DiagnosticStatus
 START_LINE = "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch"
@@ -26,7 +26,7 @@ class Level(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found; fix says what to type, and is empty where there is nothing to mend."""
+    """A finding; fix is the command to type, empty if nothing is wrong."""
 
     topic: str
     level: Level
@@ -49,7 +49,7 @@ def _entry(facts: Facts) -> str:
 
 
 def _busy(topic, what):
-    """What was asked and not answered in time says nothing about what would have come."""
+    """A question without an answer in time gives no finding."""
     return Finding(topic, Level.BUSY, f"not checked: {what}", "the machine is busy; try again when it has come to rest")
 
 
@@ -92,7 +92,7 @@ def check_python(facts):
 
 
 def check_network(facts):
-    """ROS_MASTER_URI, ROS_HOSTNAME, ROS_IP: can others call us back at the address that we announce?"""
+    """ROS_MASTER_URI, ROS_HOSTNAME, ROS_IP: can other machines connect to the address that we announce?"""
     uri = facts.variables.get("ROS_MASTER_URI", "")
     parts = urlparse(uri)
     try:
@@ -212,7 +212,7 @@ def check_simulators(facts):
 
 
 def check_troubles(facts):
-    """What the simulator survived: a plugin that failed is held still, a message that it dropped harmed nobody."""
+    """Errors that the simulator survived: a failed plugin is stopped; a dropped message does no harm."""
     if facts.topics is None:
         return
     for name, level, message in facts.topics.troubles:
@@ -253,7 +253,7 @@ def check_robot(facts):
 
 
 def check_ports(facts):
-    """Only where everything is meant to stay on this machine; with a robot, it has to reach us."""
+    """Only if everything should stay on this machine; a robot must be able to reach us."""
     if not is_loopback(master_host(facts)):
         return
     if "listeners" in facts.timed_out:

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the doctor knows: plain data, gathered by probe.py, judged by checks.py. None: could not be found out."""
+"""The doctor's facts: plain data, gathered by probe.py, judged by checks.py. None: unknown."""
 
 from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
 class Master:
-    """What the ROS master says. error is empty where it answered."""
+    """Data from the ROS master. error is empty if it answered."""
 
     error: str = ""
     use_sim_time: bool = False
@@ -20,7 +20,7 @@ class Master:
 
 @dataclass(frozen=True)
 class Topics:
-    """What came in on the robot's topics while we listened."""
+    """Messages on the robot's topics while we listened."""
 
     clock_messages: int = 0
     clock_advanced: bool = False
@@ -61,14 +61,14 @@ class Listener:
 class Facts:
     root: str
     variables: dict[str, str]
-    # host name or address -> (address it resolves to or None, does that address belong to this machine?)
+    # host name or address -> (resolved address or None, whether that address belongs to this machine)
     addresses: dict[str, tuple[str | None, bool]] = field(default_factory=dict)
     master: Master | None = None
     topics: Topics | None = None
     is_built: bool = False
     is_fresh: bool | None = None
     python: PythonFacts | None = None
-    # What `python3` is outside the lab's environment, where that is not the system's: its path.
+    # Path of `python3` outside the lab's environment, if it is not the system's.
     users_python: str = ""
     other_masters: list[OtherMaster] = field(default_factory=list)
     # Questions that were not answered in time: names of the fields above.

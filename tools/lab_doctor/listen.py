@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Print as one line of JSON what /clock, /robot/state and, of the simulator, /diagnostics say within two seconds. A
-process of its own: it needs ROS, which the doctor must do without."""
+"""Print one line of JSON with the messages of /clock, /robot/state and the simulator's /diagnostics within two seconds.
+A separate process, because it needs ROS and the doctor must work without."""
 
 import json
 import threading
@@ -13,11 +13,11 @@ from rosgraph_msgs.msg import Clock
 
 LISTEN_S = 2.0
 STATE_FIELDS = ("enabled", "stopped", "error")
-SIMULATOR_STATUS = "gazebo: "  # what the names of the simulator's statuses begin with
+SIMULATOR_STATUS = "gazebo: "  # prefix of the names of the simulator's statuses
 
 
 def main():
-    # Time from /clock could stand still; ours must not.
+    # Time from /clock may stand still, so use wall time.
     rospy.init_node("lab_doctor", anonymous=True, disable_signals=True, disable_rostime=True)
     clock, state, statuses = [], [], []
     everything = threading.Event()

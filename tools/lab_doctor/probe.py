@@ -30,7 +30,7 @@ MODULES = ("rospy", "pybullet", "numpy", "transforms3d", "tf2_ros")
 def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadline_s: float = DEADLINE_S) -> Facts:
     """Facts about the workspace at root and the ROS that the variables point to; takes at most deadline_s.
 
-    say: called with what is still waited for after PATIENCE_S.
+    say: called with the open questions after PATIENCE_S.
     """
     ros = {name: variables.get(name, "") for name in ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_IP")}
     host = urlparse(ros["ROS_MASTER_URI"]).hostname or ""
@@ -64,9 +64,9 @@ def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadli
 
 
 def answer_all(questions, timeout_s, say=lambda names: None, patience_s=PATIENCE_S) -> tuple[dict, set]:
-    """(name -> answer, names of what was not answered in time); a question that raises has no answer.
+    """(name -> answer, names of questions without an answer in time); a question that raises has no answer.
 
-    say: called once with the names that are open after patience_s. Threads that hang are left.
+    say: called once with the open names after patience_s. Hanging threads are not stopped.
     """
     answers, timed_out, ended = {}, set(), set()
 
@@ -111,7 +111,8 @@ def _outside(variables):
 
 
 def find_masters(uri: str) -> list[OtherMaster]:
-    """ROS masters of this machine at other ports; of processes that may be looked at, which are one's own."""
+    """ROS masters of this machine at other ports; only of the user's own processes, since others cannot be
+    inspected."""
     done = subprocess.run(["ss", "-Hltnp"], capture_output=True, text=True, timeout=DEADLINE_S, check=True)
     found = []
     for port in sorted(master_ports(done.stdout, _command_line) - {urlparse(uri).port}):
@@ -161,7 +162,7 @@ def _proxy(uri):
 
 
 def ask_master(uri: str) -> Master:
-    """What the master at uri says. Raises TimeoutError when somebody listens there and does not answer."""
+    """What the master at uri says. Raises TimeoutError if it accepts connections and does not answer."""
     master = _proxy(uri)
     try:
         _, _, (publishers, _, _) = master.getSystemState(CALLER_ID)
@@ -197,7 +198,7 @@ def _node_state(master, node):
 def clock_offset_s(uri: str, timeout_s: float = 1.5) -> float | None:
     """Clock of the master's host minus ours [s], from the Date line of its answers.
 
-    Date counts whole seconds; asking until it changes shows where a second begins. None if it does not in time.
+    Date has whole seconds; repeated queries find the moment when it changes. None if it does not change in time.
     """
     parts = urlparse(uri)
     first = None
@@ -223,9 +224,9 @@ def clock_offset_s(uri: str, timeout_s: float = 1.5) -> float | None:
 
 
 def listen(root: Path, uri: str) -> Topics:
-    """What arrives on /clock and /robot/state within two seconds; heard by a process that has ROS.
+    """Messages on /clock and /robot/state within two seconds, received by a process with ROS.
 
-    Raises OSError where there is no master: rospy would wait for one.
+    Raises OSError without a master: rospy would wait for one.
     """
     _proxy(uri).getPid(CALLER_ID)
     script = root / "tools" / "lab_doctor" / "listen.py"
@@ -237,13 +238,13 @@ def listen(root: Path, uri: str) -> Topics:
 
 
 def is_fresh(root: Path) -> bool:
-    """Does the fingerprint of the last set-up still fit? baxter.sh's own function says."""
+    """Whether the fingerprint of the last set-up is still valid, by baxter.sh's own function."""
     script = 'LAB_ROOT=$1; source "$1/tools/environment.bash"; [[ $(<"$1/.baxter/done") == "$(fingerprint)" ]]'
     return subprocess.run(["bash", "-c", script, "fresh", str(root)], capture_output=True).returncode == 0
 
 
 def ask_python() -> PythonFacts:
-    """Which Python a node gets, and whether it finds what nodes need."""
+    """Which Python a node gets, and whether it can import what nodes need."""
     executable = shutil.which("python3") or ""
     program = (
         "import importlib, json\n"
@@ -253,7 +254,7 @@ def ask_python() -> PythonFacts:
         "        versions[name] = str(getattr(importlib.import_module(name), '__version__', ''))\n"
         "    except Exception as error:\n"
         "        errors[name] = f'{type(error).__name__}: {error}'\n"
-        # PyPI's rospkg imports well and finds none of the packages that Debian's knows.
+        # PyPI's rospkg can be imported, but finds none of the packages that Debian's finds.
         "try:\n"
         "    import rospkg\n"
         "    rospkg.RosPack().get_path('rospy')\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A locale that writes 0,5 for 0.5: what it takes to run the unit tests once under it.
+"""Runs the unit tests under a locale that writes 0,5 for 0.5.
 
 This module is also a pytest plugin. Python itself starts with LC_NUMERIC=C; a window toolkit, or a C library that calls
 setlocale(), changes that for the whole process, and from then on strtod() in C code stops at the point in "0.5".
@@ -16,12 +16,12 @@ NAME = "de_DE.UTF-8"
 def environment(folder: Path) -> dict[str, str]:
     """Variables for a child process; the locale is compiled into folder if the folder does not have it yet.
 
-    Raises OSError or subprocess.CalledProcessError where localedef or its sources are missing.
+    Raises OSError or subprocess.CalledProcessError if localedef or its sources are missing.
     """
     target = folder / NAME
     if not (target / "LC_NUMERIC").is_file():
         folder.mkdir(parents=True, exist_ok=True)
-        # localedef is content to warn about tokens it does not know, and then exits 1 although it wrote the locale.
+        # localedef only warns about unknown tokens, and then exits with 1 although it wrote the locale.
         command = ["localedef", "--no-archive", "-c", "-i", "de_DE", "-f", "UTF-8", str(target)]
         done = subprocess.run(command, capture_output=True, text=True)
         if not (target / "LC_NUMERIC").is_file():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which tests the workspace has, and which of them a command line asks for."""
+"""Finds the tests of the workspace, and selects those of a command line."""
 
 import os
 import re
@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 LINTERS = ("ruff", "catkin_lint")
-# pytest options that are followed by a value of their own, which is no test's name.
+# pytest options that take a value, which is no test's name.
 _OPTIONS_WITH_VALUE = set("-k -m -p -o -c -W -r --maxfail --deselect --ignore --tb --durations".split())
 
 
@@ -40,9 +40,9 @@ class Inventory:
 
 @dataclass
 class Selection:
-    """What one run does. unit_targets are pytest's own arguments: files or node ids.
+    """The tests of one run. unit_targets are pytest's own arguments: files or node ids.
 
-    left_out: the long rostests that belong to what was named and do not run.
+    left_out: long rostests that were selected and do not run.
     """
 
     linters: list[str]
@@ -97,7 +97,7 @@ def _package_name(manifest):
 
 
 def select(inventory: Inventory, arguments: list[str], long: bool) -> Selection:
-    """What to run for a command line; raises SelectionError for a name that is no test's and no package's.
+    """What to run for a command line; raises SelectionError for an unknown name.
 
     Names are packages, test files (with or without folder and suffix), pytest node ids, or a linter. Everything that
     starts with a dash goes to pytest. Without any name everything runs; with pytest arguments alone, the unit layer.
@@ -161,7 +161,7 @@ def _add_named(selection, inventory, long, name):
 
 
 def _means(name, path, suffix):
-    """Does a name on the command line mean this test file?"""
+    """Whether a name on the command line means this test file."""
     if "/" in name:
         return Path(name).resolve() == path.resolve()
     return name in (path.name, path.name.removesuffix(suffix))

@@ -15,7 +15,7 @@ def pytest_addoption(parser):
     parser.addoption("--in-the-other-run", metavar="MARK", help="run no test with this mark, unless it is long")
 
 
-# Last: what -k or a name has left out is not missed.
+# Run last: tests that -k or a name has deselected do not count.
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config, items):
     if config.option.markexpr:

@@ -5,7 +5,7 @@ The words after the opening fence: the language, then any of
 
     run          a bash block that needs no simulator; runs with the quick tests
     run lab      needs a running lab: the page's own (run start), else Baxter's, enabled and without a window
-    run start    starts the page's own lab: one command that goes on running until the page is through
+    run start    starts the page's own lab: one command that runs until the end of the page
     run long     a bash block that takes long; runs with the long tests
     file=PATH    no command: the block is a file of this name, for the blocks after it
 """
@@ -21,7 +21,7 @@ KINDS = {("run",): "quick", ("run", "lab"): "lab", ("run", "start"): "start", ("
 
 
 class PageError(Exception):
-    """A block is marked in a way that means nothing; the text names page and line."""
+    """A block has an invalid mark; the text names page and line."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def marked_blocks(page, text):
 
 
 def make_workspace(folder, root):
-    """In ``folder``: what looks like the workspace ``root`` but has a ``src`` of its own, for what pages write."""
+    """Make in ``folder`` a copy of the workspace ``root`` by links, with its own ``src`` for files that pages write."""
     for entry in Path(root).iterdir():
         if entry.name not in ("src", ".git", ".baxter"):
             (folder / entry.name).symlink_to(entry)
@@ -63,7 +63,7 @@ def make_workspace(folder, root):
 
 
 def write_file(block, folder):
-    """Put a file block where the page says; a page must not write outside of the folder, nor over what is there."""
+    """Write a file block to its path; a page must not write outside of the folder, nor overwrite files."""
     path = (Path(folder) / block.path).resolve()
     if Path(folder).resolve() not in path.parents:
         raise PageError(f"{block.page}:{block.line}: file={block.path} is outside of the workspace")
@@ -84,12 +84,12 @@ def environment(folder, **variables):
 
 
 def command(block):
-    """The words that run a block."""
+    """The command that runs a block."""
     return ["bash", "-euo", "pipefail", "-c", block.text]
 
 
 def run(block, folder, limit_s, **variables):
-    """Run a block in ``folder``; raises AssertionError with its page, line and output unless it ends well in time."""
+    """Run a block in ``folder``; raises AssertionError with its page, line and output unless it succeeds in time."""
     place = f"{block.page}:{block.line}"
     try:
         done = subprocess.run(command(block), cwd=folder, env=environment(folder, **variables), timeout=limit_s,

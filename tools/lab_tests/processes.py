@@ -23,15 +23,15 @@ def marked(value: str, marker: str = MARKER) -> dict[int, str]:
                 if command:  # a zombie has none
                     found[int(entry.name)] = command
         except OSError:
-            continue  # it ended while we looked, or belongs to another user
+            continue  # it has just ended, or belongs to another user
     return found
 
 
 def wait_until_gone(value: str, timeout_s: float, marker: str = MARKER) -> dict[int, str]:
-    """What is still alive after at most timeout_s.
+    """Processes that are still alive after at most timeout_s.
 
-    Gone means not found twice in a row: a process shows no environment for the moment in which it becomes another
-    program, and a list of processes may miss one that was born meanwhile.
+    Gone means not found twice in a row: during exec a process shows no environment, and a list of processes may miss a
+    new one.
     """
     deadline = time.monotonic() + timeout_s
     was_gone = False
@@ -44,7 +44,7 @@ def wait_until_gone(value: str, timeout_s: float, marker: str = MARKER) -> dict[
 
 
 def kill_all(value: str, marker: str = MARKER):
-    """End every marked process, and what it starts meanwhile."""
+    """End every marked process, and those that it starts meanwhile."""
     for _ in range(5):
         alive = wait_until_gone(value, 0.0, marker)
         if not alive:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A share of one processor core for this process and everything it starts: a CPU quota by control group, v1 or v2.
 
-Busy loops beside a program slow it less than one expects: the scheduler prefers processes that sleep most of the time.
+Busy loops beside a program slow it less than expected: the scheduler prefers processes that sleep most of the time.
 A quota does not. See https://docs.kernel.org/admin-guide/cgroup-v2.html and .../cgroup-v1/cpusets.html (cpu.cfs_*).
 """
 
@@ -11,19 +11,19 @@ import time
 from pathlib import Path
 
 PERIOD_US = 50_000
-# The processes that were started may take so long to be gone [s].
+# Time limit for the end of started processes [s].
 REMOVAL_S = 10.0
 
 
 class QuotaError(Exception):
-    """No control group with a quota can be made here; the text says why."""
+    """A control group with a quota cannot be made here; the text says why."""
 
 
 class Quota:
     """Context manager: inside, this process and its children get ``percent`` of one core together."""
 
     def __init__(self, percent: float, mount: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")):
-        """mount, own: where control groups are, and which ones this process is in (cgroups(7)).
+        """mount, own: path of the control groups, and file with this process's groups (cgroups(7)).
 
         Raises ValueError for a share that is not between 1 % and all of the machine's cores, QuotaError.
         """
@@ -67,11 +67,11 @@ class Quota:
                 return
             except OSError:
                 if time.monotonic() > deadline:
-                    return  # a process of it lives on; the group goes with the machine
+                    return  # a process of it still runs; the group stays until the next boot
                 time.sleep(0.1)
 
     def _candidates(self):
-        """(folder in which a group can be made, what to write into it), the most likely first."""
+        """(folder for a new group, settings to write), the most likely first."""
         quota = round(PERIOD_US * self._percent / 100)
         for controllers, path in self._groups.items():
             if "cpu" in controllers.split(","):
@@ -82,7 +82,7 @@ class Quota:
                             yield folder, first
         if "" not in self._groups or not (self._mount / "cgroup.controllers").is_file():
             return
-        # Version 2: beside or above ourselves, where a parent hands the cpu controller on to its children.
+        # Version 2: beside or above our own group, where a parent enables the cpu controller for its children.
         folder = self._mount / self._groups[""]
         for parent in (folder, *folder.parents):
             if not parent.is_relative_to(self._mount):
@@ -95,7 +95,7 @@ class Quota:
                     yield parent, {"cpu.max": f"{quota} {PERIOD_US}"}
 
     def _home(self, parent: Path) -> Path:
-        """Where this process was, in the hierarchy of ``parent``."""
+        """This process's original group in the hierarchy of ``parent``."""
         relative = parent.relative_to(self._mount)
         for controllers, path in self._groups.items():
             if controllers and relative.parts and relative.parts[0] in (controllers, "cpu"):

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Counting: what JUnit files say, summed over every layer of tests, and what did not run."""
+"""Counts the results of JUnit files over all layers of tests, and the tests that did not run."""
 
 import collections
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
-# What pytest writes where nobody gave a reason.
+# pytest's text for a skip without a reason.
 BARE = ("", "unconditional skip")
 
 
@@ -31,7 +31,7 @@ class Tally:
         self.long += other.long
 
     def refuse_bare_skips(self):
-        """Skips without a reason count as failures from here on."""
+        """Count skips without a reason as failures."""
         for name, reason in self.skips:
             if reason in BARE:
                 self.add(failure(f"{name}: skipped without a reason; say what this machine lacks"))
@@ -47,7 +47,7 @@ class Tally:
 
 
 def summary(tally: Tally) -> str:
-    """What is printed last. The words up to `failed` stay as they are: continuous integration reads them."""
+    """The last printed line. The text up to `failed` must not change: continuous integration parses it."""
     counts = f"{tally.passed} passed, {tally.failed} failed, {tally.skipped} skipped, {len(tally.long)} long not run"
     return "\n".join([*_not_run(tally), counts])
 
@@ -66,7 +66,7 @@ def _not_run(tally):
 
 
 def failure(detail: str) -> Tally:
-    """One failed test that no JUnit file knows of: a crash, a timeout, a process left behind."""
+    """One failed test that is in no JUnit file: a crash, a timeout, a process left behind."""
     return Tally(failed=1, details=[detail])
 
 

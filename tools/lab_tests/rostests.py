@@ -24,13 +24,14 @@ STOP_TIMEOUT_S = 20.0
 LEFTOVER_GRACE_S = 2.0
 ENDING_POLL_S = 0.5
 OUTPUT_LINES_SHOWN = 80
-# What time limits are multiplied with, for rostest and for the tests' own deadlines (lab_testing.waiting).
+# Environment variable with the factor of time limits, for rostest and for the tests' own deadlines
+# (lab_testing.waiting).
 STRETCH_VARIABLE = "LAB_TEST_STRETCH"
 STRETCHED_ROSTEST = Path(__file__).with_name("stretched_rostest.py")
 
 
 def declared_s(path: Path) -> float:
-    """What the tests of a file may take together by their own time limits, and a minute for what is around them."""
+    """Sum of the time limits of a file's tests, plus a minute for start and end."""
     return 60.0 + sum(float(test.get("time-limit", 60.0)) for test in ElementTree.parse(path).getroot().iter("test"))
 
 
@@ -41,7 +42,7 @@ def names(test: Rostest, root: Path) -> list[str]:
 
 
 class Ended(Exception):
-    """The run was told to end before the test did."""
+    """The run was cancelled before the test ended."""
 
 
 def run(
@@ -53,8 +54,8 @@ def run(
 ):
     """Run it and return a Tally. work_folder is emptied first; logs and results stay in it.
 
-    Where `ending` is given and becomes set, the test is stopped and Ended is raised. stretch: what all time limits,
-    those in the file too, are multiplied with, because the processes get only a part of the machine.
+    Where `ending` is given and becomes set, the test is stopped and Ended is raised. stretch: factor of all time
+    limits, including those in the file, when the processes get only a part of the machine.
     """
     if time_limit_s is None:
         time_limit_s = stretch * max(LONG_TIME_LIMIT_S if test.is_long else TIME_LIMIT_S, declared_s(test.path))
@@ -64,8 +65,8 @@ def run(
     environment = {
         **os.environ,
         processes.MARKER: run_id,
-        # rostest opens a master on a free port of its own. This one answers nobody, so that a process which does not
-        # take rostest's word for the master finds none, rather than the lab that somebody has running.
+        # rostest opens a master on a free port of its own. Nothing answers at this one, so that a process that ignores
+        # rostest's setting finds no master, instead of a running lab of the user.
         "ROS_MASTER_URI": f"http://localhost:{free_port()}",
         "ROS_HOSTNAME": "localhost",
         "ROS_LOG_DIR": str(work_folder / "log"),
@@ -76,7 +77,7 @@ def run(
     output = work_folder / "output.txt"
     timed_out = False
     with output.open("wb") as stream:
-        # The results of rostest --text are not to be trusted (it exits 0 when tests fail), the XML files are.
+        # Do not trust the results of rostest --text (it exits with 0 when tests fail), but the XML files.
         child = subprocess.Popen(
             [*command, str(test.path)],
             env=environment,
@@ -90,7 +91,7 @@ def run(
         except subprocess.TimeoutExpired:
             timed_out = True
             _stop(child)
-        except BaseException:  # Ctrl-C: take the test's processes along
+        except BaseException:  # Ctrl-C: end the test's processes, too
             _stop(child)
             processes.kill_all(run_id)
             raise

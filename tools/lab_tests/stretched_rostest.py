@@ -9,7 +9,7 @@ from rostest import rostestmain
 
 
 class StretchedTest(roslaunch.core.Test):
-    """A test node that may take longer than its file says."""
+    """A test node with a longer time limit than in its file."""
 
     def __init__(self, *arguments, **options):
         super().__init__(*arguments, **options)
