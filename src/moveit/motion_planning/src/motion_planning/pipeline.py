@@ -122,7 +122,7 @@ class _Planning:
     def __init__(self, query, tools):
         self.query, self.tools = query, tools
         self.model = query.scene.model
-        self.begin = tools.clock()
+        self.begin = self.tables_made = tools.clock()
         if query.group not in self.model.groups:
             raise PlanningFailure(Code.INVALID_GROUP_NAME, "robot '%s' has no group '%s'; its groups are %s" % (
                 self.model.name, query.group, ", ".join(self.model.groups) or "none"))
@@ -145,7 +145,7 @@ class _Planning:
         goals = self._goals(scene)
         paths = []
         for attempt in range(max(1, min(query.attempts, 50))):
-            if paths and (self._elapsed() > 0.5 * query.allowed_time or self.tools.stop()):
+            if paths and (self._used() > 0.5 * query.allowed_time or self.tools.stop()):
                 break
             try:
                 paths.append(self._path(scene, start, goals, attempt))
@@ -172,6 +172,8 @@ class _Planning:
         q = self.query.scene.state.q[self.indices]
         lead = np.empty((0, len(q))) if scene is self.query.scene else q[None]
         contacts = self.tools.exact.contacts(scene, scene.state, self.query.group)
+        # The first question about a scene makes its tables; with 10,000 objects that shall not use up the time.
+        self.tables_made = self.tools.clock()
         if contacts:
             free = self._free_near(scene)
             if free is None:
@@ -306,7 +308,7 @@ class _Planning:
     # -- path ---------------------------------------------------------------------------------------------------
 
     def _path(self, scene, start, goals, attempt):
-        left = self.query.allowed_time - self._elapsed()
+        left = self.query.allowed_time - self._used()
         search = Search(exact=self.tools.exact, seed=self.tools.seed + attempt, allowed_time=max(left, 0.01),
                         clock=self.tools.clock, planner_id=self.query.planner_id, stop=self.tools.stop,
                         constraints=self.query.path_constraints)
@@ -314,7 +316,7 @@ class _Planning:
             path = self.tools.plan_path(scene, self.query.group, start, goals, search)
         except NoPath as error:
             self._look_up()
-            late = self._elapsed() >= 0.98 * self.query.allowed_time
+            late = self._used() >= 0.98 * self.query.allowed_time
             raise PlanningFailure(Code.TIMED_OUT if late else Code.PLANNING_FAILED, str(error)) from None
         return np.asarray(getattr(path, "points", path), dtype=float)
 
@@ -387,9 +389,13 @@ class _Planning:
     def _elapsed(self):
         return self.tools.clock() - self.begin
 
+    def _used(self):
+        """How much of the allowed time has been used [s]."""
+        return self.tools.clock() - self.tables_made
+
     def _is_over(self, share=1.0):
         """Whether nothing more is to be tried: stopped, or this share of the time is over."""
-        return self.tools.stop() or self._elapsed() > share * self.query.allowed_time
+        return self.tools.stop() or self._used() > share * self.query.allowed_time
 
     def _look_up(self):
         if self.tools.stop():
