@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Keeps the planning scene up to date with the topics and services that change it, and publishes its changes."""
+import contextlib
 import math
 import threading
 import time
@@ -45,6 +46,7 @@ class SceneMonitor:
         self._values, self._stamps, self._updates = {}, {}, 0
         self._base, self._newest_stamp = np.eye(4), rospy.Time()
         self._listeners = []
+        self._asking = threading.local()
         self._buffer, self._patient_from = None, 0.0
         self.reader = SceneReader(self.tf_frame)
         options = rospy.get_param("~planning_scene_monitor_options", {})
@@ -232,9 +234,19 @@ class SceneMonitor:
 
     # -- frames -------------------------------------------------------------------------------------------------
 
+    @contextlib.contextmanager
+    def asking_for(self, given_up):
+        """A context in which the thread's waits for frames end as soon as ``given_up()``."""
+        self._asking.given_up = given_up
+        try:
+            yield
+        finally:
+            self._asking.given_up = None
+
     def tf_frame(self, name):
         """Return the pose (4, 4) of a tf frame in the planning frame. Raises PlanningError."""
         self._listen_to_tf()
+        given_up = getattr(self._asking, "given_up", None)
         deadline = time.monotonic() + _FRAME_TIMEOUT_S
         while True:
             for known in (self.model.frame, self.model.root):
@@ -246,7 +258,7 @@ class SceneMonitor:
             now = time.monotonic()
             if now > deadline:
                 self._patient_from = now + _IMPATIENT_S
-            if now < self._patient_from or rospy.is_shutdown():
+            if now < self._patient_from or rospy.is_shutdown() or given_up is not None and given_up():
                 raise MessageError("'%s' is no frame: neither of the robot, nor an object or subframe of the scene, "
                                    "nor does tf lead from it to '%s' (%s)" % (name, self.model.frame, reason))
             time.sleep(0.02)

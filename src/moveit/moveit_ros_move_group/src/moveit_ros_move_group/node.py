@@ -82,7 +82,10 @@ def _capabilities(context, wanted, description, may_execute):
         "ClearOctomapService": lambda: scene.ClearOctomap(context),
         "MoveGroupExecuteService": lambda: motion.ExecuteService(context),
     }
-    return [make() for name, make in offered.items() if "move_group/" + name in wanted]
+    served = {"move_group/" + name: make for name, make in offered.items()}
+    for name in sorted(wanted & set(settings.OTHER_CAPABILITIES) - set(served)):
+        rospy.logwarn("capability '%s' is known but not served here; it is left out", name)
+    return [make() for name, make in served.items() if name in wanted]
 
 
 def main():

@@ -42,7 +42,8 @@ class CartesianPath:
             limited = request.cartesian_speed_limited_link or link
             timed = slowed(model, scene.state, group, limited, timed, speed)
         response.fraction = path.fraction
-        response.solution = trajectory_message(group.joints, timed, model.frame, rospy.Time.now())
+        # Without a stamp: a controller takes one for the time to begin at, and would leave out what is due already.
+        response.solution = trajectory_message(group.joints, timed, model.frame)
         context.show_path(scene.state, response.solution)
         if path.reason is not None:
             context.failures.tell("compute_cartesian_path", MoveItErrorCodes.SUCCESS,

@@ -62,6 +62,9 @@ class Kinematics:
             if links == [None]:
                 raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "group '%s' is no chain; name the link for the "
                                    "pose" % group.name)
+        twice = next((link for k, link in enumerate(links) if link in links[:k]), None)
+        if twice is not None:
+            raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "two poses are given for link '%s'" % twice)
         unknown = [link for link in links if link not in self.context.model.link_index]
         if unknown:
             raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "the robot has no link '%s'" % unknown[0])

@@ -76,11 +76,11 @@ class MoveAction:
             self._feedback("PLANNING")
             self.context.group(group)
             self._wait_for_state(group)
-            if plan_only:
-                self._plan_only(goal, result)
-            else:
-                reason = self._plan_and_execute(goal, result)
+            with self.context.monitor.asking_for(self._server.is_preempt_requested):
+                reason = self._plan_only(goal, result) if plan_only else self._plan_and_execute(goal, result)
         except Exception as error:  # the node outlives whatever a request does to it
+            if self._server.is_preempt_requested():
+                error = RequestError(MoveItErrorCodes.PREEMPTED, "stopped on request (%s)" % error)
             result.error_code.val, reason = failed(self.context, "move_group", error, group)
         finally:
             self._feedback("IDLE")
@@ -103,6 +103,7 @@ class MoveAction:
         scene = scene_with_diff(context, scene, options.planning_scene_diff, "move_group", keep_robot=False)
         self._plan(goal.request, scene, result)
         result.error_code.val = MoveItErrorCodes.SUCCESS
+        return ""
 
     def _plan(self, request, scene, result):
         result.trajectory_start = state_message(self.context.model, scene.state, rospy.Time.now())

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node as its parameters make it; no ROS around it."""
+import sys
+from pathlib import Path
+
+from moveit_msgs.msg import MoveItErrorCodes
+from moveit_msgs.srv import ExecuteKnownTrajectoryRequest
+
+from moveit_ros_move_group import settings
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from bad_requests import outcome  # noqa: E402
+from good_requests import good_requests  # noqa: E402
+from in_process import Node  # noqa: E402
+from small_arm import SIX, joint_state, parameters  # noqa: E402
+
+
+def node_of(monkeypatch, **private):
+    tree = parameters()
+    tree["~"] = {**tree["~"], **private}
+    node = Node(monkeypatch, tree)
+    node.topics["joint_states"](joint_state())
+    return node
+
+
+def test_without_execution_nothing_is_executed_and_the_reason_is_said(monkeypatch):
+    node = node_of(monkeypatch, allow_trajectory_execution=False, capabilities="move_group/MoveGroupExecuteService")
+    goal = good_requests(SIX)["execute_trajectory"]
+    code, text = outcome(node.ask("execute_trajectory", goal))
+    assert code == MoveItErrorCodes.CONTROL_FAILED and "allow_trajectory_execution is false" in text
+    for waits in (True, False):
+        answer = node.ask("execute_kinematic_path", ExecuteKnownTrajectoryRequest(goal.trajectory, waits))
+        assert answer.error_code.val == MoveItErrorCodes.CONTROL_FAILED
+    assert all("allow_trajectory_execution is false" in one.text for one in node.told("~failures"))
+
+
+def test_a_capability_that_is_not_served_is_named_in_the_log(monkeypatch):
+    node = node_of(monkeypatch, capabilities="move_group/Cleaning some_package/Cooking")
+    assert len([line for line in node.logged if "move_group/Cleaning" in line]) == 1
+    assert len([line for line in node.logged if "some_package/Cooking" in line]) == 1
+
+
+def test_a_known_capability_that_is_not_served_is_named_too(monkeypatch):
+    monkeypatch.setattr(settings, "OTHER_CAPABILITIES", (*settings.OTHER_CAPABILITIES, "move_group/Juggling"))
+    node = node_of(monkeypatch, capabilities="move_group/Juggling")
+    assert len([line for line in node.logged if "move_group/Juggling" in line]) == 1
+
+
+def test_a_cartesian_path_begins_whenever_it_is_sent(monkeypatch):
+    """With a stamp a controller would leave out what was due before it came."""
+    node = node_of(monkeypatch)
+    answer = node.ask("compute_cartesian_path", good_requests(SIX)["compute_cartesian_path"])
+    assert answer.fraction > 0.0
+    assert answer.solution.joint_trajectory.header.stamp.is_zero()
