@@ -11,6 +11,7 @@ from lab_doctor.probe import gather
 
 # The questions of probe.gather, in the words of users.
 QUESTIONS = {"python": "Python's imports", "topics": "messages of the robot", "master": "the ROS master",
+             "move_group": "move_group",
              "is_fresh": "reading the packages", "listeners": "the list of open ports",
              "other_masters": "other ROS masters", "users_python": "your own Python"}
 

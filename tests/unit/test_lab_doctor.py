@@ -9,7 +9,17 @@ from dataclasses import replace
 import pytest
 
 from lab_doctor.checks import Level, examine
-from lab_doctor.facts import Facts, Listener, Master, OtherMaster, PythonFacts, Topics
+from lab_doctor.facts import (
+    Controller,
+    Facts,
+    Listener,
+    Master,
+    MoveGroup,
+    OtherMaster,
+    PythonFacts,
+    Sensor,
+    Topics,
+)
 from lab_doctor.probe import (
     answer_all,
     ask_master,
@@ -43,6 +53,16 @@ ON_ROBOT = replace(
 )
 
 
+PLANNING = MoveGroup(
+    "/move_group", robot="baxter", groups={"left_arm": ["left_s0", "left_s1"], "all": ["left_s0", "left_s1"]},
+    controllers=[Controller("left/follow_joint_trajectory", ["left_s0", "left_s1"], True)],
+    joint_topic="/robot/joint_states", sensors=[Sensor("/points", ["/camera"], True)])
+
+
+def planning(**fields):
+    return replace(HEALTHY_LAB, move_group=replace(PLANNING, **fields))
+
+
 def with_variables(facts, **variables):
     return replace(facts, variables={**facts.variables, **variables})
 
@@ -55,7 +75,8 @@ def with_master(facts, **fields):
     return replace(facts, master=replace(facts.master, **fields))
 
 
-@pytest.mark.parametrize("facts", [HEALTHY_LAB, ON_ROBOT], ids=["simulator", "robot"])
+@pytest.mark.parametrize("facts", [HEALTHY_LAB, ON_ROBOT, replace(HEALTHY_LAB, move_group=PLANNING)],
+                         ids=["simulator", "robot", "planning"])
 def test_healthy_lab_has_nothing_wrong(facts):
     assert [finding for finding in examine(facts) if finding.level is not Level.OK] == []
 
@@ -123,6 +144,33 @@ SICK = {
     "stopped": (with_state(stopped=True, enabled=False), "robot", "stopped", "-r"),
     "error": (with_state(error=True), "robot", "error", "-r"),
     "silent robot": (replace(HEALTHY_LAB, topics=Topics(5, True)), "robot", "/robot/state", "roslaunch"),
+    "move_group is hung": (
+        planning(error="timeout"), "move_group", "does not answer: timeout", "rosnode ping /move_group",
+    ),
+    "no controllers": (
+        planning(controllers=[]), "move_group", "no controller moves left_s0, left_s1 of group left_arm",
+        "controller_list of /move_group",
+    ),
+    "a controller that is not there": (
+        planning(controllers=[Controller("left/follow_joint_trajectory", ["left_s0", "left_s1"], False)]),
+        "move_group", "no controller serves left/follow_joint_trajectory", "start the controller",
+    ),
+    "joints without states": (
+        planning(silent_joints=["left_s1"]), "move_group", "no message on /robot/joint_states has left_s1", "remap",
+    ),
+    "a joint beyond its limits": (
+        planning(joints_out_of_bounds=["left_s1 is at 3.0"]), "move_group", "left_s1 is at 3.0", "move the joint",
+    ),
+    "a start in collision": (
+        planning(contacts=[("left_wrist", "table")]), "move_group", "left_wrist and table touch", "disable_collisions",
+    ),
+    "a camera that is not there": (
+        planning(sensors=[Sensor("/points", [], False)]), "move_group", "nobody publishes /points", "sensors_3d.yaml",
+    ),
+    "a camera that is silent": (
+        planning(sensors=[Sensor("/points", ["/camera"], False)]),
+        "move_group", "nothing arrives on /points of /camera", "rostopic hz /points",
+    ),
     "messages not built": (
         replace(HEALTHY_LAB, topics=Topics(error="ImportError: baxter_core_msgs")),
         "robot", "baxter_core_msgs", "setup",
@@ -152,6 +200,7 @@ NOTED = {
         with_master(replace(HEALTHY_LAB, other_masters=[OtherMaster("http://localhost:11417", True)]), publishers={}),
         "master", "ROS_MASTER_URI=http://localhost:11417",
     ),
+    "plans alone": (planning(executes=False, controllers=[]), "move_group", "allow_trajectory_execution:=true"),
     "no screen": (replace(HEALTHY_LAB, display=""), "display", "desktop"),
     "two names": (with_variables(HEALTHY_LAB, ROS_IP="127.0.0.1"), "network", "unset"),
 }
@@ -170,6 +219,7 @@ BUSY = {
     "is_fresh": ("build", replace(HEALTHY_LAB, is_fresh=None)),
     "master": ("master", replace(HEALTHY_LAB, master=None, topics=None)),
     "topics": ("robot", replace(HEALTHY_LAB, topics=None)),
+    "move_group": ("move_group", HEALTHY_LAB),
     "listeners": ("ports", replace(HEALTHY_LAB, listeners=None)),
 }
 
@@ -187,6 +237,11 @@ def test_a_simulator_that_does_not_answer_in_time_is_not_called_dead():
     facts = with_master(HEALTHY_LAB, slow_nodes=["/gazebo"])
     assert [(finding.topic, finding.level) for finding in examine(facts) if finding.level is not Level.OK] == [
         ("simulator", Level.BUSY)]
+
+
+def test_another_robot_needs_no_state_of_baxter():
+    facts = replace(planning(robot="probot_anno"), topics=Topics(900, True))
+    assert [finding for finding in examine(facts) if finding.level is not Level.OK] == []
 
 
 def test_open_ports_are_one_line_however_many():

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """From facts to findings: one function for each kind of problem in a lab. Pure: no clock, no network, no ROS."""
 
-from dataclasses import dataclass
-from enum import Enum
 from urllib.parse import urlparse
 
+from lab_doctor import move_group_checks
 from lab_doctor.facts import Facts
+from lab_doctor.findings import Finding, Level
 
 # tf refuses to look up transforms this far in the future or the past of its buffer; well before that, arms lag visibly.
 MAX_CLOCK_OFFSET_S = 0.25
@@ -15,23 +15,6 @@ SIMULATOR_TOPICS = ("/clock", "/robot/joint_states")
 NAMES_SHOWN = 3
 ERROR_LEVEL = 2  # of a diagnostic_msgs/DiagnosticStatus
 START_LINE = "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch"
-
-
-class Level(Enum):
-    OK = "ok"
-    NOTE = "note"
-    BUSY = "busy"
-    WRONG = "WRONG"
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A finding; fix is the command to type, empty if nothing is wrong."""
-
-    topic: str
-    level: Level
-    what: str
-    fix: str = ""
 
 
 def is_loopback(host: str) -> bool:
@@ -232,6 +215,8 @@ def check_robot(facts):
     state = facts.topics.robot_state
     if facts.topics.error:
         yield Finding("robot", Level.WRONG, f"cannot listen: {facts.topics.error}", "./baxter.sh setup")
+    elif state is None and facts.move_group is not None and facts.move_group.robot not in ("", "baxter"):
+        return  # another robot, which has no such topic
     elif state is None:
         what = "nothing arrives on /robot/state: no robot and no simulator, or none that can call this machine"
         yield Finding("robot", Level.WRONG, what, f"mend what is wrong above, or start the lab: {START_LINE}")
@@ -250,6 +235,13 @@ def check_robot(facts):
         yield Finding("robot", Level.NOTE, what, "rosrun baxter_tools enable_robot.py -e")
     else:
         yield Finding("robot", Level.OK, "enabled")
+
+
+def check_move_group(facts):
+    if "move_group" in facts.timed_out:
+        yield _busy("move_group", "move_group, or a service of it, has not answered")
+    if facts.move_group is not None:
+        yield from move_group_checks.examine(facts.move_group)
 
 
 def check_ports(facts):
@@ -285,6 +277,7 @@ CHECKS = (
     check_simulators,
     check_troubles,
     check_robot,
+    check_move_group,
     check_ports,
     check_display,
 )

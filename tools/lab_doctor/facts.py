@@ -31,6 +31,41 @@ class Topics:
 
 
 @dataclass(frozen=True)
+class Controller:
+    """An entry of move_group's controller_list: its action, the joints that it moves; is the action served?"""
+
+    action: str
+    joints: list[str]
+    answers: bool
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A sensor that move_group makes its octomap from: its topic, who publishes it, did something come in?"""
+
+    topic: str
+    publishers: list[str]
+    heard: bool
+
+
+@dataclass(frozen=True)
+class MoveGroup:
+    """What a running move_group, and its parameters, say. error: why it could not be asked, empty where it answered."""
+
+    node: str
+    error: str = ""
+    robot: str = ""
+    executes: bool = True  # ~allow_trajectory_execution
+    groups: dict[str, list[str]] = field(default_factory=dict)  # joints that move, without those that mimic others
+    controllers: list[Controller] = field(default_factory=list)
+    joint_topic: str = ""
+    silent_joints: list[str] = field(default_factory=list)  # of the robot's, those that no message on joint_topic has
+    joints_out_of_bounds: list[str] = field(default_factory=list)  # sentences
+    contacts: list[tuple[str, str]] = field(default_factory=list)  # what touches at the robot's present posture
+    sensors: list[Sensor] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
 class PythonFacts:
     """The Python that runs nodes: its path, the version of each import, and the error of each that failed."""
 
@@ -65,6 +100,7 @@ class Facts:
     addresses: dict[str, tuple[str | None, bool]] = field(default_factory=dict)
     master: Master | None = None
     topics: Topics | None = None
+    move_group: MoveGroup | None = None  # None too where none runs
     is_built: bool = False
     is_fresh: bool | None = None
     python: PythonFacts | None = None

@@ -15,7 +15,17 @@ from pathlib import Path
 from urllib.parse import urlparse
 
 from lab_doctor.checks import SIMULATOR_TOPICS, is_loopback
-from lab_doctor.facts import Facts, Listener, Master, OtherMaster, PythonFacts, Topics
+from lab_doctor.facts import (
+    Controller,
+    Facts,
+    Listener,
+    Master,
+    MoveGroup,
+    OtherMaster,
+    PythonFacts,
+    Sensor,
+    Topics,
+)
 
 DEADLINE_S = 15.0
 # A check that takes longer than this is named on the terminal.
@@ -24,6 +34,8 @@ CALL_TIMEOUT_S = 1.0
 CALLER_ID = "/lab_doctor"
 # Debian's roscpp nodes, and rospy nodes, carry their node name on the command line when roslaunch starts them.
 ROS_PROCESS = re.compile(r"__name:=|rosmaster|roscore|roslaunch|rosrun|/lib/(tf2?|rviz|robot_state_publisher|rosout)")
+# By this service a move_group is known.
+SCENE_SERVICE = "get_planning_scene"
 MODULES = ("rospy", "pybullet", "numpy", "transforms3d", "tf2_ros")
 
 
@@ -38,6 +50,7 @@ def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadli
     questions = {
         "master": lambda: ask_master(ros["ROS_MASTER_URI"]),
         "topics": lambda: listen(root, ros["ROS_MASTER_URI"]),
+        "move_group": lambda: ask_move_group(root, ros["ROS_MASTER_URI"]),
         "is_fresh": lambda: is_fresh(root),
         "python": ask_python,
         "listeners": list_listeners,
@@ -52,6 +65,7 @@ def gather(root: Path, variables: dict[str, str], say=lambda names: None, deadli
         addresses={name: answers.get(f"address of {name}") or (None, False) for name in hosts},
         master=answers.get("master"),
         topics=answers.get("topics"),
+        move_group=answers.get("move_group"),
         is_built=(root / "devel" / "setup.bash").is_file(),
         is_fresh=answers.get("is_fresh"),
         python=answers.get("python"),
@@ -235,6 +249,23 @@ def listen(root: Path, uri: str) -> Topics:
     if done.returncode != 0:
         return Topics(error=(done.stderr.strip().splitlines() or ["no reason given"])[-1])
     return Topics(**json.loads(done.stdout.splitlines()[-1]))
+
+
+def ask_move_group(root: Path, uri: str) -> MoveGroup | None:
+    """What a move_group says, asked by a process that has ROS; None where none runs. Raises TimeoutError, OSError."""
+    services = dict(_proxy(uri).getSystemState(CALLER_ID)[2][2])
+    name, nodes = next(((name, nodes) for name, nodes in sorted(services.items()) if name.endswith("/" + SCENE_SERVICE)
+                        and nodes), ("", []))
+    if not nodes:
+        return None
+    script = root / "tools" / "lab_doctor" / "ask_move_group.py"
+    command = [shutil.which("python3") or "python3", str(script), nodes[0], name[:-len(SCENE_SERVICE)]]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S)
+    if done.returncode != 0:
+        return MoveGroup(nodes[0], error=(done.stderr.strip().splitlines() or ["no reason given"])[-1])
+    answer = json.loads(done.stdout.splitlines()[-1])
+    return MoveGroup(**{**answer, "controllers": [Controller(**one) for one in answer["controllers"]],
+                        "sensors": [Sensor(**one) for one in answer["sensors"]]})
 
 
 def is_fresh(root: Path) -> bool:
