@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Processes that a bench sets beside a lab: lab_part.py swing | press | client | busy | boxes N | empty | posture |
-latency N | lockstep TICKS | hostile.
+"""Processes that a bench sets beside a lab: lab_part.py swing | press | client | busy | boxes N | empty |
+answers FILE | posture | latency N | lockstep TICKS | hostile.
 
 Each prints "up" when it is at work.
 """
@@ -16,6 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import roslib.message
 import rospy
 from baxter_core_msgs.msg import JointCommand
 from bullet_sim_msgs.srv import AdvanceTicks
@@ -112,6 +113,16 @@ def busy():
 def empty():
     """A node that does nothing, with a service that does nothing."""
     rospy.Service("/bench_empty", Empty, lambda request: {})
+    up()
+    rospy.spin()
+
+
+def answers(path):
+    """Services /bench_answers/NAME that do nothing but answer. path: JSON {name: (type, answer in hex)}."""
+    for name, (kind, data) in json.loads(Path(path).read_text()).items():
+        service = roslib.message.get_service_class(kind)
+        answer = service._response_class().deserialize(bytes.fromhex(data))
+        rospy.Service("/bench_answers/" + name, service, lambda request, answer=answer: answer)
     up()
     rospy.spin()
 
@@ -231,7 +242,7 @@ def hostile():
 def main():
     name, *arguments = rospy.myargv(sys.argv)[1:]  # without what roslaunch adds
     rospy.init_node("bench_" + name, anonymous=True, disable_rostime=name not in ("client",))
-    parts = (swing, press, client, boxes, busy, empty, posture, latency, lockstep, hostile)
+    parts = (swing, press, client, boxes, busy, empty, answers, posture, latency, lockstep, hostile)
     {function.__name__: function for function in parts}[name](*arguments)
 
 

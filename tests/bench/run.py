@@ -41,6 +41,7 @@ SUITES = {
     "hostile": ("hostile_bench", "hostile descriptions spawned: the longest gap in joint_states, the longest answer"),
     "lockstep": ("lockstep_bench", "two fresh labs in lock-step, the same commands: joint states bit for bit"),
     "services": ("service_bench", "IK service beside an empty service"),
+    "move_group": ("move_group_bench", "move_group's services beside empty ones; how soon it is up, and cancels"),
     "tracking": ("tracking_bench", "trajActionServer: evenness of its commands, how closely the arm follows"),
     "placing": ("placing_bench", "pick and place by friction, twenty seeds a round: 100 in five"),
     "start": ("start_bench", "launch to /robot/sim/started; memory of each process"),
