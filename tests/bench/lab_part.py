@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Processes that a bench sets beside a lab: lab_part.py swing | press | client | busy | boxes N | empty |
-answers FILE | posture | latency N | lockstep TICKS | hostile.
+answers FILE | posture | latency N | lockstep TICKS | replay RECORDING ROWS FILE | hostile.
 
 Each prints "up" when it is at work.
 """
@@ -16,12 +16,14 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 import roslib.message
 import rospy
 from baxter_core_msgs.msg import JointCommand
 from bullet_sim_msgs.srv import AdvanceTicks
-from gazebo_msgs.srv import DeleteModel, SpawnModel
+from gazebo_msgs.srv import DeleteModel, SetModelConfiguration, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
+from recording import JOINT_NAMES, Recording
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, UInt16
 from std_srvs.srv import Empty
@@ -216,6 +218,47 @@ def lockstep(ticks):
     print(json.dumps({"digest": digest.hexdigest(), "states": len(counted)}), flush=True)
 
 
+def replay(path, rows, file):
+    """Send a recording's set-points as raw positions, from its first posture on, in lock-step; write where the joints
+    are at the times of its first so many rows, (rows, 14) [rad], into a file of numpy."""
+    recording, rows = Recording.read(path), int(rows)
+    ticks = round(recording.period_s / TICK_S)
+    topics = {side: "/robot/limb/%s/joint_command" % side for side in SIDES}
+    commands = {side: rospy.Publisher(topic, JointCommand, queue_size=1) for side, topic in topics.items()}
+    states = {}
+    rospy.Subscriber("/robot/joint_states", JointState, lambda message: states.__setitem__(
+        message.header.stamp.to_nsec(), dict(zip(message.name, message.position, strict=True))))
+    advance = rospy.ServiceProxy("/gazebo/advance", AdvanceTicks, persistent=True)
+    place = rospy.ServiceProxy("/gazebo/set_model_configuration", SetModelConfiguration)
+    advance.wait_for_service(60)
+    for topic, publisher in zip(topics.values(), commands.values(), strict=True):
+        wait_until(publisher.get_num_connections, "the robot to listen on " + topic, 60.0)
+
+    def step(count, await_topics=()):
+        answer = advance(count, list(await_topics), 60.0)
+        if not answer.success:
+            raise SystemExit(answer.status_message)
+        return answer.sim_time.to_nsec()
+
+    def send(mode, row):
+        for number, (side, publisher) in enumerate(commands.items()):
+            names = list(joint_names(side))
+            first = number * len(names)
+            publisher.publish(JointCommand(mode, recording.commanded[row, first:first + len(names)].tolist(), names))
+
+    up()
+    step(FIRST_TICK)
+    answer = place("baxter", "robot_description", list(JOINT_NAMES), recording.sensed[0].tolist())
+    if not answer.success:
+        raise SystemExit(answer.status_message)
+    times = [step(ticks)]
+    for row in range(rows - 1):
+        send(JointCommand.RAW_POSITION_MODE, row)
+        times.append(step(ticks, topics.values()))
+    wait_until(lambda: times[-1] in states, "joint states of %d ns" % times[-1], 60.0)
+    np.save(file, np.array([[states[time][name] for name in JOINT_NAMES] for time in times]))
+
+
 def hostile():
     """Spawn and delete what is too large, endless or not what it says. Prints the time to each answer [s] as JSON."""
     spawn = rospy.ServiceProxy("/gazebo/spawn_urdf_model", SpawnModel)
@@ -242,7 +285,7 @@ def hostile():
 def main():
     name, *arguments = rospy.myargv(sys.argv)[1:]  # without what roslaunch adds
     rospy.init_node("bench_" + name, anonymous=True, disable_rostime=name not in ("client",))
-    parts = (swing, press, client, boxes, busy, empty, answers, posture, latency, lockstep, hostile)
+    parts = (swing, press, client, boxes, busy, empty, answers, posture, latency, lockstep, replay, hostile)
     {function.__name__: function for function in parts}[name](*arguments)
 
 

@@ -82,3 +82,31 @@ def _save(path, canvas):
 
 def _write(canvas, text, x, y, size=0.4):
     cv2.putText(canvas, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, size, _INK, 1, cv2.LINE_AA)
+
+
+def curves(time_s, joints, path):
+    """Draw curves over the time, a field for each joint, left arm's joints beside the right's.
+
+    joints: {name: {title of a curve: (n,) values}}; time_s: (n,).
+    """
+    width, height, margin = 560, 150, 40
+    rows = -(-len(joints) // 2)
+    canvas = np.full((rows * height + 40, 2 * width, 3), _PAPER, dtype=np.uint8)
+    titles = list(next(iter(joints.values())))
+    for k, title in enumerate(titles):
+        cv2.line(canvas, (12 + 200 * k, 20), (52 + 200 * k, 20), _COLOURS[k], 2, cv2.LINE_AA)
+        _write(canvas, title, 60 + 200 * k, 25)
+    for number, (name, values) in enumerate(joints.items()):
+        left, top = (number // rows) * width, 40 + (number % rows) * height
+        everything = np.concatenate(list(values.values()))
+        low, high = float(everything.min()), float(everything.max())
+        scale = (height - margin) / max(high - low, 1e-9)
+        cv2.rectangle(canvas, (left + 4, top), (left + width - 8, top + height - 8), _GRID, 1)
+        for k, title in enumerate(titles):
+            x = left + 6 + (time_s - time_s[0]) / (time_s[-1] - time_s[0]) * (width - 16)
+            y = top + height - 14 - (values[title] - low) * scale
+            points = np.stack([x, y], axis=1).round().astype(np.int32)
+            cv2.polylines(canvas, [points], False, _COLOURS[k], 1, cv2.LINE_AA)
+        said = "%s  %.2f to %.2f rad, %.0f s" % (name, low, high, time_s[-1] - time_s[0])
+        _write(canvas, said, left + 10, top + 14, 0.36)
+    cv2.imwrite(str(path), canvas)

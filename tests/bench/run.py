@@ -43,6 +43,7 @@ SUITES = {
     "services": ("service_bench", "IK service beside an empty service"),
     "move_group": ("move_group_bench", "move_group's services beside empty ones; how soon it is up, and cancels"),
     "tracking": ("tracking_bench", "trajActionServer: evenness of its commands, how closely the arm follows"),
+    "fidelity": ("fidelity_bench", "a recording of a physical robot's arms, replayed: --recording FILE for another"),
     "placing": ("placing_bench", "pick and place by friction, twenty seeds a round: 100 in five"),
     "start": ("start_bench", "launch to /robot/sim/started; memory of each process"),
     "cameras": ("camera_bench", "pictures beside PyBullet's own; how many a second, and what they cost physics"),
@@ -59,6 +60,7 @@ def main():
     parser.add_argument("--quick", action="store_true", help="a tenth of the work, to see that it runs")
     parser.add_argument("--list", action="store_true", help="list the suites")
     parser.add_argument("--out", type=Path, default=ROOT / ".baxter/bench", help="folder for JSON and pictures")
+    parser.add_argument("--recording", type=Path, help="what `fidelity` replays (default: the one that is here)")
     parser.add_argument("--child", help=argparse.SUPPRESS)
     parser.add_argument("--number", type=int, default=0, help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -73,6 +75,10 @@ def main():
         return 0
     if options.child:
         return child(options)
+    if options.recording is not None:
+        if not options.recording.is_file():
+            parser.error("--recording: there is no file %s" % options.recording)
+        os.environ["BENCH_RECORDING"] = str(options.recording.resolve())
     names = options.names or list(SUITES)
     options.out.mkdir(parents=True, exist_ok=True)
     install_peers()

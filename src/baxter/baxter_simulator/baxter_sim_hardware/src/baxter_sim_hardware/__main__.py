@@ -2,6 +2,8 @@
 """``python3 -m baxter_sim_hardware``: compile everything into the cache, so that no start has to wait for it."""
 import numpy as np
 
+from baxter_sim_hardware import effects
+from baxter_sim_hardware.arms.actuators import Actuators, Wanted
 from baxter_sim_hardware.arms.setpoint import SetPoints, any_beyond, approach, follow
 
 
@@ -11,6 +13,8 @@ def main():
     points = SetPoints(1)
     follow(points.numbers, points.flags, np.zeros((1, 1)), 0, here, 1.0, 1.0)
     any_beyond(1.0, here, at_rest, here, 1.0)
+    actuators = Actuators(effects.read(effects.physical_robot())["lag"], ["left_s0"])
+    actuators.torques(Wanted(bound > 0.0, here, at_rest, bound > 0.0, here, bound), np.ones((3, 1)), 1.0)
 
 
 if __name__ == "__main__":

@@ -12,11 +12,14 @@ from baxter_model.self_collision import spawn_options
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
+from . import effects
+from .arms.actuators import Actuators
 from .arms.joint_command import JointLimits
+from .arms.joint_sensors import JointSensors
 from .arms.measured import Measured
 from .errors import HardwareError
 from .grippers.hands import hand_of
-from .robot import Baxter
+from .robot import Baxter, Behaviour
 from .robot_state import Event, State
 from .topics import interface
 from .topics.arms import ArmTopics
@@ -68,9 +71,14 @@ class BaxterPlugin(ModelPlugin):
             self._hold_other_joints(robot)
         self._dt = context.world.time_step_s
         limits = JointLimits(names, model.lower[arm], model.upper[arm], model.max_velocity[arm], model.max_effort[arm])
-        self._baxter = Baxter(
-            limbs, limits, Measured(model.read_joints()[0][arm], self._dynamics), dt=self._dt,
-            profile=self._parameter("profile", "sim"), disabled=self._parameter("disabled", "hold"), state=before)
+        profile = self._parameter("profile", "sim")
+        chosen = effects.chosen(self._parameter("effects", effects.ALL if profile == "robot" else effects.NONE))
+        rows = effects.read(effects.physical_robot()) if chosen else {}
+        self._sensors = JointSensors(rows["noise"], names, context.world.random) if "noise" in chosen else None
+        behaviour = Behaviour(profile, self._parameter("disabled", "hold"),
+                              Actuators(rows["lag"], names) if "lag" in chosen else None)
+        self._baxter = Baxter(limbs, limits, Measured(model.read_joints()[0][arm], self._dynamics), self._dt, behaviour,
+                              before)
         self._warnings = Warnings(context.log)
         self._build_parts(context, {limb.side: model.index(limb.joint_names) for limb in limbs})
         if before is not None:
@@ -175,6 +183,8 @@ class BaxterPlugin(ModelPlugin):
             self._model.drive_position(self._driven_index, drives.position, drives.effort, velocity=drives.velocity)
         if len(drives.velocity_driven):
             self._model.drive_velocity(arm[drives.velocity_driven], drives.push_velocity, drives.push_effort)
+        if len(drives.effort_driven):
+            self._model.drive_effort(arm[drives.effort_driven], drives.exerted)
         self._head.update()
         self._grippers.update(self._before)
 
@@ -195,7 +205,18 @@ class BaxterPlugin(ModelPlugin):
         return model.mass_matrix(position)[np.ix_(arm, arm)], model.inverse_dynamics(position, velocities)[arm]
 
     def _snapshot(self):
-        return Snapshot(self._model, self._before, self._dt)
+        return Snapshot(self._model, self._before, self._dt, self._sense)
+
+    def _sense(self, position, velocity, effort):
+        """What the robot says of its joints, (n,) each, where they are as given."""
+        arm, actuators = self._arm_index, self._baxter.actuators
+        if actuators is not None:
+            effort = effort.copy()
+            effort[arm] += actuators.counterbalance(position[arm])
+        if self._sensors is not None:
+            position, velocity, effort = position.copy(), velocity.copy(), effort.copy()
+            position[arm], velocity[arm], effort[arm] = self._sensors.read(position[arm], velocity[arm], effort[arm])
+        return position, velocity, effort
 
     def _measure(self):
         """Update the measured state of the arms' joints, between two ticks."""
@@ -226,7 +247,7 @@ class BaxterPlugin(ModelPlugin):
         # Messages that have arrived by now are from before the joints were moved.
         self._measure()
         self._handling.handle(self.context.pending(), self.context.world.time_s)
-        self._baxter.arms.reset()
+        self._baxter.put_elsewhere()
         self._head.reset()
         self._grippers.reset()
         self._robot.announce_reset()

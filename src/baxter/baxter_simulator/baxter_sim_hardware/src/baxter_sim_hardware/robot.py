@@ -1,31 +1,51 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter's control logic: arbitrates arm commands and defines the behaviour while disabled."""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .arms.actuators import Wanted
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
+from .arms.effort_bounds import REACH_RAD
 from .errors import HardwareError
 from .robot_state import RobotState
 
+INERTIA_TICKS = 50  # the inertias of links about their joints change that slowly
 DISABLED_BEHAVIOURS = ("hold", "sink")
+
+
+class Behaviour(NamedTuple):
+    """profile: 'sim' or 'robot' (speed ratio at start); disabled: what arms do without power, 'hold' or 'sink';
+    actuators: `arms.actuators.Actuators` of all joints of the arms, or None for ideal drives."""
+
+    profile: str = "sim"
+    disabled: str = "hold"
+    actuators: object = None
 
 
 class Baxter:
     """The robot's state and its arms, one tick at a time.
 
-    limbs, limits, measured, dt: as for `Arms`; profile: 'sim' or 'robot' (speed ratio at start); disabled: behaviour of
-    the arms without power, 'hold' or 'sink'; state: the first robot_state.State.
+    limbs, limits, measured, dt: as for `Arms`; behaviour: `Behaviour`; state: the first robot_state.State.
 
-    Attributes: `profile`; `state`, a `RobotState`; `arms`, an `Arms`; `measured`, the `Measured` that the caller
-    updates before each tick, and before each event between two ticks.
+    Attributes: `profile`, `actuators`: as in `Behaviour`; `state`, a `RobotState`; `arms`, an `Arms`; `measured`, the
+    `Measured` that the caller updates before each tick, and before each event between two ticks.
     """
 
-    def __init__(self, limbs, limits, measured, dt=0.002, profile="sim", disabled="hold", state=None):
+    def __init__(self, limbs, limits, measured, dt=0.002, behaviour=Behaviour(), state=None):  # noqa: B008 (a tuple)
+        profile, disabled, actuators = behaviour
         if profile not in SPEED_RATIO:
             raise HardwareError("profile is '%s'; choices are %s" % (profile, ", ".join(SPEED_RATIO)))
         if disabled not in DISABLED_BEHAVIOURS:
             raise HardwareError("disabled is '%s'; choices are %s" % (disabled, ", ".join(DISABLED_BEHAVIOURS)))
         self.profile = profile
         self.state = RobotState() if state is None else RobotState(state)
-        self.measured = measured
-        self.arms = Arms(limbs, limits, self.measured, speed_ratio=SPEED_RATIO[profile], dt=dt)
+        self.measured, self.actuators, self._dt = measured, actuators, dt
+        self._inertia, self._inertia_due = None, 0
+        # Behind actuators the set-points run ahead, and these bring a joint back that was pushed.
+        self.arms = Arms(limbs, limits, self.measured, speed_ratio=SPEED_RATIO[profile], dt=dt,
+                         reach_rad=REACH_RAD if actuators is None else math.inf)
         self.arms.stop()
         self._sinks = disabled == "sink"
         self._speed_ratio = SPEED_RATIO[profile]
@@ -34,6 +54,13 @@ class Baxter:
         """Start with moving arms: forget every command, bring them to rest, and hold them."""
         self.arms.take_over()
         self.arms.stop()
+
+    def put_elsewhere(self):
+        """The joints were put elsewhere: forget every command, and hold them there."""
+        self.arms.reset()
+        if self.actuators is not None:
+            self.actuators.forget()
+            self._inertia_due = 0
 
     def apply(self, event):
         """Take an enable, disable, stop, reset ... event. Raises CommandRefused if the state does not allow it."""
@@ -57,10 +84,26 @@ class Baxter:
     @property
     def moves_by_gravity(self):
         """Whether drives follow from the torque that balances gravity, so that `update` needs its present value."""
-        return self.arms.needs_gravity or (self._sinks and not self.state.enabled)
+        return self.actuators is not None or self.arms.needs_gravity or (self._sinks and not self.state.enabled)
 
     def update(self):
         """Drives of the arms for this tick; measured.gravity counts only where `moves_by_gravity`."""
         if self._sinks and not self.state.enabled:
+            if self.actuators is not None:
+                self.actuators.forget()
             return self.arms.sink()
-        return self.arms.update()
+        drives = self.arms.update()
+        return drives if self.actuators is None else self._through_actuators(drives)
+
+    def _through_actuators(self, drives):
+        arms, measured, index = self.arms, self.measured, drives.position_driven
+        driven, effort = np.zeros(len(measured.position), dtype=bool), np.zeros(len(measured.position))
+        driven[index], effort[index] = True, drives.effort
+        wanted = Wanted(driven, arms.commanded_position, arms.said_velocity, arms.in_position_mode, arms.known_gravity,
+                        effort)
+        if self._inertia_due == 0:
+            self._inertia = np.diagonal(measured.dynamics(measured.velocity)[0])
+        self._inertia_due = (self._inertia_due + 1) % INERTIA_TICKS
+        links = np.array([measured.position, measured.velocity, self._inertia])
+        torques = self.actuators.torques(wanted, links, self._dt)
+        return drives._replace(position_driven=index[:0], effort_driven=index, exerted=torques[index])

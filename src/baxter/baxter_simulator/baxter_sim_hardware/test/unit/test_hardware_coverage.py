@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="module")
 def table():
-    return yaml.safe_load((PACKAGE / "config" / "physical_robot.yaml").read_text())
+    return yaml.safe_load((PACKAGE / "config" / "physical_robot_topics.yaml").read_text())
 
 
 def test_the_physical_robot_has_268_topics(table):

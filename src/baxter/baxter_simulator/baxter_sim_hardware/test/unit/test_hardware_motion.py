@@ -99,7 +99,7 @@ def test_position_mode_needs_one_message_and_keeps_its_goal(lab):
 
 @pytest.mark.parametrize("ratio, profile", [(1.0, "sim"), (0.3, "robot"), (0.1, None), (0.0, None), (-1.0, None)])
 def test_speed_ratio_scales_position_mode(make_lab, ratio, profile):
-    lab = make_lab(parameters={"enable": True, "profile": profile or "sim"})
+    lab = make_lab(parameters={"enable": True, "profile": profile or "sim", "effects": "none"})
     lab.run(0.1)
     if profile is None:
         for side in SIDES:
@@ -367,7 +367,7 @@ def test_stop_and_disable_halt_any_motion(lab, mode, values, end):
 
 def test_a_far_goal_with_the_physical_robots_speed_ratio(make_lab):
     """0.3 of the velocity limits until a client requests more; both times the arms arrive at their targets."""
-    lab = make_lab(pose="neutral", parameters={"enable": True, "profile": "robot"})
+    lab = make_lab(pose="neutral", parameters={"enable": True, "profile": "robot", "effects": "none"})
     start, far = lab.position, np.tile([-0.8, 0.6, 1.5, 0.8, 2.5, -1.5, 2.5], 2)
     limits = lab.model.max_velocity[lab.arm]
     for ratio, goal in ((0.3, start + far), (1.0, start)):

@@ -51,6 +51,7 @@ AT_LIMIT = 0.999  # fraction of the velocity limit from which torque mode watche
 SINK_DAMPING = 150.0  # [Nm s/rad] an unpowered arm with `disabled:=sink` gives way to gravity against this
 SINK_FRICTION = 1.0  # [Nm] what still damps a joint whose gravity torque vanishes
 
+
 _NONE = np.zeros(0, dtype=int)
 
 
@@ -58,7 +59,8 @@ class Drives(NamedTuple):
     """What the joint drives shall do in this tick; indices count the joints of the limits.
 
     position_driven: indices of joints that follow position [rad] and velocity [rad/s] with up to effort [Nm];
-    velocity_driven: indices of joints that are pushed towards push_velocity [rad/s] by no more than push_effort [Nm].
+    velocity_driven: indices of joints that are pushed towards push_velocity [rad/s] by no more than push_effort [Nm];
+    effort_driven: indices of joints on which exerted [Nm] acts.
     """
 
     position_driven: np.ndarray
@@ -68,6 +70,8 @@ class Drives(NamedTuple):
     velocity_driven: np.ndarray
     push_velocity: np.ndarray
     push_effort: np.ndarray
+    effort_driven: np.ndarray = _NONE
+    exerted: np.ndarray = np.zeros(0)
 
 
 class _Limb:
@@ -92,12 +96,12 @@ class Arms:
 
     limbs: sequence of baxter_model.description.LimbModel; limits: JointLimits of all their joints, which fixes the
     order of every array here; measured: `Measured`, which the caller renews before each tick; speed_ratio: 0..1 at
-    start; dt: length of a tick [s].
+    start; dt: length of a tick [s]; reach_rad: by how much a set-point may lead its joint.
     """
 
-    def __init__(self, limbs, limits, measured, speed_ratio=1.0, dt=0.002):
+    def __init__(self, limbs, limits, measured, speed_ratio=1.0, dt=0.002, reach_rad=REACH_RAD):
         self.limits = limits
-        self._measured = measured
+        self._measured, self._reach_rad = measured, reach_rad
         self._limbs = {limb.side: _Limb(limb, limits, speed_ratio) for limb in limbs}
         self._dt = dt
         count = len(limits.names)
@@ -155,6 +159,21 @@ class Arms:
     def needs_gravity(self):
         """Whether drives follow from the torque that balances gravity."""
         return self._modes.any_in_torque or self._efforts.any_yields
+
+    @property
+    def in_position_mode(self):
+        """(n,) bool, whether the joints are in position mode."""
+        return self._modes.mode == POSITION
+
+    @property
+    def said_velocity(self):
+        """(n,) [rad/s] the feed-forward velocities of joints that follow a stream of raw set-points, else 0."""
+        return np.where(self._modes.mode == RAW_POSITION, self._stream.said_velocity(self._measured.time_s), 0.0)
+
+    @property
+    def known_gravity(self):
+        """(n,) [Nm] the torque that balances gravity, as far as compensation is not suppressed."""
+        return self._efforts.balanced * self._measured.gravity
 
     @property
     def commanded_position(self):
@@ -321,7 +340,7 @@ class Arms:
         """Return the Drives for this tick, from the measured joints."""
         measured, points = self._measured, self._points
         if self._is_settled:
-            leads = any_beyond(REACH_RAD, points.output, points.output_rate, measured.position, self._dt)
+            leads = any_beyond(self._reach_rad, points.output, points.output_rate, measured.position, self._dt)
         else:
             expired = self._modes.expired(measured.time_s)
             if expired is not None:
@@ -364,7 +383,7 @@ class Arms:
         rad/s in one. Where the joint is at its limit without being braked by the command, the motor holds it there.
         """
         velocity = self._measured.velocity[joints]
-        gravity = (self._efforts.balanced * self._measured.gravity)[joints]
+        gravity = self.known_gravity[joints]
         command = self._modes.value[joints]
         limit = self.limits.velocity[joints]
         total = command + gravity
@@ -377,7 +396,7 @@ class Arms:
         """One tick of the set-points; returns whether any leads its joint by more than it may."""
         points, smoothing = self._points, self._smoothing
         rests, braked, leads = follow(points.numbers, points.flags, smoothing.window, smoothing.oldest,
-                                      self._measured.position, REACH_RAD, self._dt)
+                                      self._measured.position, self._reach_rad, self._dt)
         smoothing.turn()
         if braked:
             # At the target and at rest: with the weaker acceleration of other motions it would overshoot.
@@ -394,8 +413,8 @@ class Arms:
         points, measured = self._points, self._measured
         # The joints have not made this tick's step yet.
         lead = points.output - points.output_rate * self._dt - measured.position
-        far = np.abs(lead) > REACH_RAD
-        offset = np.clip(lead[far], -REACH_RAD, REACH_RAD) - lead[far]
+        far = np.abs(lead) > self._reach_rad
+        offset = np.clip(lead[far], -self._reach_rad, self._reach_rad) - lead[far]
         points.position[far] += offset
         points.output[far] += offset
         self._smoothing.shift(far, offset)

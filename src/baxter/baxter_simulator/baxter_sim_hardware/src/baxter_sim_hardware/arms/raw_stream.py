@@ -31,6 +31,10 @@ class RawStream:
         self._velocity[index] = np.clip(velocities, -limit, limit)
         self._velocity_stamp[index] = time_s
 
+    def said_velocity(self, time_s):
+        """(n,) [rad/s] at what the set-points are said to move at time_s [s]; 0 for those of which nobody says so."""
+        return np.where(time_s - self._velocity_stamp <= FEED_FORWARD_S, self._velocity, 0.0)
+
     def take(self, points, mode, command, time_s):
         """Take a raw command at time_s [s]: its target moves there at the stream's own pace, or jumps there if no
         stream runs. points: SetPoints; mode: (n,) of the joints, before the command; command: JointCommand."""

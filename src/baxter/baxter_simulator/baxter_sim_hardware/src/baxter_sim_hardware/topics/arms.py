@@ -73,7 +73,7 @@ class ArmTopics(Part):
         return convert.sea_joint_state(
             time_s, BASE_FRAME, self._chains[side].joint_names,
             (arms.commanded_position[joints], arms.commanded_velocity[joints], arms.commanded_torque[joints]),
-            (snapshot.position[index], snapshot.velocity[index], snapshot.effort[index]), snapshot.gravity[index])
+            tuple(values[index] for values in snapshot.sensed), snapshot.gravity[index])
 
     def _reference_joint_states(self, time_s, component, snapshot):
         arms, order = self._baxter.arms, self._order

@@ -15,7 +15,7 @@ def served(namespace="/robot"):
 
 
 def physical(table):
-    """{topic: type} of the physical robot, from the parsed content of config/physical_robot.yaml."""
+    """{topic: type} of the physical robot, from the parsed content of config/physical_robot_topics.yaml."""
     return {name.format(limb=side): kind for name, kind in table["topics"].items() for side in SIDES}
 
 

@@ -64,8 +64,7 @@ class RobotTopics(Part):
 
     def _joint_states(self, time_s, component, snapshot):
         order = self._order
-        return self._joint_states_message.message(
-            time_s, snapshot.position[order], snapshot.velocity[order], snapshot.effort[order])
+        return self._joint_states_message.message(time_s, *(values[order] for values in snapshot.sensed))
 
     def _assembly(self, time_s, component, snapshot):
         return convert.assembly_state(self._baxter.state.assembly)

@@ -6,14 +6,22 @@ class Snapshot:
     """The model's joints after a step; expensive values are computed once, and only on demand.
 
     position [rad, m], velocity, effort [Nm, N]: (n,) each, in the model's order; before: the same three when the step
-    began.
+    began; sense: function (position, velocity, effort) -> the same three as the robot says them.
     """
 
-    def __init__(self, model, before, dt):
+    def __init__(self, model, before, dt, sense):
         self.position, self.velocity, self.effort = model.read_joints()
         self.before = before
         self._model, self._dt = model, dt
-        self._gravity = self._own_effort = None
+        self._sense = sense
+        self._gravity = self._own_effort = self._sensed = None
+
+    @property
+    def sensed(self):
+        """(position, velocity, effort) as the robot's own sensors have them, (n,) each."""
+        if self._sensed is None:
+            self._sensed = self._sense(self.position, self.velocity, self.effort)
+        return self._sensed
 
     @property
     def gravity(self):

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The actuators of a physical arm: a motor with a finite controller, and a spring between it and the link.
+
+Each joint is a series elastic actuator. Its controller sees the motor, not the link:
+
+    motor:  J w' = clip(T, limit) - spring - Coulomb friction,   T = ff + kp (r - m) + I - kd (w - w_ff)
+    spring: k (m - q) + d (w - v), which is what drives the link beside its counterbalance
+    r = filtered set-point + ff / k, ff = torque that balances gravity, as far as the controller knows it
+
+m, w: angle and speed of the motor, seen at the joint; q, v: of the link. So a load that the controller does not know
+bends the spring for good, and the error of the motor itself goes away by I, which acts at rest only.
+
+A bare wrist is so light that its spring would shake it at the length of a tick. So the spring's torque is that of the
+tick's end, where a link of the given inertia will be (linearly implicit Euler).
+"""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from baxter_sim_hardware import effects
+from numba_cache import compiler
+
+_compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
+
+# Parts of a tick in which the motors are moved: spring and motor of a wrist swing at 110 rad/s.
+PARTS = 4
+# A motor rests where it and its set-point are slower than this [rad/s].
+REST_SPEED = 0.03
+NUMBERS = ("spring_stiffness", "spring_damping", "motor_inertia", "proportional_gain", "motor_damping", "friction",
+           "set_point_filter", "position_mode_filter", "integral_rate", "integral_deadband", "torque_limit",
+           "counterbalance_offset", "counterbalance_stiffness")
+
+
+class Wanted(NamedTuple):
+    """What the actuators shall do in one tick, (n,) each.
+
+    driven: which of them follow `position` [rad]; velocity: what set-points are said to move at, 0 where nobody says
+    [rad/s]; in_position_mode; known_load: torque that the controller adds for gravity [Nm]; effort: what a drive may
+    exert [Nm].
+    """
+
+    driven: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    in_position_mode: np.ndarray
+    known_load: np.ndarray
+    effort: np.ndarray
+
+
+class Actuators:
+    """The actuators of n joints.
+
+    rows: {number: {joint: value}} as `effects.read` has them for "lag"; names: of the joints. Raises HardwareError.
+    """
+
+    def __init__(self, rows, names):
+        self._numbers = np.array([effects.per_joint(rows, number, names) for number in NUMBERS])
+        for number, least in (("spring_stiffness", 1.0), ("motor_inertia", 1e-4)):
+            values = self._numbers[NUMBERS.index(number)]
+            if values.min() < least:
+                raise effects.HardwareError("%s is %g; it must be at least %g" % (number, values.min(), least))
+        if self._numbers.min() < 0.0:
+            raise effects.HardwareError("%s is negative" % NUMBERS[int(np.argwhere(self._numbers < 0.0)[0, 0])])
+        # Motor's angle and speed, filtered set-point, integral, set-point of the tick before.
+        self._state = np.zeros((5, len(names)))
+        self._begun = np.zeros(len(names), dtype=bool)
+
+    def forget(self):
+        """The joints were put elsewhere: begin where they are."""
+        self._begun[:] = False
+
+    def torques(self, wanted, links, dt):
+        """(n,) [Nm] what drives the links in this tick, the counterbalance among it; 0 for joints that are not driven.
+
+        links: (3, n), their angles [rad], speeds [rad/s], and inertias about their joints, at least [kg m^2]; dt [s]. A
+        joint that was not driven begins with its spring in balance with the known load.
+        """
+        return _turn(self._state, self._begun, self._numbers, wanted, links, dt)
+
+    def counterbalance(self, position):
+        """(n,) [Nm] what springs beside the actuators take off them at `position` (n,) [rad]."""
+        return self._numbers[-2] + self._numbers[-1] * position
+
+
+@_compiled
+def _turn(state, begun, numbers, wanted, links, dt):
+    motor, speed, filtered, integral, last = state[0], state[1], state[2], state[3], state[4]
+    torques = np.zeros(links.shape[1])
+    part = dt / PARTS
+    for j in range(links.shape[1]):
+        if not wanted.driven[j]:
+            begun[j] = False
+            continue
+        stiffness, damping, inertia, gain, motor_damping, friction = (
+            numbers[0, j], numbers[1, j], numbers[2, j], numbers[3, j], numbers[4, j], numbers[5, j])
+        q, v, target, pace = links[0, j], links[1, j], wanted.position[j], wanted.velocity[j]
+        balance = numbers[11, j] + numbers[12, j] * q
+        known = wanted.known_load[j] + balance
+        if not begun[j]:
+            begun[j] = True
+            motor[j], speed[j], filtered[j], integral[j], last[j] = q + known / stiffness, v, q, 0.0, target
+        lag = numbers[6, j] + (numbers[7, j] if wanted.in_position_mode[j] else 0.0)
+        filtered[j] += (target - filtered[j]) * (1.0 - math.exp(-dt / lag) if lag > 0.0 else 1.0)
+        reference = filtered[j] + pace * lag + known / stiffness
+        rests = abs(target - last[j]) < REST_SPEED * dt
+        last[j] = target
+        limit = min(numbers[10, j], wanted.effort[j])
+        yields = dt * (dt * stiffness + damping) / links[2, j]
+        total = 0.0
+        for _ in range(PARTS):
+            ahead = stiffness * (motor[j] - q - dt * v) + damping * (speed[j] - v)
+            spring = (ahead + yields * known) / (1.0 + yields)
+            error = reference - motor[j]
+            asked = known + gain * error + integral[j] - motor_damping * (speed[j] - pace)
+            torque = min(max(asked, -limit), limit)
+            if rests and torque == asked and abs(speed[j]) < REST_SPEED and abs(error) > numbers[9, j]:
+                integral[j] += numbers[8, j] * gain * error * part
+            free = speed[j] + part * (torque - spring) / inertia
+            # Friction takes at most all of the speed.
+            braked = max(abs(free) - part * friction / inertia, 0.0)
+            speed[j] = math.copysign(braked, free)
+            motor[j] += part * speed[j]
+            total += spring
+        torques[j] = total / PARTS - balance
+    return torques

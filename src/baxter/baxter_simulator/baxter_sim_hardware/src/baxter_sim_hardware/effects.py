@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a physical robot does that ideal drives do not: which of it is switched on, and its numbers.
+
+The numbers stand in config/physical_robot.yaml, each with its source.
+"""
+from pathlib import Path
+
+import numpy as np
+import rospkg
+import yaml
+
+from .errors import HardwareError
+
+NAMES = ("lag", "noise")
+ALL, NONE = "all", "none"
+
+
+def physical_robot():
+    """Path of the numbers."""
+    return Path(rospkg.RosPack().get_path("baxter_sim_hardware")) / "config" / "physical_robot.yaml"
+
+
+def chosen(words):
+    """The set of effects that a text such as "lag,noise", "all" or "none" names. Raises HardwareError."""
+    if not isinstance(words, str):
+        raise HardwareError("effects is %r; it must be a text such as 'lag,noise', 'all' or 'none'" % (words,))
+    names = {word.strip() for word in words.split(",")} - {"", NONE}
+    if ALL in names:
+        return set(NAMES)
+    unknown = sorted(names - set(NAMES))
+    if unknown:
+        raise HardwareError("effects has %s; there are %s, %s and %s" % (
+            ", ".join(map(repr, unknown)), ", ".join(NAMES), ALL, NONE))
+    return names
+
+
+def read(path):
+    """{effect: {number: {joint: value}}} of a YAML file. Raises HardwareError for what is missing or no number."""
+    try:
+        table = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except (OSError, yaml.YAMLError) as error:
+        raise HardwareError("%s cannot be read: %s" % (path, error)) from error
+    found = {}
+    for effect in NAMES:
+        rows = table.get(effect) if isinstance(table, dict) else None
+        if not isinstance(rows, dict):
+            raise HardwareError("%s has no section '%s'" % (path, effect))
+        found[effect] = {}
+        for number, row in rows.items():
+            values = row.get("values") if isinstance(row, dict) else None
+            if not isinstance(values, dict) or not all(
+                    isinstance(value, (int, float)) and np.isfinite(value) for value in values.values()):
+                raise HardwareError("%s: %s.%s must have 'values' with a finite number for each joint"
+                                    % (path, effect, number))
+            found[effect][number] = values
+    return found
+
+
+def per_joint(rows, number, names):
+    """(n,) the value of `number` for the joints `names`, such as left_s0. Raises HardwareError for what is missing."""
+    try:
+        values = rows[number]
+    except KeyError:
+        raise HardwareError("there is no '%s' among %s" % (number, ", ".join(sorted(rows)))) from None
+    try:
+        return np.array([values[name.rsplit("_", 1)[1]] for name in names], dtype=float)
+    except (KeyError, IndexError) as error:
+        raise HardwareError("'%s' has no value for joint %s" % (number, error)) from None

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A recording of a physical Baxter, replayed through joint_command: with its actuators, and with ideal drives.
+
+`./baxter.sh bench fidelity [--recording FILE]` prints a line for each joint, and draws commanded, recorded and
+simulated curves. FILE: a CSV file with the columns of recordings/baxter_tracking_100hz.csv.
+"""
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from labs import HERE, Lab
+from pictures import curves
+from recording import JOINT_NAMES, Recording, delay_s, overshoots, rest
+
+RECORDING = HERE / "recordings" / "baxter_tracking_100hz.csv"
+# Each joint's root mean square of simulated minus recorded position [rad].
+RMSE_RAD = 0.012
+QUICK_S = 4.0
+
+
+def measure(report, quick, number):
+    path = Path(os.environ.get("BENCH_RECORDING") or RECORDING)
+    recording = Recording.read(path, QUICK_S if quick else None)
+    simulated = {effects: replay(path, len(recording.time_s), effects) for effects in ("all", "lag", "none")}
+    lines = ["%-9s %8s %8s %8s  %17s  %17s  %17s" % (
+        "joint", "RMSE", "largest", "ideal", "delay [s]", "overshoot [rad]", "at rest [mrad]")]
+    for j, name in enumerate(JOINT_NAMES):
+        error = simulated["all"][:, j] - recording.sensed[:, j]
+        ideal = simulated["none"][:, j] - recording.sensed[:, j]
+        commanded, pair = recording.commanded[:, j], (recording.sensed[:, j], simulated["all"][:, j])
+        lines.append("%-9s %8.4f %8.4f %8.4f  %8.3f %8.3f  %8.4f %8.4f  %8.2f %8.2f" % (
+            name, rms(error), np.abs(error).max(), rms(ideal),
+            *(delay_s(commanded, values, recording.period_s) for values in pair),
+            *(overshoots(commanded, values) for values in pair),
+            *(1e3 * rest(commanded, values) for values in pair)))
+        report.add("replay of a recording, %s: RMSE" % name, rms(error), "rad", ("ideal drives", rms(ideal)),
+                   samples=len(error), **({} if quick else {"most": RMSE_RAD}))
+        report.add("replay of a recording, %s: largest error" % name, float(np.abs(error).max()), "rad",
+                   ("ideal drives", float(np.abs(ideal).max())), samples=len(error))
+    print("simulated against recorded; pairs: recorded, simulated", *lines, sep="\n", flush=True)
+    if number == 0:
+        folder = HERE.parents[1] / ".baxter/bench"
+        folder.mkdir(parents=True, exist_ok=True)
+        curves(recording.time_s, {name: {"commanded": recording.commanded[:, j], "recorded": recording.sensed[:, j],
+                                         "simulated": simulated["lag"][:, j]}
+                                  for j, name in enumerate(JOINT_NAMES)}, folder / "fidelity.png")
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(values ** 2)))
+
+
+def replay(path, count, effects):
+    """(count, 14) positions [rad] as joint states have them, at the times of the recording's rows."""
+    with tempfile.TemporaryDirectory() as folder, Lab(
+            ready="/gazebo/advance", gui="false", enable="true", paused="true", joint_state_rate="500", effects=effects,
+            left_electric_gripper="false", right_electric_gripper="false") as lab:
+        found = Path(folder) / "positions.npy"
+        process = lab.part("replay", path, count, found)
+        process.wait()
+        if process.returncode or not found.exists():
+            sys.exit("lab_part.py replay failed with exit code %d" % process.returncode)
+        return np.load(found)
