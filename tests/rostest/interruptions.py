@@ -7,7 +7,6 @@ Private parameters: ~motions, ~interruptions: names, separated by spaces; defaul
 """
 import re
 import sys
-import unittest
 
 import rospy
 import rostest
@@ -15,6 +14,7 @@ from actionlib_msgs.msg import GoalStatus
 from interruption_bench import Bench
 from motions import POSITION, ActionMotion, ProgramMotion, Stream, all_motions
 
+from lab_testing import subtests
 from lab_testing.waiting import wait_until
 
 # A motion is interrupted when a joint is this far from its start; by then all joints move [rad, m].
@@ -95,7 +95,7 @@ INTERRUPTIONS = {
 }
 
 
-class InterruptionsTest(unittest.TestCase):
+class InterruptionsTest(subtests.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.bench = Bench()

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import os
 import subprocess
+import unittest
 from types import SimpleNamespace
 
 import pytest
 
-from lab_testing import waiting
+from lab_testing import subtests, waiting
 from lab_testing.processes import is_alive, living
 from lab_testing.waiting import wait_for_publishers, wait_until
 
@@ -61,3 +62,23 @@ def test_the_dead_that_nobody_has_buried_are_not_alive():
     assert not is_alive(child.pid) and living(child.pid) == []
     child.wait()
     assert not is_alive(child.pid)
+
+
+def test_each_failed_sub_test_is_in_the_report_of_its_test(capfd):
+    class Case(subtests.TestCase):
+        def test_some(self):
+            for number in range(4):
+                with self.subTest("one", number=number):
+                    self.assertEqual(number % 2, 0, "odd %d" % number)
+
+        def test_good(self):
+            with self.subTest("fine"):
+                pass
+
+    result = unittest.TestResult()
+    unittest.defaultTestLoader.loadTestsFromTestCase(Case).run(result)
+    assert result.testsRun == 2 and not result.errors
+    (_, text), = result.failures
+    assert "2 sub-tests failed" in text
+    assert all(said in text for said in ("(one, number=1)", "odd 1", "(one, number=3)", "odd 3"))
+    assert "odd 2" not in text

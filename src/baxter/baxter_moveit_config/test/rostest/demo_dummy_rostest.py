@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Either arm and both plan and move, to states, joint values and poses."""
-import unittest
 
 import numpy as np
 import rospy
 
 from baxter_model import SIDES, joint_names, poses, tip_of
+from lab_testing import subtests
 from lab_testing.waiting import stretched, wait_until
 from moveit_commander import MoveGroupCommander, PlanningSceneInterface, RobotCommander
 
@@ -19,7 +19,7 @@ def angles(name, side):
     return [values[joint] for joint in joint_names(side)]
 
 
-class DummyTest(unittest.TestCase):
+class DummyTest(subtests.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.arms = {side: MoveGroupCommander(side + "_arm", wait_for_servers=stretched(60.0)) for side in SIDES}

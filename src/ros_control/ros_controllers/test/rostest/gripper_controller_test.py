@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Both gripper controllers as clients see them: Debian's action client, joints with faults, no physics."""
-import unittest
 
 import actionlib
 import rospy
@@ -11,6 +10,7 @@ from control_msgs.msg import GripperCommand, GripperCommandAction, GripperComman
 from controller_manager_msgs.srv import LoadController, SwitchController
 from std_srvs.srv import SetBool
 
+from lab_testing import subtests
 from lab_testing.waiting import wait_until
 
 WAIT_S = 20.0
@@ -35,7 +35,7 @@ def goal(position, max_effort=100.0):
     return GripperCommandGoal(GripperCommand(position, max_effort))
 
 
-class GripperControllerTest(unittest.TestCase):
+class GripperControllerTest(subtests.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.clients = {}

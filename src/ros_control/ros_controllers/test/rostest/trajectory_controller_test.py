@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A trajectory controller as clients see it: Debian's action clients on joints with faults, no physics."""
 import sys
-import unittest
 
 import actionlib
 import numpy as np
@@ -23,6 +22,7 @@ from controller_manager_msgs.srv import LoadController, SwitchController
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from lab_testing import subtests
 from lab_testing.waiting import stretched, wait_until
 
 JOINTS = ["shoulder", "elbow"]
@@ -55,7 +55,7 @@ def switch(start=(), stop=()):
     assert service("/robot/controller_manager/switch_controller", SwitchController, start, stop, 2, False, 5.0).ok
 
 
-class TrajectoryControllerTest(unittest.TestCase):
+class TrajectoryControllerTest(subtests.TestCase):
     @classmethod
     def setUpClass(cls):
         for name in ("load_controller", "switch_controller"):
