@@ -71,7 +71,7 @@ class _Action:
         begin = wall_clock()
         try:
             self._feedback("PLANNING")
-            self._wait_for_state()
+            self._wait_for_state(goal.group_name)
             job = self._kind(self._context, goal)
             found = self._plan(job, goal)
             result.planning_time = wall_clock() - begin
@@ -88,9 +88,10 @@ class _Action:
         empty = not result.trajectory_stages
         finish(self._server, result, result_text(result.error_code.val, reason, empty=empty, plan_only=plan_only))
 
-    def _wait_for_state(self):
-        monitor = self._context.monitor
-        late = monitor.wait_for_state(rospy.Time.now(), _STATE_TIMEOUT_S, (), self._server.is_preempt_requested)
+    def _wait_for_state(self, group):
+        monitor, groups = self._context.monitor, self._context.model.groups
+        joints = groups[group].joints if group in groups else ()
+        late = monitor.wait_for_state(rospy.Time.now(), _STATE_TIMEOUT_S, joints, self._server.is_preempt_requested)
         if late:
             rospy.logwarn("%s: %s", self._kind.name, late)
 
