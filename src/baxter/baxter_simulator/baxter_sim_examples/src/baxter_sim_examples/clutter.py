@@ -9,12 +9,12 @@ import numpy as np
 from .pick_and_place import Spot, grip_yaw
 from .scene import BASE_HEIGHT_M, BLOCK_SIZE_M, TABLE_TOP_M, Trial
 
-THINGS = 7
+THINGS = 9
 # Where the things stand: x and y of their middles [m] in `base`.
-_NEAREST_M, _FARTHEST_M = (0.62, -0.20), (0.95, 0.45)
+_NEAREST_M, _FARTHEST_M = (0.55, -0.20), (0.90, 0.48)
 _WIDTHS_M, _HEIGHTS_M, _MASSES_KG = (0.04, 0.08), (0.06, 0.22), (0.1, 0.4)
 # Free between a thing and whatever stands beside it; the fingers reach in there.
-_GAP_M = 0.04
+_GAP_M = 0.02
 # How far the hand may lean [rad] while its fingers stay along faces of the block.
 _LEANS_RAD = (0.0, 0.35, -0.35)
 # A grasp or place loses so much quality for each radian it leans or turns away from where the arm is at ease.

@@ -26,7 +26,7 @@ def test_things_stand_on_the_table_and_clear_of_each_other(seed):
     circles = [(thing.spot, thing.radius) for thing in things] + [(trial.source, block), (trial.target, block)]
     for (a, a_radius), (b, b_radius) in itertools.combinations(circles, 2):
         if {a, b} != {trial.source, trial.target}:
-            assert math.hypot(a.x - b.x, a.y - b.y) > a_radius + b_radius + 0.039
+            assert math.hypot(a.x - b.x, a.y - b.y) > a_radius + b_radius + 0.019
     for thing in things:
         assert thing.spot.z - 0.5 * thing.height == pytest.approx(TABLE_TOP_M - BASE_HEIGHT_M)
 
