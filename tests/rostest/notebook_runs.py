@@ -24,7 +24,7 @@ CELL_TIMEOUT_S = 150
 # Those that leave Baxter's arms alone, those that move them, and those whose robot is another one.
 WATCHING = ("1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro")
 MOVING = ("5_moving_baxter", "6_rotating_the_gripper", "7_waving")
-OWN_LAB = ("joint_states_and_trajectories", "ros_control")
+OWN_LAB = ("joint_states_and_trajectories", "ros_control", "planning")
 # The pictures of docs/labs.md, drawn by a cell after the last one: notebook -> (file, expression for a matplotlib
 # figure).
 DRAWN = {
