@@ -74,7 +74,7 @@ class BaxterPlugin(ModelPlugin):
         profile = self._parameter("profile", "sim")
         chosen = effects.chosen(self._parameter("effects", effects.ALL if profile == "robot" else effects.NONE))
         rows = effects.read(effects.physical_robot()) if chosen else {}
-        self._sensors = JointSensors(rows["noise"], names, context.world.random) if "noise" in chosen else None
+        self._sensors = JointSensors(rows["noise"], names, self._seed()) if "noise" in chosen else None
         behaviour = Behaviour(profile, self._parameter("disabled", "hold"),
                               Actuators(rows["lag"], names) if "lag" in chosen else None)
         self._baxter = Baxter(limbs, limits, Measured(model.read_joints()[0][arm], self._dynamics), self._dt, behaviour,
@@ -124,6 +124,10 @@ class BaxterPlugin(ModelPlugin):
         others = np.setdiff1d(np.arange(len(model.joint_names)), self._arm_index)
         model.drive_position(others, model.read_joints()[0][others], model.max_effort[others])
         model.mark_start()
+
+    def _seed(self):
+        """Of this robot's noise: the world's seed has a say in it."""
+        return int(self.context.world.random.integers(2**32))
 
     def _parameter(self, name, default):
         return self.context.param(PARAMETERS + name, default)
@@ -215,7 +219,8 @@ class BaxterPlugin(ModelPlugin):
             effort[arm] += actuators.counterbalance(position[arm])
         if self._sensors is not None:
             position, velocity, effort = position.copy(), velocity.copy(), effort.copy()
-            position[arm], velocity[arm], effort[arm] = self._sensors.read(position[arm], velocity[arm], effort[arm])
+            position[arm], velocity[arm], effort[arm] = self._sensors.read(
+                self.context.world.tick, position[arm], velocity[arm], effort[arm])
         return position, velocity, effort
 
     def _measure(self):
