@@ -172,10 +172,10 @@ def test_states_are_counts_with_noise_and_the_same_for_the_same_seed_whoever_lis
     for heard in (True, False):
         lab = make_lab(parameters={"enable": True, "effects": "noise"}, angles=STRETCHED)
         for publisher in lab.publishers.values():
-            publisher.has_listeners(heard)
+            publisher.has_listeners = heard
         lab.run(0.5)
         publisher = lab.publishers["joint_states"]
-        publisher.has_listeners(True)
+        publisher.has_listeners = True
         publisher.messages.clear()
         lab.run(1.0)
         messages = [dict(zip(message.name, message.position, strict=True))
