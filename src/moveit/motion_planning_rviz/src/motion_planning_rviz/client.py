@@ -1,0 +1,241 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The way to a running move_group, ours or MoveIt's: its public actions, services and topics."""
+from __future__ import annotations
+
+import threading
+from typing import NamedTuple
+
+import actionlib
+import rospy
+from moveit_msgs import msg, srv
+from moveit_msgs.msg import MoveItErrorCodes, PlanningSceneComponents
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import String
+
+from motion_planning.errors import PlanningError
+from motion_planning_rviz.interaction import group_values
+from motion_planning_rviz.messages import code_name, goal_constraints, pose_message, state_message, state_values
+
+SERVICES = {"apply_planning_scene": srv.ApplyPlanningScene, "check_state_validity": srv.GetStateValidity,
+            "compute_ik": srv.GetPositionIK, "get_planning_scene": srv.GetPlanningScene,
+            "query_planner_interface": srv.QueryPlannerInterfaces}
+ACTIONS = {"move_group": msg.MoveGroupAction, "execute_trajectory": msg.ExecuteTrajectoryAction}
+#: How long a service is waited for that nobody offers yet [s].
+SERVICE_WAIT_S = 2.0
+
+
+class NoAnswer(PlanningError):
+    """move_group is not there, or refuses."""
+
+
+class NoPosture(PlanningError):
+    """Inverse kinematics found nothing. code: the name of MoveIt's error code."""
+
+    def __init__(self, code):
+        super().__init__(code)
+        self.code = code
+
+
+class Touch(NamedTuple):
+    """Two bodies that touch, by name. links: those of them that are links of the robot; held: those that it holds;
+    point (3,) in ``frame``."""
+
+    a: str
+    b: str
+    links: tuple
+    held: tuple
+    point: tuple
+    frame: str
+
+
+class Snapshot(NamedTuple):
+    """values: {joint: value} of the robot; objects: CollisionObjects; attached: AttachedCollisionObjects; colours:
+    {object: r g b a}."""
+
+    values: dict
+    objects: list
+    attached: list
+    colours: dict
+
+
+class Outcome(NamedTuple):
+    """How an action ended. text: of its server, or the error code's name; trajectory: the RobotTrajectory of a plan;
+    seconds: that planning took."""
+
+    success: bool
+    text: str
+    trajectory: msg.RobotTrajectory | None = None
+    seconds: float = 0.0
+
+
+class MoveGroupClient:
+    """Calls and goals. model: PlanningModel; planning_time_s: allowed for a plan."""
+
+    def __init__(self, model, planning_time_s):
+        self._model, self._planning_time_s = model, planning_time_s
+        self._proxies = {}
+        self._clients = {name: actionlib.ActionClient(name, kind) for name, kind in ACTIONS.items()}
+        self._event = rospy.Publisher("trajectory_execution_event", String, queue_size=5)
+        self._lock = threading.Lock()
+        self._handles = set()
+
+    # -- questions ----------------------------------------------------------------------------------------------
+
+    def snapshot(self):
+        """Return the Snapshot of now. Raises NoAnswer."""
+        parts = PlanningSceneComponents
+        scene = self._call("get_planning_scene", parts(
+            parts.ROBOT_STATE | parts.ROBOT_STATE_ATTACHED_OBJECTS | parts.WORLD_OBJECT_NAMES
+            | parts.WORLD_OBJECT_GEOMETRY | parts.OBJECT_COLORS)).scene
+        colours = {entry.id: (entry.color.r, entry.color.g, entry.color.b, entry.color.a)
+                   for entry in scene.object_colors}
+        return Snapshot(state_values(scene.robot_state), list(scene.world.collision_objects),
+                        list(scene.robot_state.attached_collision_objects), colours)
+
+    def posture(self, handle, pose, state, avoid):
+        """Return {joint: value} that put a handle's link to ``pose`` (4, 4) in the root link, near ``state``.
+
+        Raises NoPosture and NoAnswer.
+        """
+        request = msg.PositionIKRequest(group_name=handle.group, ik_link_name=handle.link, avoid_collisions=avoid,
+                                        robot_state=state_message(state.positions))
+        request.pose_stamped.header.frame_id = self._model.root
+        request.pose_stamped.pose = pose_message(pose)
+        answer = self._call("compute_ik", request)
+        if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+            raise NoPosture(code_name(answer.error_code.val))
+        return state_values(answer.solution)
+
+    def validity(self, group, state):
+        """Return (whether move_group takes ``state``, [Touch ...]). Raises NoAnswer."""
+        answer = self._call("check_state_validity", state_message(state.positions), group, msg.Constraints())
+        return answer.valid, [_touch(contact) for contact in answer.contacts]
+
+    def planners(self, group):
+        """Return ((pipeline, planner), ...) for a group. Raises NoAnswer."""
+        found = []
+        for interface in self._call("query_planner_interface").planner_interfaces:
+            for name in interface.planner_ids:
+                # "arm[RRTConnect]" are the settings of a planner for one group.
+                owner, bracket, rest = name.partition("[")
+                if bracket and owner != group:
+                    continue
+                found.append((interface.pipeline_id, rest.rstrip("]") if bracket else name))
+        return tuple(dict.fromkeys(found))
+
+    def _call(self, name, *values):
+        """The answer of a service. Connections are kept: a marker that is dragged asks often."""
+        for attempt in (1, 2):
+            try:
+                if name not in self._proxies:
+                    rospy.wait_for_service(name, SERVICE_WAIT_S)
+                    self._proxies[name] = rospy.ServiceProxy(name, SERVICES[name], persistent=True)
+                return self._proxies[name](*values)
+            except (rospy.ROSException, rospy.ServiceException) as error:
+                proxy = self._proxies.pop(name, None)
+                if proxy is not None:
+                    proxy.close()
+                if proxy is None or attempt == 2:
+                    raise NoAnswer("service %s does not answer: %s" % (rospy.resolve_name(name), error)) from None
+        raise AssertionError("not reached")
+
+    # -- the scene ----------------------------------------------------------------------------------------------
+
+    def add_box(self, name, size, pose):
+        """Put a cube with sides of ``size`` [m] at ``pose`` (4, 4) in the root link. Raises NoAnswer."""
+        box = msg.CollisionObject(id=name, operation=msg.CollisionObject.ADD,
+                                  primitives=[SolidPrimitive(SolidPrimitive.BOX, [size] * 3)],
+                                  primitive_poses=[pose_message(pose)])
+        box.header.frame_id = self._model.root
+        self._apply(objects=[box])
+
+    def remove(self, name):
+        """Take an object out of the world. Raises NoAnswer."""
+        self._apply(objects=[msg.CollisionObject(id=name, operation=msg.CollisionObject.REMOVE)])
+
+    def attach(self, name, link, touch_links):
+        """Fix an object of the world to a link. Raises NoAnswer."""
+        held = msg.AttachedCollisionObject(link_name=link, touch_links=list(touch_links))
+        held.object.id, held.object.operation = name, msg.CollisionObject.ADD
+        self._apply(attached=[held])
+
+    def detach(self, name, link):
+        """Put what a link holds back into the world. Raises NoAnswer."""
+        held = msg.AttachedCollisionObject(link_name=link)
+        held.object.id, held.object.operation = name, msg.CollisionObject.REMOVE
+        self._apply(attached=[held])
+
+    def _apply(self, objects=(), attached=()):
+        scene = msg.PlanningScene(is_diff=True)
+        scene.robot_state.is_diff = True
+        scene.world.collision_objects, scene.robot_state.attached_collision_objects = list(objects), list(attached)
+        if not self._call("apply_planning_scene", scene).success:
+            raise NoAnswer("move_group refuses the change of the scene; its log says why")
+
+    # -- motions ------------------------------------------------------------------------------------------------
+
+    def plan(self, query, execute, done):
+        """Plan for an interaction.Query, and ``execute`` it at once where that is true; ``done(Outcome)`` is called in
+        a thread of actionlib's. Raises NoAnswer."""
+        goal = msg.MoveGroupGoal()
+        request, options = goal.request, goal.planning_options
+        request.group_name, request.pipeline_id, request.planner_id = query.group, query.pipeline, query.planner
+        request.allowed_planning_time, request.num_planning_attempts = self._planning_time_s, 1
+        request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = query.speed
+        request.start_state = state_message({} if query.start is None else query.start.positions)
+        request.goal_constraints = [goal_constraints(group_values(self._model, query.goal, query.group))]
+        options.plan_only = not execute
+        options.planning_scene_diff.is_diff = options.planning_scene_diff.robot_state.is_diff = True
+        self._send("move_group", goal, done)
+
+    def execute(self, trajectory, done):
+        """Follow a RobotTrajectory; ``done(Outcome)`` as in :meth:`plan`. Raises NoAnswer."""
+        self._send("execute_trajectory", msg.ExecuteTrajectoryGoal(trajectory), done)
+
+    def stop(self):
+        """End what is planned and executed, whoever began it."""
+        with self._lock:
+            handles = tuple(self._handles)
+        for handle in handles:
+            handle.cancel()
+        self._event.publish("stop")
+
+    def _send(self, name, goal, done):
+        client = self._clients[name]
+        # A duration below 0 looks once: the client's own wait has no end while simulated time stands still.
+        if not client.wait_for_server(rospy.Duration(0, -1)):
+            raise NoAnswer("move_group is not there: nobody serves the action %s" % rospy.resolve_name(name))
+
+        ended = threading.Event()
+
+        def transition(handle):
+            if handle.get_comm_state() == actionlib.CommState.DONE:
+                ended.set()
+                with self._lock:
+                    self._handles.discard(handle)
+                done(_outcome(handle))
+
+        # Sent without our lock: actionlib holds a lock of its own while it calls transition, which wants ours.
+        handle = client.send_goal(goal, transition_cb=transition)
+        with self._lock:
+            # A handle that nobody holds is forgotten by actionlib.
+            if not ended.is_set():
+                self._handles.add(handle)
+
+
+def _touch(contact):
+    bodies = ((contact.contact_body_1, contact.body_type_1), (contact.contact_body_2, contact.body_type_2))
+    kinds = msg.ContactInformation
+    return Touch(contact.contact_body_1, contact.contact_body_2,
+                 tuple(name for name, kind in bodies if kind == kinds.ROBOT_LINK),
+                 tuple(name for name, kind in bodies if kind == kinds.ROBOT_ATTACHED),
+                 (contact.position.x, contact.position.y, contact.position.z), contact.header.frame_id)
+
+
+def _outcome(handle):
+    result, text = handle.get_result(), handle.get_goal_status_text()
+    if result is None:
+        return Outcome(False, text or "no result came")
+    success = result.error_code.val == MoveItErrorCodes.SUCCESS
+    return Outcome(success, text or code_name(result.error_code.val), getattr(result, "planned_trajectory", None),
+                   getattr(result, "planning_time", 0.0))

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Marker arrays that change little by little, and the planned path as a film of them."""
+import threading
+import time
+
+import rospy
+from visualization_msgs.msg import Marker, MarkerArray
+
+from motion_planning_rviz import drawing
+from motion_planning_rviz.messages import line_marker, marker_of
+
+#: Pictures of the planned path each second.
+FILM_HZ = 15.0
+
+
+class Picture:
+    """A topic with one set of markers. Only what has gone is deleted: rviz would load meshes anew, and flicker."""
+
+    def __init__(self, name):
+        self._publisher = rospy.Publisher(name, MarkerArray, queue_size=2, latch=True)
+        self._shown = None
+
+    def show(self, markers):
+        """Publish ``markers``, and that those of the last time which are not among them are gone."""
+        keys = {(marker.ns, marker.id) for marker in markers}
+        # An earlier process of this node may have left some.
+        gone = [Marker(action=Marker.DELETEALL)] if self._shown is None else [
+            Marker(ns=ns, id=number, action=Marker.DELETE) for ns, number in sorted(self._shown - keys)]
+        self._shown = keys
+        if gone or markers:
+            self._publisher.publish(MarkerArray(gone + list(markers)))
+
+    def is_looked_at(self):
+        return self._publisher.get_num_connections() > 0
+
+
+class Film:
+    """Shows a playback.Playback on a topic again and again, in a thread of its own. width: of the line [m]."""
+
+    def __init__(self, name, model, width):
+        self._picture, self._model, self._width = Picture(name), model, width
+        self._lock = threading.Lock()
+        self._wake = threading.Event()
+        self._enabled, self._playback, self._begin = True, None, 0.0
+        self._solids, self._lines = {}, []
+        threading.Thread(target=self._run, name="film", daemon=True).start()
+
+    def show(self, playback, links):
+        """Show a path from now on; ``links``: those whose way is drawn as a line."""
+        with self._lock:
+            self._playback, self._begin = playback, time.monotonic()
+            self._solids = drawing.link_solids(self._model.robot, playback.moving)
+            self._lines = [line_marker("way of " + link, playback.trail(link), self._model.root, drawing.PATH,
+                                       self._width) for link in links if link in playback.moving]
+        self._wake.set()
+
+    def enable(self, enabled):
+        """Show the path, or hide it until it is enabled again."""
+        with self._lock:
+            self._enabled = enabled
+        self._wake.set()
+
+    def forget(self):
+        """Show nothing any more."""
+        with self._lock:
+            self._playback = None
+        self._wake.set()
+
+    def _run(self):
+        while not rospy.is_shutdown():
+            with self._lock:
+                playing = self._enabled and self._playback is not None
+                markers = self._markers() if playing and self._picture.is_looked_at() else []
+                if markers or not playing:
+                    self._picture.show(markers)
+            # Real time: a film goes on while simulated time stands still.
+            self._wake.wait(1.0 / FILM_HZ if playing else None)
+            self._wake.clear()
+
+    def _markers(self):
+        frames = self._model.frames(self._playback.at(time.monotonic() - self._begin))
+        poses = {link: frames[self._model.link_index[link]] for link in self._solids}
+        return self._lines + [marker_of(one, self._model.root)
+                              for one in drawing.drawn(self._solids, poses, drawing.PATH)]

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is going to be planned: group, start, goal, settings; and which links of a group can be dragged."""
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from motion_planning.errors import PlanningError
+from motion_planning.kinematics import ik
+from motion_planning.model import State
+from urdf_model.transforms import rotation_angle
+
+WHICH = ("goal", "start")
+
+
+class InteractionError(PlanningError):
+    """Something that was asked for and cannot be had."""
+
+
+class Handle(NamedTuple):
+    """A link that can be dragged, and the group whose joints follow it."""
+
+    link: str
+    group: str
+
+
+@dataclass(frozen=True, eq=False)
+class Query:
+    """What would be planned now. It never changes.
+
+    group: name. goal: State. start: State, None for where the robot is. speed: share of the joints' limits, for
+    velocity and acceleration. pipeline, planner: names, empty for move_group's own choice. avoid: whether inverse
+    kinematics keeps clear of collisions.
+    """
+
+    group: str
+    goal: State
+    start: State | None = None
+    speed: float = 1.0
+    pipeline: str = ""
+    planner: str = ""
+    avoid: bool = False
+
+    def state(self, which):
+        """The State of "goal" or "start"; None for a start where the robot is."""
+        return self.goal if which == "goal" else self.start
+
+    def with_state(self, which, state):
+        return replace(self, **{which: state})
+
+
+def plannable(model):
+    """Return the names of groups that something can be planned for: those with joints, ends of arms apart."""
+    return tuple(name for name, group in model.groups.items() if group.joints and group.end_effector is None)
+
+
+def handles_of(model, group_name):
+    """Return the Handles of a group: its end effector's link or its tip, or those of the groups in it; maybe none."""
+    group = model.group(group_name)
+    if not group.joints or group.end_effector is not None:
+        return ()
+    if group.tip is not None:
+        mounted = [model.end_effectors[name].parent_link for name in group.end_effectors]
+        link = next((link for link in mounted if link in group.moving_links), group.tip)
+        return (Handle(link, group_name),) if link in group.moving_links else ()
+    found = (handle for name in group.subgroups if name in model.groups for handle in handles_of(model, name))
+    return tuple(dict.fromkeys(found))
+
+
+def pose_of(model, state, link):
+    """Return the pose (4, 4) of ``link`` in the robot's root link."""
+    return model.frame_of(state.q, link)
+
+
+def outwards(model, state, link):
+    """Return which way is out of the arm at ``link``, a unit vector (3,) in the root link: that axis of the link which
+    leads most directly away from the link before it. Frames of tools point either way."""
+    frames = model.frames(state.q)
+    here, joint = frames[model.link_index[link]], model.robot.parent_joint(link)
+    way = here[:3, 2]
+    while joint is not None:
+        step = here[:3, 3] - frames[model.link_index[joint.parent], :3, 3]
+        if np.linalg.norm(step) > 1e-3:
+            way = step
+            break
+        joint = model.robot.parent_joint(joint.parent)
+    along = here[:3, :3].T @ way
+    axis = int(np.abs(along).argmax())
+    return np.copysign(1.0, along[axis]) * here[:3, axis]
+
+
+def is_at(pose, other, position_m=1e-3, angle_rad=1e-2):
+    """Whether two poses (4, 4) are the same for the eye."""
+    return bool(np.linalg.norm(pose[:3, 3] - other[:3, 3]) < position_m
+                and rotation_angle(pose[:3, :3].T @ other[:3, :3]) < angle_rad)
+
+
+def named_state(model, state, group_name, name):
+    """Return ``state`` with the joints of a group's named state. Raises InteractionError."""
+    states = model.group(group_name).states
+    if name not in states:
+        raise InteractionError("group '%s' has no state '%s'; its states are %s"
+                               % (group_name, name, ", ".join(states) or "none"))
+    return state.with_joints(states[name])
+
+
+def random_state(model, state, group_name, generator):
+    """Return ``state`` with the joints of a group anywhere within their limits. generator: numpy.random.Generator."""
+    indices = model.group(group_name).indices
+    low, high = model.bounds[indices].T
+    return state.with_q(generator.uniform(low, high), indices)
+
+
+def with_known(state, values):
+    """Return ``state`` with those of ``values`` {joint: value} that are variables of the robot and finite."""
+    known = {name: value for name, value in values.items() if name in state.variables and np.isfinite(value)}
+    return state.with_joints(known)
+
+
+def group_values(model, state, group_name):
+    """Return {joint: value} of a group's joints."""
+    group = model.group(group_name)
+    return dict(zip(group.joints, state.q[group.indices].tolist(), strict=True))
+
+
+def why_unreachable(model, handle, pose, state):
+    """Return the sentence why no joint values put a handle's link to ``pose`` (4, 4) in the root link; None where some
+    do."""
+    try:
+        ik(model, handle.group, {handle.link: pose}, state.with_base(None), timeout_s=0.0)
+    except PlanningError as error:
+        return str(error)
+    return None
+
+
+def rigid_links(robot, link):
+    """Return the links of ``robot`` (urdf_model.Robot) that move as one with ``link``, itself too, sorted."""
+    found, new = {link}, [link]
+    while new:
+        here = new.pop()
+        joint = robot.parent_joint(here)
+        near = [joint.parent] if joint is not None and not joint.movable else []
+        near += [below.child for below in robot.joints.values() if below.parent == here and not below.movable]
+        new += [one for one in near if one not in found]
+        found.update(near)
+    return sorted(found)
+
+
+def touch_links(model, handle):
+    """Return the links that may touch what a handle's link holds: those fixed to it, and its end effectors'."""
+    links = set(rigid_links(model.robot, handle.link))
+    for effector in model.end_effectors.values():
+        if effector.parent_link == handle.link and effector.group in model.groups:
+            links.update(model.groups[effector.group].links)
+    return sorted(links)

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One thread that does things in turn, so that what they change needs no locks."""
+import threading
+from collections import deque
+
+
+class Worker:
+    """Calls functions in the order in which they came. ``on_error``: function of an exception that one raised."""
+
+    def __init__(self, on_error):
+        self._on_error = on_error
+        self._wake = threading.Condition()
+        self._waiting = deque()
+        self._ended = False
+        self._thread = threading.Thread(target=self._run, name="worker", daemon=True)
+        self._thread.start()
+
+    def put(self, function, key=None):
+        """Call ``function()`` later. With a ``key`` it takes the place of the last waiting one of the same key: of a
+        marker that is dragged only the newest pose counts."""
+        with self._wake:
+            if key is not None and self._waiting and self._waiting[-1][0] == key:
+                self._waiting.pop()
+            self._waiting.append((key, function))
+            self._wake.notify()
+
+    def end(self):
+        """Do nothing any more, and wait for what is being done."""
+        with self._wake:
+            self._ended = True
+            self._waiting.clear()
+            self._wake.notify()
+        if threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    def _run(self):
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._waiting or self._ended)
+                if self._ended:
+                    return
+                _, function = self._waiting.popleft()
+            try:
+                function()
+            except Exception as error:  # the thread outlives whatever a request does to it
+                self._on_error(error)
