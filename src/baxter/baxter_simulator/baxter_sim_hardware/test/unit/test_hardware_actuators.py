@@ -12,6 +12,8 @@ from baxter_sim_hardware import effects
 from baxter_sim_hardware.arms.actuators import Actuators
 from baxter_sim_hardware.errors import HardwareError
 
+pytestmark = pytest.mark.once
+
 POSITION, VELOCITY, TORQUE, RAW = 1, 2, 3, 4
 TICK_S = 0.002
 BENCH = Path(__file__).resolve().parents[6] / "tests" / "bench"
@@ -192,7 +194,6 @@ def test_states_are_counts_with_noise_and_the_same_for_the_same_seed_whoever_lis
     assert grippers and all(messages[-1][name] == true[name] for name in grippers)
 
 
-@pytest.mark.once
 def test_a_recording_of_a_physical_robot_is_followed_by_both_arms(make_lab):
     """By the same numbers on both arms; ideal drives are up to 0.08 rad off."""
     sys.path.append(str(BENCH))
