@@ -30,6 +30,17 @@ class ExecutionSettings:
     wait_for_rest: bool = True
     connection_timeout: float = 15.0
 
+    @property
+    def usual_start_tolerance(self):
+        """That of joints without one of their own."""
+        tolerance = self.start_tolerance
+        return tolerance.get("", 0.0) if isinstance(tolerance, dict) else tolerance
+
+    def allow_at_start(self, tolerance):
+        """Put ``tolerance`` [rad or m] in the place of that of joints without one of their own."""
+        own = self.start_tolerance
+        self.start_tolerance = type(own)(tolerance, own) if isinstance(own, dict) else tolerance
+
 
 @dataclass
 class Outcome:
@@ -41,12 +52,12 @@ class Outcome:
 
 
 class Executor:
-    """One execution at a time. monitor: gives the joints' values (SceneMonitor)."""
+    """One execution at a time. settings: ExecutionSettings, which may be changed."""
 
     def __init__(self, controllers, settings, monitor, handle_of):
         """controllers: list of controllers.Controller. handle_of(controller): how it is spoken to, as
         handles.Handles.of."""
-        self._controllers, self._settings, self._monitor = controllers, settings, monitor
+        self._controllers, self.settings, self._monitor = controllers, settings, monitor
         self._handle_of = handle_of
         self._busy = threading.Lock()
         self._stop = threading.Event()
@@ -94,7 +105,7 @@ class Executor:
         chosen = choose(self._controllers, trajectory.joint_names, self._is_alive)
         off = None if from_anywhere else start_deviation(
             trajectory.joint_names, trajectory.points[0].positions, self._monitor.joint_values(),
-            self._settings.start_tolerance, self._monitor.continuous)
+            self.settings.start_tolerance, self._monitor.continuous)
         if off:
             return Outcome(MoveItErrorCodes.CONTROL_FAILED,
                            "Invalid Trajectory: start point deviates from current robot state more than the allowed "
@@ -104,7 +115,7 @@ class Executor:
 
         handles = [self._handle_of(controller) for controller in chosen]
         for controller, handle in zip(chosen, handles, strict=True):
-            if not handle.connected(self._settings.connection_timeout, given_up):
+            if not handle.connected(self.settings.connection_timeout, given_up):
                 if given_up():
                     return Outcome(MoveItErrorCodes.PREEMPTED, "stopped on request")
                 return Outcome(MoveItErrorCodes.CONTROL_FAILED, "Action client not connected: %s does not answer; is "
@@ -120,7 +131,7 @@ class Executor:
 
     def _watch(self, trajectory, chosen, handles, preempted, invalidated):
         duration = trajectory.points[-1].time_from_start.to_sec()
-        allowed = allowed_duration(duration, chosen, self._settings.scaling, self._settings.margin)
+        allowed = allowed_duration(duration, chosen, self.settings.scaling, self.settings.margin)
         begin = rospy.get_time()
         # Time that has been set back, as by a reset of the simulation, ends nothing; the limit starts anew.
         while True:
@@ -138,13 +149,13 @@ class Executor:
             failed = _failed(handles)
             if failed is not None:
                 return self._cancel(handles, failed.code, failed.text)
-            if self._settings.monitored and now - begin > allowed:
+            if self.settings.monitored and now - begin > allowed:
                 return self._cancel(handles, MoveItErrorCodes.TIMED_OUT, "%s did not end within %.2f s (%.2f s planned)"
                                     % (", ".join(map(str, chosen)), allowed, duration))
         failed = _failed(handles)
         if failed is not None:
             return failed
-        if self._settings.wait_for_rest:
+        if self.settings.wait_for_rest:
             self._wait_for_rest(trajectory.joint_names, preempted)
         return Outcome(MoveItErrorCodes.SUCCESS)
 
@@ -158,7 +169,7 @@ class Executor:
 
     def _wait_for_rest(self, names, preempted):
         """Until three joint states in a row agree within the start tolerance."""
-        tolerance = self._settings.start_tolerance
+        tolerance = self.settings.start_tolerance
         limits = [tolerance.get(name, 0.0) if isinstance(tolerance, dict) else tolerance for name in names]
         deadline, before, same, number = time.monotonic() + _REST_S, None, 0, -1
         while time.monotonic() < deadline and not rospy.is_shutdown() and not self._stop.is_set() and not preempted():

@@ -32,7 +32,8 @@ _NAMES = {"joint_state_topic": "joint_states", "attached_collision_object_topic"
 class SceneMonitor:
     """The scene as it is now: what messages said, with the robot where its joint states say it is.
 
-    continuous: names of the joints that turn without end. Calls may come from any thread.
+    continuous: names of the joints that turn without end. publishes, publishes_states: whether changes of the scene,
+    and of the robot alone, are published, ``hz`` times a second at most. Calls may come from any thread.
     """
 
     def __init__(self, model, say_failure):
@@ -55,10 +56,10 @@ class SceneMonitor:
             self._listen_to_tf()
         self._bounds_error = float(np.finfo(float).eps)
         settings = rospy.get_param("~planning_scene_monitor", {})
-        self._publishes = bool(settings.get("publish_planning_scene", False))
-        self._publishes_states = bool(settings.get("publish_state_updates", False))
+        self.publishes = bool(settings.get("publish_planning_scene", False))
+        self.publishes_states = bool(settings.get("publish_state_updates", False))
         hz = settings.get("publish_planning_scene_hz", _USUAL_HZ)
-        self._hz = hz if isinstance(hz, (int, float)) and 0.0 < hz < math.inf else _USUAL_HZ
+        self.hz = hz if isinstance(hz, (int, float)) and 0.0 < hz < math.inf else _USUAL_HZ
         self._publisher = rospy.Publisher(options.get("monitored_planning_scene_topic", "~monitored_planning_scene"),
                                           PlanningScene, queue_size=100)
         self.joint_state_topic = rospy.resolve_name(topics["joint_state_topic"])
@@ -274,8 +275,8 @@ class SceneMonitor:
     def _publish_changes(self):
         published = None
         while not rospy.is_shutdown():
-            time.sleep(1.0 / self._hz)
-            if not self._publishes:
+            time.sleep(1.0 / self.hz)
+            if not self.publishes:
                 continue
             try:
                 published = self._publish_change(published)
@@ -290,7 +291,7 @@ class SceneMonitor:
             self._publisher.publish(scene_message(scene, octomap=self._octomap, stamp=stamp))
             return scene
         if np.array_equal(scene.state.q, published.state.q) and scene.state.attached is published.state.attached and \
-                np.array_equal(scene.state.base, published.state.base) or not self._publishes_states and \
+                np.array_equal(scene.state.base, published.state.base) or not self.publishes_states and \
                 scene.state.attached is published.state.attached:
             scene = scene.with_state(published.state)
         unchanged = scene.state is published.state and all(

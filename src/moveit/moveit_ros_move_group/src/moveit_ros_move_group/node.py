@@ -10,7 +10,7 @@ from model_files.resources import ResourceFinder
 from motion_planning.errors import PlanningError
 from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshReader, PlanningModel
-from moveit_ros_move_group import settings
+from moveit_ros_move_group import settings, tuning
 from moveit_ros_move_group.capabilities import cartesian, kinematics, motion, pick_place, planners, scene
 from moveit_ros_move_group.context import Context
 from moveit_ros_move_group.execution import Executor
@@ -85,7 +85,9 @@ def _capabilities(context, wanted, description, may_execute):
     served = {"move_group/" + name: make for name, make in offered.items()}
     for name in sorted(wanted & set(settings.OTHER_CAPABILITIES) - set(served)):
         rospy.logwarn("capability '%s' is known but not served here; it is left out", name)
-    return [make() for name, make in served.items() if name in wanted]
+    made = [make() for name, make in served.items() if name in wanted]
+    move_action = next((one for one in made if isinstance(one, motion.MoveAction)), None)
+    return made + tuning.servers(context.executor, context.monitor, move_action)
 
 
 def main():

@@ -120,7 +120,7 @@ def test_a_scene_that_cannot_be_published_is_followed_by_others(make):
 @pytest.mark.parametrize("hz", [0, -5.0, "often", float("inf")])
 def test_a_rate_that_is_none_counts_as_the_usual_one(make, hz):
     monitor = make(planning_scene_monitor={"publish_planning_scene_hz": hz})
-    assert monitor._hz == 4.0
+    assert monitor.hz == 4.0
 
 
 def test_joint_states_of_unequal_lists_are_left_out(make):

@@ -3,10 +3,15 @@
 import sys
 from pathlib import Path
 
+import pytest
+import rospy
+from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter
+from dynamic_reconfigure.srv import ReconfigureRequest
 from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import ExecuteKnownTrajectoryRequest
 
 from moveit_ros_move_group import settings
+from moveit_ros_move_group.capabilities.motion import MoveAction
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bad_requests import outcome  # noqa: E402
@@ -52,3 +57,41 @@ def test_a_cartesian_path_begins_whenever_it_is_sent(monkeypatch):
     answer = node.ask("compute_cartesian_path", good_requests(SIX)["compute_cartesian_path"])
     assert answer.fraction > 0.0
     assert answer.solution.joint_trajectory.header.stamp.is_zero()
+
+
+def reconfigured(node, server, **values):
+    config = Config()
+    for name, value in values.items():
+        field, kind = {bool: ("bools", BoolParameter), int: ("ints", IntParameter),
+                       float: ("doubles", DoubleParameter)}[type(value)]
+        getattr(config, field).append(kind(name, value))
+    answer = node.ask("~%s/set_parameters" % server, ReconfigureRequest(config)).config
+    return {one.name: one.value for field in (answer.bools, answer.ints, answer.doubles) for one in field}
+
+
+def test_settings_can_be_changed_while_it_runs(monkeypatch):
+    node = node_of(monkeypatch, plan_execution={"max_replan_attempts": 3})
+    execution = node.context.executor.settings
+    now = reconfigured(node, "trajectory_execution", execution_duration_monitoring=False, allowed_start_tolerance=0.2,
+                       allowed_execution_duration_scaling=99.0)
+    assert (execution.monitored, execution.start_tolerance, execution.scaling) == (False, 0.2, 10.0)
+    assert now["allowed_execution_duration_scaling"] == 10.0 and now["wait_for_trajectory_completion"] is False
+    reconfigured(node, "planning_scene_monitor", publish_planning_scene=True, publish_planning_scene_hz=20.0)
+    assert node.context.monitor.publishes and node.context.monitor.hz == 20.0
+    action = next(one for one in node.kept if isinstance(one, MoveAction))
+    assert action.replan_attempts == 3
+    reconfigured(node, "plan_execution", max_replan_attempts=1)
+    assert action.replan_attempts == 1
+
+
+def test_tolerances_of_single_joints_outlive_a_change_of_the_usual_one(monkeypatch):
+    node = node_of(monkeypatch, trajectory_execution={"joints_allowed_start_tolerance": {"j1": 0.5}})
+    reconfigured(node, "trajectory_execution", allowed_start_tolerance=0.3)
+    tolerance = node.context.executor.settings.start_tolerance
+    assert (tolerance.get("j1"), tolerance.get("j2")) == (0.5, 0.3)
+
+
+def test_a_setting_that_is_not_there_is_refused(monkeypatch):
+    node = node_of(monkeypatch)
+    with pytest.raises(rospy.ServiceException, match="there is no setting 'colour'"):
+        reconfigured(node, "plan_execution", colour=1)

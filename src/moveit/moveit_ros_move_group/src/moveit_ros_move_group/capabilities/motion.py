@@ -57,11 +57,11 @@ class PlanService:
 
 
 class MoveAction:
-    """The action ``move_group``: plan, or plan and execute."""
+    """The action ``move_group``: plan, or plan and execute. replan_attempts: where a goal does not say how many."""
 
     def __init__(self, context, planner, may_execute):
         self.context, self._planner, self._may_execute = context, planner, may_execute
-        self._replan_attempts = rospy.get_param("~plan_execution/max_replan_attempts", _REPLAN_ATTEMPTS)
+        self.replan_attempts = rospy.get_param("~plan_execution/max_replan_attempts", _REPLAN_ATTEMPTS)
         self._changed = threading.Event()
         context.monitor.on_change(self._changed.set)
         self._server = actionlib.SimpleActionServer("move_group", MoveGroupAction, self._run, auto_start=False)
@@ -119,7 +119,7 @@ class MoveAction:
             rospy.logwarn("move_group: the start state is for planning alone; the robot starts where it is")
         group = context.model.groups[request.group_name]
         require_state(context, group)
-        attempts = 1 + (max(0, options.replan_attempts or self._replan_attempts) if options.replan else 0)
+        attempts = 1 + (max(0, options.replan_attempts or self.replan_attempts) if options.replan else 0)
         for attempt in range(attempts):
             self._changed.clear()
             scene = context.monitor.scene()

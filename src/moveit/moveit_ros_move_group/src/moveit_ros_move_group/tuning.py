@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What dynamic_reconfigure's clients may change while the node runs, under MoveIt's names."""
+import rospy
+
+from loop_ros.reconfigure import Setting, SettingsServer
+
+
+class _RosTopics:
+    """Publishers and services of a plain node, as SettingsServer asks for them."""
+
+    def publisher(self, topic, msg_class, latch=False):
+        return rospy.Publisher(topic, msg_class, latch=latch, queue_size=10)
+
+    def service(self, name, service_class, handler):
+        return rospy.Service(name, service_class, handler)
+
+
+def servers(executor, monitor, move_action):
+    """Return the SettingsServers of ``~trajectory_execution``, ``~planning_scene_monitor`` and ``~plan_execution``.
+
+    executor: execution.Executor; move_action: motion.MoveAction; no server of one that is None. monitor: SceneMonitor.
+    """
+    topics, made = _RosTopics(), [_of_monitor(_RosTopics(), monitor)]
+    if executor is not None:
+        made.append(_of_execution(topics, executor.settings))
+    if move_action is not None:
+        made.append(SettingsServer(topics, "~plan_execution", [Setting(
+            "max_replan_attempts", int(move_action.replan_attempts), 0, 10000,
+            "how often a goal that may be planned again is planned again")],
+            lambda values: setattr(move_action, "replan_attempts", values["max_replan_attempts"])))
+    return made
+
+
+def _of_execution(topics, settings):
+    def apply(values):
+        settings.monitored = values["execution_duration_monitoring"]
+        settings.scaling = values["allowed_execution_duration_scaling"]
+        settings.margin = values["allowed_goal_duration_margin"]
+        settings.wait_for_rest = values["wait_for_trajectory_completion"]
+        if values["allowed_start_tolerance"] != server.values["allowed_start_tolerance"]:
+            settings.allow_at_start(values["allowed_start_tolerance"])
+
+    server = SettingsServer(topics, "~trajectory_execution", [
+        Setting("execution_duration_monitoring", settings.monitored, meaning="end what takes too long"),
+        Setting("allowed_execution_duration_scaling", float(settings.scaling), 1.0, 10.0,
+                "how much longer than planned a trajectory may take"),
+        Setting("allowed_goal_duration_margin", float(settings.margin), 0.1, 60.0, "and so much more [s]"),
+        Setting("allowed_start_tolerance", float(settings.usual_start_tolerance), 0.0, 1e9,
+                "how far [rad or m] joints may be from a trajectory's start; 0: as far as they like"),
+        Setting("wait_for_trajectory_completion", settings.wait_for_rest, meaning="wait until the joints rest"),
+    ], apply)
+    return server
+
+
+def _of_monitor(topics, monitor):
+    def apply(values):
+        monitor.publishes, monitor.publishes_states, monitor.hz = (
+            values["publish_planning_scene"], values["publish_state_updates"], values["publish_planning_scene_hz"])
+
+    return SettingsServer(topics, "~planning_scene_monitor", [
+        Setting("publish_planning_scene", monitor.publishes, meaning="publish changes of the scene"),
+        Setting("publish_planning_scene_hz", float(monitor.hz), 0.1, 100.0, "so often at most [Hz]"),
+        Setting("publish_state_updates", monitor.publishes_states, meaning="publish where the robot goes, too"),
+    ], apply)
