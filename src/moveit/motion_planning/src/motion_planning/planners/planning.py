@@ -10,6 +10,7 @@ import numpy as np
 
 from motion_planning.planners.constrained import ConstrainedPlanning
 from motion_planning.planners.errors import NoPath
+from motion_planning.planners.parts import apart
 from motion_planning.planners.trees import REACH, Path, Run, rrt_connect, shorten
 from motion_planning.planners.warming import warm_up
 from motion_planning.spheres import SphereChecker, SphereModel
@@ -166,7 +167,7 @@ class _Planning:
         checker, seed = self.checker, self.search.seed
         self._note("way out")
         while True:
-            found = rrt_connect(checker, self.bounds, outwards[-1], entries, run._replace(seed=seed), REACH)
+            found = self._found(checker, outwards[-1], entries, run._replace(seed=seed))
             self._note("search")
             short = shorten(found, checker, run._replace(seed=seed))
             self._note("shorten")
@@ -179,6 +180,15 @@ class _Planning:
                 return path
             run.check("a path was looked for that exact geometry agrees with")
             checker, seed = checker.at(max(_FINEST, _FINER * checker.resolution)), seed + 1
+
+    def _found(self, checker, start, goals, run):
+        """A Path by spheres to one of ``goals``."""
+        if checker.parts:
+            nearest = goals[np.linalg.norm(goals - start, axis=1).argmin()]
+            found = apart(checker, self.bounds, start, nearest, run, REACH)
+            if found is not None:
+                return found
+        return rrt_connect(checker, self.bounds, start, goals, run, REACH)
 
     def _way_out(self, q, run):
         """Points (m, k) from ``q``, free by exact geometry, to the first that is free by spheres."""

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Whether configurations and edges of a group are free, by spheres; many at once."""
 import copy
+import functools
 
 import numpy as np
 
 from motion_planning.spheres import kernel
-from motion_planning.spheres.tables import bake
+from motion_planning.spheres.tables import bake, split
 
 #: States on an edge are at most this far apart [rad, the Euclidean distance of joint values].
 RESOLUTION = 1.0 / 64.0
@@ -34,8 +35,22 @@ class SphereChecker:
     def at(self, resolution):
         """Return this checker with edges looked at in steps of another ``resolution`` [rad]."""
         other = copy.copy(self)
+        other.__dict__.pop("parts", None)
         other.resolution = resolution
         return other
+
+    @functools.cached_property
+    def parts(self):
+        """[(indices (j,) of the group's joints, SphereChecker of these alone)] of parts that move independently of
+        each other, each on joints of its own; what is between parts is not looked at. Empty where there are not two.
+        """
+        found = []
+        for indices, tables in split(self.tables):
+            alone = copy.copy(self)
+            alone.__dict__.pop("parts", None)
+            alone.tables = tables
+            found.append((indices, alone))
+        return found
 
     def edge(self, a, b):
         """Whether the straight line from ``a`` to ``b`` (k,) is free; ``a`` itself is not looked at."""

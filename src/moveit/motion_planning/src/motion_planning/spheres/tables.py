@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from motion_planning.shapes import Cone, Octree
+from motion_planning.spheres import kernel
 from motion_planning.spheres.cover import ball
 from motion_planning.spheres.sphere_model import cached, cover, fitting
 from motion_planning.spheres.world_tables import Tree, forest, joined, pyramid, solids_of, tree_of
@@ -95,6 +96,31 @@ def _with_tests(robot, stills, places):
             branches += [sum(key < number for key in keys), sum(key <= number for key in keys)]
     return (joints, *rest, robot.pairs, np.array([test[3:] for test in tests], np.int32).ravel(),
             np.array(branches, np.int32), skips)
+
+
+def split(tables):
+    """Return [(indices of variables, tables of these alone)] of the branches of a robot, see ``kernel``.
+
+    Empty where there are not at least two, each with variables of its own, that together have them all.
+    """
+    robot, world = tables
+    joints, pairs, rows = robot[0].reshape(-1, kernel.JOINT), robot[5].reshape(-1, 2), robot[7].reshape(
+        -1, kernel.BRANCH)
+    if len(rows) < 2:
+        return []
+    owned = [np.unique(joints[first:last, 2]) for first, last, *_ in rows]
+    if len(np.concatenate(owned)) != len(np.unique(joints[:, 2])):
+        return []
+    found = []
+    for row, indices in zip(rows, owned, strict=True):
+        alone = joints.copy()
+        # Only the branch's own joints are placed.
+        alone[row[0] : row[1], 2] = np.searchsorted(indices, alone[row[0] : row[1], 2])
+        alone[: row[0], 2] = alone[row[1] :, 2] = 0
+        inside = ((pairs >= row[2]) & (pairs < row[3])).all(axis=1)
+        found.append((indices, ((alone.ravel(), *robot[1:5], pairs[inside].ravel(), robot[6],
+                                 np.ascontiguousarray(row), robot[8]), world)))
+    return found
 
 
 # -- the robot ----------------------------------------------------------------------------------------------------
