@@ -12,6 +12,8 @@ import pytest
 from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
 from motion_planning.planners import NoPath, Run, Search, plan_path, rrt_connect, shorten
+from motion_planning.planners.parts import apart as planned_apart
+from motion_planning.planners.planning import sphere_model_of
 from motion_planning.scene import Scene, WorldObject
 from motion_planning.spheres import SphereChecker, SphereModel
 from urdf_model import Box, Cylinder
@@ -223,6 +225,10 @@ class Refusing:
         self._left -= 1
         return self._left < 0 and self._exact.free(scene, state, group)
 
+    def first_blocked(self, scene, postures, group):
+        self._left -= 1
+        return 0 if self._left >= 0 else self._exact.first_blocked(scene, postures, group)
+
     def contacts(self, *arguments, **more):
         return self._exact.contacts(*arguments, **more)
 
@@ -234,6 +240,93 @@ def test_a_path_that_exact_geometry_refuses_is_not_returned(snake, exact):
     assert np.allclose(plan_path(scene, "arm", start, [goal], search(twice)).points[-1], goal, atol=1e-6)
     with pytest.raises(NoPath):
         plan_path(scene, "arm", start, [goal], patient(Refusing(exact, (start, goal), 10**9), 1))
+
+
+class Watched:
+    """An exact checker that keeps the postures that it is asked about."""
+
+    def __init__(self, exact):
+        self.model, self.meshes, self.seen = exact.model, exact.meshes, []
+        self._exact = exact
+
+    def free(self, scene, state, group):
+        return self._exact.free(scene, state, group)
+
+    def first_blocked(self, scene, postures, group):
+        self.seen.extend(postures)
+        return self._exact.first_blocked(scene, postures, group)
+
+
+def test_exact_geometry_sees_every_corner_every_eighth_state_and_all_that_spheres_doubt(snake, exact):
+    scene, group = slot(snake, 0.006), snake.groups["arm"]
+    watched = Watched(exact)
+    path = plan_path(scene, "arm", np.zeros(4), [np.array([1.5, 0.2, 0.5, -0.3])], search(watched))
+    seen, doubted = np.array(watched.seen), 0
+    assert all((np.abs(seen - corner).max(axis=1) < 1e-6).any() for corner in path.points)
+    checker = SphereChecker(sphere_model_of(watched), group, scene)
+    for a, b in itertools.pairwise(path.points):
+        count = int(np.ceil(np.linalg.norm(b - a) / checker.resolution))
+        states = a + (b - a) * ((np.arange(count) + 0.5) / count)[:, None]
+        asked = np.array([(np.abs(seen - q).max(axis=1) < 1e-9).any() for q in states])
+        free = checker.valid(states)
+        assert (asked | free).all() and asked.sum() >= count // 8
+        doubted += (~free).sum()
+    assert doubted
+
+
+# -- two arms ---------------------------------------------------------------------------------------------------------
+
+PAIR = """<robot name="pair"><link name="base"/>%s</robot>""" % "".join("""
+<link name="%(n)s_l0"><collision><origin xyz="0.25 0 0"/><geometry><box size="0.5 0.05 0.05"/></geometry>
+</collision></link>
+<link name="%(n)s_l1"><collision><origin xyz="0.25 0 0"/><geometry><box size="0.5 0.05 0.05"/></geometry>
+</collision></link>
+<joint name="%(n)s_j0" type="revolute"><origin xyz="0 %(y)s 0"/><parent link="base"/><child link="%(n)s_l0"/>
+<axis xyz="0 0 1"/><limit lower="-2.8" upper="2.8" effort="1" velocity="1"/></joint>
+<joint name="%(n)s_j1" type="revolute"><origin xyz="0.5 0 0"/><parent link="%(n)s_l0"/><child link="%(n)s_l1"/>
+<axis xyz="0 0 1"/><limit lower="-2.8" upper="2.8" effort="1" velocity="1"/></joint>""" % {"n": n, "y": y}
+                                                                  for n, y in (("a", 0.4), ("b", -0.4)))
+PAIR_SRDF = """<robot name="pair"><group name="both"><joint name="a_j0"/><joint name="a_j1"/><joint name="b_j0"/>
+<joint name="b_j1"/></group><disable_collisions link1="a_l0" link2="a_l1" reason="Adjacent"/>
+<disable_collisions link1="b_l0" link2="b_l1" reason="Adjacent"/></robot>"""
+
+
+@pytest.fixture(scope="module")
+def pair():
+    model = PlanningModel.from_xml(PAIR, PAIR_SRDF)
+    return model, ExactChecker(model, None)
+
+
+def test_two_arms_get_past_each_other_each_planned_for_alone(pair):
+    model, exact = pair
+    scene, group = Scene(model), model.groups["both"]
+    checker = SphereChecker(SphereModel.of(model, None), group, scene)
+    assert [indices.tolist() for indices, _ in checker.parts] == [[0, 1], [2, 3]]
+    # Alone, an arm does not meet the other.
+    crossed = np.array([-0.8, 0.0, 0.8, 0.0])
+    assert not checker.valid(crossed)[0] and all(alone.valid(crossed[part])[0] for part, alone in checker.parts)
+    rng = np.random.default_rng(5)
+    found = waited = 0
+    for seed in range(60):
+        start, goal = free_postures(exact, scene, group, rng, 2)
+        if not checker.valid([start, goal]).all():
+            continue
+        run = Run(seed, time.monotonic() + PATIENCE_S, time.monotonic)
+        path = planned_apart(checker, model.bounds[group.indices], start, goal, run, 0.5)
+        if path is None:
+            continue
+        found += 1
+        assert np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
+        states = states_on(path.points, 0.011)
+        assert exact.first_blocked(scene, states, "both") is None
+        # Nobody waited where both could move at once.
+        moves = np.abs(np.diff(path.points, axis=0)) > 1e-6
+        waited += not (moves[:, :2].any(axis=1) & moves[:, 2:].any(axis=1)).all()
+    assert found >= 20 and waited >= 2
+
+
+def test_an_arm_alone_has_no_parts(snake, exact):
+    assert SphereChecker(SphereModel.of(snake, None), snake.groups["arm"], Scene(snake)).parts == []
 
 
 # -- no path --------------------------------------------------------------------------------------------------------

@@ -125,29 +125,45 @@ def _to_box(point, rotation, centre, half):
 
 @compiled
 def boxes_meet(turn_a, centre_a, half_a, turn_b, centre_b, half_b):
-    """Whether two boxes overlap or are nearer than a micrometre: no one of 15 axes separates them (Gottschalk 1996)."""
+    """Whether two boxes overlap or are nearer than a micrometre: no one of 15 axes separates them (Gottschalk 1996).
+
+    All in scalars: an array made here would take longer than the rest.
+    """
     margin = 1e-6
-    r, size = np.empty((3, 3)), np.empty((3, 3))
-    t = np.empty(3)
     x, y, z = centre_b[0] - centre_a[0], centre_b[1] - centre_a[1], centre_b[2] - centre_a[2]
-    for i in range(3):
-        t[i] = turn_a[0, i] * x + turn_a[1, i] * y + turn_a[2, i] * z
-        for j in range(3):
-            r[i, j] = (turn_a[0, i] * turn_b[0, j] + turn_a[1, i] * turn_b[1, j] + turn_a[2, i] * turn_b[2, j])
-            size[i, j] = abs(r[i, j]) + 1e-9
-        reach = half_a[i] + half_b[0] * size[i, 0] + half_b[1] * size[i, 1] + half_b[2] * size[i, 2]
-        if abs(t[i]) > reach + margin:
-            return False
-    for j in range(3):
-        reach = half_b[j] + half_a[0] * size[0, j] + half_a[1] * size[1, j] + half_a[2] * size[2, j]
-        if abs(t[0] * r[0, j] + t[1] * r[1, j] + t[2] * r[2, j]) > reach + margin:
-            return False
-    for i in range(3):
-        k, m = (i + 1) % 3, (i + 2) % 3
-        for j in range(3):
-            n, o = (j + 1) % 3, (j + 2) % 3
-            reach = (half_a[k] * size[m, j] + half_a[m] * size[k, j]
-                     + half_b[n] * size[i, o] + half_b[o] * size[i, n])
-            if abs(t[m] * r[k, j] - t[k] * r[m, j]) > reach + margin:
-                return False
-    return True
+    t0, r00, r01, r02 = _along(turn_a, 0, x, y, z, turn_b)
+    s00, s01, s02 = abs(r00) + 1e-9, abs(r01) + 1e-9, abs(r02) + 1e-9
+    a0, a1, a2, b0, b1, b2 = half_a[0], half_a[1], half_a[2], half_b[0], half_b[1], half_b[2]
+    if abs(t0) > a0 + b0 * s00 + b1 * s01 + b2 * s02 + margin:
+        return False
+    t1, r10, r11, r12 = _along(turn_a, 1, x, y, z, turn_b)
+    s10, s11, s12 = abs(r10) + 1e-9, abs(r11) + 1e-9, abs(r12) + 1e-9
+    if abs(t1) > a1 + b0 * s10 + b1 * s11 + b2 * s12 + margin:
+        return False
+    t2, r20, r21, r22 = _along(turn_a, 2, x, y, z, turn_b)
+    s20, s21, s22 = abs(r20) + 1e-9, abs(r21) + 1e-9, abs(r22) + 1e-9
+    if abs(t2) > a2 + b0 * s20 + b1 * s21 + b2 * s22 + margin:
+        return False
+    if (abs(t0 * r00 + t1 * r10 + t2 * r20) > b0 + a0 * s00 + a1 * s10 + a2 * s20 + margin
+            or abs(t0 * r01 + t1 * r11 + t2 * r21) > b1 + a0 * s01 + a1 * s11 + a2 * s21 + margin
+            or abs(t0 * r02 + t1 * r12 + t2 * r22) > b2 + a0 * s02 + a1 * s12 + a2 * s22 + margin):
+        return False
+    # The cross products of an axis of each.
+    return not (abs(t2 * r10 - t1 * r20) > a1 * s20 + a2 * s10 + b1 * s02 + b2 * s01 + margin
+                or abs(t2 * r11 - t1 * r21) > a1 * s21 + a2 * s11 + b2 * s00 + b0 * s02 + margin
+                or abs(t2 * r12 - t1 * r22) > a1 * s22 + a2 * s12 + b0 * s01 + b1 * s00 + margin
+                or abs(t0 * r20 - t2 * r00) > a2 * s00 + a0 * s20 + b1 * s12 + b2 * s11 + margin
+                or abs(t0 * r21 - t2 * r01) > a2 * s01 + a0 * s21 + b2 * s10 + b0 * s12 + margin
+                or abs(t0 * r22 - t2 * r02) > a2 * s02 + a0 * s22 + b0 * s11 + b1 * s10 + margin
+                or abs(t1 * r00 - t0 * r10) > a0 * s10 + a1 * s00 + b1 * s22 + b2 * s21 + margin
+                or abs(t1 * r01 - t0 * r11) > a0 * s11 + a1 * s01 + b2 * s20 + b0 * s22 + margin
+                or abs(t1 * r02 - t0 * r12) > a0 * s12 + a1 * s02 + b0 * s21 + b1 * s20 + margin)
+
+
+@compiled
+def _along(turn_a, axis, x, y, z, turn_b):
+    """What (x, y, z) and the three axes of b are along an axis of a."""
+    u, v, w = turn_a[0, axis], turn_a[1, axis], turn_a[2, axis]
+    return (u * x + v * y + w * z, u * turn_b[0, 0] + v * turn_b[1, 0] + w * turn_b[2, 0],
+            u * turn_b[0, 1] + v * turn_b[1, 1] + w * turn_b[2, 1],
+            u * turn_b[0, 2] + v * turn_b[1, 2] + w * turn_b[2, 2])

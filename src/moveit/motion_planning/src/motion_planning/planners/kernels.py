@@ -181,3 +181,44 @@ def shortcut(tables, path, count, numbers, step, tries, misses):
         count += change
         known = i + 1
     return count
+
+
+@compiled
+def way_through(free, closed):
+    """Return cells (m, 2) of a way of fewest steps from the first to the last cell of ``free`` (a, b) bool; (0, 2)
+    where there is none.
+
+    A step leads to one of the eight cells around; ``closed`` (a, b, 9): steps by (di, dj) that it may not take, at
+    3 di + dj + 4.
+    """
+    rows, columns = free.shape
+    before = np.full(rows * columns, -1, np.int64)
+    queue = np.empty(rows * columns, np.int64)
+    goal = rows * columns - 1
+    queue[0], before[0] = 0, 0
+    taken, known = 0, 1
+    while taken < known and before[goal] < 0:
+        cell = queue[taken]
+        taken += 1
+        i, j = cell // columns, cell % columns
+        # Forwards together first, last back together.
+        for step in (8, 7, 5, 6, 2, 3, 1, 0):
+            u, v = i + step // 3 - 1, j + step % 3 - 1
+            if u < 0 or v < 0 or u >= rows or v >= columns or not free[u, v] or closed[i, j, step]:
+                continue
+            if before[u * columns + v] < 0:
+                before[u * columns + v] = cell
+                queue[known] = u * columns + v
+                known += 1
+    count, cell = 0, goal
+    while before[goal] >= 0:
+        queue[count] = cell
+        count += 1
+        if cell == 0:
+            break
+        cell = before[cell]
+    cells = np.empty((count, 2), np.int64)
+    for k in range(count):
+        cell = queue[count - 1 - k]
+        cells[k, 0], cells[k, 1] = cell // columns, cell % columns
+    return cells

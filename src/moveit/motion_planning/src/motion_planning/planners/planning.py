@@ -25,6 +25,8 @@ _STEPS_OUT = (0.03, 0.4)
 _CANDIDATES = 48
 # Edges that are checked by exact geometry alone are shorter: most of them fail.
 _EXACT_REACH = 0.25
+# Of the states of a path exact geometry sees one in so many even where spheres prove them free; so many at once.
+_SEEN, _AT_ONCE = 8, 64
 
 _sphere_models, _checkers = weakref.WeakKeyDictionary(), weakref.WeakKeyDictionary()
 _sphere_models_lock, _checkers_lock = threading.Lock(), threading.Lock()
@@ -85,10 +87,11 @@ def plan_path(scene, group, start, goals, search):
 
     Its times are of "tables", "ends" (the exact check of start and goals), "way out", "search", "shorten" and "exact".
 
-    It is looked for and shortened by spheres that contain the robot, then every state on it, as close as those that the
-    spheres were asked about and between them, is checked by ``search.exact``. Where exact geometry is free and the
-    spheres are not, it leads out of there by exact geometry. With ``search.constraints``, start and goals have to keep
-    to them, and the points of the path are as dense as it takes. Raises NoPath.
+    It is looked for and shortened by spheres that contain the robot. Then its states, as close as those that the
+    spheres were asked about and between them, are checked by ``search.exact``: each corner, every eighth, and all that
+    lie not within what spheres prove free. Where exact geometry is free and the spheres are not, it leads out of there
+    by exact geometry. With ``search.constraints``, start and goals have to keep to them, and the points of the path are
+    as dense as it takes. Raises NoPath.
     """
     return _Planning(scene, group, search).path(start, goals)
 
@@ -183,7 +186,7 @@ class _Planning:
 
     def _found(self, checker, start, goals, run):
         """A Path by spheres to one of ``goals``."""
-        if checker.parts:
+        if len(checker.parts) == 2:
             nearest = goals[np.linalg.norm(goals - start, axis=1).argmin()]
             found = apart(checker, self.bounds, start, nearest, run, REACH)
             if found is not None:
@@ -273,18 +276,31 @@ class _Planning:
     def _edge_is_free(self, a, b):
         count = max(1, math.ceil(np.linalg.norm(b - a) / (0.5 * self.checker.resolution)))
         # Far end first: it is new.
-        return all(self._exact_free(a + (b - a) * (k / count)) for k in range(count, 0, -1))
+        return self._all_free(a + (b - a) * (np.arange(count, 0, -1) / count)[:, None])
+
+    def _all_free(self, states):
+        return self.search.exact.first_blocked(self.scene, states, self.group.name) is None
 
     def _path_is_free(self, points, run):
-        """Whether exact geometry agrees, at states between those that spheres were asked about."""
+        """Whether exact geometry agrees, at states between those that spheres were asked about.
+
+        Spheres contain the robot: where they are free, so is what is in them. Exact geometry is asked about all other
+        states, and whatever spheres say about every eighth and each corner.
+        """
+        states, corners = [points[:1]], [0]
         for a, b in zip(points[:-1], points[1:], strict=True):
             count = max(1, math.ceil(np.linalg.norm(b - a) / self.checker.resolution))
-            for k in range(count):
-                if k % 64 == 0:
-                    run.check("a path was checked by exact geometry")
-                if not self._exact_free(a + (b - a) * ((k + 0.5) / count)):
-                    return False
-            if not self._exact_free(b):
+            states += [a + (b - a) * ((np.arange(count) + 0.5) / count)[:, None], b[None]]
+            corners.append(corners[-1] + count + 1)
+        states = np.concatenate(states)
+        doubtful = ~self.checker.valid(states)
+        some = np.zeros(len(states), dtype=bool)
+        some[::_SEEN], some[corners] = True, True
+        # What spheres doubt is what may turn out to touch.
+        order = np.concatenate([np.flatnonzero(doubtful), np.flatnonzero(some & ~doubtful)])
+        for begin in range(0, len(order), _AT_ONCE):
+            run.check("a path was checked by exact geometry")
+            if not self._all_free(states[order[begin : begin + _AT_ONCE]]):
                 return False
         return True
 

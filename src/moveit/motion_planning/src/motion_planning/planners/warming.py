@@ -6,6 +6,7 @@ import numpy as np
 
 from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
+from motion_planning.planners import kernels
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import Path, Run, rrt_connect, shorten
 from motion_planning.scene import Scene
@@ -32,6 +33,7 @@ def warm_up():
         pass  # as it has to be: what counts is that everything is compiled now
     shorten(Path(ends), checker, run)
     checker.valid(ends)
+    kernels.way_through(np.ones((2, 2), dtype=bool), np.zeros((2, 2, 9), dtype=bool))
     exact = ExactChecker(model, None)
     exact.free(Scene(model))
     exact.distance(Scene(model))
