@@ -11,7 +11,7 @@ from motion_planning.collision_pairs import ALWAYS_SHARE, TRIALS, disabled_pairs
 from motion_planning.errors import PlanningError
 from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshReader, PlanningModel
-from motion_planning.planners.planning import prepare
+from motion_planning.planners.planning import prepare, sphere_model_of
 from motion_planning.srdf import element_of, with_disabled_pairs
 
 
@@ -69,9 +69,14 @@ def _prepare_one(path):
     """Return why the robot of a file cannot be prepared, None where it is."""
     try:
         model = PlanningModel.from_xml(_text(path), "")
-        prepare(ExactChecker(model, MeshReader(ResourceFinder())))
+        exact = ExactChecker(model, MeshReader(ResourceFinder()))
+        prepare(exact)
+        left = sphere_model_of(exact).not_kept()
     except (ValueError, OSError) as error:
         return "%s: %s" % (path, error)
+    if left:
+        return "%s: the spheres of %d links cannot be kept on disk, '%s' is the first; make room or let the cache be " \
+               "written" % (path, len(left), left[0])
     return None
 
 

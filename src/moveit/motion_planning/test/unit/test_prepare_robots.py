@@ -13,11 +13,12 @@ URDF = """<robot name="crank">
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 
-def prepare(cache, *files):
+def prepare(cache, *files, before=""):
     cache.mkdir(exist_ok=True)
     # Compiled code stays where it is: only the spheres go into a folder of the test.
     program = ("import sys; from motion_planning.spheres import sphere_model; from motion_planning import commands; "
-               "sphere_model.folder = lambda *_: sys.argv[1]; sys.exit(commands.prepare_robots(sys.argv[2:]))")
+               "sphere_model.folder = lambda *_: sys.argv[1]; " + before
+               + "sys.exit(commands.prepare_robots(sys.argv[2:]))")
     return subprocess.run([sys.executable, "-c", program, str(cache), *map(str, files)], capture_output=True, text=True,
                           timeout=300)
 
@@ -43,6 +44,18 @@ def test_what_is_no_robot_is_named_and_the_others_are_prepared(tmp_path):
     assert [line.split(":")[:2] for line in done.stderr.splitlines()] == [
         ["prepare_robots", " " + str(bad)], ["prepare_robots", " " + str(tmp_path / "none.urdf")]]
     assert len(list((tmp_path / "cache").glob("*.npy"))) == 3
+
+
+def test_spheres_that_find_no_room_are_named_and_nothing_half_written_stays(tmp_path):
+    robot = tmp_path / "robot.urdf"
+    robot.write_text(URDF)
+    # As on a full disk: files can be made, but hold nothing.
+    full = ("import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+            "resource.setrlimit(resource.RLIMIT_FSIZE, (64, 64)); ")
+    done = prepare(tmp_path / "cache", robot, before=full)
+    assert done.returncode == 1
+    assert "%s: the spheres of 2 links cannot be kept on disk, 'base' is the first" % robot in done.stderr
+    assert not list((tmp_path / "cache").iterdir())
 
 
 def test_the_script_needs_a_file():

@@ -74,6 +74,11 @@ class SphereModel:
             self._fixed[link] = [(boxes_of(geometry), pose) for geometry, pose in self._parts[link]]
         return self._fixed[link]
 
+    def not_kept(self):
+        """Return names of the links whose spheres are not on disk."""
+        return [name for name, parts in self._parts.items()
+                if parts and not _file(cover, parts, fitting(parts, self.tolerance)).exists()]
+
     def kept(self, key, make):
         """Return what ``make()`` returned for this key, made again only when many others have been asked for since."""
         with self._lock:
@@ -120,19 +125,13 @@ def mesh_boxes(parts, cell):
 
 def cached(function, parts, size):
     """Return ``function(parts, size)``, an array, from disk where it has been made before."""
-    digest = hashlib.sha256(repr((function.__name__, size)).encode())
-    for geometry, pose in parts:
-        digest.update(np.ascontiguousarray(pose).tobytes())
-        if _is_mesh(geometry):
-            digest.update(geometry.vertices.tobytes() + geometry.triangles.tobytes())
-        else:
-            digest.update(repr(geometry).encode())
-    path = Path(folder("motion_planning_spheres", [covers.__file__])) / (digest.hexdigest()[:32] + ".npy")
+    path = _file(function, parts, size)
     try:
         return np.load(path)
     except (OSError, ValueError, EOFError):
         pass
     made = function(parts, size)
+    unfinished = None
     try:
         # Two processes may make it at once: the file is whole or not there.
         handle, unfinished = tempfile.mkstemp(dir=path.parent)
@@ -140,8 +139,22 @@ def cached(function, parts, size):
             np.save(file, made)
         os.replace(unfinished, path)
     except OSError:
-        pass  # a cache that cannot be written is as good as none
+        # A cache that cannot be written is as good as none; who has to know asks ``not_kept``.
+        if unfinished is not None:
+            Path(unfinished).unlink(missing_ok=True)
     return made
+
+
+def _file(function, parts, size):
+    """The path of the file that what ``function`` makes of ``parts`` is kept in."""
+    digest = hashlib.sha256(repr((function.__name__, size)).encode())
+    for geometry, pose in parts:
+        digest.update(np.ascontiguousarray(pose).tobytes())
+        if _is_mesh(geometry):
+            digest.update(geometry.vertices.tobytes() + geometry.triangles.tobytes())
+        else:
+            digest.update(repr(geometry).encode())
+    return Path(folder("motion_planning_spheres", [covers.__file__])) / (digest.hexdigest()[:32] + ".npy")
 
 
 def _is_mesh(geometry):
