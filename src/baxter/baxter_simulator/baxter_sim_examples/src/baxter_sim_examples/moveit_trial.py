@@ -45,19 +45,25 @@ class MoveItTrials:
         with GazeboScene(trial, things) as world:
             self._tell(trial, things)
             try:
-                self._expect(self._arm.pick(BLOCK, [_grasp(one) for one in grasps(trial.source)]), "pick")
-                if world.height() < trial.source.z + _LIFTED_M:
-                    raise TrialFailed("the hand came up without the block")
-                self._expect(self._arm.place(BLOCK, [_place(spot) for spot in landings(trial.target)]), "place")
-                self._go_ready("after the block was put down")
-                miss = world.distance(trial.target)
-                if miss > MISS_M:
-                    raise TrialFailed("the block is %.1f mm from where it should be" % (1e3 * miss))
-            finally:
+                miss = self._carry(trial, world)
+            except TrialFailed as failure:
                 touched = world.touched(TOUCHED_M)
+                raise TrialFailed("%s; the robot touched %s" % (failure, touched)) if touched else failure from None
+            touched = world.touched(TOUCHED_M)
             if touched:
                 raise TrialFailed("the robot touched %s" % touched)
             return miss
+
+    def _carry(self, trial, world):
+        self._expect(self._arm.pick(BLOCK, [_grasp(one) for one in grasps(trial.source)]), "pick")
+        if world.height() < trial.source.z + _LIFTED_M:
+            raise TrialFailed("the hand came up without the block")
+        self._expect(self._arm.place(BLOCK, [_place(spot) for spot in landings(trial.target)]), "place")
+        self._go_ready("after the block was put down")
+        miss = world.distance(trial.target)
+        if miss > MISS_M:
+            raise TrialFailed("the block is %.1f mm from where it should be" % (1e3 * miss))
+        return miss
 
     def _go_ready(self, when):
         if not self._arm.go(READY):
