@@ -69,7 +69,7 @@ def cartesian_path(model, group, start, link, waypoints, steps):
         raise CartesianError("the greatest step must be above 0, got %g m" % max_step)
     if not (math.isfinite(jump_threshold) and jump_threshold >= 0.0):
         raise CartesianError("the jump threshold must be 0 or more, got %g" % jump_threshold)
-    follower = _Follower(model, model.groups[group], start, link, steps.accept)
+    follower = Follower(model, model.groups[group], start, link, steps.accept)
     waypoints = [follower.pose(i, waypoint) for i, waypoint in enumerate(waypoints)]
     here = follower.pose_of_link(follower.q)
     pieces = [_pieces(a, b) for a, b in zip([here, *waypoints], waypoints, strict=False)]
@@ -84,7 +84,7 @@ def cartesian_path(model, group, start, link, waypoints, steps):
             if steps.stop is not None and steps.stop():
                 reason = "stopped"
             else:
-                line = _Line(here, goal)
+                line = Line(here, goal)
                 reason = follower.advance(line, step / count, (step + 1) / count, points)
             if reason is not None:
                 reason = "%s, on the way to waypoint %d of %d, after %.0f %% of it" % (
@@ -115,17 +115,19 @@ def _without_jump(path, done, threshold, names):
     return CartesianPath(path.joints[:first + 1], done[first], reason)
 
 
-class _Line:
-    """Poses from one to another: the position on a line, the rotation about one axis."""
+class Line:
+    """Poses (4, 4) from one to another: the position on a line, the rotation about one axis."""
 
     def __init__(self, begin, end):
+        """begin, end (4, 4). length [m], angle [rad]: of the whole way."""
         self._begin, self._shift = begin, end[:3, 3] - begin[:3, 3]
         turn = begin[:3, :3].T @ end[:3, :3]
-        self._angle = rotation_angle(turn)
-        self._axis = _axis(turn, self._angle)
+        self.length, self.angle = float(np.linalg.norm(self._shift)), rotation_angle(turn)
+        self._axis = _axis(turn, self.angle)
 
     def at(self, fraction):
-        rotation = self._begin[:3, :3] @ axis_rotation(self._axis, fraction * self._angle)
+        """Return the pose at ``fraction`` of the way, 0 to 1."""
+        rotation = self._begin[:3, :3] @ axis_rotation(self._axis, fraction * self.angle)
         return rigid(rotation, self._begin[:3, 3] + fraction * self._shift)
 
 
@@ -152,12 +154,18 @@ def _pieces(begin, end):
     return max(distance, angle / _RADIANS_PER_METRE)
 
 
-class _Follower:
-    """Follows a line with the joints of one group that move the link. q (k,): where it has got to."""
+class Follower:
+    """Follows a line with the joints of one group that move the link.
+
+    A line is anything that gives the pose at a fraction of the way: ``at(fraction)``. q (k,): where the group has got
+    to; fractions: the line's at each point that was appended.
+    """
 
     def __init__(self, model, group, start, link, accept):
-        self._accept = accept
+        """model: PlanningModel; group: Group; start: State; accept: as :class:`Steps` has it. Raises CartesianError."""
+        self._accept, self.link = accept, link
         self._names = group.joints
+        self.fractions = []
         self.q = np.array(start.q, dtype=float)[list(group.indices)]
         base, joints = _moving(model, group, link)
         self._chain = Chain.from_robot(model.robot, base, link)
@@ -173,6 +181,7 @@ class _Follower:
             raise CartesianError("waypoint %d is no pose: %s" % (number + 1, error)) from None
 
     def pose_of_link(self, q):
+        """Return the pose (4, 4) of the link in the planning frame with the group's joints at ``q`` (k,)."""
         return self._base @ self._chain.fk(q[self._columns])
 
     def advance(self, line, begin, end, points):
@@ -180,15 +189,17 @@ class _Follower:
         before = self.q
         count = len(points)
         reason = self._advance(line, begin, end, points, _HALVINGS)
+        reached = len(points)
         if reason is not None:
             del points[count:]
+            del self.fractions[len(self.fractions) - (reached - count):]
             self.q = before
         return reason
 
     def _advance(self, line, begin, end, points, halvings):
         goal = line.at(end)
         try:
-            q = self._solve(goal)
+            q = self.solved(goal, self.q)
         except NoSolution as error:
             return str(error)
         middle = 0.5 * (self.q + q)
@@ -211,15 +222,17 @@ class _Follower:
                     return reason
         self.q = q
         points.append(q)
+        self.fractions.append(end)
         return None
 
-    def _solve(self, pose):
-        target, seed = Target(self._base_inverse @ pose), self.q[self._columns]
+    def solved(self, pose, near):
+        """Return the group's joints (k,) near ``near`` (k,) that put the link at ``pose``. Raises NoSolution."""
+        target, seed = Target(self._base_inverse @ pose), near[self._columns]
         try:
             found = solve(self._chain, target, seed, budget=_NEXT)
         except NoSolution:
             found = solve(self._chain, target, seed, budget=_THOROUGH)
-        q = self.q.copy()
+        q = near.copy()
         q[self._columns] = found.q
         return q
 

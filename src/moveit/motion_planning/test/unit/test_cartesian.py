@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motion_planning.cartesian import CartesianError, Steps, _Line, cartesian_path
+from motion_planning.cartesian import CartesianError, Line, Steps, cartesian_path
 from urdf_model.transforms import axis_rotation, rigid, rotation_angle
 
 READY = {"joint_1": 0.0, "joint_2": 0.0, "joint_3": 0.0, "joint_4": 0.0, "joint_5": 0.6, "joint_6": 0.0}
@@ -150,7 +150,7 @@ def test_half_turns_have_an_axis(robot):
         axis = axis / np.linalg.norm(axis)
         for angle in (np.pi, np.pi - 1e-5, np.pi - 5e-4, 3.0, 1e-7):
             end = rigid(axis_rotation(axis, angle), (0.0, 0.0, 0.0))
-            line = _Line(np.eye(4), end)
+            line = Line(np.eye(4), end)
             assert np.abs(line.at(1.0) - end).max() < 1e-6
             assert abs(rotation_angle(line.at(0.5)[:3, :3]) - 0.5 * angle) < 1e-6
 
