@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """``python3 -m motion_planning``: compile the planner into the cache, so that no start has to wait for it."""
-from motion_planning.planners import warm_up
+from motion_planning import planners
+from motion_planning.occupancy import kernels
 
-warm_up()
+planners.warm_up()
+kernels.warm_up()
