@@ -14,10 +14,12 @@ from sensor_msgs.msg import JointState
 from motion_planning.errors import PlanningError
 from motion_planning.scene import Scene
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of
+from moveit_ros_move_group.convert.octomap import octomap_message
 from moveit_ros_move_group.convert.scene_in import SceneReader
 from moveit_ros_move_group.convert.scene_out import scene_diff, scene_message
 
 # How long [s] a frame that tf does not know yet is waited for, in wall time.
+_NEWEST = rospy.Time()
 _FRAME_TIMEOUT_S = 0.5
 # For so long [s] after one that did not come no other is waited for: a scene may name thousands.
 _IMPATIENT_S = 1.0
@@ -46,7 +48,7 @@ class SceneMonitor:
         self._scene, self._octomap = Scene(model), None
         self._values, self._stamps, self._updates = {}, {}, 0
         self._base, self._newest_stamp = np.eye(4), rospy.Time()
-        self._listeners = []
+        self._listeners, self._clear_sensors = [], lambda: None
         self._asking = threading.local()
         self._buffer, self._patient_from = None, 0.0
         self.reader = SceneReader(self.tf_frame)
@@ -96,7 +98,17 @@ class SceneMonitor:
                             message.world.octomap)
 
     def clear_octomap(self):
+        self._clear_sensors()
         self._change(lambda scene: (scene.with_octomap(None), []), "clear_octomap")
+
+    def set_octomap(self, octree, pose):
+        """Put an Octree, or None, at ``pose`` (4, 4) in the place of the scene's octomap."""
+        message = None if octree is None else octomap_message(octree, pose, self.model.frame, rospy.Time.now())
+        self._change(lambda scene: (scene.with_octomap(octree, pose), []), "octomap", message)
+
+    def on_clear_octomap(self, clear):
+        """``clear()`` is called before the octomap is cleared."""
+        self._clear_sensors = clear
 
     def change(self, function, request):
         """Put ``function(scene)`` in the scene's place. Raises PlanningError and leaves the scene as it is."""
@@ -244,15 +256,15 @@ class SceneMonitor:
         finally:
             self._asking.given_up = None
 
-    def tf_frame(self, name):
-        """Return the pose (4, 4) of a tf frame in the planning frame. Raises PlanningError."""
+    def tf_frame(self, name, stamp=_NEWEST):
+        """Return the pose (4, 4) of a tf frame in the planning frame at ``stamp``. Raises PlanningError."""
         self._listen_to_tf()
         given_up = getattr(self._asking, "given_up", None)
         deadline = time.monotonic() + _FRAME_TIMEOUT_S
         while True:
             for known in (self.model.frame, self.model.root):
                 try:
-                    found = matrix_of(self._buffer.lookup_transform_core(known, name, rospy.Time()).transform)
+                    found = matrix_of(self._buffer.lookup_transform_core(known, name, stamp).transform)
                     return found if known == self.model.frame else self.scene().frame(known) @ found
                 except tf2_ros.TransformException as error:
                     reason = str(error)

@@ -10,14 +10,17 @@ from model_files.resources import ResourceFinder
 from motion_planning.errors import PlanningError
 from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshReader, PlanningModel
+from motion_planning.planners.planning import sphere_model_of
 from moveit_ros_move_group import settings, tuning
-from moveit_ros_move_group.capabilities import cartesian, kinematics, motion, pick_place, planners, scene
+from moveit_ros_move_group.capabilities import cartesian, kinematics, motion, pick_place, planners, scene, sequence
 from moveit_ros_move_group.context import Context
 from moveit_ros_move_group.execution import Executor
 from moveit_ros_move_group.failures import Failures
 from moveit_ros_move_group.handles import Handles
+from moveit_ros_move_group.industrial import IndustrialPlanner
 from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_ros_move_group.planning import Planner
+from moveit_ros_move_group.sensors import Sensors
 from rospy_limits.node import limit_ports
 from rospy_start import MissingParameter, end_on_signals, wait_for_param
 
@@ -46,6 +49,7 @@ def build():
     may_execute = rospy.get_param("~allow_trajectory_execution", True)
     context = Context(model, monitor, exact, failures, pipes, usual, _executor(monitor) if may_execute else None)
     kept = [context, *_capabilities(context, wanted, name, may_execute)]
+    kept.append(Sensors(monitor, sphere_model_of(exact)))
     if context.executor is not None:
         kept.append(motion.StopEvent(context.executor))
     return kept
@@ -63,7 +67,7 @@ def _executor(monitor):
 
 
 def _capabilities(context, wanted, description, may_execute):
-    planner = Planner(context)
+    planner = Planner(context, IndustrialPlanner(context, description))
     planner.warm_up()
     timeouts = {group: entry["kinematics_solver_timeout"]
                 for group, entry in (rospy.get_param(description + "_kinematics", {}) or {}).items()
@@ -83,6 +87,9 @@ def _capabilities(context, wanted, description, may_execute):
         "MoveGroupExecuteService": lambda: motion.ExecuteService(context),
     }
     served = {"move_group/" + name: make for name, make in offered.items()}
+    served.update({"pilz_industrial_motion_planner/MoveGroupSequence" + kind: make for kind, make in (
+        ("Action", lambda: sequence.SequenceAction(context, planner, may_execute)),
+        ("Service", lambda: sequence.SequenceService(context, planner)))})
     for name in sorted(wanted & set(settings.OTHER_CAPABILITIES) - set(served)):
         rospy.logwarn("capability '%s' is known but not served here; it is left out", name)
     made = [make() for name, make in served.items() if name in wanted]

@@ -28,15 +28,18 @@ OURS = "RRTConnect"
 class Planner:
     """Plans requests. Calls may come from any thread."""
 
-    def __init__(self, context):
-        self._context = context
+    def __init__(self, context, industrial):
+        """industrial: IndustrialPlanner, for the pipelines that are."""
+        self._context, self._industrial = context, industrial
         self._warned = set()
         self._seeds = itertools.count()
 
     def plan(self, request, scene, stop=lambda: False):
         """Return a pipeline.Plan for a MotionPlanRequest from the state of ``scene``. Raises PlanningError."""
         context = self._context
-        pipe = self._pipeline(request)
+        pipe = self._pipeline(request.pipeline_id)
+        if pipe.industrial:
+            return self._limited(request, self._industrial.plan(request, scene, pipe, self._tools(stop)))
         self._remark_on_planner(request, pipe)
         try:
             goals = [constraint_set_of(goal, scene, context.monitor.reader) for goal in request.goal_constraints]
@@ -50,10 +53,22 @@ class Planner:
             request.allowed_planning_time if request.allowed_planning_time > 0.0 else _USUAL_TIME_S,
             request.num_planning_attempts, _scaling(request.max_velocity_scaling_factor),
             _scaling(request.max_acceleration_scaling_factor), pipe.timing, pipe.start_bounds_error, pipe.jiggle)
-        tools = pipeline.Tools(context.exact, plan_path, sampler, wall_clock, next(self._seeds),
-                               lambda: stop() or rospy.is_shutdown())
-        plan = pipeline.plan(query, tools)
-        return self._limited(request, plan)
+        return self._limited(request, pipeline.plan(query, self._tools(stop)))
+
+    def plan_sequence(self, items, scene, stop=lambda: False):
+        """Return [(group name, pipeline.Plan), ...] for MotionSequenceItems from the state of ``scene``.
+
+        Raises PlanningError.
+        """
+        pipelines = self._context.pipelines
+        usual = pipelines[self._context.default_pipeline]
+        usual = usual if usual.industrial else next((pipe for pipe in pipelines.values() if pipe.industrial), usual)
+        pipes = [self._pipeline(item.req.pipeline_id) if item.req.pipeline_id else usual for item in items]
+        other = next((pipe.name for pipe in pipes if not pipe.industrial), None)
+        if other is not None:
+            raise RequestError(MoveItErrorCodes.FAILURE, "pipeline '%s' plans no sequences; load "
+                               "pilz_industrial_motion_planner and name it as pipeline_id" % other)
+        return self._industrial.plan_sequence(items, scene, pipes, self._tools(stop))
 
     def warm_up(self):
         """Load compiled code and make the robot's spheres, so that the first request does not wait for them."""
@@ -71,6 +86,10 @@ class Planner:
             time_path(np.array([q, near]), context.model.velocity[group.indices],
                       context.model.acceleration[group.indices])
 
+    def _tools(self, stop):
+        return pipeline.Tools(self._context.exact, plan_path, sampler, wall_clock, next(self._seeds),
+                              lambda: stop() or rospy.is_shutdown())
+
     def _limited(self, request, plan):
         """The plan, slowed to ``max_cartesian_speed`` where the request limits a link's speed."""
         speed, link = request.max_cartesian_speed, request.cartesian_speed_limited_link
@@ -80,8 +99,8 @@ class Planner:
             return plan
         return plan._replace(timed=slowed(self._context.model, plan.start, group, link, plan.timed, speed))
 
-    def _pipeline(self, request):
-        name = request.pipeline_id or self._context.default_pipeline
+    def _pipeline(self, name):
+        name = name or self._context.default_pipeline
         if name not in self._context.pipelines:
             raise RequestError(MoveItErrorCodes.FAILURE, "there is no planning pipeline '%s'; there are %s"
                                % (name, ", ".join(self._context.pipelines)))

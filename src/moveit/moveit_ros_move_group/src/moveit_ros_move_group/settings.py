@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What move_group reads from the parameter server."""
 import math
+import re
 from dataclasses import dataclass, field
 
 import rospy
 
 from motion_planning.errors import PlanningError
+from motion_planning.industrial import PLANNERS as INDUSTRIAL_PLANNERS
 from moveit_ros_move_group.controllers import read_list
 from moveit_ros_move_group.execution import ExecutionSettings
 
@@ -16,7 +18,7 @@ DEFAULT_CAPABILITIES = (
     "move_group/MoveGroupQueryPlannersService", "move_group/MoveGroupStateValidationService",
     "move_group/MoveGroupGetPlanningSceneService", "move_group/ApplyPlanningSceneService",
     "move_group/ClearOctomapService")
-# Known by name; of these the node has the service for known trajectories alone.
+# Known by name; of these the node has the service for known trajectories and those for sequences.
 OTHER_CAPABILITIES = ("move_group/MoveGroupExecuteService", "move_group/TfPublisher",
                       "pilz_industrial_motion_planner/MoveGroupSequenceAction",
                       "pilz_industrial_motion_planner/MoveGroupSequenceService")
@@ -25,13 +27,16 @@ _TIMINGS = {"AddTimeParameterization": "time_optimal_trajectory_generation",
             "AddTimeOptimalParameterization": "time_optimal_trajectory_generation",
             "AddIterativeSplineParameterization": "iterative_spline_parameterization",
             "AddRuckigTrajectorySmoothing": "ruckig"}
+# Planning plugins that stand for motions of industrial robots, and those that nothing here stands for.
+_INDUSTRIAL, _NOT_BUILT_IN = "pilz_industrial_motion_planner", "chomp|stomp"
 _FAKE = "moveit_fake_controller_manager/MoveItFakeControllerManager"
 
 
 @dataclass
 class Pipeline:
     """A planning pipeline: name; planners: {name: {key: text}}; groups: {group: {key: value}}; timing: algorithm;
-    start_bounds_error [rad or m]; jiggle: share of a joint's range."""
+    start_bounds_error [rad or m]; jiggle: share of a joint's range; industrial: plans PTP, LIN and CIRC; usual: planner
+    where neither request nor group names one."""
 
     name: str
     planners: dict = field(default_factory=dict)
@@ -39,6 +44,8 @@ class Pipeline:
     timing: str = "time_optimal_trajectory_generation"
     start_bounds_error: float = 0.05
     jiggle: float = 0.02
+    industrial: bool = False
+    usual: str = ""
 
     def planner_ids(self):
         """Names as query_planner_interface gives them: ``group[planner]`` and plain."""
@@ -47,7 +54,7 @@ class Pipeline:
         return ids + list(self.planners)
 
     def default_planner(self, group):
-        return str(self.groups.get(group, {}).get("default_planner_config") or "")
+        return str(self.groups.get(group, {}).get("default_planner_config") or self.usual)
 
 
 def pipelines(groups):
@@ -57,6 +64,11 @@ def pipelines(groups):
     for name, tree in named.items() if isinstance(named, dict) else ():
         if not isinstance(tree, dict) or "planning_plugin" not in tree:
             complaints.append("pipeline '%s' has no planning_plugin; it is left out" % name)
+            continue
+        plugin = str(tree["planning_plugin"])
+        if re.match(_NOT_BUILT_IN, plugin):
+            complaints.append("pipeline '%s' is left out: its planner %s is not built in; use ompl or "
+                              "pilz_industrial_motion_planner" % (name, plugin))
             continue
         found[name] = _pipeline(name, tree, groups)
     if not found:
@@ -72,6 +84,11 @@ def pipelines(groups):
 
 def _pipeline(name, tree, groups):
     pipeline = Pipeline(name)
+    if str(tree.get("planning_plugin", "")).startswith(_INDUSTRIAL):
+        pipeline.industrial, pipeline.usual = True, str(tree.get("default_planner_config", ""))
+        pipeline.planners = {planner: {} for planner in INDUSTRIAL_PLANNERS}
+        pipeline.start_bounds_error = _number(tree.get("start_state_max_bounds_error"), pipeline.start_bounds_error)
+        return pipeline
     configs = tree.get("planner_configs")
     pipeline.planners = {key: {k: str(v) for k, v in (value or {}).items()} for key, value in configs.items()} \
         if isinstance(configs, dict) else {}
@@ -159,6 +176,9 @@ def initial_positions(model):
 def capabilities():
     """Return (set of the capabilities that are wanted, list of complaints)."""
     wanted = set(DEFAULT_CAPABILITIES) | set(str(rospy.get_param("~capabilities", "")).split())
+    named = rospy.get_param("~planning_pipelines", {})
+    for tree in named.values() if isinstance(named, dict) else ():
+        wanted |= set(str(tree.get("capabilities", "")).split()) if isinstance(tree, dict) else set()
     wanted -= set(str(rospy.get_param("~disable_capabilities", "")).split())
     unknown = sorted(wanted - set(DEFAULT_CAPABILITIES) - set(OTHER_CAPABILITIES))
     return wanted, ["there is no capability '%s'; it is left out" % name for name in unknown]

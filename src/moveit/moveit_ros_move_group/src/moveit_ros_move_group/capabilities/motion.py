@@ -85,8 +85,9 @@ class MoveAction:
         finally:
             self._feedback("IDLE")
         empty = len(result.planned_trajectory.joint_trajectory.points) < 2
-        finish(self._server, result, result_text(result.error_code.val, reason, empty=empty and not (
-            plan_only and result.error_code.val == MoveItErrorCodes.SUCCESS), plan_only=plan_only))
+        code = result.error_code.val
+        finish(self._server, result, result_text(code, reason, empty=empty and not (
+            plan_only and code == MoveItErrorCodes.SUCCESS), plan_only=plan_only))
 
     def _wait_for_state(self, group):
         joints = self.context.model.groups[group].joints
@@ -258,11 +259,12 @@ def failed(context, request, error, group=""):
     return MoveItErrorCodes.FAILURE, text
 
 
-def finish(server, result, text):
-    """End an action's goal as MoveIt does: succeeded, preempted or aborted."""
-    if result.error_code.val == MoveItErrorCodes.SUCCESS:
+def finish(server, result, text, code=None):
+    """End an action's goal as MoveIt does: succeeded, preempted or aborted. code: the result's unless given."""
+    code = result.error_code.val if code is None else code
+    if code == MoveItErrorCodes.SUCCESS:
         server.set_succeeded(result, text)
-    elif result.error_code.val == MoveItErrorCodes.PREEMPTED:
+    elif code == MoveItErrorCodes.PREEMPTED:
         server.set_preempted(result, text)
     else:
         server.set_aborted(result, text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Octomap messages to occupied cubes.
+"""Octomap messages to occupied cubes, and back.
 
 Format: A. Hornung et al., OctoMap (Autonomous Robots 2013), section 3.4: depth first, eight children of each node in
 two bits each (binary), or an occupancy of four bytes and a byte of flags (full).
@@ -8,9 +8,11 @@ import math
 import struct
 
 import numpy as np
+from octomap_msgs.msg import OctomapWithPose
 
+from motion_planning.exact.octree import occupied_tree
 from motion_planning.shapes import Octree
-from moveit_ros_move_group.convert.geometry import MessageError
+from moveit_ros_move_group.convert.geometry import MessageError, pose_of
 
 _LEVELS = 16
 _FREE, _OCCUPIED, _INNER = 1, 2, 3
@@ -36,6 +38,19 @@ def octree_of(message):
         return Octree(message.resolution, np.array(boxes)) if boxes else None
     except ValueError as error:
         raise MessageError(str(error)) from None
+
+
+def octomap_message(octree, pose, frame, stamp):
+    """Return the OctomapWithPose, binary, of an Octree at ``pose`` (4, 4) in ``frame``.
+
+    What is not occupied is unknown in it.
+    """
+    message = OctomapWithPose(origin=pose_of(pose))
+    message.header.frame_id, message.header.stamp = frame, stamp
+    message.octomap.header = message.header
+    message.octomap.binary, message.octomap.id, message.octomap.resolution = True, "OcTree", octree.resolution
+    message.octomap.data = occupied_tree(octree).tolist()
+    return message
 
 
 def _children(centre, size):

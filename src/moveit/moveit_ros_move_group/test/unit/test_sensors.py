@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A camera's clouds become the scene's octomap, in messages that octomap itself can read."""
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import fcl
+import numpy as np
+import pytest
+import rospy
+from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2, PointField
+from std_msgs.msg import Header
+
+from motion_planning.shapes import Octree
+from moveit_ros_move_group.convert.clouds import cloud_of, points_of, points_of_depth
+from moveit_ros_move_group.convert.geometry import MessageError
+from moveit_ros_move_group.convert.octomap import octomap_message, octree_of
+from moveit_ros_move_group.sensors import read_settings
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from in_process import Node  # noqa: E402
+
+# As long as a slow machine may need: what is tested is the answer.
+PATIENCE_S = 60.0
+CLOUD = {"sensor_plugin": "occupancy_map_monitor/PointCloudOctomapUpdater", "point_cloud_topic": "/eye/points",
+         "max_range": 3.0, "padding_offset": 0.02, "filtered_cloud_topic": "filtered_cloud"}
+# A box of 0.1 m on a post that nothing stands for.
+URDF = """<robot name="post"><link name="base"/><link name="arm"><collision><geometry>
+  <box size="0.1 0.1 0.4"/></geometry></collision></link>
+  <joint name="turn" type="revolute"><origin xyz="0 0 0.5"/><parent link="base"/><child link="arm"/>
+  <axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>"""
+SRDF = """<robot name="post"><virtual_joint name="world_joint" type="fixed" parent_frame="world" child_link="base"/>
+  <group name="arm"><joint name="turn"/></group></robot>"""
+
+
+def cloud(points, frame="base", stamp=10.0):
+    return cloud_of(np.asarray(points, dtype=np.float32), Header(stamp=rospy.Time.from_sec(stamp), frame_id=frame))
+
+
+def wait_for(condition, what):
+    deadline = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, "no " + what
+        time.sleep(0.005)
+
+
+# -- messages -------------------------------------------------------------------------------------------------------
+
+def test_clouds_of_any_layout_are_read():
+    points = np.arange(18, dtype=np.float32).reshape(6, 3)
+    assert (points_of(cloud(points)) == points).all()
+    rows = np.zeros((2, 3), np.dtype({"names": ["x", "y", "z"], "formats": [">f4"] * 3, "offsets": [4, 12, 8],
+                                      "itemsize": 20}))
+    for i, name in enumerate("xyz"):
+        rows[name] = points[:, i].reshape(2, 3)
+    data = b"".join(row.tobytes() + b"gap" for row in rows)
+    message = PointCloud2(height=2, width=3, point_step=20, row_step=63, is_bigendian=True, data=data, fields=[
+        PointField(name, offset, PointField.FLOAT32, 1) for name, offset in (("x", 4), ("y", 12), ("z", 8))])
+    assert (points_of(message) == points).all()
+    message.row_step = 200
+    with pytest.raises(MessageError, match="sizes do not fit"):
+        points_of(message)
+    message.fields.pop()
+    with pytest.raises(MessageError, match="no field 'z'"):
+        points_of(message)
+
+
+@pytest.mark.parametrize(("encoding", "kind", "unit"), [("32FC1", "<f4", 1.0), ("16UC1", "<u2", 1e3)])
+def test_depth_images_are_read(encoding, kind, unit):
+    depth = np.array([[1.0, 2.0, 0.1], [0.0, 9.0, 3.0]])
+    image = Image(height=2, width=3, encoding=encoding, data=(depth * unit).astype(kind).tobytes(),
+                  step=3 * np.dtype(kind).itemsize)
+    info = CameraInfo(K=[2.0, 0.0, 1.0, 0.0, 4.0, 0.5, 0.0, 0.0, 1.0])
+    points = points_of_depth(image, info, 0.3, 5.0)
+    expected = [(-0.5, -0.125, 1.0), (0.0, -0.25, 2.0), None, None, None, (1.5, 0.375, 3.0)]
+    for point, wanted in zip(points, expected, strict=True):
+        assert np.isnan(point[2]) if wanted is None else point == pytest.approx(wanted)
+    image.encoding = "rgb8"
+    with pytest.raises(MessageError, match="rgb8"):
+        points_of_depth(image, info, 0.3, 5.0)
+
+
+def test_octomap_messages_are_what_octomap_reads():
+    boxes = np.array([(0.05, 0.05, 0.05, 0.1), (0.15, 0.05, 0.05, 0.1), (-0.95, 0.45, 2.05, 0.1),
+                      (0.2, -0.2, 0.2, 0.4)])
+    message = octomap_message(Octree(0.1, boxes), np.eye(4), "world", rospy.Time(5)).octomap
+    assert (message.id, message.binary, message.resolution) == ("OcTree", True, 0.1)
+    back = octree_of(message).boxes
+    assert sorted(map(tuple, back.round(6).tolist())) == sorted(map(tuple, boxes.round(6).tolist()))
+    # FCL hands the stream to octomap's own reader.
+    tree = fcl.CollisionObject(fcl.OcTree(0.1, np.array(message.data, dtype=np.int8)))
+    for centre, side in ((box[:3], box[3]) for box in boxes):
+        for offset, hit in ((0.0, True), (0.5 * side + 0.02, False)):
+            probe = fcl.CollisionObject(fcl.Sphere(0.01), fcl.Transform(centre + (0.0, 0.0, offset)))
+            assert (fcl.collide(tree, probe) > 0) == hit
+
+
+def test_settings_are_understood_and_nonsense_is_told():
+    found, complaints = read_settings([CLOUD, {"sensor_plugin": "a/LaserUpdater"}, 7,
+                                       {**CLOUD, "point_subsample": 3, "max_range": "far"}])
+    assert len(found) == 2 and found[1].subsample == 3 and found[1].max_range == np.inf
+    assert len(complaints) == 3 and any("LaserUpdater" in text for text in complaints)
+    assert read_settings("none") == ([], [])
+
+
+# -- the node -------------------------------------------------------------------------------------------------------
+
+@pytest.fixture
+def node(monkeypatch):
+    parameters = {"robot_description": URDF, "robot_description_semantic": SRDF,
+                  "~": {"sensors": [CLOUD], "octomap_resolution": 0.05, "octomap_frame": "base", "max_range": 2.0}}
+    node = Node(monkeypatch, parameters)
+    node.ask("joint_states", JointState(header=Header(stamp=rospy.Time(10)), name=["turn"], position=[0.0]))
+    return node
+
+
+def octomap_of(node):
+    octomap = node.context.monitor.scene().octomap
+    return np.empty((0, 3)) if octomap is None else octomap.shapes[0][0].boxes[:, :3]
+
+
+def test_a_cloud_becomes_an_obstacle_and_goes_again(node):
+    node.ask("/eye/points", cloud([(1.0, 0.0, 0.5), (1.0, 0.3, 0.5), (2.5, 0.0, 0.5), (0.0, 0.0, 0.6)]))
+    wait_for(lambda: len(octomap_of(node)), "octomap")
+    # The point beyond the range and that on the robot's arm are no obstacles.
+    assert sorted(map(tuple, octomap_of(node).round(3).tolist())) == [(1.025, 0.025, 0.525), (1.025, 0.325, 0.525)]
+    shown = points_of(node.told("~display_octomap")[-1])
+    assert len(shown) == 2
+    scene = node.ask("get_planning_scene", SimpleNamespace(components=SimpleNamespace(components=0))).scene
+    assert scene.world.octomap.header.frame_id == "world" and scene.world.octomap.octomap.id == "OcTree"
+    node.ask("clear_octomap", None)
+    assert not len(octomap_of(node))
+    node.ask("/eye/points", cloud([(1.0, 0.3, 0.5)]))
+    wait_for(lambda: len(octomap_of(node)), "octomap after it was cleared")
+    assert len(octomap_of(node)) == 1
+
+
+def test_the_arm_is_where_it_was_at_the_clouds_time(node):
+    # The arm is a box of 0.1 m; turned by an eighth its edge is where the point is, which is beside its face before.
+    for stamp, turn in ((20.0, 0.0), (21.0, 0.785), (22.0, 0.0)):
+        state = JointState(header=Header(stamp=rospy.Time.from_sec(stamp)), name=["turn"], position=[turn])
+        for topic in ("joint_states", "/joint_states"):  # the monitor's, and the sensors' own
+            node.ask(topic, state)
+    far = (1.0, 0.3, 0.5)
+    node.ask("/eye/points", cloud([(0.0, 0.09, 0.6), far], stamp=21.0))
+    wait_for(lambda: len(octomap_of(node)), "octomap")
+    assert len(octomap_of(node)) == 1
+    node.ask("/eye/points", cloud([(0.0, 0.09, 0.6), far], stamp=22.0))
+    wait_for(lambda: len(octomap_of(node)) == 2, "point beside the arm")
+
+
+def test_clouds_that_cannot_be_used_are_told_once_in_the_log(node):
+    node.ask("/eye/points", PointCloud2(header=Header(frame_id="base")))
+    wait_for(lambda: any("no field" in line for line in node.logged), "word of the cloud's fields")
+    node.ask("/eye/points", cloud([(1.0, 0.3, 0.5)]))
+    wait_for(lambda: len(octomap_of(node)), "octomap")
