@@ -12,7 +12,7 @@ from urdf_model.transforms import axis_rotation, rigid
 
 def test_variables_are_what_can_be_moved_depth_first(mix):
     assert mix.variables == ("turn", "push", "grip")
-    assert mix.links == ("base", "turret", "slide", "finger", "thumb", "eye")
+    assert mix.links == ("base", "eye", "turret", "slide", "finger", "thumb")
     assert mix.frame == mix.root == "base" and mix.virtual_joint is None
     assert mix.continuous.tolist() == [True, False, False]
     assert mix.bounds.tolist() == [[-math.pi, math.pi], [0.1, 0.3], [-1.0, 1.0]]
@@ -110,6 +110,30 @@ def test_a_joint_that_mimics_itself_is_refused(mix_texts):
         PlanningModel.from_xml(text, mix_texts[1])
 
 
+def test_a_fixed_virtual_joint_leaves_the_root_the_planning_frame(mix_texts):
+    urdf, srdf = mix_texts
+    for kind, frame in (("fixed", "base"), ("floating", "hall"), ("planar", "hall")):
+        joint = '<virtual_joint name="stand" type="%s" parent_frame="hall" child_link="base"/></robot>' % kind
+        assert PlanningModel.from_xml(urdf, srdf.replace("</robot>", joint)).frame == frame
+
+
+def test_joints_are_in_moveits_order_whatever_order_texts_have(mix_texts):
+    """Depth first, those of one link by name, groups like the robot: programs send values in this order."""
+    urdf, srdf = mix_texts
+    arm = """<link name="%(s)s"/><link name="%(s)s_tip"/>
+      <joint name="%(s)s_arm" type="revolute"><parent link="base"/><child link="%(s)s"/><axis xyz="0 0 1"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+      <joint name="a_%(s)s" type="revolute"><parent link="%(s)s"/><child link="%(s)s_tip"/><axis xyz="0 0 1"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
+    model = PlanningModel.from_xml(
+        "<robot name='two'><link name='base'/>%s%s</robot>" % (arm % {"s": "right"}, arm % {"s": "left"}),
+        "<robot name='two'><group name='both'><group name='r'/><group name='l'/></group>"
+        "<group name='r'><joint name='a_right'/><joint name='right_arm'/></group>"
+        "<group name='l'><link name='left_tip'/><link name='left'/></group></robot>")
+    assert model.variables == model.groups["both"].joints == ("left_arm", "a_left", "right_arm", "a_right")
+    assert model.groups["r"].joints == ("right_arm", "a_right")
+
+
 def test_texts_that_are_none_are_refused(mix_texts):
     urdf, srdf = mix_texts
     with pytest.raises(ModelError, match="not a URDF"):
@@ -126,7 +150,7 @@ def test_baxters_groups(baxter):
         arm = baxter.groups[side + "_arm"]
         assert arm.joints == tuple("%s_%s" % (side, name) for name in names) and arm.tip == side + "_gripper"
     both = baxter.groups["both_arms"]
-    assert both.joints == baxter.groups["right_arm"].joints + baxter.groups["left_arm"].joints
+    assert both.joints == baxter.groups["left_arm"].joints + baxter.groups["right_arm"].joints
     assert both.chain is None and both.subgroups == ("right_arm", "left_arm")
     hand = baxter.groups["left_hand"]
     assert hand.joints == () and hand.tip == "left_gripper" and hand.end_effector.name == "left_hand_eef"

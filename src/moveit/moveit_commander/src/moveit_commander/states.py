@@ -41,7 +41,7 @@ def message_of(model, state):
     message.joint_state.header.frame_id = message.multi_dof_joint_state.header.frame_id = model.frame
     values = model.joint_values(state.q)
     message.joint_state.name, message.joint_state.position = list(values), list(values.values())
-    if model.virtual_joint is not None:
+    if model.virtual_joint is not None and model.virtual_joint.type != "fixed":
         message.multi_dof_joint_state.joint_names = [model.virtual_joint.name]
         message.multi_dof_joint_state.transforms = [list_to_transform(pose_to_list(pose_of(state.base)))]
     return message

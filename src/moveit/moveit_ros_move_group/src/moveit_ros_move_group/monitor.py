@@ -54,7 +54,7 @@ class SceneMonitor:
         self.reader = SceneReader(self.tf_frame)
         options = rospy.get_param("~planning_scene_monitor_options", {})
         topics = {key: options.get(key, usual) for key, usual in _NAMES.items()}
-        if model.virtual_joint is not None and model.virtual_joint.type != "fixed":
+        if model.virtual_joint is not None:
             self._listen_to_tf()
         self._bounds_error = float(np.finfo(float).eps)
         settings = rospy.get_param("~planning_scene_monitor", {})
@@ -235,7 +235,7 @@ class SceneMonitor:
 
     def _robot_base(self, before):
         joint = self.model.virtual_joint
-        if self._buffer is None or joint is None:
+        if joint is None or joint.type == "fixed":
             return before
         try:
             found = self._buffer.lookup_transform_core(joint.parent_frame, joint.child_link, rospy.Time())
@@ -272,6 +272,8 @@ class SceneMonitor:
             if now > deadline:
                 self._patient_from = now + _IMPATIENT_S
             if now < self._patient_from or rospy.is_shutdown() or given_up is not None and given_up():
+                if self.model.virtual_joint is not None and name == self.model.virtual_joint.parent_frame:
+                    return np.eye(4)  # what the robot stands on, as its description says
                 raise MessageError("'%s' is no frame: neither of the robot, nor an object or subframe of the scene, "
                                    "nor does tf lead from it to '%s' (%s)" % (name, self.model.frame, reason))
             time.sleep(0.02)

@@ -22,8 +22,14 @@ SRDF = """<robot name="crane">
 
 
 @pytest.fixture(scope="session")
-def model():
-    return PlanningModel.from_xml(URDF, SRDF)
+def texts():
+    """URDF and SRDF of the robot."""
+    return URDF, SRDF
+
+
+@pytest.fixture(scope="session")
+def model(texts):
+    return PlanningModel.from_xml(*texts)
 
 
 @pytest.fixture

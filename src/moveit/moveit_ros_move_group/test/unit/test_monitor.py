@@ -4,13 +4,15 @@ import threading
 import time
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import rospy
-from geometry_msgs.msg import Pose
+from geometry_msgs.msg import Pose, TransformStamped
 from moveit_msgs.msg import CollisionObject, PlanningScene
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 
+from motion_planning.model import PlanningModel
 from moveit_ros_move_group import monitor as module
 from moveit_ros_move_group.monitor import SceneMonitor
 
@@ -33,7 +35,7 @@ class Topic:
 
 @pytest.fixture
 def make(monkeypatch, model):
-    """make(parameters): a SceneMonitor without a master; its threads end with the test."""
+    """make(model, parameters): a SceneMonitor without a master; its threads end with the test."""
     shutdown, monitors = threading.Event(), []
     monkeypatch.setattr(rospy.rostime, "_rostime_initialized", True)
     monkeypatch.setattr(rospy, "Publisher", Topic)
@@ -41,7 +43,7 @@ def make(monkeypatch, model):
     monkeypatch.setattr(rospy, "is_shutdown", shutdown.is_set)
     monkeypatch.setattr(module.tf2_ros, "TransformListener", lambda buffer: None)
 
-    def made(**parameters):
+    def made(model=model, **parameters):
         monkeypatch.setattr(rospy, "get_param", lambda name, usual: parameters.get(name.lstrip("~"), usual))
         monitors.append(SceneMonitor(model, lambda request, text: None))
         return monitors[-1]
@@ -94,6 +96,30 @@ def test_joint_states_come_in_while_a_scene_waits_for_a_frame(make, monkeypatch)
     assert monitor.scene().state.q[monitor.model.index["turn"]] == 1.0
     go_on.set()
     thread.join(PATIENCE_S)
+
+
+def test_what_a_robot_stands_on_is_where_tf_has_it(make, monkeypatch, texts):
+    """A fixed virtual joint: the robot is where its root is. Where tf knows nothing of its parent, both are one."""
+    transforms = {}
+
+    def lookup(to, name, _):
+        if (to, name) not in transforms:
+            raise module.tf2_ros.LookupException("no such frame")
+        return transforms[to, name]
+
+    monkeypatch.setattr(module.tf2_ros, "Buffer", lambda debug: SimpleNamespace(lookup_transform_core=lookup))
+    monkeypatch.setattr(module, "_FRAME_TIMEOUT_S", 0.0)
+    model = PlanningModel.from_xml(texts[0], texts[1].replace('type="floating"', 'type="fixed"'))
+    monitor = make(model)
+    assert model.frame == "base" and np.array_equal(monitor.tf_frame("world"), np.eye(4))
+    transforms["base", "world"] = TransformStamped()
+    transforms["base", "world"].transform.translation.z = -0.7
+    transforms["base", "world"].transform.rotation.w = 1.0
+    transforms["world", "base"] = TransformStamped()
+    assert monitor.tf_frame("world")[2, 3] == -0.7
+    assert np.array_equal(monitor.scene().state.base, np.eye(4))
+    assert monitor.apply(scene(box("crate", "world")), "test") == []
+    assert monitor.scene().objects["crate"].pose[2, 3] == -0.7
 
 
 def test_frames_that_do_not_come_are_not_waited_for_one_by_one(make, monkeypatch):

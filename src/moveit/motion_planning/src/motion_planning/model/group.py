@@ -63,11 +63,8 @@ def build_groups(robot, srdf, model, warnings):
             entry = srdf.groups[name]
             own = set(entry.joints) | {by_child[link].name for link in entry.links if link in by_child}
             own.update(joint.name for chain in entry.chains for joint in robot.chain(*chain))
-            listed = sorted(own, key=rank.__getitem__)
-            for subgroup in entry.subgroups:
-                listed += [joint for joint in members_of(subgroup) if joint not in own]
-                own.update(listed)
-            members[name] = listed
+            own.update(joint for subgroup in entry.subgroups for joint in members_of(subgroup))
+            members[name] = sorted(own, key=rank.__getitem__)
         return members[name]
 
     groups = {}
@@ -93,9 +90,12 @@ def build_groups(robot, srdf, model, warnings):
 
 
 def depth_first(robot):
-    """Return the joints of ``robot`` (urdf_model.Robot), fixed ones too, each before those that hang on it."""
+    """Return the joints of ``robot`` (urdf_model.Robot), fixed ones too, each before those that hang on it.
+
+    Those of one link by their names, wherever the URDF has them: MoveIt's order, in which programs send joint values.
+    """
     below = {}
-    for joint in robot.joints.values():
+    for _, joint in sorted(robot.joints.items()):
         below.setdefault(joint.parent, []).append(joint)
     found, stack = [], below.get(robot.root, [])[::-1]
     while stack:

@@ -20,7 +20,7 @@ class PlanningModel:
     """The robot that is planned for. It never changes and may be used from any number of threads.
 
     name: the URDF's. robot: urdf_model.Robot, its limits narrowed. srdf: srdf.Srdf. warnings: what was ignored.
-    root: root link. frame: the planning frame, that is the virtual joint's parent frame, or else the root.
+    root: root link. frame: the planning frame: the parent frame of a virtual joint that moves, or else the root.
     virtual_joint: srdf.VirtualJoint or None.
     variables: names of the n joints that can be moved (not fixed, not mimic), depth-first; index: {name: where}.
     mimics: {joint that mimics another: (variable, multiplier, offset)}: it stands at multiplier * variable + offset.
@@ -45,7 +45,8 @@ class PlanningModel:
         self.continuous = read_only(arrays[3], bool)
         self.root = robot.root
         self.virtual_joint = srdf.virtual_joints[0] if srdf.virtual_joints else None
-        self.frame = self.virtual_joint.parent_frame if self.virtual_joint else self.root
+        moves = self.virtual_joint is not None and self.virtual_joint.type != "fixed"
+        self.frame = self.virtual_joint.parent_frame if moves else self.root
         self.mimics = {}
         self.links = (self.root, *(joint.child for joint in joints))
         self.link_index = {name: number for number, name in enumerate(self.links)}

@@ -56,9 +56,9 @@ def state_message(model, state, stamp=None, attached=True, is_diff=False):
     values = model.joint_values(state.q)
     message.joint_state.name = list(values)
     message.joint_state.position = list(values.values())
+    multi = message.multi_dof_joint_state
+    multi.header.frame_id, multi.header.stamp = model.frame, stamp
     if model.virtual_joint is not None and model.virtual_joint.type != "fixed":
-        multi = message.multi_dof_joint_state
-        multi.header.frame_id, multi.header.stamp = model.frame, stamp
         multi.joint_names, multi.transforms = [model.virtual_joint.name], [transform_of(state.base)]
     if attached:
         message.attached_collision_objects = [attached_message(body) for body in state.attached.values()]
