@@ -73,7 +73,8 @@ class _ActionHandle:
 
     def __init__(self, controller, action_type):
         self.controller = controller
-        self._client = actionlib.ActionClient(controller.action, action_type)
+        # Resolved: actionlib remaps a name as it is written, where roscpp's remaps what it stands for.
+        self._client = actionlib.ActionClient(rospy.resolve_name(controller.action), action_type)
         self._sent, self._goal = None, _Goal()
 
     @property
