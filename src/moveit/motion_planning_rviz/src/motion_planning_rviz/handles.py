@@ -27,8 +27,7 @@ def marker_name(which, link):
 def marker_message(which, link, pose, frame, scale):
     """Return the InteractiveMarker of ``which`` ("goal", "start") for a link at ``pose`` (4, 4) in ``frame``: arrows
     and rings along and about three axes, and a ball. scale [m]."""
-    message = InteractiveMarker(name=marker_name(which, link), description="%s of %s" % (which, link), scale=scale,
-                                pose=pose_message(pose))
+    message = InteractiveMarker(name=marker_name(which, link), scale=scale, pose=pose_message(pose))
     # A stamp of zero: rviz keeps the marker in this frame, and answers in it.
     message.header.frame_id = frame
     ball = Marker(type=Marker.SPHERE, scale=Vector3(*[_BALL * scale] * 3),

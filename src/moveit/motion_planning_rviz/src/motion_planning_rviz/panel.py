@@ -94,7 +94,7 @@ class Panel:
         self.view.ghost(which, state, touches, self._snapshot.attached if self._snapshot else (), unreached)
         if moved:
             self.view.place(which, {handle: interaction.pose_of(self.model, state, handle.link)
-                                    for handle in self.handles if unreached is None or handle != unreached[0]})
+                                    for handle in self.handles})
         self._say()
 
     def _invalid(self, state, touches):

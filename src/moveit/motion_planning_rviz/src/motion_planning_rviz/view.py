@@ -19,7 +19,7 @@ PICTURES = ("goal_state", "start_state", "contacts", "planning_scene", "text")
 FILM = "planned_path"
 _COLUMNS = 60
 # Sizes of what is drawn, as shares of the markers' size.
-_TEXT, _ABOVE, _LINE, _CONTACT = 0.16, 0.8, 0.04, 0.15
+_TEXT, _ABOVE, _LINE, _CONTACT = 0.16, 1.0, 0.04, 0.15
 
 
 class View:

@@ -62,7 +62,9 @@ def test_out_of_reach_the_ghost_stays_and_the_reason_is_said(probot, panel_of):
     (handle,) = panel.handles
     before = panel.query.goal
     far = moved(panel.view.poses[("goal", "tool0")], 3.0, 0.0, 0.0)
+    panel.view.poses.clear()
     panel.drag("goal", handle, far)
+    assert panel.view.poses == {}, "the handle is taken away from where it was dragged"
     state, _, _, unreached = panel.view.ghosts["goal"]
     assert state is before and unreached[0] == handle and unreached[1] is far
     assert panel.view.lines[0].startswith("link 'tool0' cannot be put there: out of reach: ")
