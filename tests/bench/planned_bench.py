@@ -2,9 +2,10 @@
 """What planning calls valid, looked at by PyBullet, which shares nothing with the planner.
 
 Trajectories are made as move_group makes them, and sampled as controllers play them: 10,000 states in five rounds. No
-state may touch anything or be out of limits, nor move faster or accelerate more than the joints may. PyBullet takes a
-mesh that moves, a finger, as its convex hull, which is larger than the mesh.
+state may touch anything or be out of limits, nor move faster or accelerate more than the joints may. Meshes are
+the meshes themselves; PyBullet does not compare two of them with each other.
 """
+import functools
 import re
 import tempfile
 import time
@@ -36,8 +37,8 @@ def measure(report, quick, number):
     for name, robot, place in kinds:
         prepare(robot.exact)
         for kind in (problems.table, problems.shelf):
-            some["%s, %s" % (name, kind.__name__)] = (
-                kind(robot, place, number * PROBLEMS + k) for k in range(PROBLEMS))
+            some["%s, %s" % (name, kind.__name__)] = map(functools.partial(kind, robot, place),
+                                                         range(number * PROBLEMS, (number + 1) * PROBLEMS))
     try:
         some["both arms, bookshelf"] = problems.bookshelf(baxter)[number::97]
     except OSError as error:
@@ -108,10 +109,9 @@ class World:
         text = xacro.process_file(str(Path(packages.get_path(package)) / file)).toxml()
         text = re.sub(r"package://([^/\"]+)", lambda found: packages.get_path(found[1]), text)
         tree = ElementTree.fromstring(text)
-        for link in tree.iter("link"):
-            if not any(joint.movable for joint in model.robot.chain(model.root, link.get("name"))):
-                for collision in link.iter("collision"):
-                    collision.set("concave", "yes")  # the mesh itself: PyBullet has that for what stands still
+        for collision in tree.iter("collision"):
+            collision.set("concave", "yes")  # the mesh itself, not the convex hull of it
+        ElementTree.indent(tree)  # PyBullet breaks long lines anywhere
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "robot.urdf"
             path.write_bytes(ElementTree.tostring(tree))
