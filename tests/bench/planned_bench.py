@@ -71,7 +71,7 @@ def look(report, title, some, worlds, states):
         world.furnish(problem.scene)
         for posture in postures:
             q = problem.scene.state.with_q(posture, indices).q
-            touches = world.touching(dict(zip(model.variables, q, strict=True)))
+            touches = world.touching(model.joint_values(q))  # those that mimic others too
             if touches:
                 print("%s: %s" % (problem.name, touches))
             touching += bool(touches)
