@@ -128,7 +128,7 @@ def test_a_cloud_becomes_an_obstacle_and_goes_again(node):
     shown = points_of(node.told("~display_octomap")[-1])
     assert len(shown) == 2
     scene = node.ask("get_planning_scene", SimpleNamespace(components=SimpleNamespace(components=0))).scene
-    assert scene.world.octomap.header.frame_id == "world" and scene.world.octomap.octomap.id == "OcTree"
+    assert scene.world.octomap.header.frame_id == "base" and scene.world.octomap.octomap.id == "OcTree"
     node.ask("clear_octomap", None)
     assert not len(octomap_of(node))
     node.ask("/eye/points", cloud([(1.0, 0.3, 0.5)]))
