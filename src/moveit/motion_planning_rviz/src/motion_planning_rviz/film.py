@@ -14,9 +14,13 @@ FILM_HZ = 15.0
 
 
 class Picture:
-    """A topic with one set of markers. Only what has gone is deleted: rviz would load meshes anew, and flicker."""
+    """A topic with one set of markers. Only what has gone is deleted: rviz would load meshes anew, and flicker.
 
-    def __init__(self, name):
+    frame: one that tf knows.
+    """
+
+    def __init__(self, name, frame):
+        self._frame = frame
         self._publisher = rospy.Publisher(name, MarkerArray, queue_size=2, latch=True)
         self._shown = None
 
@@ -26,6 +30,9 @@ class Picture:
         # An earlier process of this node may have left some.
         gone = [Marker(action=Marker.DELETEALL)] if self._shown is None else [
             Marker(ns=ns, id=number, action=Marker.DELETE) for ns, number in sorted(self._shown - keys)]
+        for marker in gone:
+            # rviz deletes what has no frame at once, before it has drawn what came earlier.
+            marker.header.frame_id = self._frame
         self._shown = keys
         if gone or markers:
             self._publisher.publish(MarkerArray(gone + list(markers)))
@@ -38,7 +45,7 @@ class Film:
     """Shows a playback.Playback on a topic again and again, in a thread of its own. width: of the line [m]."""
 
     def __init__(self, name, model, width):
-        self._picture, self._model, self._width = Picture(name), model, width
+        self._picture, self._model, self._width = Picture(name, model.root), model, width
         self._lock = threading.Lock()
         self._wake = threading.Event()
         self._enabled, self._playback, self._begin = True, None, 0.0

@@ -17,7 +17,8 @@ _COLOURS = {"goal": drawing.GOAL, "start": drawing.START}
 #: Topics with pictures, below the node's name.
 PICTURES = ("goal_state", "start_state", "contacts", "planning_scene", "text")
 FILM = "planned_path"
-_COLUMNS = 60
+# Of each line of text; rviz leaves a text out whose middle is out of sight.
+_COLUMNS, _ROWS = 60, 2
 # Sizes of what is drawn, as shares of the markers' size.
 _TEXT, _ABOVE, _LINE, _CONTACT = 0.16, 1.0, 0.04, 0.15
 
@@ -29,7 +30,7 @@ class View:
 
     def __init__(self, model, handles, scale):
         self._model, self._handles, self._scale = model, handles, scale
-        self._pictures = {name: Picture("~" + name) for name in PICTURES}
+        self._pictures = {name: Picture("~" + name, model.root) for name in PICTURES}
         self._status = rospy.Publisher("~status", String, queue_size=10, latch=True)
         self._film = Film("~" + FILM, model, _LINE * scale)
         self._solids, self._moving, self._links = {}, frozenset(), ()
@@ -107,9 +108,13 @@ class View:
     # -- text, scene, path --------------------------------------------------------------------------------------
 
     def say(self, motion, notes):
-        """Write lines beside the goal, and onto ``~status``. motion: what is being done, into the log, too."""
+        """Write lines above the goal, the ends of long ones left out, and all of them onto ``~status``.
+
+        motion: what is being done, into the log, too.
+        """
         lines = [line for line in (motion, *notes) if line]
-        rows = [row for line in lines for row in textwrap.wrap(line, _COLUMNS)]
+        rows = [row for line in lines for row in textwrap.wrap(line, _COLUMNS, max_lines=_ROWS,
+                                                                placeholder=" ...")]
         height = _TEXT * self._scale
         place = self._anchor + (0.0, 0.0, _ABOVE * self._scale + 0.5 * height * len(rows))
         self._pictures["text"].show([text_marker("\n".join(rows), place, self._model.root, height)] if rows else [])
