@@ -11,7 +11,7 @@ import numpy as np
 
 from motion_planning.constraints.manifold import Manifold
 from motion_planning.errors import PlanningError
-from motion_planning.planners import NoPath, Search, first_touching
+from motion_planning.planners import NoPath, Search, first_touching, rrt_connect
 from motion_planning.scene import Scene
 from motion_planning.timing import Timed, time_path
 
@@ -66,8 +66,9 @@ class PlanQuery:
     """What is asked for.
 
     scene: Scene with the robot at the start; group: name; goals: ConstraintSets, of which one has to be met.
-    path_constraints: ConstraintSet that holds all the way, or None. allowed_time [s]; attempts: plans of which the
-    shortest counts. velocity_scaling, acceleration_scaling: 0 < f <= 1. timing: algorithm of timing.time_path.
+    path_constraints: ConstraintSet that holds all the way, or None. planner: as Search has it. allowed_time [s];
+    attempts: plans of which the shortest counts. velocity_scaling, acceleration_scaling: 0 < f <= 1. timing: algorithm
+    of timing.time_path.
     start_bounds_error: by how much [rad or m] the start may be beyond a limit; it is brought onto it.
     jiggle: share of a joint's range within which a start that touches something is moved to one that does not.
     """
@@ -76,7 +77,7 @@ class PlanQuery:
     group: str
     goals: list
     path_constraints: Any = None
-    planner_id: str = ""
+    planner: Callable = rrt_connect
     allowed_time: float = 5.0
     attempts: int = 1
     velocity_scaling: float = 1.0
@@ -311,8 +312,8 @@ class _Planning:
     def _path(self, scene, start, goals, attempt):
         left = self.query.allowed_time - self._used()
         search = Search(exact=self.tools.exact, seed=self.tools.seed + attempt, allowed_time=max(left, 0.01),
-                        clock=self.tools.clock, planner_id=self.query.planner_id, stop=self.tools.stop,
-                        constraints=self.query.path_constraints)
+                        clock=self.tools.clock, stop=self.tools.stop, constraints=self.query.path_constraints,
+                        planner=self.query.planner)
         try:
             path = self.tools.plan_path(scene, self.query.group, start, goals, search)
         except NoPath as error:

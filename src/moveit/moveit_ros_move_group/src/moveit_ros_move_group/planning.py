@@ -2,7 +2,6 @@
 """MotionPlanRequests to plans."""
 import itertools
 import math
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +12,7 @@ from motion_planning import pipeline
 from motion_planning.constraints import sampler
 from motion_planning.errors import PlanningError
 from motion_planning.planners import Search, plan_path
+from motion_planning.planners.names import config_name, kind_of, planner_of
 from motion_planning.scene import Scene
 from motion_planning.timing import time_path
 from moveit_ros_move_group.capabilities.cartesian import slowed
@@ -21,8 +21,8 @@ from moveit_ros_move_group.convert.constraints import constraint_set_of
 
 # [s], where a request has none.
 _USUAL_TIME_S = 5.0
-# The planner that stands for the others.
-OURS = "RRTConnect"
+# Remarks on planners that are kept, so that none is made twice.
+_MOST_REMARKS = 1000
 
 
 class Planner:
@@ -31,7 +31,7 @@ class Planner:
     def __init__(self, context, industrial):
         """industrial: IndustrialPlanner, for the pipelines that are."""
         self._context, self._industrial = context, industrial
-        self._warned = set()
+        self._remarks = set()
         self._seeds = itertools.count()
 
     def plan(self, request, scene, stop=lambda: False):
@@ -40,7 +40,6 @@ class Planner:
         pipe = self._pipeline(request.pipeline_id)
         if pipe.industrial:
             return self._limited(request, self._industrial.plan(request, scene, pipe, self._tools(stop)))
-        self._remark_on_planner(request, pipe)
         try:
             goals = [constraint_set_of(goal, scene, context.monitor.reader) for goal in request.goal_constraints]
             path_constraints = constraint_set_of(request.path_constraints, scene, context.monitor.reader)
@@ -49,7 +48,7 @@ class Planner:
         if any(goal is None for goal in goals):
             raise RequestError(MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "a goal without any constraint says nothing")
         query = pipeline.PlanQuery(
-            scene, request.group_name, goals, path_constraints, request.planner_id,
+            scene, request.group_name, goals, path_constraints, self._planner(request, pipe),
             request.allowed_planning_time if request.allowed_planning_time > 0.0 else _USUAL_TIME_S,
             request.num_planning_attempts, _scaling(request.max_velocity_scaling_factor),
             _scaling(request.max_acceleration_scaling_factor), pipe.timing, pipe.start_bounds_error, pipe.jiggle)
@@ -106,20 +105,16 @@ class Planner:
                                % (name, ", ".join(self._context.pipelines)))
         return self._context.pipelines[name]
 
-    def _remark_on_planner(self, request, pipe):
-        """Warn once of a planner that another stands for, and of a name that nobody knows."""
+    def _planner(self, request, pipe):
+        """The planner that a request names; what is to be said of it is said once."""
         asked = request.planner_id or pipe.default_planner(request.group_name)
-        name = re.sub(r"^.*\[(.*)\]$", r"\1", asked)
-        kind = pipe.planners.get(name, {}).get("type", name).rpartition("::")[2]
-        kind = kind[:-len("kConfigDefault")] if kind.endswith("kConfigDefault") else kind
-        if not name or kind == OURS or asked in self._warned:
-            return
-        self._warned.add(asked)
-        if name in pipe.planners:
-            rospy.logwarn("planner '%s' is not built in; RRTConnect, with paths shortened, plans in its place", name)
-        else:
-            rospy.logwarn("there is no planner '%s' in pipeline '%s'; RRTConnect plans. Its planners are %s", name,
-                          pipe.name, ", ".join(pipe.planners) or "not listed")
+        planner, remarks = planner_of(kind_of(asked, pipe.planners),
+                                      pipe.settings(request.group_name, config_name(asked)))
+        for remark in remarks:
+            if remark not in self._remarks and len(self._remarks) < _MOST_REMARKS:
+                self._remarks.add(remark)
+                rospy.logwarn("%s", remark)
+        return planner
 
 
 def _scaling(factor):

@@ -51,7 +51,11 @@ class Pipeline:
         """Names as query_planner_interface gives them: ``group[planner]`` and plain."""
         ids = ["%s[%s]" % (group, planner) for group, entry in self.groups.items()
                for planner in entry.get("planner_configs") or [] if planner in self.planners]
-        return ids + list(self.planners)
+        return list(dict.fromkeys([*ids, *self.planners]))
+
+    def settings(self, group, planner):
+        """Return {key: text} of a planner's configuration, with what was set for the group alone in place."""
+        return {**self.planners.get(planner, {}), **self.planners.get("%s[%s]" % (group, planner), {})}
 
     def default_planner(self, group):
         return str(self.groups.get(group, {}).get("default_planner_config") or self.usual)

@@ -34,17 +34,17 @@ _sphere_models_lock, _checkers_lock = threading.Lock(), threading.Lock()
 
 class Search(NamedTuple):
     """How to look for a path. exact: ExactChecker. seed: the same one gives the same path where time suffices.
-    allowed_time [s] on ``clock``, a function that returns seconds. planner_id: kept for the caller; there is one
-    planner. stop: asked every few ms whether to end. constraints: ConstraintSet that every state on the path keeps to,
-    or None."""
+    allowed_time [s] on ``clock``, a function that returns seconds. stop: asked every few ms whether to end.
+    constraints: ConstraintSet that every state on the path keeps to, or None. planner: what looks for paths by spheres,
+    a function as ``rrt_connect`` (``names.planner_of``); constraints have one of their own."""
 
     exact: Any
     seed: int
     allowed_time: float
     clock: Callable[[], float]
-    planner_id: str = ""
     stop: Callable[[], bool] = lambda: False
     constraints: Any = None
+    planner: Callable = rrt_connect
 
 
 def sphere_model_of(exact):
@@ -186,12 +186,12 @@ class _Planning:
 
     def _found(self, checker, start, goals, run):
         """A Path by spheres to one of ``goals``."""
-        if len(checker.parts) == 2:
+        if self.search.planner is rrt_connect and len(checker.parts) == 2:
             nearest = goals[np.linalg.norm(goals - start, axis=1).argmin()]
             found = apart(checker, self.bounds, start, nearest, run, REACH)
             if found is not None:
                 return found
-        return rrt_connect(checker, self.bounds, start, goals, run, REACH)
+        return self.search.planner(checker, self.bounds, start, goals, run)
 
     def _way_out(self, q, run):
         """Points (m, k) from ``q``, free by exact geometry, to the first that is free by spheres."""

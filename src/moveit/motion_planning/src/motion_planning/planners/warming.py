@@ -4,6 +4,8 @@ import time
 
 import numpy as np
 
+from motion_planning.constraints import ConstraintSet, OrientationTarget
+from motion_planning.constraints.manifold import Manifold
 from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
 from motion_planning.planners import kernels
@@ -34,6 +36,8 @@ def warm_up():
     shorten(Path(ends), checker, run)
     checker.valid(ends)
     kernels.way_through(np.ones((2, 2), dtype=bool), np.zeros((2, 2, 9), dtype=bool))
+    arm, level = model.groups["arm"], ConstraintSet(orientations=[OrientationTarget("arm", np.eye(3))])
+    Manifold(Scene(model), arm, level, ends[0]).project(ends[0])
     exact = ExactChecker(model, None)
     exact.free(Scene(model))
     exact.distance(Scene(model))

@@ -34,9 +34,7 @@ class Planners:
     @answered("get_planner_params", GetPlannerParamsResponse)
     def _get(self, request, response):
         pipeline = self._pipeline(request.pipeline_id)
-        params = dict(pipeline.planners.get(request.planner_config, {})) if pipeline else {}
-        if pipeline and request.group:
-            params.update(pipeline.planners.get("%s[%s]" % (request.group, request.planner_config), {}))
+        params = pipeline.settings(request.group, request.planner_config) if pipeline else {}
         response.params.keys, response.params.values = list(params), list(params.values())
         response.params.descriptions = [""] * len(params)
 
