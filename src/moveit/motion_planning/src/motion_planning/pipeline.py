@@ -71,6 +71,7 @@ class PlanQuery:
     of timing.time_path.
     start_bounds_error: by how much [rad or m] the start may be beyond a limit; it is brought onto it.
     jiggle: share of a joint's range within which a start that touches something is moved to one that does not.
+    planner_id: the command, where `industrial` plans.
     """
 
     scene: Scene
@@ -85,6 +86,7 @@ class PlanQuery:
     timing: str = "time_optimal_trajectory_generation"
     start_bounds_error: float = 0.05
     jiggle: float = 0.02
+    planner_id: str = ""
 
 
 @dataclass(frozen=True, eq=False)

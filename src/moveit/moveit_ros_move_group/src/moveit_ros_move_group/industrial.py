@@ -57,8 +57,8 @@ class IndustrialPlanner:
         except PlanningError as error:
             raise RequestError(getattr(error, "code", MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS), str(error)) from None
         query = pipeline.PlanQuery(
-            scene, request.group_name, [goal for goal in goals if goal is not None], path_constraints, planner,
-            velocity_scaling=request.max_velocity_scaling_factor,
+            scene, request.group_name, [goal for goal in goals if goal is not None], path_constraints,
+            planner_id=planner, velocity_scaling=request.max_velocity_scaling_factor,
             acceleration_scaling=request.max_acceleration_scaling_factor, start_bounds_error=pipe.start_bounds_error)
         start = request.start_state.joint_state
         speeds = dict(zip(start.name, start.velocity, strict=False))
