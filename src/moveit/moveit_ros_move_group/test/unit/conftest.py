@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A small robot, and its scene."""
 import pytest
+import rospy
 
 from motion_planning.model import PlanningModel
 from motion_planning.scene import Scene
@@ -19,6 +20,13 @@ SRDF = """<robot name="crane">
   <virtual_joint name="world_joint" type="floating" parent_frame="world" child_link="base"/>
   <group name="arm"><chain base_link="base" tip_link="hand"/></group>
 </robot>"""
+
+
+@pytest.fixture(autouse=True)
+def wall_time(monkeypatch):
+    """ROS time without a node, also after tests of a simulator in the same process, whose time stands still."""
+    monkeypatch.setattr(rospy.rostime, "_rostime_initialized", True)
+    monkeypatch.setattr(rospy.rostime, "_rostime_current", None)
 
 
 @pytest.fixture(scope="session")

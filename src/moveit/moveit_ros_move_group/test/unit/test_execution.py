@@ -21,12 +21,6 @@ JOINTS = ["turn", "reach"]
 LONG_S = 1000.0
 
 
-@pytest.fixture(autouse=True)
-def wall_time(monkeypatch):
-    """ROS time without a node."""
-    monkeypatch.setattr(rospy.rostime, "_rostime_initialized", True)
-
-
 def trajectory(seconds, **changes):
     points = [JointTrajectoryPoint(positions=[0.0, 0.0], time_from_start=rospy.Duration(0.0)),
               JointTrajectoryPoint(positions=[1.0, 0.5], time_from_start=rospy.Duration(seconds))]
