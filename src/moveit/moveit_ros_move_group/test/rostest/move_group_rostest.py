@@ -340,7 +340,8 @@ class MoveGroupTest(unittest.TestCase):
 
     def test_planners_have_the_names_of_the_configuration(self):
         interfaces = self.services["query_planner_interface"]().planner_interfaces
-        self.assertEqual([(one.name, one.pipeline_id) for one in interfaces], [("OMPL", "ompl")])
+        self.assertEqual([(one.name, one.pipeline_id) for one in interfaces], [
+            ("OMPL", "ompl"), ("Pilz Industrial Motion Planner", "pilz_industrial_motion_planner")])
         self.assertIn("manipulator[RRTConnect]", interfaces[0].planner_ids)
 
 
