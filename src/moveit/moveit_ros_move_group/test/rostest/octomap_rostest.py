@@ -76,7 +76,7 @@ class OctomapTest(unittest.TestCase):
         wait_until(entered, "the octomap", TIMEOUT_S)
         octomap = self.octomap()
         self.assertEqual((octomap.header.frame_id, octomap.octomap.id, octomap.octomap.binary),
-                         ("base_link", "OcTree", True))
+                         ("world", "OcTree", True))
         self.assertAlmostEqual(octomap.octomap.resolution, 0.02)
         self.assertGreater(self.nearest(middle), RADIUS_M)
         wait_until(lambda: self.look(can, robot) or self.filtered, "the filtered cloud", TIMEOUT_S)
