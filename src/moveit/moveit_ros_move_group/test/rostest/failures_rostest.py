@@ -44,6 +44,8 @@ class FailuresTest(unittest.TestCase):
         cls.services = {name: rospy.ServiceProxy(name, kind) for name, kind in (
             ("apply_planning_scene", ApplyPlanningScene), ("compute_cartesian_path", GetCartesianPath),
             ("compute_fk", GetPositionFK))}
+        for name in cls.services:
+            rospy.wait_for_service(name, TIMEOUT_S)
         cls.told = []
         cls.subscriber = rospy.Subscriber("/move_group/failures", Failure, cls.told.append, queue_size=100)
         cls.robot = Robot("manipulator", JOINTS, (), FREE, ASIDE, "tool0", (), "base_link")
