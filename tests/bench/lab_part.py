@@ -180,11 +180,34 @@ def latency(count):
     print(json.dumps({"ticks": found, "median": statistics.median(found)}), flush=True)
 
 
+class LockStep:
+    """Commands both arms of a world that was launched paused, tick by tick."""
+
+    def __init__(self):
+        self._topics = {side: "/robot/limb/%s/joint_command" % side for side in SIDES}
+        self._publishers = {side: rospy.Publisher(topic, JointCommand, queue_size=1)
+                            for side, topic in self._topics.items()}
+        self._advance = rospy.ServiceProxy("/gazebo/advance", AdvanceTicks, persistent=True)
+        self._advance.wait_for_service(60)
+        for side, publisher in self._publishers.items():
+            wait_until(publisher.get_num_connections, "the robot to listen on " + self._topics[side], 60.0)
+
+    def send(self, mode, values):
+        """Command the joints of both arms; values: {side: seven numbers}."""
+        for side, publisher in self._publishers.items():
+            publisher.publish(JointCommand(mode, list(values[side]), list(joint_names(side))))
+
+    def step(self, count, after_commands=False):
+        """Advance by so many ticks, when both arms' commands have come where asked for; returns the response."""
+        answer = self._advance(count, list(self._topics.values()) if after_commands else [], 60.0)
+        if not answer.success:
+            raise SystemExit(answer.status_message)
+        return answer
+
+
 def lockstep(ticks):
     """Swing both arms of a world that was launched paused, for so many ticks, a command for each arm every
     COMMAND_TICKS. Prints a digest of all joint states, and how many there were, as JSON."""
-    topics = {side: "/robot/limb/%s/joint_command" % side for side in SIDES}
-    commands = {side: rospy.Publisher(topic, JointCommand, queue_size=1) for side, topic in topics.items()}
     states = {}
 
     def note(message):
@@ -193,25 +216,13 @@ def lockstep(ticks):
         states[1_000_000_000 * seconds + nanoseconds] = message._buff[4:]
 
     rospy.Subscriber("/robot/joint_states", rospy.AnyMsg, note)
-    advance = rospy.ServiceProxy("/gazebo/advance", AdvanceTicks, persistent=True)
-    advance.wait_for_service(60)
-    for topic, publisher in zip(topics.values(), commands.values(), strict=True):
-        wait_until(publisher.get_num_connections, "the robot to listen on " + topic, 60.0)
-
-    def step(count, await_topics=()):
-        answer = advance(count, list(await_topics), 60.0)
-        if not answer.success:
-            raise SystemExit(answer.status_message)
-        return answer
-
+    world = LockStep()
     up()
-    begin = step(FIRST_TICK - step(1).tick).sim_time.to_nsec()
+    begin = world.step(FIRST_TICK - world.step(1).tick).sim_time.to_nsec()
     for number in range(int(ticks) // COMMAND_TICKS):
         swing = 0.3 * math.sin(2.0 * number * COMMAND_TICKS * TICK_S)
-        for side, publisher in commands.items():
-            publisher.publish(JointCommand(JointCommand.POSITION_MODE, [angle + swing for angle in NEUTRAL],
-                                           list(joint_names(side))))
-        end = step(COMMAND_TICKS, topics.values()).sim_time.to_nsec()
+        world.send(JointCommand.POSITION_MODE, dict.fromkeys(SIDES, [angle + swing for angle in NEUTRAL]))
+        end = world.step(COMMAND_TICKS, after_commands=True).sim_time.to_nsec()
     wait_until(lambda: end in states, "joint states of %d ns" % end, 60.0)
     counted = sorted(stamp for stamp in states if begin < stamp <= end)
     digest = hashlib.sha256(b"".join(states[stamp] for stamp in counted))
@@ -221,40 +232,24 @@ def lockstep(ticks):
 def replay(path, rows, file):
     """Send a recording's set-points as raw positions, from its first posture on, in lock-step; write where the joints
     are at the times of its first so many rows, (rows, 14) [rad], into a file of numpy."""
-    recording, rows = Recording.read(path), int(rows)
+    recording = Recording.read(path)
     ticks = round(recording.period_s / TICK_S)
-    topics = {side: "/robot/limb/%s/joint_command" % side for side in SIDES}
-    commands = {side: rospy.Publisher(topic, JointCommand, queue_size=1) for side, topic in topics.items()}
     states = {}
     rospy.Subscriber("/robot/joint_states", JointState, lambda message: states.__setitem__(
         message.header.stamp.to_nsec(), dict(zip(message.name, message.position, strict=True))))
-    advance = rospy.ServiceProxy("/gazebo/advance", AdvanceTicks, persistent=True)
     place = rospy.ServiceProxy("/gazebo/set_model_configuration", SetModelConfiguration)
-    advance.wait_for_service(60)
-    for topic, publisher in zip(topics.values(), commands.values(), strict=True):
-        wait_until(publisher.get_num_connections, "the robot to listen on " + topic, 60.0)
-
-    def step(count, await_topics=()):
-        answer = advance(count, list(await_topics), 60.0)
-        if not answer.success:
-            raise SystemExit(answer.status_message)
-        return answer.sim_time.to_nsec()
-
-    def send(mode, row):
-        for number, (side, publisher) in enumerate(commands.items()):
-            names = list(joint_names(side))
-            first = number * len(names)
-            publisher.publish(JointCommand(mode, recording.commanded[row, first:first + len(names)].tolist(), names))
-
+    world = LockStep()
     up()
-    step(FIRST_TICK)
+    world.step(FIRST_TICK)
     answer = place("baxter", "robot_description", list(JOINT_NAMES), recording.sensed[0].tolist())
     if not answer.success:
         raise SystemExit(answer.status_message)
-    times = [step(ticks)]
-    for row in range(rows - 1):
-        send(JointCommand.RAW_POSITION_MODE, row)
-        times.append(step(ticks, topics.values()))
+    times = [world.step(ticks).sim_time.to_nsec()]
+    for commanded in recording.commanded[:int(rows) - 1].tolist():
+        angles = dict(zip(JOINT_NAMES, commanded, strict=True))
+        world.send(JointCommand.RAW_POSITION_MODE,
+                   {side: [angles[name] for name in joint_names(side)] for side in SIDES})
+        times.append(world.step(ticks, after_commands=True).sim_time.to_nsec())
     wait_until(lambda: times[-1] in states, "joint states of %d ns" % times[-1], 60.0)
     np.save(file, np.array([[states[time][name] for name in JOINT_NAMES] for time in times]))
 
