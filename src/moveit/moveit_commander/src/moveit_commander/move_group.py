@@ -10,35 +10,30 @@ from moveit_msgs.msg import (
     ExecuteTrajectoryGoal,
     MoveItErrorCodes,
     PlannerInterfaceDescription,
-    PositionIKRequest,
     RobotState,
     RobotTrajectory,
 )
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from baxter_sim_kinematics import NoSolution, solve
-from urdf_model.transforms import rpy_from_matrix, rpy_matrix
+from urdf_model.transforms import rpy_from_matrix
 
 from . import requests, scene_calls, states
 from .connection import connect
-from .conversions import list_to_pose, matrix_of, pose_of, pose_to_list
+from .conversions import pose_of
 from .description import load
 from .exception import MoveItCommanderException
 from .plan import Plan, trajectory_of
-from .requests import ORIENTATION, POSE, POSITION, Settings
+from .requests import JOINTS, RequestSettings, code_name
 from .retiming import retimed
-from .targets import JointTarget, jacobian, random_values, values_of, with_followers, within_limits
-from .tuning import Tunable
+from .targeting import Targeting
+from .targets import JointTarget, jacobian, random_values, values_of, within_limits
 
 __all__ = ["MoveGroupCommander"]
 
-_JOINTS = "joints"
 _OPTIONAL_ACTION_WAIT_S = 5.0
-_CODES = {value: name for name, value in vars(MoveItErrorCodes).items() if name.isupper() and isinstance(value, int)}
 
 
-class MoveGroupCommander(Tunable):
+class MoveGroupCommander(Targeting):
     """Commander of one group of the robot. Positions in m, angles in rad, times in s, quaternions x, y, z, w.
 
     name: the group, as the SRDF has it. robot_description: parameter with the URDF; SRDF, limits and settings lie
@@ -57,7 +52,7 @@ class MoveGroupCommander(Tunable):
         self._connection.advertise("trajectory_execution_event")
         self._connection.wait_for_actions(["move_group", "execute_trajectory"], wait_for_servers)
         own = description.kinematics.get(name) or {}
-        super().__init__(Settings(
+        super().__init__(RequestSettings(
             velocity_scaling=description.velocity_scaling, acceleration_scaling=description.acceleration_scaling,
             **{key + "_tolerance": float(own["goal_%s_tolerance" % key])
                for key in ("joint", "position", "orientation") if "goal_%s_tolerance" % key in own}))
@@ -65,7 +60,7 @@ class MoveGroupCommander(Tunable):
         self._reference_frame = self._model.frame
         self._joint_target = JointTarget(self._model, self._group)
         self._pose_targets = {}
-        self._kind = _JOINTS
+        self._kind = JOINTS
         self._remembered = {}
         self._random = np.random.default_rng()
 
@@ -201,196 +196,11 @@ class MoveGroupCommander(Tunable):
             joint_state=msg.joint_state, multi_dof_joint_state=msg.multi_dof_joint_state,
             attached_collision_objects=msg.attached_collision_objects, is_diff=msg.is_diff or partial)
 
-    # -- targets: joints --------------------------------------------------------------------------------------------
-
-    def get_joint_value_target(self):
-        """Return the target's joint values, in the order of :meth:`get_current_joint_values`."""
-        return self._joint_target.values()
-
-    def set_joint_value_target(self, arg1, arg2=None, arg3=None):
-        """Set the joint values to reach; a pose is turned into joint values at once.
-
-        arg1: values in the group's order; {joint: value}; a JointState or RobotState; a joint's name, with its value as
-        arg2; a Pose or PoseStamped, with a link's name and whether the nearest pose will do (bool) as arg2 and arg3.
-        Raises MoveItCommanderException for values beyond the limits, names that are not there, poses out of reach.
-        """
-        if isinstance(arg1, Pose | PoseStamped):
-            options = [option for option in (arg2, arg3) if option is not None]
-            if not all(isinstance(option, str | bool) for option in options):
-                raise MoveItCommanderException("beside a pose, expected a link's name (str) and whether the nearest "
-                                               "pose will do (bool), got %r" % (options,))
-            link = next((option for option in options if isinstance(option, str)), "")
-            self._set_joints_at(arg1, link, any(option is True for option in options))
-        elif isinstance(arg1, str):
-            if arg2 is None or arg3 is not None or np.size(arg2) != 1:
-                raise MoveItCommanderException("expected one value for joint '%s'" % arg1)
-            value, = [arg2] if np.ndim(arg2) == 0 else arg2
-            self._joint_target.set_by_name({arg1: value}, self._settings.joint_tolerance)
-        elif arg2 is not None or arg3 is not None:
-            raise MoveItCommanderException("expected joint values alone, got more: %r, %r" % (arg2, arg3))
-        else:
-            self._set_joints(arg1)
-        self._kind = _JOINTS
-
-    def _set_joints(self, values):
-        tolerance = self._settings.joint_tolerance
-        if isinstance(values, RobotState | JointState):
-            joints = values.joint_state if isinstance(values, RobotState) else values
-            self._joint_target.set_robot(states.named_positions(joints), tolerance)
-        elif isinstance(values, dict):
-            self._joint_target.set_by_name(values, tolerance)
-        else:
-            self._joint_target.set_values(values, tolerance)
-
-    def _set_joints_at(self, pose, link, nearest):
-        link = self._link(link, "set the pose for")
-        stamped = self._in_reference_frame(pose)
-        request = PositionIKRequest(group_name=self._group.name, ik_link_name=link, pose_stamped=stamped)
-        request.robot_state = states.message_of(
-            self._model, self._state_now().with_q(self._joint_target.moved(), self._group.indices))
-        answer = self._connection.call("compute_ik", ik_request=request)
-        if answer.error_code.val == MoveItErrorCodes.SUCCESS:
-            solution = states.named_positions(answer.solution.joint_state)
-            values = {name: solution[name] for name in self._group.joints}
-        elif nearest:
-            values = dict(zip(self._group.joints, self._nearest(stamped, link), strict=True))
-        else:
-            raise MoveItCommanderException("Error setting joint target: no joint values put '%s' at %s in '%s' (%s)" % (
-                link, ["%.4g" % value for value in pose_to_list(stamped.pose)], stamped.header.frame_id,
-                _CODES.get(answer.error_code.val, answer.error_code.val)))
-        self._joint_target.set_by_name(values, self._settings.joint_tolerance)
-
-    def _nearest(self, stamped, link):
-        """Joint values (k,) that bring the group's tip nearest to a pose in the frame of a link of the robot."""
-        chain, frame = self._group.chain, stamped.header.frame_id
-        if chain is None or link != self._group.tip or frame not in (*self._model.links, self._model.frame):
-            raise MoveItCommanderException(
-                "the nearest pose can be found for the tip of a chain alone, in the frame of a link; got link '%s' of "
-                "group '%s' in '%s'" % (link, self._group.name, frame))
-        now = self._state_now()
-        frames = [np.eye(4) if name == self._model.frame else self._model.frame_of(now.q, name, now.base)
-                  for name in (chain.base, frame)]
-        target = np.linalg.inv(frames[0]) @ frames[1] @ matrix_of(stamped.pose)
-        try:
-            return solve(chain, target, seed=np.clip(now.q[self._group.indices], chain.lower, chain.upper)).q
-        except NoSolution as failure:
-            return failure.best
-
-    def set_random_target(self):
-        """Set random joint values as the target."""
-        self.set_joint_value_target(self.get_random_joint_values())
-
-    def set_named_target(self, name):
-        """Set a remembered or a named state as the target. Raises MoveItCommanderException for an unknown name."""
-        self.set_joint_value_target(self.get_named_target_values(name))
-
-    def get_named_target_values(self, target):
-        """Return {joint: value} of a remembered or named state. Raises MoveItCommanderException for an unknown name."""
-        if target in self._remembered:
-            return dict(zip(self._group.valued_joints, self._remembered[target], strict=True))
-        if target not in self._group.states:
-            raise MoveItCommanderException("group '%s' has no state '%s'; it has %s" % (
-                self._group.name, target, ", ".join(self.get_named_targets()) or "none"))
-        return with_followers(self._model, self._group, self._group.states[target])
-
-    def remember_joint_values(self, name, values=None):
-        """Remember joint values, those of now unless some are given, under a name."""
-        values = list(values) if values is not None else self.get_current_joint_values()
-        if len(values) != self.get_variable_count():
-            raise MoveItCommanderException("group '%s' has %d joints, got %d values"
-                                           % (self._group.name, self.get_variable_count(), len(values)))
-        self._remembered[name] = values
-
-    def get_remembered_joint_values(self):
-        """Return {name: values}."""
-        return dict(self._remembered)
-
-    def forget_joint_values(self, name):
-        """Forget what was remembered under a name."""
-        self._remembered.pop(name, None)
-
-    # -- targets: poses ---------------------------------------------------------------------------------------------
-
-    def set_pose_target(self, pose, end_effector_link=""):
-        """Set the pose of a link to reach: Pose, PoseStamped, or x, y, z and roll, pitch, yaw or a quaternion."""
-        self.set_pose_targets([pose], end_effector_link)
-
-    def set_pose_targets(self, poses, end_effector_link=""):
-        """Set poses of a link, one of which is to be reached. Poses of other links stay targets besides."""
-        link = self._link(end_effector_link, "set the pose for")
-        poses = [self._in_reference_frame(pose) for pose in poses]
-        if not poses:
-            raise MoveItCommanderException("expected a pose for link '%s', got none" % link)
-        self._pose_targets[link], self._kind = poses, POSE
-
-    def set_rpy_target(self, rpy, end_effector_link=""):
-        """Set the orientation of a link to reach, [roll, pitch, yaw]."""
-        if len(rpy) != 3:
-            raise MoveItCommanderException("expected roll, pitch and yaw, got %d values" % len(rpy))
-        turn = np.eye(4)
-        turn[:3, :3] = rpy_matrix(*rpy)
-        self._set_part(ORIENTATION, end_effector_link, orientation=pose_of(turn).orientation)
-
-    def set_orientation_target(self, q, end_effector_link=""):
-        """Set the orientation of a link to reach, a quaternion [x, y, z, w]."""
-        if len(q) != 4:
-            raise MoveItCommanderException("expected a quaternion x, y, z, w, got %d values" % len(q))
-        self._set_part(ORIENTATION, end_effector_link, orientation=list_to_pose([0.0, 0.0, 0.0, *q]).orientation)
-
-    def set_position_target(self, xyz, end_effector_link=""):
-        """Set the position of a link to reach, [x, y, z]; any orientation will do."""
-        if len(xyz) != 3:
-            raise MoveItCommanderException("expected x, y, z, got %d values" % len(xyz))
-        self._set_part(POSITION, end_effector_link, position=list_to_pose([*xyz, 0.0, 0.0, 0.0]).position)
-
-    def _set_part(self, kind, link, **part):
-        link = self._link(link, "set the %s for" % kind)
-        targets = self._pose_targets.get(link)
-        pose = targets[0] if targets else self._in_reference_frame([0.0] * 6)
-        fields = {"position": pose.pose.position, "orientation": pose.pose.orientation, **part}
-        self._pose_targets[link], self._kind = [PoseStamped(header=pose.header, pose=Pose(**fields))], kind
-
-    def _in_reference_frame(self, pose):
-        """A PoseStamped as it is; a Pose or a list in the reference frame."""
-        if isinstance(pose, PoseStamped):
-            if pose.header.frame_id:
-                return pose
-            pose = pose.pose
-        return self._stamped(pose if isinstance(pose, Pose) else list_to_pose(pose), self._reference_frame)
-
-    def shift_pose_target(self, axis, value, end_effector_link=""):
-        """Set the pose now, shifted along axis 0 to 2 [m] or with roll, pitch or yaw (3 to 5) changed [rad]."""
-        if axis not in range(6):
-            raise MoveItCommanderException("expected an axis from 0 to 5, got %r" % (axis,))
-        frame = self._frame_of(self._state_now(), end_effector_link)
-        values = [*frame[:3, 3].tolist(), *rpy_from_matrix(frame)]
-        values[axis] += value
-        self.set_pose_target(self._stamped(list_to_pose(values), self._model.frame), end_effector_link)
-
-    def clear_pose_target(self, end_effector_link):
-        """Forget the poses of a link."""
-        self._pose_targets.pop(end_effector_link or self._end_effector_link, None)
-
-    def clear_pose_targets(self):
-        """Forget all poses to reach."""
-        self._pose_targets.clear()
-
-    def limit_max_cartesian_link_speed(self, speed, link_name=""):
-        """Limit the speed of a link [m/s], the end effector's unless one is named."""
-        if not speed > 0.0:
-            raise MoveItCommanderException("expected a speed above 0, got %s" % speed)
-        self._settings.cartesian_speed = float(speed)
-        self._settings.cartesian_speed_link = self._link(link_name, "limit the speed of")
-
-    def clear_max_cartesian_link_speed(self):
-        """Limit no link's speed."""
-        self._settings.cartesian_speed, self._settings.cartesian_speed_link = 0.0, ""
-
     # -- plan and move ----------------------------------------------------------------------------------------------
 
     def construct_motion_plan_request(self):
         """Return the MotionPlanRequest that plan() would send."""
-        if self._kind == _JOINTS:
+        if self._kind == JOINTS:
             goals = [requests.joint_goal(self._group.joints, self._joint_target.moved(),
                                          self.get_goal_joint_tolerance())]
         else:
@@ -435,7 +245,7 @@ class MoveGroupCommander(Tunable):
         code = result.error_code.val
         if code != MoveItErrorCodes.SUCCESS:
             rospy.logwarn("%s of group '%s' failed: %s (%s)", action, self._group.name, text or "no reason given",
-                          _CODES.get(code, code))
+                          code_name(code))
         return result
 
     def compute_cartesian_path(self, waypoints, eef_step, jump_threshold=0.0, avoid_collisions=True,
@@ -459,7 +269,7 @@ class MoveGroupCommander(Tunable):
         answer = self._connection.call("compute_cartesian_path", **fields)
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
             rospy.logwarn("no Cartesian path of group '%s': %s", self._group.name,
-                          _CODES.get(answer.error_code.val, answer.error_code.val))
+                          code_name(answer.error_code.val))
             return RobotTrajectory(), -1.0
         return answer.solution, answer.fraction
 

@@ -10,6 +10,7 @@ from moveit_msgs.msg import (
     JointConstraint,
     MotionPlanRequest,
     MoveGroupGoal,
+    MoveItErrorCodes,
     OrientationConstraint,
     PickupGoal,
     PlaceGoal,
@@ -22,14 +23,21 @@ from shape_msgs.msg import SolidPrimitive
 
 from .exception import MoveItCommanderException
 
-#: Kinds of goal of a pose: what of it counts.
+#: Kinds of goal: joints, or a pose and what of it counts.
+JOINTS = "joints"
 POSE, POSITION, ORIENTATION = "pose", "position", "orientation"
+_CODES = {value: name for name, value in vars(MoveItErrorCodes).items() if name.isupper() and isinstance(value, int)}
 #: How far a hand comes and goes where only a pose to place at is known: wished for, and at least [m].
 _PLACE_DISTANCE_M, _PLACE_MIN_DISTANCE_M = 0.2, 0.1
 
 
+def code_name(code):
+    """The name of one of MoveItErrorCodes, or the number where it has none."""
+    return _CODES.get(code, code)
+
+
 @dataclass
-class Settings:
+class RequestSettings:
     """What a commander is set to. Lengths in m, angles in rad, times in s; scaling 0 to 1."""
 
     planning_time: float = 5.0

@@ -4,14 +4,14 @@ import rospy
 from moveit_msgs.msg import Constraints, TrajectoryConstraints
 
 from .exception import MoveItCommanderException
-from .requests import Settings
+from .requests import RequestSettings
 
 
 class Tunable:
     """Something with settings for planning. Angles in rad, positions in m, times in s."""
 
     def __init__(self, settings=None):
-        self._settings = settings or Settings()
+        self._settings = settings or RequestSettings()
 
     def get_goal_tolerance(self):
         """Return the tolerances of joints, position and orientation."""
