@@ -14,6 +14,7 @@ from .damping import JointDamping
 from .errors import BulletSimError, within
 from .pose import Pose
 from .quiet_pybullet import pybullet
+from .state_watch import Fault, out_of_bounds
 
 # Bullet's joint motor reaches its target as velocity = gain * error / time step. With 20 solver iterations a gain of
 # 0.5 holds Baxter's arms within 5e-5 rad for 0.11 ms a step; the default of 0.1 sags by 2.4e-4 rad.
@@ -31,13 +32,6 @@ _LIGHT = 1e-20  # of efforts, which have no bound
 # most 0.01 beyond.
 _QUICK = 5.0
 
-# Bounds of what Model.read_joints returns. Efforts only need to be finite.
-_OF_JOINTS = (
-    bounds.JOINT_POSITION,
-    bounds.TURN_RATE,
-    bounds.Bound(-1e100, 1e100, "N or N m", "what a drive has given, which is bounded by itself"),
-)
-
 # Largest force of the gear between coupled joints [N, Nm]: more than any drive of a finger.
 _GEAR_FORCE = 1000.0
 
@@ -54,13 +48,6 @@ class Contact(NamedTuple):
     distance: float  # negative when the shapes overlap
     force: float  # along the normal, in the last step
     friction: tuple  # force (3,) on a, across the normal, in the last step [N]
-
-
-class Fault(NamedTuple):
-    """An impossible state."""
-
-    text: str  # which value is out of its bound
-    is_finite: bool
 
 
 class Model(Body):
@@ -372,7 +359,7 @@ class Model(Body):
             quick = velocity @ velocity
             total += joints @ joints + quick + _LIGHT * (effort @ effort)
         if not total <= _SURELY_FINE:
-            found = self._fault(base, self.read_joints())
+            found = out_of_bounds(self.merged.root, self.joint_names, base, self.read_joints())
             if found:
                 return Fault(found, math.isfinite(total))
         if self._all and quick > _QUICK * _QUICK:
@@ -396,17 +383,6 @@ class Model(Body):
         )
         self._reading = None
         return self.read_joints()[0]
-
-    def _fault(self, base, readings):
-        try:
-            within(bounds.POSITION, base[0], "the position of link '%s'" % self.merged.root)
-            within(bounds.POSITION, base[1], "the orientation of link '%s'" % self.merged.root)
-            for values, bound, what in zip(readings, _OF_JOINTS, ("position", "velocity", "effort"), strict=True):
-                for name, value in zip(self.joint_names, values.tolist(), strict=True):
-                    within(bound, value, "the %s of joint '%s'" % (what, name))
-        except BulletSimError as error:
-            return str(error)
-        return ""
 
     def motion(self):
         """Return the state that :meth:`take_body` needs to continue the present motion."""

@@ -1,5 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """After each step, restores models with an impossible state, before anything reads it."""
+from typing import NamedTuple
+
+from urdf_model import bounds
+
+from .errors import BulletSimError, within
+
+# Bounds of what Model.read_joints returns. Efforts only need to be finite.
+_OF_JOINTS = (
+    bounds.JOINT_POSITION,
+    bounds.TURN_RATE,
+    bounds.Bound(-1e100, 1e100, "N or N m", "what a drive has given, which is bounded by itself"),
+)
 
 # Fewest steps between two log lines about one model.
 _QUIET_STEPS = 5000
@@ -7,6 +19,30 @@ _QUIET_STEPS = 5000
 # That is enough: when a NaN is found, all bodies are checked in the same step.
 _ASLEEP_STEPS = 50
 _TURNS = 50
+
+
+class Fault(NamedTuple):
+    """An impossible state."""
+
+    text: str  # which value is out of its bound
+    is_finite: bool
+
+
+def out_of_bounds(root, joint_names, base, readings):
+    """Return which value of a model is out of its bound, or "".
+
+    base: (position (3,), quaternion (4,)) of the link ``root``; readings: position, velocity and effort of the joints
+    ``joint_names``, (n,) each.
+    """
+    try:
+        within(bounds.POSITION, base[0], "the position of link '%s'" % root)
+        within(bounds.POSITION, base[1], "the orientation of link '%s'" % root)
+        for values, bound, what in zip(readings, _OF_JOINTS, ("position", "velocity", "effort"), strict=True):
+            for name, value in zip(joint_names, values.tolist(), strict=True):
+                within(bound, value, "the %s of joint '%s'" % (what, name))
+    except BulletSimError as error:
+        return str(error)
+    return ""
 
 
 class StateWatch:
