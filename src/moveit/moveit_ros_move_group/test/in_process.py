@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """move_group without ROS around it: the node's own code, called directly; what it offers is kept in dictionaries."""
+import contextlib
 import threading
 from types import SimpleNamespace
 
@@ -75,6 +76,23 @@ class Node:
         if endpoint in self.servers:
             return self.servers[endpoint].ask(message)
         return (self.services.get(endpoint) or self.topics[endpoint])(message)
+
+    @contextlib.contextmanager
+    def hearing(self, topic, make):
+        """Fifty times a second the node hears on a topic what make() returns."""
+        done = threading.Event()
+
+        def say():
+            while not done.wait(0.02):
+                self.topics[topic](make())
+
+        thread = threading.Thread(target=say, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
 
     def told(self, topic):
         return [message for name, message in self.published if name == topic]

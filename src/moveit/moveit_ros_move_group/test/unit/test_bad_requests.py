@@ -35,17 +35,8 @@ def empty(node):
 @pytest.fixture(scope="module", autouse=True)
 def joint_states(node):
     """The arm stands still, and says so."""
-    done = threading.Event()
-
-    def say():
-        while not done.wait(0.02):
-            node.topics["joint_states"](joint_state())
-
-    thread = threading.Thread(target=say, daemon=True)
-    thread.start()
-    yield
-    done.set()
-    thread.join()
+    with node.hearing("joint_states", joint_state):
+        yield
 
 
 def failures(node):

@@ -35,17 +35,8 @@ def node():
 @pytest.fixture
 def standing(node):
     """The arm stands at FREE, and says so."""
-    done = threading.Event()
-
-    def say():
-        while not done.wait(0.02):
-            node.topics["joint_states"](joint_state())
-
-    thread = threading.Thread(target=say, daemon=True)
-    thread.start()
-    yield
-    done.set()
-    thread.join()
+    with node.hearing("joint_states", joint_state):
+        yield
 
 
 @pytest.fixture(autouse=True)
