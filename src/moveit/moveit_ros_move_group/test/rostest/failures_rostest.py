@@ -5,7 +5,7 @@ import sys
 import unittest
 from pathlib import Path
 
-import actionlib
+import clients
 import rospy
 from geometry_msgs.msg import Quaternion
 from motion_planning_msgs.msg import Failure
@@ -37,15 +37,11 @@ LAST_LIMIT = 3.1416
 class FailuresTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.move = actionlib.SimpleActionClient("move_group", MoveGroupAction)
-        cls.execute = actionlib.SimpleActionClient("execute_trajectory", ExecuteTrajectoryAction)
-        for client in (cls.move, cls.execute):
-            assert client.wait_for_server(rospy.Duration(TIMEOUT_S)), "move_group is not there"
-        cls.services = {name: rospy.ServiceProxy(name, kind) for name, kind in (
-            ("apply_planning_scene", ApplyPlanningScene), ("compute_cartesian_path", GetCartesianPath),
-            ("compute_fk", GetPositionFK))}
-        for name in cls.services:
-            rospy.wait_for_service(name, TIMEOUT_S)
+        cls.move = clients.action("move_group", MoveGroupAction)
+        cls.execute = clients.action("execute_trajectory", ExecuteTrajectoryAction)
+        cls.services = clients.services(
+            apply_planning_scene=ApplyPlanningScene, compute_cartesian_path=GetCartesianPath,
+            compute_fk=GetPositionFK)
         cls.told = []
         cls.subscriber = rospy.Subscriber("/move_group/failures", Failure, cls.told.append, queue_size=100)
         cls.robot = Robot("manipulator", JOINTS, (), FREE, ASIDE, "tool0", (), "base_link")

@@ -4,7 +4,7 @@
 import time
 import unittest
 
-import actionlib
+import clients
 import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus
@@ -53,13 +53,9 @@ def box(name, position, size):
 class FakeControllersTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.move = actionlib.SimpleActionClient("move_group", MoveGroupAction)
-        assert cls.move.wait_for_server(rospy.Duration(TIMEOUT_S)), "move_group is not there"
-        cls.services = {name: rospy.ServiceProxy(name, kind) for name, kind in (
-            ("apply_planning_scene", ApplyPlanningScene), ("get_planning_scene", GetPlanningScene),
-            ("compute_fk", GetPositionFK))}
-        for name in cls.services:
-            rospy.wait_for_service(name, TIMEOUT_S)
+        cls.move = clients.action("move_group", MoveGroupAction)
+        cls.services = clients.services(
+            apply_planning_scene=ApplyPlanningScene, get_planning_scene=GetPlanningScene, compute_fk=GetPositionFK)
         cls.feedback = []
         cls.event = rospy.Publisher("trajectory_execution_event", String, queue_size=1)
 

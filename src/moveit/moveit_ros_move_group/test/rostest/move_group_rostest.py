@@ -3,7 +3,7 @@
 """move_group with a simulated arm, asked as MoveIt's clients ask: by messages."""
 import unittest
 
-import actionlib
+import clients
 import numpy as np
 import rospy
 from actionlib_msgs.msg import GoalStatus
@@ -88,17 +88,13 @@ def box(name, position, size):
 class MoveGroupTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.move = actionlib.SimpleActionClient("move_group", MoveGroupAction)
-        cls.execute = actionlib.SimpleActionClient("execute_trajectory", ExecuteTrajectoryAction)
-        for client in (cls.move, cls.execute):
-            assert client.wait_for_server(rospy.Duration(TIMEOUT_S)), "move_group is not there"
-        cls.services = {name: rospy.ServiceProxy(name, kind) for name, kind in (
-            ("plan_kinematic_path", GetMotionPlan), ("compute_ik", GetPositionIK), ("compute_fk", GetPositionFK),
-            ("compute_cartesian_path", GetCartesianPath), ("check_state_validity", GetStateValidity),
-            ("get_planning_scene", GetPlanningScene), ("apply_planning_scene", ApplyPlanningScene),
-            ("query_planner_interface", QueryPlannerInterfaces))}
-        for name in cls.services:
-            rospy.wait_for_service(name, TIMEOUT_S)
+        cls.move = clients.action("move_group", MoveGroupAction)
+        cls.execute = clients.action("execute_trajectory", ExecuteTrajectoryAction)
+        cls.services = clients.services(
+            plan_kinematic_path=GetMotionPlan, compute_ik=GetPositionIK, compute_fk=GetPositionFK,
+            compute_cartesian_path=GetCartesianPath, check_state_validity=GetStateValidity,
+            get_planning_scene=GetPlanningScene, apply_planning_scene=ApplyPlanningScene,
+            query_planner_interface=QueryPlannerInterfaces)
         cls.failures = []
         cls.subscriber = rospy.Subscriber("/move_group/failures", Failure, cls.failures.append, queue_size=100)
 
