@@ -9,6 +9,8 @@ import time
 import numpy as np
 from labs import Lab
 
+from lab_testing.waiting import wait_until
+
 CALLS, CANCELS = 200, 10
 FREE, ASIDE = (0.0, 0.3, 0.4, 0.0, 0.6, 0.0), (1.2, 0.3, 0.4, 0.0, 0.6, 0.5)
 JOINTS = ["joint_%d" % number for number in range(1, 7)]
@@ -144,9 +146,7 @@ def cancelled(count):
         """From cancelling a goal to its end [ms]; it is cancelled so long after its feedback names the phase."""
         states = []
         client.send_goal(goal, feedback_cb=lambda message: states.append(message.state))
-        deadline = time.monotonic() + LIMIT_S
-        while phase not in states and time.monotonic() < deadline:
-            time.sleep(0.001)
+        wait_until(lambda: phase in states, phase, LIMIT_S, 0.001)
         time.sleep(wait_s)
         begin = time.perf_counter()
         client.cancel_goal()

@@ -3,12 +3,12 @@
 import re
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
 from moveit_msgs.msg import MoveItErrorCodes
 
+from lab_testing.waiting import wait_until
 from motion_planning.scene import Scene
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -114,10 +114,7 @@ def test_joint_states_come_in_while_a_large_scene_is_read(node):
     thread.start()
     assert reading.wait(60.0)
     before = node.context.monitor.joint_update()[0]
-    deadline = time.monotonic() + 60.0
-    while node.context.monitor.joint_update()[0] < before + 3 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert node.context.monitor.joint_update()[0] >= before + 3
+    wait_until(lambda: node.context.monitor.joint_update()[0] >= before + 3, "three joint states", 60.0)
     assert node.context.monitor.scene() is not None
     go_on.set()
     thread.join(60.0)

@@ -11,6 +11,7 @@ from control_msgs.msg import FollowJointTrajectoryResult
 from moveit_msgs.msg import MoveItErrorCodes, RobotTrajectory
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from lab_testing.waiting import wait_until
 from moveit_ros_move_group import handles
 from moveit_ros_move_group.controllers import read_list
 from moveit_ros_move_group.execution import ExecutionSettings, Executor
@@ -110,10 +111,7 @@ class Lab:
 
 
 def until(condition):
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to be"
-        time.sleep(0.001)
+    wait_until(condition, timeout_s=PATIENCE_S, interval_s=0.001)
 
 
 def test_each_controller_gets_its_joints():

@@ -12,6 +12,7 @@ from moveit_msgs.msg import CollisionObject, PlanningScene
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 
+from lab_testing.waiting import wait_until
 from motion_planning.model import PlanningModel
 from moveit_ros_move_group import monitor as module
 from moveit_ros_move_group.monitor import SceneMonitor
@@ -69,10 +70,7 @@ def scene(*objects):
 
 
 def until(condition):
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to be"
-        time.sleep(0.001)
+    wait_until(condition, timeout_s=PATIENCE_S, interval_s=0.001)
 
 
 def test_joint_states_come_in_while_a_scene_waits_for_a_frame(make, monkeypatch):

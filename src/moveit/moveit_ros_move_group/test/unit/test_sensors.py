@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A camera's clouds become the scene's octomap, in messages that octomap itself can read."""
+import functools
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +12,7 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2, PointField
 from std_msgs.msg import Header
 
+from lab_testing.waiting import wait_until
 from motion_planning.shapes import Octree
 from moveit_ros_move_group.convert.clouds import cloud_of, points_of, points_of_depth
 from moveit_ros_move_group.convert.geometry import MessageError
@@ -23,6 +24,7 @@ from in_process import Node  # noqa: E402
 
 # As long as a slow machine may need: what is tested is the answer.
 PATIENCE_S = 60.0
+wait_for = functools.partial(wait_until, timeout_s=PATIENCE_S)
 CLOUD = {"sensor_plugin": "occupancy_map_monitor/PointCloudOctomapUpdater", "point_cloud_topic": "/eye/points",
          "max_range": 3.0, "padding_offset": 0.02, "filtered_cloud_topic": "filtered_cloud"}
 # A box of 0.1 m on a post that nothing stands for.
@@ -36,13 +38,6 @@ SRDF = """<robot name="post"><virtual_joint name="world_joint" type="fixed" pare
 
 def cloud(points, frame="base", stamp=10.0):
     return cloud_of(np.asarray(points, dtype=np.float32), Header(stamp=rospy.Time.from_sec(stamp), frame_id=frame))
-
-
-def wait_for(condition, what):
-    deadline = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < deadline, "no " + what
-        time.sleep(0.005)
 
 
 # -- messages -------------------------------------------------------------------------------------------------------
