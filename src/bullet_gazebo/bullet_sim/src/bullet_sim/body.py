@@ -21,23 +21,24 @@ class Body:
     #: For how many checks of ``StateWatch`` the base has not moved.
     still_for = 0
 
-    def __init__(self, client, world, blueprint, body, root_offset):
-        """``client``: PyBullet's; ``blueprint``: :class:`bullet_sim.builder.Blueprint`; ``body``, ``root_offset``: what
-        ``builder.build`` returned for it."""
+    def __init__(self, client, world, blueprint, parts, root_offset):
+        """``client``: PyBullet's; ``blueprint``: :class:`bullet_sim.builder.Blueprint`; ``parts``, ``root_offset``:
+        what ``builder.build`` returned for it."""
         #: The blueprint that the body is made from; its collision pairs may change.
         self.blueprint = blueprint
         self.name = blueprint.name
         self.robot = blueprint.robot
         self.merged = merged = blueprint.merged
         self.static = blueprint.static
-        self.body = body
+        #: Its multibodies.
+        self.parts = parts
         self._client = client
         self._world = world
         self._root_offset = root_offset
         self._root_offset_inverse = inverse(root_offset)
         self._root_is_centre = bool(np.array_equal(root_offset, np.eye(4)))
         # Pose of a fixed root, cached so that a tick need not ask for it.
-        self._base_quaternion = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)[1]
+        self._base_quaternion = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=client)[1]
         self._link_index = {merged.root: BASE, **{joint.child: i for i, joint in enumerate(merged.joints.values())}}
         self._link_names = {index: link for link, index in self._link_index.items()}
         self._late_twist = None
@@ -45,12 +46,16 @@ class Body:
         self._pushes, self._pushed_at = [], -1  # of the step after `_pushed_at` steps
         self._pairs = ()
         self._firm = set()  # indices of links with friction that does not creep
-        if blueprint.self_collision:
-            self.set_self_collision_pairs(())
+        self.set_self_collision_pairs(())
         self._weightless = {}  # body's name -> its mass
         for link in merged.links.values():
             if not link.gravity:
                 self.set_weight(link.name, False)
+
+    @property
+    def body(self):
+        """PyBullet's number of the multibody that has the root's shape; the only one of most models."""
+        return self.parts.bodies[0]
 
     # -- links --------------------------------------------------------------------------------------------------
 
@@ -78,11 +83,11 @@ class Body:
     def set_base_pose(self, pose):
         """Put the model's frame at ``pose``, at rest if it is free; joints keep their positions."""
         centre = Pose.from_matrix(pose.checked().matrix() @ self._root_offset)
-        pybullet.resetBasePositionAndOrientation(
-            self.body, centre.position, centre.quaternion, physicsClientId=self._client
-        )
+        self.parts.set_base(centre.position, centre.quaternion)
         self._base_quaternion = centre.quaternion
         self._late_twist = None
+        if not self.static:
+            self._world.note_placed(self)
         self._world.wake_all()
 
     def base_twist(self):
@@ -131,7 +136,7 @@ class Body:
             )
             self._world.note_touched(self)
 
-    def feel_again(self):
+    def reapply_wrenches(self):
         """For World, after a step: apply again what was applied to the model while it slept.
 
         Bullet wakes a body at the end of a step, so the body ignores forces in that step: its velocity is then exactly
@@ -156,7 +161,8 @@ class Body:
         """
         total = np.zeros(3)
         index = self._link_index[self._frame(link).link]
-        points = pybullet.getContactPoints(bodyA=self.body, linkIndexA=index, physicsClientId=self._client)
+        body, local = self.parts.places[index]
+        points = pybullet.getContactPoints(bodyA=body, linkIndexA=local, physicsClientId=self._client)
         for point in points or ():
             total += point[9] * np.array(point[7])
         return total
@@ -164,8 +170,14 @@ class Body:
     def grip_firmly(self, link):
         """Make friction at a link's body hold without creeping: by default it creeps by 0.3 mm/s under load."""
         index = self._link_index[self._frame(link).link]
-        pybullet.changeDynamics(self.body, index, frictionAnchor=1, physicsClientId=self._client)
+        pybullet.changeDynamics(*self.parts.places[index], frictionAnchor=1, physicsClientId=self._client)
         self._firm.add(index)
+
+    def soften(self, link, stiffness, damping):
+        """Make the surface of a link's body yield in contacts: stiffness [N/m], damping [N s/m]."""
+        index = self._link_index[self._frame(link).link]
+        pybullet.changeDynamics(*self.parts.places[index], contactStiffness=stiffness, contactDamping=damping,
+                                physicsClientId=self._client)
 
     def renew_contacts(self, link):
         """Forget the contacts of a link's body; the next step detects them again.
@@ -175,7 +187,7 @@ class Body:
         """
         index = self._link_index[self._frame(link).link]
         # Every body is in group 1 and collides with all; setting this again makes Bullet drop the body's contacts.
-        pybullet.setCollisionFilterGroupMask(self.body, index, 1, -1, physicsClientId=self._client)
+        pybullet.setCollisionFilterGroupMask(*self.parts.places[index], 1, -1, physicsClientId=self._client)
 
     # -- mass properties, of bodies: links with what is fixed to them ---------------------------------------------
 
@@ -212,7 +224,8 @@ class Body:
         rotation = self.merged.frames[body].offset[:3, :3]
         inertia = rotation @ inertia @ rotation.T
         arguments = {"physicsClientId": self._client}
-        info = pybullet.getDynamicsInfo(self.body, index, **arguments)
+        place = self.parts.places[index]
+        info = pybullet.getDynamicsInfo(*place, **arguments)
         axes = Pose((0.0, 0.0, 0.0), info[4]).matrix()[:3, :3]
         turned = axes.T @ inertia @ axes
         moments = np.diag(turned)
@@ -225,9 +238,9 @@ class Body:
             raise BulletSimError(
                 "the principal axes of link '%s' cannot be turned; give an inertia with the present axes" % body
             )
-        pybullet.changeDynamics(self.body, index, mass=mass, **arguments)
+        pybullet.changeDynamics(*place, mass=mass, **arguments)
         # After the mass, which makes PyBullet guess an inertia of its own.
-        pybullet.changeDynamics(self.body, index, localInertiaDiagonal=moments.tolist(), **arguments)
+        pybullet.changeDynamics(*place, localInertiaDiagonal=moments.tolist(), **arguments)
         link.inertial = Inertial(mass, link.inertial.centre, inertia)
         if body in self._weightless:
             self._weightless[body] = mass
@@ -265,21 +278,25 @@ class Body:
             if a != b:
                 wanted.add((min(a, b), max(a, b)))
         self._pairs = tuple(sorted(wanted))
-        if not self.blueprint.self_collision:
-            if wanted:
-                self.blueprint = self.blueprint._replace(self_collision=True)
-                self._world.make_anew([self])
+        if wanted and not self.blueprint.self_collision:
+            self.blueprint = self.blueprint._replace(self_collision=True)
+            self._world.rebuild([self])
             return
+        if not self.blueprint.self_collision and len(self.parts.bodies) == 1:
+            return
+        places = self.parts.places
         links = sorted(self._link_names)
         for i, a in enumerate(links):
             for b in links[i + 1 :]:
                 pybullet.setCollisionFilterPair(
-                    self.body, self.body, a, b, int((a, b) in wanted), physicsClientId=self._client
+                    places[a].body, places[b].body, places[a].index, places[b].index, int((a, b) in wanted),
+                    physicsClientId=self._client
                 )
 
-    def link_name(self, index):
-        """Return the merged name of the link that PyBullet numbers ``index`` (-1 is the root)."""
-        return self._link_names[index]
+    def link_name(self, body, index):
+        """Return the merged name of the link that PyBullet numbers ``index`` (-1 is the root) in the multibody
+        ``body``."""
+        return self._link_names[self.parts.index(body, index)]
 
     def frame_of(self, motion):
         """For World: the pose of the model's frame in what ``Model.motion`` or ``Model.last_good`` returned."""
@@ -288,10 +305,9 @@ class Body:
     def _restore_collisions(self):
         """For Model: set the collision pairs and the firm friction again on a rebuilt body."""
         pairs = {frozenset((self._link_names[a], self._link_names[b])) for a, b in self._pairs}
-        if self.blueprint.self_collision:
-            self.set_self_collision_pairs([tuple(pair) for pair in pairs])
+        self.set_self_collision_pairs([tuple(pair) for pair in pairs])
         for index in self._firm:
-            pybullet.changeDynamics(self.body, index, frictionAnchor=1, physicsClientId=self._client)
+            pybullet.changeDynamics(*self.parts.places[index], frictionAnchor=1, physicsClientId=self._client)
 
     # -- inside -------------------------------------------------------------------------------------------------
 
@@ -321,7 +337,8 @@ class Body:
         if index == BASE:
             centre = Pose(*pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client))
             return centre.matrix() @ self._root_offset_inverse
-        state = pybullet.getLinkState(self.body, index, computeForwardKinematics=1, physicsClientId=self._client)
+        state = pybullet.getLinkState(*self.parts.places[index], computeForwardKinematics=1,
+                                      physicsClientId=self._client)
         return Pose(state[4], state[5]).matrix()
 
     def _twist(self, index, point):
@@ -330,17 +347,19 @@ class Body:
             linear, angular = map(np.array, pybullet.getBaseVelocity(self.body, physicsClientId=self._client))
             centre = np.array(pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)[0])
         else:
-            state = pybullet.getLinkState(self.body, index, computeLinkVelocity=1, physicsClientId=self._client)
+            state = pybullet.getLinkState(*self.parts.places[index], computeLinkVelocity=1,
+                                          physicsClientId=self._client)
             centre, linear, angular = np.array(state[0]), np.array(state[6]), np.array(state[7])
         return linear + np.cross(angular, point - centre), angular
 
     def _push(self, index, force, torque=(0.0, 0.0, 0.0), position=None):
+        place = self.parts.places[index]
         if position is None:
             if index == BASE:
                 position = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self._client)[0]
             else:
-                position = pybullet.getLinkState(self.body, index, physicsClientId=self._client)[0]
+                position = pybullet.getLinkState(*place, physicsClientId=self._client)[0]
         arguments = {"flags": pybullet.WORLD_FRAME, "physicsClientId": self._client}
-        pybullet.applyExternalForce(self.body, index, list(force), list(position), **arguments)
+        pybullet.applyExternalForce(*place, list(force), list(position), **arguments)
         if any(torque):
-            pybullet.applyExternalTorque(self.body, index, list(torque), **arguments)
+            pybullet.applyExternalTorque(*place, list(torque), **arguments)

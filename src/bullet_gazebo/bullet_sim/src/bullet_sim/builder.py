@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Turn a merged robot into a PyBullet multibody.
+"""Turn a merged robot into PyBullet multibodies, mostly one (:mod:`bullet_sim.parts`).
 
-The body is made with ``createMultiBody`` instead of ``loadURDF``: no temporary file, collision shapes shared between
+A body is made with ``createMultiBody`` instead of ``loadURDF``: no temporary file, collision shapes shared between
 copies, the inertia exactly as merged, and 10 ms where loading the same robot from a file takes 60.
 """
 
@@ -12,6 +12,7 @@ import numpy as np
 from urdf_model import MergedRobot, Robot, Surface, bounds
 from urdf_model.transforms import quaternion_from_matrix, rigid
 
+from .parts import Parts, limbs
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import NO_SHAPE, principal_axes
@@ -25,6 +26,8 @@ _JOINT_TYPES = {
 _ASSUMED_MASS_KG = 1e-3
 # Gazebo's defaults of a collision without <surface>: friction, and the damping of a contact [N s/m].
 _DEFAULT_FRICTION = 1.0
+# Largest friction of a wheel, a link on a continuous joint. Bullet takes no more than this.
+_WHEEL_FRICTION = 10.0
 _DEFAULT_DAMPING = 1.0
 # Stiffer contacts than this are left rigid; 1 kg then sinks in by 0.1 um.
 _RIGID_N_PER_M = 1e8
@@ -34,7 +37,8 @@ class Blueprint(NamedTuple):
     """The data that a model is built from, and rebuilt from.
 
     ``merged``: the urdf_model.MergedRobot of ``robot``; ``static`` fixes its root in the world; ``mesh_cuts``: as for
-    ``World.spawn``; ``self_collision``: whether any two of its links can collide with each other.
+    ``World.spawn``; ``self_collision``: whether any two of its links can collide with each other; ``in_limbs``: whether
+    its limbs may be multibodies of their own.
     """
 
     name: str
@@ -43,83 +47,104 @@ class Blueprint(NamedTuple):
     static: bool
     mesh_cuts: dict | None
     self_collision: bool
+    in_limbs: bool = True
 
 
 def build(client, blueprint, pose, shapes, warn):
-    """Create the multibody of a :class:`Blueprint` with its root body at ``pose``, its shapes from a ShapeStore.
+    """Create the multibodies of a :class:`Blueprint` with its root body at ``pose``, its shapes from a ShapeStore.
 
-    Returns (body id, inertial offset (4, 4) of the root link). ``warn(text)`` is called for missing masses.
+    Returns (Parts, inertial offset (4, 4) of the root link). ``warn(text)`` is called for missing masses.
     """
-    merged, static, mesh_cuts = blueprint.merged, blueprint.static, blueprint.mesh_cuts
+    merged, static = blueprint.merged, blueprint.static
     root = merged.links[merged.root]
-    body_of = {joint.child: joint for joint in merged.joints.values()}
-    order = {merged.root: 0, **{joint.child: i + 1 for i, joint in enumerate(merged.joints.values())}}
-
     if static:
         # A root that cannot move needs no inertia, and Model.inverse_dynamics wants its axes to be the link's own.
         root_mass, root_moments, root_offset = 0.0, np.zeros(3), np.eye(4)
     else:
         root_mass, root_moments, root_offset = _inertial(root, warn)
+    joints, start = limbs(merged, static and blueprint.in_limbs), Pose.from_matrix(pose.matrix())
+    base = {
+        "baseMass": root_mass,
+        "basePosition": start.position,
+        "baseOrientation": start.quaternion,
+        "baseInertialFramePosition": root_offset[:3, 3].tolist(),
+        "baseInertialFrameOrientation": quaternion_from_matrix(root_offset).tolist(),
+        # Self-collision must be enabled at creation; Model then keeps only the requested pairs.
+        "flags": (pybullet.URDF_USE_SELF_COLLISION if blueprint.self_collision else 0)
+        | (0 if static else pybullet.URDF_ENABLE_SLEEPING),
+    }
+    # The first has the root's shape.
+    root_shapes = [shapes.compound(root.collisions, static, blueprint.mesh_cuts)] + [NO_SHAPE] * (len(joints) - 1)
+    bodies = [_build_limb(client, blueprint, numbers, {**base, "baseCollisionShapeIndex": shape}, shapes, warn)
+              for numbers, shape in zip(joints, root_shapes, strict=True)]
+    if not static:
+        pybullet.changeDynamics(bodies[0], -1, localInertiaDiagonal=root_moments.tolist(), physicsClientId=client)
+    pybullet.changeDynamics(bodies[0], -1, **_contact(root.surface, 1.0), physicsClientId=client)
+    return Parts(client, bodies, joints), root_offset
+
+
+def _build_limb(client, blueprint, numbers, base, shapes, warn):
+    """Create a multibody of the joints ``numbers`` on the root; ``base``: createMultiBody's arguments for the root.
+
+    Returns PyBullet's number of it.
+    """
+    merged, joints = blueprint.merged, list(blueprint.merged.joints.values())
     columns = {key: [] for key in _COLUMNS}
-    moments = []
-    for joint in merged.joints.values():
+    moments, order = [], {merged.root: 0}
+    for local, number in enumerate(numbers):
+        joint = joints[number]
+        order[joint.child] = local + 1
         link = merged.links[joint.child]
         mass, principal, offset = _inertial(link, warn)
         moments.append(principal)
         columns["linkMasses"].append(mass)
-        columns["linkCollisionShapeIndices"].append(shapes.compound(link.collisions, False, mesh_cuts))
+        columns["linkCollisionShapeIndices"].append(
+            shapes.compound(link.collisions, False, blueprint.mesh_cuts, exact=is_wheel(joint)))
         columns["linkVisualShapeIndices"].append(NO_SHAPE)
         columns["linkPositions"].append(joint.origin[:3, 3].tolist())
         columns["linkOrientations"].append(quaternion_from_matrix(joint.origin).tolist())
         columns["linkInertialFramePositions"].append(offset[:3, 3].tolist())
         columns["linkInertialFrameOrientations"].append(quaternion_from_matrix(offset).tolist())
-        columns["linkParentIndices"].append(order[body_of[joint.child].parent])
+        columns["linkParentIndices"].append(joint.parent)
         columns["linkJointTypes"].append(_JOINT_TYPES[joint.type])
         columns["linkJointAxis"].append(joint.axis.tolist())
+    columns["linkParentIndices"] = [order[parent] for parent in columns["linkParentIndices"]]
 
-    start = Pose.from_matrix(pose.matrix())
-    body = pybullet.createMultiBody(
-        baseMass=root_mass,
-        baseCollisionShapeIndex=shapes.compound(root.collisions, static, mesh_cuts),
-        basePosition=start.position,
-        baseOrientation=start.quaternion,
-        baseInertialFramePosition=root_offset[:3, 3].tolist(),
-        baseInertialFrameOrientation=quaternion_from_matrix(root_offset).tolist(),
-        # Self-collision must be enabled at creation; Model then keeps only the requested pairs.
-        flags=(pybullet.URDF_USE_SELF_COLLISION if blueprint.self_collision else 0)
-        | (0 if static else pybullet.URDF_ENABLE_SLEEPING),
-        physicsClientId=client,
-        **columns,
-    )
-    # PyBullet has air drag by default; a URDF has none. The inertia goes in a call of its own: given
+    body = pybullet.createMultiBody(**base, **columns, physicsClientId=client)
+    # PyBullet has air drag by default; a URDF has none. The inertia goes in a separate call: given
     # together with a drag, PyBullet 3.2.7 ignores it.
     calm = {"linearDamping": 0.0, "angularDamping": 0.0, "physicsClientId": client}
     pybullet.changeDynamics(body, -1, **calm)
-    if not static:
-        pybullet.changeDynamics(body, -1, localInertiaDiagonal=root_moments.tolist(), physicsClientId=client)
-    for index, joint in enumerate(merged.joints.values()):
-        pybullet.changeDynamics(body, index, **calm)
-        pybullet.changeDynamics(body, index, localInertiaDiagonal=moments[index].tolist(), physicsClientId=client)
+    for local, number in enumerate(numbers):
+        joint = joints[number]
+        pybullet.changeDynamics(body, local, **calm)
+        pybullet.changeDynamics(body, local, localInertiaDiagonal=moments[local].tolist(), physicsClientId=client)
         if joint.limit.lower is not None:
             pybullet.changeDynamics(
                 body,
-                index,
+                local,
                 jointLowerLimit=joint.limit.lower,
                 jointUpperLimit=joint.limit.upper,
                 physicsClientId=client,
             )
-    for name, index in order.items():
-        # The base is link -1 to PyBullet.
-        pybullet.changeDynamics(body, index - 1, **_contact(merged.links[name].surface), physicsClientId=client)
-    return body, root_offset
+        most = _WHEEL_FRICTION if is_wheel(joint) else 1.0
+        pybullet.changeDynamics(body, local, **_contact(merged.links[joint.child].surface, most),
+                                physicsClientId=client)
+    return body
 
 
-def _contact(surface):
+def is_wheel(joint):
+    """Whether the link behind a joint can be a wheel: its radius decides how far it goes, its friction how it pulls."""
+    return joint.type == "continuous"
+
+
+def _contact(surface, most):
     """Return changeDynamics' arguments for a urdf_model.Surface, or for a link without one."""
     surface = surface or Surface()
     # Bullet multiplies the two friction coefficients of a contact; Gazebo (ODE) takes the smaller one, and 1 by
-    # default. With coefficients clamped to 1, the product equals the smaller one whenever one of them is 1.
-    arguments = {"lateralFriction": _DEFAULT_FRICTION if surface.friction is None else min(surface.friction, 1.0)}
+    # default. With coefficients clamped to 1, the product equals the smaller one whenever one of them is 1. Wheels may
+    # have more, as they need it on Gazebo's floors of 100.
+    arguments = {"lateralFriction": _DEFAULT_FRICTION if surface.friction is None else min(surface.friction, most)}
     if surface.restitution is not None:
         arguments["restitution"] = min(surface.restitution, 1.0)  # beyond 1 it would gain energy at each bounce
     if surface.stiffness is not None and surface.stiffness < _RIGID_N_PER_M:

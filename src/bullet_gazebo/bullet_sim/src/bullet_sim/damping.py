@@ -1,14 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Viscous damping of a model's joints, bounded where Bullet's integration would become unstable."""
+"""Viscous damping of a model's joints, bounded where Bullet's integration would become unstable.
+
+It is not bounded where a description asks for implicit damping (Gazebo's ``implicitSpringDamper``). An implicit step,
+(inertia + time step * damping) * change of velocity = time step * (effort - damping * velocity), is an explicit one of
+a joint with more inertia: where the damping is too large for the links' own inertia, they get it.
+"""
 
 import math
 
 import numpy as np
 
+from .mass_matrix import mass_matrix_of
 from .quiet_pybullet import pybullet
 
 # Bullet applies joint damping explicitly: beyond inertia / time step it adds energy. Half of that is safe.
 _MARGIN = 0.5
+# Inertia of a link with implicit damping, in units of time step * damping. Links of a chain turn against each other, so
+# it takes four times as much as one joint alone.
+_OF_A_CHAIN = 4.0
 
 
 class JointDamping:
@@ -22,19 +31,27 @@ class JointDamping:
         #: (n,) as it acts [Nm s/rad or N s/m].
         self.values = np.zeros(len(model.joint_names))
         self._wanted = {}
-        self._bounds = None
+        self._felt = None
+        # A sliding link would become heavier.
+        self._implicit = {index for index, joint in enumerate(model.merged.joints.values())
+                          if joint.implicit_damping and joint.type != "prismatic"}
+        self._added = np.zeros(len(model.joint_names))  # to the moments of inertia of the joints' links [kg m^2]
         for index, damping in wanted.items():
             self.set(index, damping)
 
     def set(self, index, damping):
         """Set the damping of joint ``index``, as far as it is stable."""
         self._wanted[index] = damping
-        self.values[index] = min(damping, self._stable()[index])
+        bound = self._stable()[index]
+        if index in self._implicit:
+            self._add_inertia(index, _OF_A_CHAIN * self._time_step_s * damping if damping > bound else 0.0)
+            bound = math.inf
+        self.values[index] = min(damping, bound)
         self._tell(index)
 
     def step_changed(self, time_step_s):
         """Adapt the bounds to a new length of a tick [s]."""
-        self._time_step_s, self._bounds = time_step_s, None
+        self._time_step_s = time_step_s
         for index, damping in self._wanted.items():
             self.set(index, damping)
 
@@ -42,17 +59,44 @@ class JointDamping:
         """Set all damping again, on a rebuilt multibody."""
         for index in range(len(self.values)):
             self._tell(index)
+            self.restore_inertia(index)
+
+    def restore_inertia(self, index):
+        """Add what implicit damping takes to the inertia of the link behind joint ``index``, which was set again."""
+        added, self._added[index] = self._added[index], 0.0
+        self._add_inertia(index, added)
+
+    def _add_inertia(self, index, added):
+        change, self._added[index] = added - self._added[index], added
+        if change:
+            place = self._model.parts.places[index]
+            moments = pybullet.getDynamicsInfo(*place, physicsClientId=self._client)[2]
+            pybullet.changeDynamics(*place, localInertiaDiagonal=[m + change for m in moments],
+                                    physicsClientId=self._client)
 
     def _tell(self, index):
-        pybullet.changeDynamics(self._model.body, index, jointDamping=self.values[index], physicsClientId=self._client)
+        pybullet.changeDynamics(*self._model.parts.places[index], jointDamping=self.values[index],
+                                physicsClientId=self._client)
+
+    def _inertia(self):
+        """(n, n) The joint-space inertia at the present position, with the base held fixed."""
+        if self._model.static:
+            try:
+                return self._model.mass_matrix(self._model.read_joints()[0])
+            except (pybullet.error, SystemError):
+                # Bullet refuses a link with a moment larger than the sum of the others, which many descriptions have.
+                pass
+        return mass_matrix_of(self._model)
 
     def _stable(self):
-        """(n,) The largest damping of each joint that is certainly stable at the present position."""
+        """(n,) The largest damping of each joint that is certainly stable at the position of the first call."""
         model = self._model
-        if self._bounds is None:
-            felt = np.full(len(self.values), math.inf)
-            if model.static:
+        if self._felt is None:
+            self._felt = np.full(len(self.values), math.inf)
+            if model.static or self._implicit:
                 # The inertia that a joint feels when the others are free to give way is 1 / (M^-1)_ii.
-                felt = 1.0 / np.diag(np.linalg.inv(model.mass_matrix(model.read_joints()[0])))
-            self._bounds = _MARGIN * felt / self._time_step_s
-        return self._bounds
+                self._felt = 1.0 / np.diag(np.linalg.inv(self._inertia()))
+        bounds = _MARGIN * self._felt / self._time_step_s
+        if not model.static:
+            bounds[[index not in self._implicit for index in range(len(bounds))]] = math.inf
+        return bounds

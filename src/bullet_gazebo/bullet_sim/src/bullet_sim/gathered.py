@@ -8,6 +8,7 @@ radius. As many of them as possible stay primitives.
 """
 
 import itertools
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,6 +83,21 @@ def _convex(part):
         top = np.array([0.0, 0.0, _less(geometry.length / 2.0)])
         return [np.concatenate([ring + top, ring - top])]
     return [_less(geometry.radius) * even_directions(_BALL_POINTS)]
+
+
+def without_margin(part):
+    """Return a Part of a mesh that is as large with the margin that Bullet adds as ``part`` is without; any other part
+    as it is."""
+    if part.hollow or not isinstance(part.geometry, Mesh):
+        return part
+    scale = np.asarray(part.geometry.scale, dtype=float)
+    points = np.concatenate(_convex(part))
+    low, high = points.min(axis=0), points.max(axis=0)
+    halves, middle = (high - low) / 2.0, (high + low) / 2.0
+    smaller = np.array([_less(half) / half if half > 0.0 else 1.0 for half in halves])
+    origin = part.origin.copy()
+    origin[:3, 3] += origin[:3, :3] @ ((1.0 - smaller) * middle)
+    return part._replace(geometry=replace(part.geometry, scale=tuple((smaller * scale).tolist())), origin=origin)
 
 
 def _less(half_m):

@@ -19,6 +19,9 @@ MOST_TRIANGLES = 2_000_000
 _MOST_BYTES_BESIDE = 10_000_000
 # The formats of Gazebo and rviz, and some more. No archives: their content may be endless.
 _FORMATS = ("dae", "stl", "obj", "ply", "off", "glb", "gltf")
+# Pictures whose brightness is a height.
+_HEIGHTS = ("png", "jpg", "jpeg")
+_MOST_HEIGHTS = 1025 * 1025  # rows of a power of two and one, as Gazebo wants them
 # Materials and buffers that a mesh may name. Textures are not drawn.
 _BESIDE = (".mtl", ".bin")
 
@@ -55,14 +58,17 @@ class _Beside:
 
 
 def load_scene(path):
-    """Return the trimesh.Scene in the file at ``path``. Raises MeshError, OSError, and what libraries raise."""
+    """Return the trimesh.Scene in the file at ``path``; a picture is a terrain of 1 x 1 x 1 m, with its brightness as
+    height. Raises MeshError, OSError, and what libraries raise."""
     import trimesh  # 0.1 s to import, and needed only the first time that a mesh is seen
 
     path = Path(path)
     kind = path.suffix[1:].lower()
-    if kind not in _FORMATS:
+    if kind not in _FORMATS + _HEIGHTS:
         raise MeshError("it is in the format '%s'; expected one of %s" % (kind, ", ".join(_FORMATS)))
     content = read_file(path, MOST_BYTES)
+    if kind in _HEIGHTS:
+        return trimesh.Scene(trimesh.Trimesh(*_terrain(_heights(content)), process=False))
     if kind == "dae":
         _refuse_entities(content)
     scene = trimesh.load(
@@ -83,6 +89,28 @@ def load_scene(path):
             if len(getattr(mesh, "faces", ())):
                 mesh.process()
     return scene
+
+
+def _heights(content):
+    """The heights (rows, columns) in a picture, 0 to 1: the brightest point is the highest."""
+    from PIL import Image
+
+    with Image.open(io.BytesIO(content)) as picture:
+        if not 4 <= picture.width * picture.height <= _MOST_HEIGHTS or min(picture.size) < 2:
+            raise MeshError("it has %d x %d heights; expected 2 x 2 to 1025 x 1025" % picture.size)
+        values = np.asarray(picture if picture.mode.startswith(("I", "F")) else picture.convert("L"), dtype=float)
+    return values / (values.max() or 1.0)
+
+
+def _terrain(heights):
+    """Corners (n, 3) and triangles (m, 3) of a square of side 1 about the origin, the first row of ``heights`` at its
+    side of greatest y."""
+    rows, columns = heights.shape
+    y, x = np.meshgrid(np.linspace(0.5, -0.5, rows), np.linspace(-0.5, 0.5, columns), indexing="ij")
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]))
+    return (np.stack([x.ravel(), y.ravel(), heights.ravel()], axis=1),
+            np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)]))
 
 
 def _refuse_entities(content):

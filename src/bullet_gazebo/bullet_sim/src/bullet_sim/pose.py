@@ -11,7 +11,7 @@ from urdf_model.transforms import matrix_from_quaternion, quaternion_from_matrix
 
 from .errors import BulletSimError, within
 
-# A larger norm is no rounding of a unit quaternion, and its square may overflow.
+# A larger norm is not a rounding of a unit quaternion, and its square may overflow.
 _LONGEST_QUATERNION = 1e6
 
 
@@ -31,7 +31,7 @@ class Pose(NamedTuple):
         return rigid(matrix_from_quaternion(self.quaternion), np.asarray(self.position, dtype=float))
 
     def checked(self):
-        """Return this pose with a normalised quaternion; raises BulletSimError when it is no pose in this world."""
+        """Return this pose with a normalised quaternion; raises BulletSimError when it is not a pose in this world."""
         if len(self.position) != 3 or len(self.quaternion) != 4:
             raise BulletSimError("a pose is 3 numbers of position and 4 of quaternion, found %s" % (self,))
         if not all(math.isfinite(v) for v in (*self.position, *self.quaternion)):

@@ -17,7 +17,7 @@ from urdf_model.files import kind_of
 from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 
 from .errors import BulletSimError
-from .gathered import Part, gathered
+from .gathered import Part, gathered, without_margin
 from .limited import MESHES, LimitError
 from .mesh_loading import MOST_BYTES, to_wavefront
 from .quiet_pybullet import pybullet
@@ -131,7 +131,7 @@ class MeshFiles:
         self._cache = cache or MeshCache()
 
     def path(self, mesh):
-        """Return the path of the file; raises BulletSimError if it does not exist or is no regular file."""
+        """Return the path of the file; raises BulletSimError if it does not exist or is not a regular file."""
         path = self._find_mesh(mesh.filename)
         if path is None:
             raise BulletSimError("mesh %s cannot be found%s" % (mesh.filename, _reason(mesh.filename)))
@@ -176,16 +176,19 @@ class ShapeStore:
         self._mesh_files = mesh_files
         self._shapes = {}
 
-    def compound(self, shapes, concave, mesh_cuts=None):
+    def compound(self, shapes, concave, mesh_cuts=None, exact=False):
         """Return PyBullet's id of the compound of ``shapes`` (urdf_model.Shape), or -1 for none.
 
         ``concave`` keeps meshes as triangles (only for bodies that never move); otherwise they are their convex hull.
         ``mesh_cuts``: as for ``World.spawn``; such a mesh becomes the convex hulls of its parts in either case.
+        ``exact``: Bullet's margin of 1 mm does not make meshes larger.
         Raises BulletSimError as ``MeshFiles.parts`` does, Call that before, in another thread: it is the slow part.
         """
         parts = self._mesh_files.parts(shapes, concave, mesh_cuts)
         if not parts:
             return NO_SHAPE
+        if exact:
+            parts = [without_margin(part) for part in parts]
         key = tuple((geometry, file, origin.tobytes(), hollow) for geometry, file, origin, hollow in parts)
         if key not in self._shapes:
             self._shapes[key] = self._create(parts)

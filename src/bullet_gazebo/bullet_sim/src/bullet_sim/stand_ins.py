@@ -47,7 +47,7 @@ def with_stand_ins(robot, mesh_files):
         links[link.name] = dataclasses.replace(link, visuals=visuals, collisions=collisions)
         kinds = sorted({type(shape.geometry).__name__.lower() for shape in spare})
         reasons = list(dict.fromkeys(reason for _, reason in (*lost, *unseen)))
-        told.append("%s; a %s stands in for it in link '%s'" % ("; ".join(reasons), " and a ".join(kinds), link.name))
+        told.append("%s; a %s replaces it in link '%s'" % ("; ".join(reasons), " and a ".join(kinds), link.name))
     if not links:
         return robot, ""
     return dataclasses.replace(robot, links={**robot.links, **links}), "; ".join(told)

@@ -56,7 +56,7 @@ class StateWatch:
     def __init__(self, world, error):
         self._world = world
         self._error = error
-        self._told = {}  # model's name -> steps
+        self._logged_at = {}  # model's name -> steps
         self._lively, self._resting = [], []
         self._sorted = False
         self._turn = 0
@@ -102,11 +102,11 @@ class StateWatch:
             for model in faults:
                 model.put_back()
         else:
-            world.make_anew(list(world.models.values()), {model: model.last_good() for model in faults})
+            world.rebuild(list(world.models.values()), {model: model.last_good() for model in faults})
         for model, fault in faults.items():
-            told = self._told.get(model.name)
+            told = self._logged_at.get(model.name)
             if told is None or world.steps - told >= _QUIET_STEPS:
-                self._told[model.name] = world.steps
+                self._logged_at[model.name] = world.steps
                 self._error(
                     "model '%s': %s, at tick %d. It was put back to where it was before, at rest; look for an extreme "
                     "force, mass or inertia" % (model.name, fault.text, world.tick)

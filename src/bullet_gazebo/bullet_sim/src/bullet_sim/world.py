@@ -7,12 +7,14 @@ import numpy as np
 
 from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
-from .builder import Blueprint, build
+from .builder import Blueprint, build, is_wheel
 from .errors import BulletSimError, within
 from .model import Contact, Model
+from .overlaps import come_out
 from .pose import Pose
 from .quiet_pybullet import pybullet
 from .shapes import MeshCache, MeshFiles, ShapeStore
+from .sliding_wheels import SlidingWheels, fixed_wheels
 from .stand_ins import with_stand_ins
 from .state_watch import StateWatch
 
@@ -81,8 +83,10 @@ class World:
         self.mesh_files = MeshFiles(find_mesh, MeshCache(warn=warn))
         self._shapes = ShapeStore(self._client, self.mesh_files)
         self._weightless = []  # models of which some link has no weight
+        self._sliding = {}  # model -> its SlidingWheels
         self._watch = StateWatch(self, error)
         self._touched = []  # models that were touched since the last step, perhaps asleep
+        self._placed = []  # free models that were put somewhere since the last step
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step_s,
             numSolverIterations=self.solver_iterations,
@@ -168,13 +172,18 @@ class World:
         rough = {merged.frames[link].link for link in mesh_cuts or () if not _has_mesh(robot.links.get(link))}
         pairs = [pair for pair in self_collision_pairs if all(merged.frames[link].link not in rough for link in pair)]
         blueprint = Blueprint(name, robot, merged, static, mesh_cuts, bool(pairs))
-        body, root_offset = build(self._client, blueprint, pose, self._shapes,
-                                  lambda text: self._warn("model '%s': %s" % (name, text)))
-        model = Model(self._client, self, blueprint, body, root_offset)
+        parts, root_offset = build(self._client, blueprint, pose, self._shapes,
+                                   lambda text: self._warn("model '%s': %s" % (name, text)))
+        model = Model(self._client, self, blueprint, parts, root_offset)
         if pairs:
             model.set_self_collision_pairs(pairs)
         self.models[name] = model
-        self._watch.models_changed()
+        if not static:
+            self.note_placed(model)
+        wheels = [] if static else fixed_wheels(merged.joints.values())
+        if wheels:
+            self._sliding[model] = SlidingWheels(self._client, model, wheels)
+        self._models_changed()
         return model
 
     def make_shape(self, merged, link, static=None, mesh_cuts=None):
@@ -184,7 +193,8 @@ class World:
         :meth:`spawn`.
         """
         static = is_fixed(merged.root, static)
-        self._shapes.compound(merged.links[link].collisions, static and link == merged.root, mesh_cuts)
+        exact = any(joint.child == link and is_wheel(joint) for joint in merged.joints.values())
+        self._shapes.compound(merged.links[link].collisions, static and link == merged.root, mesh_cuts, exact)
 
     def add_ground_plane(self, name="ground_plane"):
         """Add the half space below z = 0; return its Model (one link, "link", as Gazebo's has)."""
@@ -196,11 +206,18 @@ class World:
         model = self._model(name)
         model.remove()
         del self.models[name]
-        self._watch.models_changed()
+        self._sliding.pop(model, None)
+        self._models_changed()
         self.note_weightless(model, False)
         self._touched = [other for other in self._touched if other is not model]
+        self._placed = [other for other in self._placed if other is not model]
         # Bodies that stood on it must fall.
         self.wake_all()
+
+    def _models_changed(self):
+        self._watch.models_changed()
+        for wheels in self._sliding.values():
+            wheels.models_changed()
 
     def note_weightless(self, model, wanted):
         """For Model: whether ``model`` has links whose weight must be taken away at each step."""
@@ -211,6 +228,11 @@ class World:
         if model not in self._touched:
             self._touched.append(model)
         self._watch.note_touched(model)
+
+    def note_placed(self, model):
+        """For Model: ``model``, which is free, was put somewhere; the next step moves it out of what it overlaps."""
+        if model not in self._placed:
+            self._placed.append(model)
 
     def _put_contact_ahead(self):
         """PyBullet has one value for all worlds of a process: set ours again if another world changed it."""
@@ -223,18 +245,24 @@ class World:
     def step(self):
         """Advance the world by one tick."""
         self._put_contact_ahead()
+        if self._placed:
+            placed, self._placed = self._placed, []
+            for model in placed:
+                come_out(self._client, model, [other for other in self.models.values() if other is not model])
         for model in self._weightless:
             model.cancel_weight()
+        for wheels in self._sliding.values():
+            wheels.correct()
         pybullet.stepSimulation(physicsClientId=self._client)
         self.tick += 1
         self.steps += 1
         if self._touched:
             touched, self._touched = self._touched, []
             for model in touched:
-                model.feel_again()
+                model.reapply_wrenches()
         self._watch.look()
 
-    def make_anew(self, models, motions=None):
+    def rebuild(self, models, motions=None):
         """Rebuild the multibodies of ``models``.
 
         ``motions``: {model: result of ``Model.motion`` or ``Model.last_good``}. All bodies are removed before the first
@@ -244,8 +272,8 @@ class World:
         for model in models:
             model.remove()
         for model, motion in motions.items():
-            body, _ = build(self._client, model.blueprint, model.frame_of(motion), self._shapes, lambda text: None)
-            model.take_body(body, motion)
+            parts, _ = build(self._client, model.blueprint, model.frame_of(motion), self._shapes, lambda text: None)
+            model.take_parts(parts, motion)
         self.wake_all()
 
     def reset_models(self):
@@ -265,15 +293,17 @@ class World:
 
     def contacts(self, model=None, other=None):
         """Return the contacts of the last step as a list of Contact; all, or those of one Model, or between two."""
-        body = {key: value.body for key, value in (("bodyA", model), ("bodyB", other)) if value is not None}
-        points = pybullet.getContactPoints(physicsClientId=self._client, **body)
-        names = {other.body: other for other in self.models.values()} if points else {}
+        if model is None:
+            points = pybullet.getContactPoints(physicsClientId=self._client) or ()
+        else:
+            points = model.parts.contacts(None if other is None else other.parts)
+        names = self._models_by_body() if points else {}
         found = []
-        for point in points or ():
+        for point in points:
             a, b = names[point[1]], names[point[2]]
             found.append(
                 Contact(
-                    a.name, a.link_name(point[3]), b.name, b.link_name(point[4]),
+                    a.name, a.link_name(point[1], point[3]), b.name, b.link_name(point[2], point[4]),
                     point[5], point[7], point[8], point[9],
                     tuple(point[10] * u + point[12] * v for u, v in zip(point[11], point[13], strict=True)),
                 )
@@ -300,10 +330,10 @@ class World:
 
         A ray that starts inside a convex shape does not hit that shape.
         """
-        models = {model.body: model for model in self.models.values()}
+        models = self._models_by_body()
         hits = pybullet.rayTestBatch(list(starts), list(ends), physicsClientId=self._client)
-        found = ((models.get(hit[0]), hit[1]) for hit in hits)
-        return [None if model is None else (model.name, model.link_name(link)) for model, link in found]
+        found = ((models.get(hit[0]), hit) for hit in hits)
+        return [None if model is None else (model.name, model.link_name(*hit[:2])) for model, hit in found]
 
     def close(self):
         """Disconnect the physics client. The world cannot be used afterwards."""
@@ -311,6 +341,9 @@ class World:
             pybullet.disconnect(physicsClientId=self._client)
             self._client = None
             self.models = {}
+
+    def _models_by_body(self):
+        return {body: model for model in self.models.values() for body in model.parts.bodies}
 
     def _model(self, name):
         try:

@@ -3,6 +3,7 @@
 
 import hashlib
 import math
+import re
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from bullet_sim import BulletSimError, Pose, World
+from bullet_sim.mass_matrix import mass_matrix_of
 from urdf_model import parse_urdf
 from urdf_model.transforms import axis_rotation, pose_matrix, rigid
 
@@ -111,6 +113,24 @@ def test_mass_matrix_carries_the_merged_inertia(arm):
     expected = lower.inertia[1, 1] + lower.mass * (lower.centre[0] ** 2 + lower.centre[2] ** 2)
     expected += tool_inertia[1, 1] + tool.mass * (tool_centre[0] ** 2 + tool_centre[2] ** 2)
     assert arm.mass_matrix(np.zeros(2))[1, 1] == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_mass_matrix_from_the_links_is_bullets(arm):
+    arm.set_joint_positions(BOTH, np.array([0.4, -1.1]))
+    np.testing.assert_allclose(mass_matrix_of(arm), arm.mass_matrix(np.array([0.4, -1.1])), rtol=1e-6)
+
+
+def test_a_damped_arm_may_have_an_inertia_that_no_body_has(world):
+    """A moment larger than the sum of the others: published descriptions have such, and Gazebo takes them."""
+    lower = ARM.index('<link name="lower">')
+    other = '<inertia ixx="0.3" iyy="0.1" izz="10"/>'
+    impossible = ARM[:lower] + re.sub("<inertia [^>]*>", other, ARM[lower:], count=1)
+    arm = world.spawn(parse_urdf(impossible), "arm", static=True)
+    assert arm.damping[0] == 0.5
+    arm.drive_velocity(BOTH, np.array([0.2, 0.2]), np.array([100.0, 100.0]))
+    for _ in range(100):
+        world.step()
+    assert arm.read_joints()[1] == pytest.approx([0.2, 0.2], abs=0.01)
 
 
 def test_position_drive_holds_and_reports_the_gravity_torque(world, arm):
@@ -325,7 +345,7 @@ def test_mesh_is_converted_once_and_a_missing_one_gets_a_stand_in(tmp_path, monk
     np.testing.assert_allclose(world.ray_test_batch([(0.05, 0.05, 1)], [(0.05, 0.05, 0)]), 0.9, atol=0.01)
     assert told == [] and len(list((tmp_path / "cache/bullet_sim/meshes").glob("*.obj"))) == 1
     world.spawn(parse_urdf(mesh % "package://nowhere/box.stl"), "lost", Pose((5, 0, 0)), static=True)
-    assert len(told) == 1 and "package://nowhere/box.stl cannot be found; a box stands in for it" in told[0]
+    assert len(told) == 1 and "package://nowhere/box.stl cannot be found; a box replaces it" in told[0]
     world.step()
     assert world.ray_test_batch([(5, 0, 1)], [(5, 0, 0)])[0] < 1.0
     world.close()

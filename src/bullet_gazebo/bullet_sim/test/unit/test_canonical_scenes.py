@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bullet_sim import Pose, World
+from bullet_sim.sliding_wheels import fixed_wheels
 from urdf_model import Box, Link, Robot, Shape, parse_urdf
 from urdf_model.transforms import pose_matrix
 
@@ -217,3 +218,47 @@ def test_wheels_count_how_far_a_cart_goes(world):
     assert travelled == pytest.approx(0.1 * cart.read_joints()[0].mean(), rel=0.005)
     assert travelled == pytest.approx(0.5 * 2.0 + 0.25, rel=0.02)
     assert abs(cart.base_pose().position[1]) < 0.01
+
+
+@pytest.mark.parametrize(("kind", "holds"), [("continuous", True), ("revolute", False)])
+def test_only_wheels_have_a_friction_above_one(world, kind, holds):
+    # A slope of 60° needs a friction of tan 60° = 1.7. The cart's wheels are braked; gravity is tilted in its place.
+    text = CART.replace('type="continuous"', 'type="%s"' % kind).replace(
+        "</joint>", '<limit lower="-9" upper="9" effort="99" velocity="9"/></joint>')
+    wheels = [end + side for end in ("front", "rear") for side in ("left", "right")]
+    text = text.replace("</robot>", "".join('<gazebo reference="%s"><mu1>200</mu1></gazebo>' % name for name in wheels)
+                        + "</robot>")
+    world.add_ground_plane()
+    cart = world.spawn(parse_urdf(text), "cart", Pose((0.0, 0.0, 0.1)))
+    index = cart.index(wheels)
+    world.set_gravity((G * math.sin(math.radians(60.0)), 0.0, -G * math.cos(math.radians(60.0))))
+    run(world, 1.0, lambda time_s: cart.drive_velocity(index, np.zeros(4), np.full(4, 50.0)))
+    assert (abs(cart.base_pose().position[0]) < 0.02) is holds
+
+
+@pytest.mark.parametrize("mu", [0.5, 1.0])
+def test_a_vehicle_with_fixed_wheels_turns_against_coulombs_friction(world, mu):
+    # Base 0.4 m, track 0.3 m: it turns as if its track were 1 + (base / track)^2 times as large, by friction of the
+    # same size in all directions.
+    wheels = [end + side for end in ("front", "rear") for side in ("left", "right")]
+    surfaces = "".join('<gazebo reference="%s"><mu1>%g</mu1></gazebo>' % (name, mu) for name in wheels)
+    world.add_ground_plane()
+    cart = world.spawn(parse_urdf(CART.replace("</robot>", surfaces + "</robot>")), "cart", Pose((0.0, 0.0, 0.1)))
+    speeds, efforts = np.array([-1.0, 1.0, -1.0, 1.0]) * 0.3 / 0.1, np.full(4, 20.0)
+    angles = []
+
+    def drive(time_s):
+        cart.drive_velocity(cart.index(wheels), speeds, efforts)
+        turned = cart.base_pose().matrix()
+        angles.append(math.atan2(turned[1, 0], turned[0, 0]))
+
+    run(world, 2.0, drive)
+    way = np.unwrap(angles)
+    rate = (way[-1] - way[len(way) // 2]) / 1.0
+    assert 2.0 * 0.3 / rate == pytest.approx(0.3 * (1.0 + (0.4 / 0.3) ** 2), rel=0.15)
+
+
+def test_fixed_wheels_are_those_of_several_axles():
+    cart = list(parse_urdf(CART).joints.values())
+    assert fixed_wheels(cart) == [0, 1, 2, 3]
+    assert fixed_wheels(cart[:2]) == [] == fixed_wheels(list(parse_urdf(PENDULUM).joints.values()))

@@ -88,3 +88,18 @@ def test_more_than_can_be_made_in_time_are_refused_with_the_limit(world, cube):
     with pytest.raises(BulletSimError, match="link 'row', with what is fixed to it, has 1001 .* at most 1000"):
         world.spawn(row(["box"] * 1001, cube, moves=True), "row")
     assert not world.models
+
+
+@pytest.mark.parametrize(("kind", "half_m"), [("continuous", 0.05), ("fixed", 0.051)])
+def test_a_wheel_of_a_mesh_is_as_large_as_its_mesh(world, cube, kind, half_m):
+    body = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    wheel = '<collision><origin xyz="0.2 0 0" rpy="0.5 0 0"/><geometry>%s</geometry></collision>' % (
+        SHAPES["mesh"].format(cube=cube))
+    world.spawn(parse_urdf(
+        '<robot name="cart"><link name="base">%s</link><link name="wheel">%s%s</link><joint name="axle" type="%s">'
+        '<parent link="base"/><child link="wheel"/><axis xyz="1 0 0"/></joint></robot>' % (body, body, wheel, kind)),
+        "cart", Pose((0.0, 0.0, 1.0)))
+    middle, along = np.array([0.2, 0.0, 1.0]), np.array([0.0, -np.sin(0.5), np.cos(0.5)])
+    rays = np.array([along, -along, (1.0, 0.0, 0.0)])
+    reach = 1.0 - world.ray_test_batch(middle + rays, np.tile(middle, (3, 1)))
+    np.testing.assert_allclose(reach, half_m, atol=2e-4)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Work in a process of its own ends, and its error names the limit."""
+"""Work in a separate process ends, and its error names the limit."""
 
 import os
 import re
@@ -11,10 +11,12 @@ import pytest
 from bullet_sim.limited import LimitedProcess, LimitError
 from lab_testing.waiting import wait_until
 
+pytestmark = pytest.mark.tree
+
 
 @pytest.fixture
 def process():
-    process = LimitedProcess(processor_s=1, memory_bytes=600_000_000, waiting_s=30.0)
+    process = LimitedProcess(processor_s=1, memory_bytes=600_000_000, waiting_s=300.0)
     yield process
     process.close()
 

@@ -7,10 +7,11 @@ import zipfile
 
 import numpy as np
 import pytest
+from PIL import Image
 
-from bullet_sim import BulletSimError, MeshCache, MeshFiles
+from bullet_sim import BulletSimError, MeshCache, MeshFiles, Pose, World
 from bullet_sim.mesh_loading import MOST_HOLLOW_TRIANGLES, MOST_HULL_POINTS, hull_points
-from urdf_model import Mesh
+from urdf_model import Mesh, parse_urdf
 
 COLLADA = """<?xml version="1.0"?>%s<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset><up_axis>Z_UP</up_axis></asset>%s</COLLADA>"""
@@ -85,6 +86,9 @@ def sparse(path):
     ("nan.stl", lambda path: write_stl(path, np.nan * bumpy_ball(4)[0], bumpy_ball(4)[1]), "cannot be used"),
     ("sparse.stl", sparse, "expected at most 100000000"),
     ("text.obj", lambda path: path.write_text("v 0 0 0\n" * 10), "cannot be used"),
+    ("large.png", lambda path: Image.new("L", (1026, 1025)).save(path), "1026 x 1025 heights; expected"),
+    ("flat.png", lambda path: Image.new("L", (9, 1)).save(path), "9 x 1 heights"),
+    ("text.png", lambda path: path.write_text("P"), "cannot be used"),
     ("x.exe", lambda path: path.write_text("MZ"), "in the format 'exe'"),
 ])
 def test_what_is_hostile_is_refused_with_its_reason(tmp_path, cache, name, make, message):
@@ -143,3 +147,35 @@ def test_a_hull_keeps_its_size():
     for direction in np.random.default_rng(2).normal(size=(200, 3)):
         direction = direction / np.linalg.norm(direction)
         assert (kept @ direction).max() > 0.995 * (points @ direction).max()
+
+
+# -- heights ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_a_picture_is_a_terrain_whose_brightest_point_is_the_highest(tmp_path, cache, kind):
+    Image.fromarray(np.array([[0, 50, 100], [0, 0, 200]], dtype=kind)).save(tmp_path / "hills.png")
+    points, triangles = points_of(cache.wavefront(tmp_path / "hills.png"))
+    # x along a row; the first row at the greatest y, as on a map.
+    assert sorted(points.tolist()) == [[-0.5, -0.5, 0.0], [-0.5, 0.5, 0.0], [0.0, -0.5, 0.0], [0.0, 0.5, 0.25],
+                                       [0.5, -0.5, 1.0], [0.5, 0.5, 0.5]]
+    assert triangles == 4
+
+
+def test_a_box_rests_on_a_terrain_where_it_is_as_high(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    Image.fromarray(np.tile(np.arange(33, dtype=np.uint8), (33, 1))).save(tmp_path / "slope.png")
+    world = World(time_step_s=0.002)
+    shape = "<collision><geometry>%s</geometry></collision>"
+    world.spawn(parse_urdf('<robot name="t"><link name="l">%s</link></robot>' % shape % (
+        '<mesh filename="%s" scale="8 8 1"/>' % (tmp_path / "slope.png"))), "terrain", static=True)
+    inertial = '<inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>'
+    box = world.spawn(parse_urdf('<robot name="b"><link name="l">%s%s</link></robot>' % (
+        inertial, shape % '<box size="0.2 0.2 0.2"/>')), "box", Pose((2.0, 0.0, 1.0)))
+    for _ in range(1000):
+        world.step()
+    x, _, z = box.base_pose().position
+    world.close()
+    assert x == pytest.approx(2.0, abs=0.1)
+    # The middle of the box is 0.1 m away from the slope of one in eight.
+    assert z == pytest.approx((x + 4.0) / 8.0 + 0.1 * np.hypot(1.0, 1.0 / 8.0), abs=0.01)

@@ -110,7 +110,7 @@ def test_a_believable_inertia_gives_the_box_that_has_it():
     extents = np.abs(visual.origin[:3, :3]) @ visual.geometry.size
     np.testing.assert_allclose(extents, (0.1, 0.2, 0.3), rtol=1e-5)
     assert visual.colour == (1, 0, 0, 1) and collision.geometry == visual.geometry
-    assert told == "mesh package://gone/a.stl cannot be found; a box stands in for it in link 'a'"
+    assert told == "mesh package://gone/a.stl cannot be found; a box replaces it in link 'a'"
 
 
 @pytest.mark.parametrize("mass, inertia", [(1e-5, 10), (1e3, 1e-6), (1, 1e-9), (0, 0)])

@@ -73,7 +73,7 @@ def test_pybullet_itself_breaks(world, boxes, monkeypatch):
     assert math.isnan(pybullet.getBasePositionAndOrientation(boxes[0].body, physicsClientId=world._client)[0][0])
 
 
-def test_a_state_that_cannot_be_is_put_back_before_anybody_sees_it(world, boxes, told):
+def test_a_state_that_cannot_be_is_put_back_before_it_is_published(world, boxes, told):
     before = [box.base_pose().position for box in boxes]
     break_world(boxes[0])
     for _ in range(5):
@@ -132,7 +132,7 @@ def test_of_one_body_one_line_is_enough(world, boxes, told):
     assert len([line for line in told if "'beside'" in line]) == 1
 
 
-def test_links_that_shall_collide_still_do_in_a_body_that_was_made_anew(world):
+def test_links_that_collide_still_do_in_a_rebuilt_body(world):
     arm = world.spawn(parse_urdf(ARM), "arm", Pose((3, 0, 1)), static=True)
     arm.set_joint_positions(BOTH, np.array([0.0, math.pi]))
     world.step()

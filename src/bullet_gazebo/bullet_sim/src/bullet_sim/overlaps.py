@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Free models that were put into other things come out of them without gaining speed.
+
+Bullet turns the depth of an overlap into a speed. A Husky, which its launch file spawns with its wheels 0.13 m in the
+ground, then flies 100 m high. Gazebo (ODE) corrects an overlap by the position alone.
+"""
+import numpy as np
+
+from .quiet_pybullet import pybullet
+
+# Shallower overlaps stay: bodies that rest on each other have them [m].
+_ALLOWED_M = 1e-3
+# Each moves a model out of what it is deepest in; in a corner the next one leads out of the other wall.
+_ROUNDS = 10
+
+
+def come_out(client, model, others):
+    """Move ``model`` (a free Model) out of the Models ``others``; its velocity is kept.
+
+    It stays where it is if it cannot come out, between two walls for example. ``client``: PyBullet's.
+    """
+    start, turn = pybullet.getBasePositionAndOrientation(model.body, physicsClientId=client)
+    twist = pybullet.getBaseVelocity(model.body, physicsClientId=client)
+    place = np.array(start)
+    for _ in range(_ROUNDS):
+        way = _deepest(client, model, others)
+        if way is None:
+            break
+        place = place + way
+        _put(client, model, place.tolist(), turn, twist)
+    else:
+        _put(client, model, start, turn, twist)
+
+
+def _put(client, model, place, turn, twist):
+    pybullet.resetBasePositionAndOrientation(model.body, place, turn, physicsClientId=client)
+    pybullet.resetBaseVelocity(model.body, *twist, physicsClientId=client)
+
+
+def _deepest(client, model, others):
+    """Return the way (3,) [m, world] out of what ``model`` is deepest in, or None."""
+    depth, way = _ALLOWED_M, None
+    for body in (body for other in others for body in other.parts.bodies):
+        for point in pybullet.getClosestPoints(model.body, body, 0.0, physicsClientId=client) or ():
+            if -point[8] > depth:
+                # The normal points to the first body.
+                depth = -point[8]
+                way = depth * np.array(point[7])
+    return way

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The multibodies that one model consists of in Bullet.
+
+A step costs Bullet, for each joint that is driven, a pass over all joints of its multibody. A fixed root transmits
+nothing, so the limbs on it need not be one multibody: two arms as two cost a quarter less.
+"""
+from typing import NamedTuple
+
+from .quiet_pybullet import pybullet
+
+# A limb with fewer joints joins another one: a multibody costs something, too.
+_LEAST_JOINTS = 4
+# Groups of joints that are remembered. A robot drives a few of them at every tick.
+_MOST_SHARES = 64
+
+
+class Place(NamedTuple):
+    """Where Bullet has a link and the joint before it."""
+
+    body: int  # PyBullet's number of the multibody
+    index: int  # in it; -1 is its root
+
+
+def limbs(merged, separate):
+    """The joints of each multibody that a urdf_model.MergedRobot is built as: a list of lists of indices, each in the
+    order of the robot's joints.
+
+    One, unless ``separate`` and several limbs with some joints are on the root, which must be fixed.
+    """
+    joints = list(merged.joints.values())
+    if not separate:
+        return [list(range(len(joints)))]
+    limb_of, found = {}, {}
+    for number, joint in enumerate(joints):
+        limb_of[joint.child] = limb_of.get(joint.parent, joint.child)
+        found.setdefault(limb_of[joint.child], []).append(number)
+    large = [limb for limb in found.values() if len(limb) >= _LEAST_JOINTS]
+    small = [number for limb in found.values() if len(limb) < _LEAST_JOINTS for number in limb]
+    if len(large) < 2:
+        return [list(range(len(joints)))]
+    least = min(large, key=len)
+    return [sorted(limb + small) if limb is least else limb for limb in large]
+
+
+class Parts:
+    """Reads and commands the joints of several multibodies as those of one."""
+
+    def __init__(self, client, bodies, joints):
+        """``client``: PyBullet's; ``bodies``: its numbers of the multibodies, the first has the root's shape;
+        ``joints``: what :func:`limbs` returned."""
+        self._client = client
+        self.bodies = tuple(bodies)
+        #: {index of a joint, or -1 for the root: Place}
+        self.places = {-1: Place(self.bodies[0], -1)}
+        self._joints, self._local = joints, [list(range(len(numbers))) for numbers in joints]
+        for body, numbers in zip(self.bodies, joints, strict=True):
+            self.places.update((number, Place(body, local)) for local, number in enumerate(numbers))
+        in_turn = [number for numbers in joints for number in numbers]
+        self._order = None
+        if in_turn != sorted(in_turn):
+            self._order = sorted(range(len(in_turn)), key=in_turn.__getitem__)
+        self._indices = {place: index for index, place in self.places.items()}
+        self._shares = {}
+
+    def index(self, body, local):
+        """The model's index of the link that PyBullet has as ``local`` of ``body``; every root is the model's."""
+        return -1 if local == -1 else self._indices[body, local]
+
+    def joint_states(self):
+        """PyBullet's states of all joints, in the order of the model."""
+        if len(self.bodies) == 1:
+            return pybullet.getJointStates(self.bodies[0], self._local[0], physicsClientId=self._client)
+        states = []
+        for body, local in zip(self.bodies, self._local, strict=True):
+            states += pybullet.getJointStates(body, local, physicsClientId=self._client)
+        return states if self._order is None else [states[number] for number in self._order]
+
+    def command(self, index, mode, **columns):
+        """``setJointMotorControlArray`` for joints ``index`` (k,), an int array; ``columns``: PyBullet's arguments,
+        lists of k."""
+        for body, local, rows in self._share(index):
+            pybullet.setJointMotorControlArray(
+                body, local, mode, physicsClientId=self._client,
+                **(columns if rows is None else {name: _rows(column, rows) for name, column in columns.items()}))
+
+    def put(self, index, position, velocity):
+        """Put joints ``index`` (k,), an int array, at ``position`` and ``velocity``, lists of k, at once."""
+        position, velocity = [[value] for value in position], [[value] for value in velocity]
+        for body, local, rows in self._share(index):
+            values = (position, velocity) if rows is None else (_rows(position, rows), _rows(velocity, rows))
+            # In one call, since each call computes all link poses.
+            pybullet.resetJointStatesMultiDof(body, local, *values, physicsClientId=self._client)
+
+    def inverse_dynamics(self, position, velocity, acceleration):
+        """``calculateInverseDynamics`` of lists over all joints; returns a list."""
+        efforts = [0.0] * len(position)
+        for body, numbers in zip(self.bodies, self._joints, strict=True):
+            found = pybullet.calculateInverseDynamics(
+                body, *([values[number] for number in numbers] for values in (position, velocity, acceleration)),
+                physicsClientId=self._client)
+            for number, effort in zip(numbers, found, strict=True):
+                efforts[number] = effort
+        return efforts
+
+    def mass_matrices(self, position):
+        """(numbers of the joints, ``calculateMassMatrix`` of them) of each multibody; ``position``: list over all
+        joints."""
+        for body, numbers in zip(self.bodies, self._joints, strict=True):
+            yield numbers, pybullet.calculateMassMatrix(body, [position[number] for number in numbers],
+                                                        physicsClientId=self._client)
+
+    def set_base(self, position, quaternion):
+        """Put the root there, with all limbs on it."""
+        for body in self.bodies:
+            pybullet.resetBasePositionAndOrientation(body, position, quaternion, physicsClientId=self._client)
+
+    def contacts(self, other=None):
+        """PyBullet's contacts of the multibodies, with those of ``other`` (Parts) where it is given; each once."""
+        if other is None:
+            found = []
+            for number, body in enumerate(self.bodies):
+                points = pybullet.getContactPoints(bodyA=body, physicsClientId=self._client) or ()
+                # Those with an earlier one are there already.
+                found += [point for point in points if point[2] not in self.bodies[:number]]
+            return found
+        pairs = [(a, b) for number, a in enumerate(self.bodies)
+                 for b in (self.bodies[number:] if other is self else other.bodies)]
+        return [point for a, b in pairs
+                for point in pybullet.getContactPoints(bodyA=a, bodyB=b, physicsClientId=self._client) or ()]
+
+    def remove(self):
+        """Take the multibodies out of the physics."""
+        for body in self.bodies:
+            pybullet.removeBody(body, physicsClientId=self._client)
+
+    def _share(self, index):
+        """[(multibody, its joints, their rows among ``index``; None: all)]"""
+        if len(self.bodies) == 1:
+            return ((self.bodies[0], index.tolist(), None),)
+        key = index.dtype, index.tobytes()
+        shares = self._shares.get(key)
+        if shares is None:
+            if len(self._shares) >= _MOST_SHARES:
+                self._shares.clear()
+            shares = self._shares[key] = self._make_share(index.tolist())
+        return shares
+
+    def _make_share(self, index):
+        rows_of = {}
+        for row, number in enumerate(index):
+            rows_of.setdefault(self.places[number].body, []).append(row)
+        return [(body, [self.places[index[row]].index for row in rows], _as_slice(rows, len(index)))
+                for body, rows in rows_of.items()]
+
+
+def _as_slice(rows, count):
+    """Ascending ``rows`` of ``count``: None for all of them, a slice where they follow each other, which is quicker."""
+    if len(rows) == count:
+        return None
+    return slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] + 1 == len(rows) else rows
+
+
+def _rows(column, rows):
+    return column[rows] if isinstance(rows, slice) else [column[row] for row in rows]

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Free models that are put into other things come out without gaining speed."""
+import numpy as np
+import pytest
+
+from bullet_sim import Pose, World
+from urdf_model import Box, Link, Robot, Shape, parse_urdf
+
+BOX = """<robot name="box"><link name="it"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/>
+</inertial><collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>%s</robot>"""
+# As many vehicles' wheels: their contacts correct an overlap within one step.
+STIFF = '<gazebo reference="it"><kp>1e7</kp><kd>1</kd></gazebo>'
+
+
+@pytest.fixture(params=[0.001, 0.002], ids=["1ms", "2ms"])
+def world(request):
+    world = World(time_step_s=request.param)
+    yield world
+    world.close()
+
+
+def wall(world, name, x):
+    """A fixed wall of 0.2 m, its middle at ``x``."""
+    link = Link("link", collisions=[Shape(Box((0.2, 4.0, 4.0)), np.eye(4), "c", None, "link")])
+    world.spawn(Robot(name, {"link": link}, {}, "link"), name, Pose((x, 0.0, 0.0)), static=True)
+
+
+def highest(world, model, seconds=1.0):
+    heights = []
+    for _ in range(round(seconds / world.time_step_s)):
+        world.step()
+        heights.append(model.base_pose().position[2])
+    return max(heights)
+
+
+@pytest.mark.parametrize("surface", ["", STIFF], ids=["rigid", "stiff"])
+def test_a_model_spawned_in_the_ground_stands_on_it(world, surface):
+    world.add_ground_plane()
+    box = world.spawn(parse_urdf(BOX % surface), "box", Pose((0.0, 0.0, -0.03)))
+    assert highest(world, box) < 0.102
+    assert box.base_pose().position == pytest.approx((0.0, 0.0, 0.1), abs=0.002)
+
+
+def test_a_model_put_into_the_ground_keeps_its_velocity(world):
+    world.add_ground_plane()
+    box = world.spawn(parse_urdf(BOX % STIFF), "box", Pose((0.0, 0.0, 2.0)))
+    box.set_base_pose(Pose((0.0, 0.0, 0.05)))
+    box.set_base_twist((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    assert box.base_pose().position[2] == 0.05  # as it was put, while no time passes
+    assert highest(world, box, 0.5) == pytest.approx(0.1 + 1.0 / (2.0 * 9.81), abs=0.003)
+
+
+def test_a_shallow_overlap_stays(world):
+    world.set_gravity((0.0, 0.0, 0.0))
+    world.add_ground_plane()
+    box = world.spawn(parse_urdf(BOX % ""), "box", Pose((0.0, 0.0, 0.0995)))
+    world.step()
+    assert box.base_pose().position[2] < 0.0999
+
+
+def test_a_model_in_a_corner_comes_out_of_both_walls(world):
+    world.add_ground_plane()
+    wall(world, "wall", 0.0)
+    box = world.spawn(parse_urdf(BOX % STIFF), "box", Pose((0.15, 0.0, 0.05)))
+    for _ in range(round(1.0 / world.time_step_s)):
+        world.step()
+    assert box.base_pose().position == pytest.approx((0.2, 0.0, 0.1), abs=0.002)
+
+
+def test_a_model_between_two_walls_stays_where_it_was_put(world):
+    wall(world, "left", 0.0)
+    wall(world, "right", 0.35)
+    world.set_gravity((0.0, 0.0, 0.0))
+    box = world.spawn(parse_urdf(BOX % ""), "box", Pose((0.175, 0.0, 0.0)))
+    world.step()
+    assert box.base_pose().position == pytest.approx((0.175, 0.0, 0.0), abs=0.01)
