@@ -79,7 +79,7 @@ class Document:
         try:
             return tuple(int(word) for word in text.split("."))
         except ValueError:
-            raise self.error(self.root, "version='%s' is no version; expected one such as 1.6" % text) from None
+            raise self.error(self.root, "version='%s' is not a version; expected one such as 1.6" % text) from None
 
     def error(self, element, text):
         """Return an SdfError with file and line."""

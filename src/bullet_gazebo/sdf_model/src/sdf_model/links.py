@@ -61,7 +61,7 @@ def _inertial(document, link):
         for tag, i, j, default in _INERTIA:
             matrix[i, j] = matrix[j, i] = document.number(inertia, tag, default)
         if np.linalg.eigvalsh(matrix)[0] < -1e-9 * np.abs(matrix).max():
-            raise document.error(inertia, "<inertia> has a negative principal moment; no body has that")
+            document.mend(inertia, "<inertia> with a negative principal moment, which no body has")
     pose = document.pose(element)
     return Inertial(mass, pose[:3, 3].copy(), pose[:3, :3] @ matrix @ pose[:3, :3].T)
 
@@ -90,6 +90,11 @@ def _shape(document, element, link):
         document.note_unknown(kind, ("uri", "scale"))
         scale = document.vector(kind, "scale", (1.0, 1.0, 1.0))
         found = Mesh(_file(document, document.text(kind, "uri")), scale)
+    elif kind.tag == "heightmap":
+        document.note_unknown(kind, ("uri", "size", "pos", "texture", "blend", "sampling", "use_terrain_paging"))
+        size = document.vector(kind, "size", (1.0, 1.0, 1.0))
+        found = Mesh(_file(document, document.text(kind, "uri")), tuple(size))
+        origin = origin @ pose_matrix(document.vector(kind, "pos", (0.0, 0.0, 0.0)))
     else:
         if kind.tag != "empty":
             document.note(kind)

@@ -118,7 +118,7 @@ class ModelReader:
         path = self._folders.find(uri, document.folder)
         stand_in = self._folders.stand_in(uri) if path is None else None
         if stand_in is not None:
-            document.mend(element, "%s is not there, a shape of its size stands in for it" % uri)
+            document.mend(element, "%s does not exist, a shape of its size replaces it" % uri)
             inner = Document(stand_in, "the stand-in of %s" % uri, None, document.notes)
             return inner, inner.root.find("model")
         if path is None:
@@ -156,7 +156,7 @@ class ModelReader:
         for link in element.iterchildren("link"):
             name = document.name(link)
             if name in parts.links:
-                raise document.error(link, "link '%s' stands twice" % name)
+                raise document.error(link, "link '%s' appears twice" % name)
             parts.links[name] = (read_link(document, link, name), frames.where(name, link))
             parts.gazebo += _sensors(link, name)
         if not parts.links:
@@ -165,7 +165,7 @@ class ModelReader:
         for joint in element.iterchildren("joint"):
             read = _joint(document, joint, frames)
             if read.name in names:
-                raise document.error(joint, "joint '%s' stands twice" % read.name)
+                raise document.error(joint, "joint '%s' appears twice" % read.name)
             names.add(read.name)
             parts.joints.append(read)
         self._hold_kinematic(document, element, parts)
@@ -275,7 +275,8 @@ def _joint(document, element, frames):
         document.note(element, "joint '%s' of type %s, which is held fixed" % (name, kind))
         kind = "fixed"
     ends = (_end(document, element, role) for role in ("parent", "child"))
-    return SdfJoint(name, kind, *ends, frame, axis, limit, damping, friction, element)
+    implicit = any(document.flag(element, "physics/ode/" + tag) for tag in ("implicit_spring_damper", "cfm_damping"))
+    return SdfJoint(name, kind, *ends, frame, axis, limit, damping, friction, implicit, element)
 
 
 def _axis(document, given, name, frame, frames):

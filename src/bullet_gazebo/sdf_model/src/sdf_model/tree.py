@@ -26,6 +26,7 @@ class SdfJoint:
     limit: Limit
     damping: float
     friction: float
+    implicit_damping: bool
     element: Any
 
 
@@ -118,7 +119,7 @@ def _without_welds(parts):
 
 
 def _root(links, joints):
-    """Return the root link: the world, or the first link that is no joint's child."""
+    """Return the root link: the world, or the first link that is not a joint's child."""
     if WORLD in links:
         return WORLD
     children = {joint.child for joint in joints}
@@ -137,6 +138,7 @@ def _joint(links, joint, parent, child):
         joint.limit,
         damping=joint.damping,
         friction=joint.friction,
+        implicit_damping=joint.implicit_damping,
         line=joint.element.sourceline,
         child_offset=inverse(joint.frame) @ links[child][1],
     )

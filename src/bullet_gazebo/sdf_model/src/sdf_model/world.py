@@ -45,7 +45,7 @@ class SdfWorld:
 def parse_sdf_world(path, folders=None):
     """Return the SdfWorld of the file at ``path``. ``folders`` (ModelFolders): where models are looked for.
 
-    Raises SdfError when the file cannot be read or is no world, and for numbers of the world itself that are wrong;
+    Raises SdfError when the file cannot be read or is not a world, and for numbers of the world itself that are wrong;
     what is wrong in a model is in ``SdfWorld.problems``.
     """
     try:
@@ -129,7 +129,7 @@ class _WorldReader:
             world.lights += model.lights
             return
         if any(other.name == model.name for other in world.models):
-            raise document.error(element, "model '%s' stands twice; give this one a <name> of its own" % model.name)
+            raise document.error(element, "model '%s' appears twice; give this one another <name>" % model.name)
         model.pose = self._frames.where(document.relative_to(element), element) @ model.pose
         self._frames.add(model.name, element, pose=model.pose)
         world.models.append(model)

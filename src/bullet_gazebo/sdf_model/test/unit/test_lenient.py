@@ -40,6 +40,12 @@ def test_an_old_model_of_attributes_is_what_it_says():
     assert "<origin pose>" in model.warning
 
 
+def test_an_impossible_inertia_is_read_with_a_note():
+    model = read(LINK % "<inertial><inertia><ixx>1</ixx><ixy>2</ixy><iyy>1</iyy><izz>1</izz></inertia></inertial>")
+    assert model.robot.links["l"].inertial.inertia[0, 1] == 2.0
+    assert "negative principal moment" in model.warning and "line 3" in model.warning
+
+
 def test_an_element_goes_before_the_attribute_of_its_name_and_plugins_are_left_alone():
     model = read(LINK % '<collision name="c"><geometry><sphere radius="9"><radius>1</radius></sphere></geometry>'
                         '</collision>' + '<plugin filename="x.so"><limit lower="1"/></plugin>')

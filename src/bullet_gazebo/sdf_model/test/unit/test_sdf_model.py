@@ -71,6 +71,16 @@ def test_a_link_has_its_shapes_inertia_surface_and_colours():
     assert [shape.colour for shape in link.visuals] == [(0.9, 0.1, 0.1, 1.0), (0, 1, 0, 0.75), None]
 
 
+@pytest.mark.parametrize(("physics", "implicit"), [
+    ("<implicit_spring_damper>1</implicit_spring_damper>", True), ("<cfm_damping>true</cfm_damping>", True),
+    ("<implicit_spring_damper>0</implicit_spring_damper>", False), ("", False)])
+def test_damping_may_be_implicit(physics, implicit):
+    joint = read("""<link name="a"/><link name="b"/><joint name="j" type="revolute"><parent>a</parent><child>b</child>
+    <axis><xyz>0 0 1</xyz><dynamics><damping>0.4</damping></dynamics></axis><physics><ode>%s</ode></physics>
+    </joint>""" % physics).robot.joints["j"]
+    assert (joint.damping, joint.implicit_damping) == (0.4, implicit)
+
+
 def test_a_link_without_inertia_has_the_defaults_of_sdf():
     inertial = read('<link name="l"/>').robot.links["l"].inertial
     assert inertial.mass == 1.0 and np.array_equal(inertial.inertia, np.eye(3))
@@ -273,7 +283,7 @@ def test_what_cannot_be_had_is_a_line_and_the_rest_is_there(tmp_path, shelf):
     missing, twice, massless = found.problems
     assert "a.world, line 3" in missing and "model://castle not found" in missing and "one" in missing
     assert "GAZEBO_MODEL_PATH" in missing
-    assert "line 5" in twice and "stands twice" in twice and "<name>" in twice
+    assert "line 5" in twice and "appears twice" in twice and "<name>" in twice
     assert "line 6" in massless and "<mass> is 0 kg" in massless
 
 
@@ -312,7 +322,7 @@ def test_a_model_folder_may_lack_its_config(tmp_path, shelf):
     ("<sdf version='new'/>", "version='new'"),
     (sdf(""), "model 'm' has no <link>"),
     (sdf("<link/>"), "line 3: <link> has no name"),
-    (sdf('<link name="a"/><link name="a"/>'), "link 'a' stands twice"),
+    (sdf('<link name="a"/><link name="a"/>'), "link 'a' appears twice"),
     (sdf('<link name="a"><pose>0 0 1 0</pose></link>'), "line 3: <pose> is '0 0 1 0', expected 6 numbers"),
     (sdf('<link name="a"><pose>0 0 1 0 0 nan</pose></link>'), "expected 6 numbers"),
     (sdf('<link name="a"><gravity>maybe</gravity></link>'), "<gravity> is 'maybe', expected true or false"),
@@ -342,3 +352,12 @@ def test_a_world_file_needs_a_world(tmp_path):
 def test_core_loads_without_ros():
     block = "import sys; sys.modules.update(dict.fromkeys(('rospy', 'roslib', 'geometry_msgs'))); "
     subprocess.run([sys.executable, "-c", block + "import sdf_model"], check=True)
+
+
+def test_a_heightmap_is_a_mesh_of_its_size_at_its_place():
+    model = read("""<link name="l"><pose>0 0 2 0 0 0</pose><collision name="c"><geometry><heightmap>
+<uri>model://hills/hills.png</uri><size>129 64 10</size><pos>1 2 3</pos><texture><size>10</size></texture></heightmap>
+</geometry></collision></link>""")
+    shape, = model.robot.links["l"].collisions
+    assert shape.geometry == Mesh("model://hills/hills.png", (129, 64, 10)) and model.warning == ""
+    assert shape.origin[:3, 3].tolist() == [1, 2, 3]

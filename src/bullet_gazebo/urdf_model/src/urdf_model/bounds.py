@@ -64,7 +64,7 @@ EFFORT = _either_way(1e7, "N or N m", "of a joint: as for forces and torques")
 DAMPING = Bound(0.0, 1e12, "N s/m or N m s/rad", "of joints and contacts: holds a joint fast already")
 FRICTION = Bound(0.0, 1e9, "N or N m", "of a joint: more than any effort overcomes")
 MASS = Bound(0.0, 1e7, "kg", "10000 t. Bullet solves ratios of masses up to some 1e10 in doubles")
-#: Less than a microgram is no mass: its inverse times a force overflows a double.
+#: Less than a microgram is not a mass: its inverse times a force overflows a double.
 LEAST_MASS_KG = 1e-9
 #: A moving body needs some inertia, or the solver divides by zero: for its mass that of a ball of 1.6 mm radius
 #: (0.4 m r^2), smaller than any part of a robot.

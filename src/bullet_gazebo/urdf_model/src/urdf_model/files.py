@@ -28,7 +28,7 @@ def read_file(path, most_bytes):
 
 
 def kind_of(mode):
-    """Return in words what a path with the ``st_mode`` ``mode`` is, where it is no regular file."""
+    """Return in words what a path with the ``st_mode`` ``mode`` is, where it is not a regular file."""
     kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a named pipe"), (stat.S_ISSOCK, "a socket"),
              (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"))
     return next((words for is_kind, words in kinds if is_kind(mode)), "something else")

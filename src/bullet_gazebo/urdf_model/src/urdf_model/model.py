@@ -116,6 +116,8 @@ class Joint:
     damping: float = 0.0  # N m s/rad or N s/m
     friction: float = 0.0  # N m or N
     line: int = 0
+    # Whether the damping is to be integrated implicitly: as it is written, however light the links are.
+    implicit_damping: bool = False
     # 4x4, the child's frame in the joint's. In a URDF they are one; an SDF joint may sit elsewhere in its child.
     child_offset: np.ndarray = field(default_factory=lambda: np.eye(4))
 

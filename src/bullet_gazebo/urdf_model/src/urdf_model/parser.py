@@ -92,12 +92,15 @@ class _Reader:
         for element in self.root.iterchildren("gazebo"):
             if element.get("reference") in links:
                 self.gazebo_reference(element, links[element.get("reference")])
+            elif element.get("reference") in joints:
+                joints[element.get("reference")].implicit_damping |= any(
+                    _is_true(element.findtext(tag)) for tag in ("implicitSpringDamper", "cfmDamping"))
         return Robot(name, links, joints, root, transmissions, list(self.root.iterchildren("gazebo")), self.warnings)
 
     def add_unique(self, table, item, element, kind):
         if item.name in table:
             raise self.error(
-                element, "%s '%s' stands twice (first in line %s)" % (kind, item.name, table[item.name].line)
+                element, "%s '%s' appears twice (first in line %s)" % (kind, item.name, table[item.name].line)
             )
         table[item.name] = item
 
@@ -307,7 +310,7 @@ class _Reader:
                     raise self.error(part, "%s of link '%s' is %g; expected 0 or more" % (tag, link.name, found[name]))
         if found:
             link.surface = Surface(**found)
-        link.gravity = (element.findtext("turnGravityOff") or "").strip().lower() not in ("true", "1")
+        link.gravity = not _is_true(element.findtext("turnGravityOff"))
         colour = MATERIALS.get((element.findtext("material") or "").strip())
         if colour is not None:
             for shape in link.visuals:
@@ -398,6 +401,11 @@ class _Reader:
 
 def _words(values):
     return " ".join("%g" % value for value in values)
+
+
+def _is_true(text):
+    """Whether a flag of Gazebo's, of which ``text`` is the content or None, is set."""
+    return (text or "").strip().lower() in ("true", "1")
 
 
 def _reduction(text):

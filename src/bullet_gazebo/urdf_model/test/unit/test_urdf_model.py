@@ -133,7 +133,7 @@ def edit(old, new):
         ("<robot", "not well-formed XML"),
         ("<sdf/>", "root element is <sdf>, expected <robot>"),
         ("<robot name='r'/>", "has no <link>"),
-        (edit('<link name="base"/>', '<link name="base"/><link name="base"/>'), "line 4: link 'base' stands twice"),
+        (edit('<link name="base"/>', '<link name="base"/><link name="base"/>'), "line 4: link 'base' appears twice"),
         (edit('<link name="base"/>', "<link/>"), "<link> has no name"),
         (edit('<child link="plate"/>', '<child link="plank"/>'), "child link 'plank', which does not exist"),
         (edit('type="revolute"', 'type="hinge"'), "type 'hinge'; known: revolute, continuous"),
@@ -239,3 +239,15 @@ def test_inverse_undoes():
 def test_a_quaternion_without_direction_is_refused(quaternion):
     with pytest.raises(ValueError, match="not a rotation"):
         matrix_from_quaternion(quaternion)
+
+
+@pytest.mark.parametrize(("flag", "implicit"), [
+    ("<implicitSpringDamper>1</implicitSpringDamper>", True), ("<cfmDamping>true</cfmDamping>", True),
+    ("<implicitSpringDamper>false</implicitSpringDamper>", False), ("", False)])
+def test_damping_may_be_implicit(flag, implicit):
+    robot = parse_urdf("""<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
+    <parent link="a"/><child link="b"/><dynamics damping="0.4"/></joint>
+    <gazebo reference="j">%s</gazebo><gazebo reference="j"><provideFeedback>1</provideFeedback></gazebo>
+    </robot>""" % flag)
+    assert robot.joints["j"].implicit_damping is implicit
+    assert merge_fixed(robot).joints["j"].implicit_damping is implicit
