@@ -28,7 +28,7 @@ class Diagnostics:
         self._divisor = ticks_between(RATE_HZ, 1.0 / self._simulation.step_s)
 
     def on_tick(self):
-        """Publish what is due at this tick."""
+        """Publish the messages due at this tick."""
         simulation = self._simulation
         if simulation.tick % self._divisor == 0 and self._publisher.has_listeners:
             message = DiagnosticArray(status=self.statuses())

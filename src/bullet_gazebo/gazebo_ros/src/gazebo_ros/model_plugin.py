@@ -59,7 +59,7 @@ class ModelPlugin:
         """Before the physics step: read the state, command the drives. ``time_s`` is the time the step starts at."""
 
     def publish(self, time_s):
-        """After the physics step: publish what is due. ``time_s`` is the time that the step reached."""
+        """After the physics step: publish due messages. ``time_s`` is the time that the step reached."""
 
     def step_changed(self, step_s):
         """From the next tick on, a tick lasts ``step_s`` [s]; ``update`` gets it as ``dt``."""
@@ -95,9 +95,9 @@ class ModelPlugin:
         """
         with contextlib.suppress(Exception):
             self.close()
-        self.context.begin_anew()
+        self.context.begin_restart()
         plugin = type(self)(self.context, *arguments)
-        self.context.end_anew()
+        self.context.end_restart()
         return plugin
 
     def hold(self):

@@ -32,7 +32,7 @@ from loop_ros.publisher import PublisherHub
 from loop_ros.request_queue import RequestQueue
 from loop_ros.ros_objects import RosObjects
 from loop_ros.subscriber import SubscriberHub
-from model_files.resources import ResourceFinder, model_folders, model_sizes, resource_folders
+from model_files.resources import ResourceFinder, model_folders, model_sizes, plugin_tables, resource_folders
 from rospy_limits.node import limit_ports
 from sdf_model import ModelFolders
 from world_picture import snapshot
@@ -109,7 +109,7 @@ def _build(log, cleanup, line):
     for problem in description.problems:
         log.error(problem)
     table = PluginTable.from_yaml(os.path.join(share, "config", "model_plugins.yaml"),
-                                  rospy.get_param("~model_plugins", None))
+                                  rospy.get_param("~model_plugins", None), plugin_tables(packages), log.warn)
     finder = ResourceFinder(packages)
 
     writer = _snapshot_writer(log)

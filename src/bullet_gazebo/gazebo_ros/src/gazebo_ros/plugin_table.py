@@ -8,6 +8,11 @@ import yaml
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
 
+def _read(path):
+    with open(path, encoding="utf-8") as file:
+        return yaml.safe_load(file) or {}
+
+
 class PluginTable:
     """File name of a plugin -> ``"module:Class"``, imported when first asked for."""
 
@@ -23,10 +28,18 @@ class PluginTable:
         self._classes = {}
 
     @classmethod
-    def from_yaml(cls, path, extra=None):
-        """The table of a YAML file, with the entries of the mapping ``extra`` added or replaced."""
-        with open(path, encoding="utf-8") as file:
-            entries = yaml.safe_load(file) or {}
+    def from_yaml(cls, path, extra=None, others=(), warn=None):
+        """The table of a YAML file, with the entries of the mapping ``extra`` added or replaced. ``others``: further
+        files, the first one of which counts; one that cannot be used is left out, after a call of ``warn(text)``."""
+        entries = _read(path)
+        for other in reversed(others):
+            try:
+                more = _read(other)
+                cls(more)
+            except (OSError, UnicodeDecodeError, yaml.YAMLError, PluginError) as error:
+                warn("%s is left out: %s" % (other, error))
+            else:
+                entries.update(more)
         if extra is not None and not isinstance(extra, dict):
             raise PluginError("~model_plugins is %r, expected a mapping of file name to module:Class" % (extra,))
         return cls({**entries, **(extra or {})})

@@ -66,7 +66,7 @@ class Publications:
             self.write_snapshot()
 
     def on_tick(self):
-        """Publish what is due at this tick."""
+        """Publish the messages due at this tick."""
         simulation = self._simulation
         tick = simulation.tick
         now = time.perf_counter()

@@ -269,16 +269,16 @@ class Simulation:
         if len(hosted.failed_at) >= FAILURES:
             self._give_up(hosted, "%s has failed %d times within %g s" % (who, FAILURES, FAILURES_WITHIN_S))
             return
-        self._log.error("%s: %s; it begins anew from where the model is now.\n%s"
+        self._log.error("%s: %s; it restarts from the model's present state.\n%s"
                         % (who, hosted.last_error, _trace(error)))
-        self._begin_anew(hosted)
+        self._restart_or_stop(hosted)
 
-    def _begin_anew(self, hosted):
+    def _restart_or_stop(self, hosted):
         try:
             hosted.plugin = hosted.plugin.restarted()
         except SURVIVED as error:
-            hosted.last_error = "beginning anew raised %s" % described(error)
-            self._give_up(hosted, "%s cannot begin anew" % _names(hosted))
+            hosted.last_error = "its restart raised %s" % described(error)
+            self._give_up(hosted, "%s cannot restart" % _names(hosted))
             return
         hosted.has_failed = False
         self._sort()
@@ -297,7 +297,7 @@ class Simulation:
 
     def _revive(self, hosted, by):
         hosted.failed_at = []
-        self._begin_anew(hosted)
+        self._restart_or_stop(hosted)
         if not hosted.has_failed:
             self._log.info("%s is revived by %s" % (_names(hosted), by))
 

@@ -150,7 +150,7 @@ class Spawner:
         if mended or drawing is None:
             drawing = None if is_floor(robot) else drawing_urdf(merged)
         stands_fast = is_fixed(merged.root, options["static"])
-        for link in _that_take_time(merged):
+        for link in _slow_bodies(merged):
             self._mesh_files.parts(merged.links[link].collisions, stands_fast and link == merged.root,
                                    options.get("mesh_cuts"))
         return Prepared(name=name, xml=xml, robot=robot, merged=merged, drawing=drawing, start=start, plugins=plugins,
@@ -162,7 +162,7 @@ class Spawner:
         Raises ``BulletSimError``.
         """
         static, cuts = prepared.options.get("static"), prepared.options.get("mesh_cuts")
-        for link in _that_take_time(prepared.merged):
+        for link in _slow_bodies(prepared.merged):
             self._simulation.requests.call(self._simulation.world.make_shape, prepared.merged, link, static, cuts)
 
     def spawn(self, prepared, pose):
@@ -253,7 +253,7 @@ class Spawner:
     def _add_screen(self, prepared, link, place, size_m, pixels):
         frames = merge_fixed(prepared.robot).frames
         if link not in frames:
-            raise PluginError("a screen shall hang on link '%s', which '%s' has not" % (link, prepared.robot.name))
+            raise PluginError("a screen is on link '%s', which '%s' does not have" % (link, prepared.robot.name))
         if self._folder is None:
             return NoPicture()
         try:
@@ -300,7 +300,7 @@ class Spawner:
             raise SpawnRefused("entity already exists: delete the model '%s' first or choose another name" % name)
 
 
-def _that_take_time(merged):
+def _slow_bodies(merged):
     """The names of the bodies whose collision shape is a file: a mesh, or the file that gathers more shapes than
     PyBullet takes."""
     return [link.name for link in merged.links.values() if len(link.collisions) > MOST_SHAPES

@@ -55,7 +55,7 @@ def is_static(robot):
 def start_configuration(robot):
     """Joint positions {name: rad or m} of the model at its start, from ``<gazebo><start_configuration>``.
 
-    Raises :class:`ExtrasError` for unknown or repeated joints and values that are no numbers.
+    Raises :class:`ExtrasError` for unknown or repeated joints and values that are not numbers.
     """
     known = [joint.name for joint in robot.movable_joints()]
     positions = {}

@@ -26,7 +26,7 @@ def main():
     os.nice(19)
     os.environ.setdefault("LP_NUM_THREADS", "1")
     if not os.environ.get("DISPLAY"):
-        print("gazebo_gui: no display (DISPLAY is not set), the lab goes on without a window; rviz or gui:=false")
+        print("gazebo_gui: no display (DISPLAY is not set), the lab goes on without a window")
         return 0
     _keep_the_output_for_python()
     from gazebo_ros import window  # loads PyBullet, which is not needed without a display

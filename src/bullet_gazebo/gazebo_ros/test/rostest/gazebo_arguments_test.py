@@ -14,7 +14,7 @@ from lab_testing.waiting import wait_until
 
 BALL = """<robot name="ball"><link name="body"><inertial><mass value="1"/>
   <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
-DEADLINE_S = 20.0
+DEADLINE_S = 90.0
 
 
 class GazeboArguments(unittest.TestCase):
@@ -33,7 +33,7 @@ class GazeboArguments(unittest.TestCase):
         stamps = []
         subscriber = rospy.Subscriber("/clock", Clock, lambda message: stamps.append(message.clock.to_nsec()))
         command = ["rosrun", "gazebo_ros", "spawn_model", "-urdf", "-stdin", "-model", "ball", "-z", "50", "-unpause"]
-        spawned = subprocess.run(command, input=BALL, text=True, timeout=30, check=False)
+        spawned = subprocess.run(command, input=BALL, text=True, timeout=DEADLINE_S, check=False)
         self.assertEqual(spawned.returncode, 0)
         self.assertFalse(physics().pause)
         self.assertAlmostEqual(properties.max_update_rate, 2.0 / properties.time_step)

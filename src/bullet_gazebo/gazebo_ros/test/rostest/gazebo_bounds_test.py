@@ -26,7 +26,7 @@ SERVICES = {
     "set_model_configuration": srv.SetModelConfiguration, "clear_body_wrenches": srv.BodyRequest,
     "get_physics_properties": srv.GetPhysicsProperties, "set_physics_properties": srv.SetPhysicsProperties,
     "pause_physics": Empty, "reset_simulation": Empty, "reset_world": Empty, "advance": AdvanceTicks}
-DEADLINE_S = 15.0
+DEADLINE_S = 90.0
 NOW, ALWAYS = rospy.Time(0), rospy.Duration(-1)
 UPRIGHT = Quaternion(0, 0, 0, 1)
 ABSURD = (1e308, -1e308, 1e30, math.nan, math.inf)

@@ -55,7 +55,7 @@ class GazeboHostile(unittest.TestCase):
     def stood_in_for(self, mesh, *words):
         response = self.spawn(MESH % mesh)
         self.assertTrue(response.success, response.status_message)
-        for word in ("stands in for it", *words):
+        for word in ("replaces it", *words):
             self.assertIn(word, response.status_message)
 
     def test_meshes_that_are_no_files(self):

@@ -44,7 +44,7 @@ ARM = """<robot name="arm"><link name="base"/>
   <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><axis xyz="0 1 0"/>
     <origin xyz="0.4 0 0"/><limit lower="-2" upper="2" velocity="3" effort="100"/></joint>
   <gazebo><plugin name="probe" filename="libprobe.so">%s</plugin></gazebo></robot>"""
-DEADLINE_S = 15.0
+DEADLINE_S = 90.0
 
 
 class Listener:
@@ -104,9 +104,11 @@ class GazeboServices(unittest.TestCase):
     def test_clock_has_500_stamps_a_second_and_does_not_run_ahead(self):
         with Listener("/clock", Clock) as clock:
             clock.wait()
-            start, count = time.monotonic(), len(clock.messages)
-            clock.wait(count + 1000)
+            # Messages may have waited for this process; what the simulator answers is of that moment.
+            start, begin = time.monotonic(), self.get_world_properties().sim_time
+            wait_until(lambda: self.get_world_properties().sim_time >= begin + 2.0, "two seconds of simulation")
             lasted = time.monotonic() - start
+            clock.wait(1000)
             stamps = [message.clock.to_nsec() for message in clock.messages]
         # A busy machine makes it slower, and a pause of half a second is caught up; it never runs much faster.
         self.assertGreater(lasted, 1.4)
@@ -267,7 +269,7 @@ class GazeboServices(unittest.TestCase):
         arguments = ["-J", "shoulder", repr(values["shoulder"]), "-J", "arm::elbow", repr(values["elbow"])]
         command = ["rosrun", "gazebo_ros", "spawn_model", "-urdf", "-stdin"]
         spawned = subprocess.run([*command, "-model", "arm", "-z", "1.5", "-Y", "-1e-1", "-robot_namespace", "/arm",
-                                  *arguments], input=ARM % "", text=True, timeout=30, check=False)
+                                  *arguments], input=ARM % "", text=True, timeout=DEADLINE_S, check=False)
         self.assertEqual(spawned.returncode, 0)
         with Listener("/arm/first_state", JointState) as first:
             message = first.wait()[0]
@@ -276,11 +278,11 @@ class GazeboServices(unittest.TestCase):
             self.assertAlmostEqual(position, values[name], delta=2e-4)
         self.assertAlmostEqual(self.get_model_state("arm", "").pose.position.z, 1.5)
         self.assertAlmostEqual(self.get_model_state("arm", "").pose.orientation.z, -math.sin(0.05))
-        wrong = subprocess.run([*command, "-model", "other", "-J", "knee", "1"], input=ARM % "", text=True, timeout=30,
-                               check=False)
+        wrong = subprocess.run([*command, "-model", "other", "-J", "knee", "1"], input=ARM % "", text=True,
+                               timeout=DEADLINE_S, check=False)
         self.assertEqual(wrong.returncode, 1)
 
-    def test_a_plugin_that_breaks_begins_anew_and_a_reset_revives_it(self):
+    def test_a_plugin_that_breaks_restarts_and_a_reset_revives_it(self):
         self.spawn_ok("arm", ARM % "", namespace="/arm")
         publisher = rospy.Publisher("/arm/break", String, queue_size=1)
         wait_until(lambda: publisher.get_num_connections() > 0, "a connection to /arm/break")

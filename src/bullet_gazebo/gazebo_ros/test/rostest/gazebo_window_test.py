@@ -82,7 +82,7 @@ class GazeboWindow(unittest.TestCase):
         wait_until(lambda: len(self.red()[0]) > 1000, "a red box for the mesh that is missing")
         self.assertTrue(services["delete_model"]("ghost").success)
 
-        # Paused, or the slide would fall; what services move is seen all the same.
+        # Paused, or the slide would fall; bodies moved by services are still visible.
         services["pause_physics"]()
         self.assertTrue(services["spawn_urdf_model"]("pied", PIED, "", pose, "").success)
         wait_until(lambda: all(len(self.seen(channel)[0]) > 1000 for channel in range(3)), "a box in three colours")

@@ -57,6 +57,21 @@ def test_parameters_add_to_the_file_and_replace_entries(tmp_path):
         table.find("libb.so")
 
 
+def test_files_of_packages_add_to_the_table_and_a_broken_one_is_left_out(tmp_path):
+    texts = {"ours": "liba.so: a:A\nlibb.so: b:B\n", "first": "libb.so: first:B\n", "second": "libb.so: second:B\n"
+             "libd.so: d:D\n", "list": "- libe.so\n", "broken": "libf.so: [", "wrong": "libg.so: no_class\n"}
+    paths = {name: tmp_path / (name + ".yaml") for name in texts}
+    for name, text in texts.items():
+        paths[name].write_text(text, encoding="utf-8")
+    warnings = []
+    others = [paths[name] for name in ("first", "second", "list", "broken", "wrong")]
+    table = PluginTable.from_yaml(paths["ours"], {"libc.so": "c:C"}, others, warnings.append)
+    assert table.known == ["liba.so", "libb.so", "libc.so", "libd.so"]
+    with pytest.raises(PluginError, match="first:B"):
+        table.find("libb.so")
+    assert len(warnings) == 3 and all("is left out" in line for line in warnings)
+
+
 def test_our_own_table_is_well_formed():
     assert "libbaxter_gazebo_ros_control.so" in PluginTable.from_yaml(CONFIG).known
 
@@ -72,7 +87,7 @@ def test_names_in_a_context_are_relative_to_its_namespace():
     assert context.param("/settings/enable/deeper", 7) == 7
 
 
-def test_a_plugin_that_begins_anew_keeps_what_it_opened():
+def test_a_plugin_that_restarts_keeps_what_it_opened():
     ros = FakeRos()
     context = PluginContext(None, None, PluginSource(namespace="/robot"), None, ros, {},
                             PluginHost(add_screen=lambda *_: object()))

@@ -42,7 +42,7 @@ def test_in_real_time_every_tick_that_is_due_counts(monkeypatch):
     assert world.snapshots == list(range(5, 1001, 5))
 
 
-def test_flat_out_nobody_gets_more_than_he_can_use(monkeypatch):
+def test_at_full_speed_no_subscriber_gets_more_than_it_can_use(monkeypatch):
     world = World(monkeypatch, factor=20.0, asked=0.0)
     world.run(20.0)
     wall_s = world.wall_s - 100.0

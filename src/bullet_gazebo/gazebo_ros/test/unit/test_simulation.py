@@ -103,13 +103,13 @@ def simulation(log, counts):
 
 @pytest.fixture
 def running(simulation):
-    """The loop in a thread of its own."""
+    """The loop in a separate thread."""
     ending = threading.Event()
     thread = threading.Thread(target=simulation.run, args=(ending.is_set,))
     thread.start()
     yield simulation
     ending.set()
-    thread.join(5.0)
+    thread.join(60.0)
     assert not thread.is_alive()
 
 
@@ -119,7 +119,7 @@ def host(simulation, **options):
     return hosted
 
 
-def advance(simulation, ticks, topics=(), timeout_s=5.0):
+def advance(simulation, ticks, topics=(), timeout_s=60.0):
     return simulation.requests.call(simulation.start_advance, ticks, topics, timeout_s)
 
 
@@ -167,7 +167,7 @@ CALLS = {"update": Simulation.do_tick, "publish": Simulation.do_tick,
 
 @pytest.mark.parametrize("error", [RuntimeError, RecursionError, SystemExit, MemoryError])
 @pytest.mark.parametrize("where", CALLS)
-def test_a_plugin_that_raises_once_begins_anew(simulation, log, where, error):
+def test_a_plugin_that_raises_once_restarts(simulation, log, where, error):
     bad, good = host(simulation, fails_in=where, error=error), host(simulation)
     CALLS[where](simulation)
     line, = log.of("error")
@@ -235,7 +235,7 @@ def test_a_failed_plugin_can_ask_to_be_revived(simulation, log):
     assert bad.plugin.calls[-1][0] == "publish"
 
 
-def test_a_plugin_that_cannot_begin_anew_counts_as_failed_at_once(simulation, log):
+def test_a_plugin_that_cannot_restart_counts_as_failed_immediately(simulation, log):
     bad = host(simulation, fails_in="update", restart_fails=True)
     simulation.do_tick()
     assert bad.has_failed and "cannot begin" in log.of("error")[-1]
@@ -294,17 +294,17 @@ def test_a_paused_world_stands_still_and_answers(running):
 
 
 def test_a_world_runs_in_real_time(running):
-    running.paused = False
     start, start_tick = time.monotonic(), running.tick
+    running.paused = False
     wait_until(lambda: running.tick - start_tick >= 250, "half a second of simulation")
     # A busy machine may delay it; it never comes early.
     assert time.monotonic() - start > 0.45
 
 
 def test_an_advance_makes_exactly_so_many_ticks(running):
-    assert advance(running, 7).result(5.0) == (7, 14_000_000)
-    assert advance(running, 0).result(5.0) == (7, 14_000_000)
-    assert advance(running, 1000).result(5.0) == (1007, 2_014_000_000)
+    assert advance(running, 7).result(60.0) == (7, 14_000_000)
+    assert advance(running, 0).result(60.0) == (7, 14_000_000)
+    assert advance(running, 1000).result(60.0) == (1007, 2_014_000_000)
     assert running.world.steps == 1007
 
 
@@ -315,11 +315,11 @@ def test_an_advance_waits_for_its_topics_each_time(running, counts):
     assert running.requests.call(lambda: running.tick) == 0
     assert not future.done()
     counts["/command"] += 1
-    assert future.result(5.0)[0] == 2
+    assert future.result(60.0)[0] == 2
     # What arrived before does not count again.
     second = advance(running, 2, ["/command"], timeout_s=0.1)
     with pytest.raises(AdvanceRefused, match="no message within 0.1 s on /command"):
-        second.result(5.0)
+        second.result(60.0)
     assert running.tick == 2
 
 
@@ -334,7 +334,7 @@ def test_two_advances_at_a_time_are_refused(running, counts):
     with pytest.raises(AdvanceRefused, match="under way"):
         advance(running, 1)
     counts["/command"] += 1
-    assert first.result(5.0)[0] == 1
+    assert first.result(60.0)[0] == 1
 
 
 def test_a_topic_that_nobody_listens_to_is_named(running):
@@ -352,4 +352,4 @@ def test_unpausing_ends_a_waiting_advance(running):
     future = advance(running, 5, ["/command"])
     running.paused = False
     with pytest.raises(AdvanceRefused, match="unpaused with 5 ticks left"):
-        future.result(5.0)
+        future.result(60.0)

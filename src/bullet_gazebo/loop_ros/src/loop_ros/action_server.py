@@ -164,9 +164,9 @@ class ActionServer:
         if stamp and stamp <= self._last_cancel:
             handle.cancel(text="a request to cancel all goals up to a later time came before this goal")
         else:
-            self._answering(handle, self._on_goal)
+            self._call_owner(handle, self._on_goal)
 
-    def _answering(self, handle, callback):
+    def _call_owner(self, handle, callback):
         """Call the owner's ``callback`` with a goal. If it raises, the goal is aborted, so that no client waits for
         it."""
         try:
@@ -191,7 +191,7 @@ class ActionServer:
                 continue
             if handle._may("request cancel of"):
                 handle._step("request cancel of", "")
-                self._answering(handle, self._on_cancel)
+                self._call_owner(handle, self._on_cancel)
         if message.id and not known:
             # The cancel request arrived before its goal; the goal will not start.
             early = GoalHandle(self, None, GoalID(message.stamp, message.id), GoalStatus.RECALLING)

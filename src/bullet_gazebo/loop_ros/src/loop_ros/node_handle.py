@@ -14,7 +14,7 @@ class NodeHandle:
         self.namespace = namespace
         self._ros = ros
         self._opened = []  # of (what it is: kind, name, type ..., the object, whether it is closed with the others)
-        self._kept = []  # the same, of the owner before; see `begin_anew`
+        self._kept = []  # the same, of the owner before; see `begin_restart`
         self._subscriptions, self._noted = [], set()  # the numbers of those that got messages
 
     def resolve(self, name):
@@ -62,7 +62,7 @@ class NodeHandle:
         return self._serving(self._ros.service, self.resolve(name), srv_class, handler)
 
     def service_in_thread(self, name, srv_class, handler):
-        """Advertise a slow service; ``handler(request)`` runs in a thread of its own.
+        """Advertise a slow service; ``handler(request)`` runs in a separate thread.
 
         It may use the objects of the loop through :meth:`call_in_loop` only.
         """
@@ -100,13 +100,13 @@ class NodeHandle:
         """
         self._ros.faults.note(place, error)
 
-    def begin_anew(self):
-        """Until :meth:`end_anew`, opening a topic or service of the same name and type returns the one that is already
-        open."""
+    def begin_restart(self):
+        """Until :meth:`end_restart`, opening a topic or service of the same name and type returns the one that is
+        already open."""
         self._kept, self._opened = [*self._kept, *self._opened], []
 
-    def end_anew(self):
-        """Close what was open before :meth:`begin_anew` and has not been opened again."""
+    def end_restart(self):
+        """Close what was open before :meth:`begin_restart` and has not been opened again."""
         kept, self._kept = self._kept, []
         _close_all(kept)
 
@@ -129,7 +129,7 @@ class NodeHandle:
 
     def _serving(self, advertise, name, srv_class, handler):
         def make():
-            answering = _Answering(handler)
+            answering = _ReplaceableService(handler)
             answering.service = advertise(name, srv_class, lambda request: answering.handler(request))
             return answering
 
@@ -138,7 +138,7 @@ class NodeHandle:
         return answering
 
 
-class _Answering:
+class _ReplaceableService:
     """A service whose handler can be replaced."""
 
     def __init__(self, handler):

@@ -110,7 +110,7 @@ class LoopRos(Protocol):
         """As :meth:`Topics.service`."""
 
     def service_in_thread(self, name, srv_class, handler) -> Service:
-        """Serve ``name``; ``handler(request)`` runs in a thread of its own."""
+        """Serve ``name``; ``handler(request)`` runs in a separate thread."""
 
     def served(self):
         """Names of the services that are served now: a list."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Topics and services of the loop, registered with the ROS master by a thread of their own.
+"""Topics and services of the loop, registered with the ROS master by a separate thread.
 
 A registration is a round trip to the master (1 to 2 ms); a robot brings about a hundred. The objects are returned at
 once and become active when they are registered, so the loop never waits; :meth:`RosObjects.flush` waits for all of
@@ -48,7 +48,7 @@ class RosObjects:
             registered.append(registration)
             # rospy would put a queue and a thread between us and each connection.
             registration.impl.set_queue_size(None)
-            registration.impl.add_subscriber_listener(_Attention(self._publishers, publisher))
+            registration.impl.add_subscriber_listener(_ConnectionNotice(self._publishers, publisher))
             publisher.attach(registration.impl)
 
         def unregister():
@@ -69,7 +69,8 @@ class RosObjects:
         def register():
             registration = rospy.Subscriber(topic, msg_class, subscription.put, tcp_nodelay=True)
             registered.append(registration)
-            # If rospy made a connection before this line, rospy reads it in a thread of its own.
+            subscription.senders = registration.get_num_connections
+            # If rospy made a connection before this line, rospy reads it in a separate thread.
             _read_in_loop(registration.impl, self._subscribers, self._log, self.faults)
 
         def unregister():
@@ -225,7 +226,7 @@ def _receive(transport, impl, subscribers, log, faults):
     transport.close()
 
 
-class _Attention(rospy.SubscribeListener):
+class _ConnectionNotice(rospy.SubscribeListener):
     """Notifies the loop of a publisher's new connection."""
 
     def __init__(self, hub, publisher):

@@ -17,6 +17,8 @@ class Subscription:
 
     #: Called once, when the subscription is closed.
     on_close = None
+    #: How many publishers are connected: a function without arguments. 1 where nobody counts them.
+    senders = staticmethod(lambda: 1)
 
     def __init__(self, depth=1, notice=lambda: None, on_fault=_raise):
         """``notice()`` is called for each new message, in the thread that puts it in; ``on_fault(error)`` for

@@ -63,7 +63,7 @@ def serve_until(hub, condition, what):
         hub.service()
         return condition()
 
-    wait_until(served, what, 10.0, 0.0)
+    wait_until(served, what, 60.0, 0.0)
 
 
 def test_messages_come_whole_and_in_order(hub, line):
@@ -154,7 +154,7 @@ def test_a_publisher_that_goes_ends_its_connection_and_no_other(hub, line):
 
 def test_a_connection_closed_from_this_side_ends(hub, line):
     hub.service()
-    # As rospy does it, in a thread of its own; the number of the descriptor may then be given to another file at once.
+    # As rospy does it, in a separate thread; the number of the descriptor may then be given to another file at once.
     line.near.shutdown(socket.SHUT_RDWR)
     line.near.close()
     replacement = Line(hub)

@@ -24,6 +24,13 @@ def resource_folders(packages=None, environ=os.environ):
     return [*_listed(environ, "GAZEBO_RESOURCE_PATH"), *exported_folders("gazebo_media_path", packages)]
 
 
+def plugin_tables(packages=None, environ=os.environ):
+    """The files ``model_plugins.yaml`` in the folders of ``GAZEBO_PLUGIN_PATH`` and in those that packages export as
+    ``plugin_path``, first the more important one. ``packages``: RosPack."""
+    folders = [*_listed(environ, "GAZEBO_PLUGIN_PATH"), *exported_folders("plugin_path", packages)]
+    return [path for path in (folder / "model_plugins.yaml" for folder in folders) if path.is_file()]
+
+
 def model_sizes(packages):
     """Shapes that replace models of Gazebo's library, in the form that :class:`sdf_model.ModelFolders` takes."""
     path = Path(packages.get_path("model_files")) / "config" / "model_sizes.yaml"
@@ -33,7 +40,7 @@ def model_sizes(packages):
 def exported_folders(attribute, packages=None):
     """The folders (Paths) that packages name in ``<export><gazebo_ros attribute="${prefix}/models:..."/></export>``.
 
-    ``attribute``: gazebo_model_path or gazebo_media_path. An unreadable manifest is skipped.
+    ``attribute``: gazebo_model_path, gazebo_media_path or plugin_path. An unreadable manifest is skipped.
     """
     packages = packages or rospkg.RosPack()
     found = []
@@ -65,11 +72,11 @@ class ResourceFinder:
         self._model_folders = model_folders(self._packages)
         self._resource_folders = resource_folders(self._packages)
         self._found = {}
-        self._may_look_anew = True
+        self._may_look_again = True
 
     def __call__(self, name):
-        """The path if it exists and is no folder, else None. It need not be a regular file: the caller checks when it
-        opens it."""
+        """The path if it exists and is not a folder, else None. It need not be a regular file: the caller checks when
+        it opens it."""
         if name not in self._found:
             self._found[name] = next((str(path) for path in self._candidates(name) if _is_there(path)), None)
         return self._found[name]
@@ -77,7 +84,7 @@ class ResourceFinder:
     def forget_missing(self):
         """Search again for names that were not found: files and packages appear while a user works on a lab."""
         self._found = {name: path for name, path in self._found.items() if path is not None}
-        self._may_look_anew = True
+        self._may_look_again = True
 
     def _candidates(self, name):
         url = urlparse(name)
@@ -100,10 +107,10 @@ class ResourceFinder:
         try:
             return Path(self._packages.get_path(name))
         except rospkg.ResourceNotFound:
-            if not self._may_look_anew:
+            if not self._may_look_again:
                 return None
         # A RosPack caches its first crawl. A crawl is slow, so a missing package causes one, and not one per mesh.
-        self._may_look_anew = False
+        self._may_look_again = False
         self._packages = rospkg.RosPack()
         return self._package_folder(name)
 

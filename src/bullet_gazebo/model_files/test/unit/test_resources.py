@@ -5,7 +5,14 @@ import os
 import pytest
 import rospkg
 
-from model_files.resources import ResourceFinder, exported_folders, model_folders, model_sizes, resource_folders
+from model_files.resources import (
+    ResourceFinder,
+    exported_folders,
+    model_folders,
+    model_sizes,
+    plugin_tables,
+    resource_folders,
+)
 from sdf_model import ModelFolders, parse_sdf_model
 from urdf_model import merge_fixed
 
@@ -61,12 +68,14 @@ def test_files_are_found_by_every_kind_of_name(tmp_path, monkeypatch):
 def exporting(tmp_path, monkeypatch):
     """A package that exports folders of models and media, as those made for Gazebo do; returns its folder."""
     folder = tmp_path / "field"
-    for name in ("models/mug", "more", "media"):
+    for name in ("models/mug", "more", "media", "plugins"):
         (folder / name).mkdir(parents=True)
     (folder / "models" / "mug" / "mug.stl").touch()
     (folder / "media" / "part.stl").touch()
+    (folder / "plugins" / "model_plugins.yaml").touch()
     (folder / "package.xml").write_text("""<package><name>field</name><export>
-<gazebo_ros gazebo_model_path="${prefix}/models:${prefix}/more" gazebo_media_path="${prefix}"/>
+<gazebo_ros gazebo_model_path="${prefix}/models:${prefix}/more" gazebo_media_path="${prefix}"
+            plugin_path="${prefix}/lib:${prefix}/plugins"/>
 </export></package>""")
     monkeypatch.setenv("ROS_PACKAGE_PATH", "%s:%s" % (tmp_path, os.environ["ROS_PACKAGE_PATH"]))
     return folder
@@ -82,6 +91,11 @@ def test_packages_export_folders_of_models_and_media(exporting, monkeypatch):
     assert finder("file://media/part.stl") == str(exporting / "media" / "part.stl")
 
 
+def test_packages_export_tables_of_plugins(exporting, monkeypatch):
+    monkeypatch.setenv("GAZEBO_PLUGIN_PATH", "/nowhere")
+    assert plugin_tables() == [exporting / "plugins" / "model_plugins.yaml"]
+
+
 def test_models_of_gazebos_library_have_stand_ins_of_their_size():
     packages = rospkg.RosPack()
     folders = ModelFolders([], model_sizes(packages))
@@ -92,5 +106,5 @@ def test_models_of_gazebos_library_have_stand_ins_of_their_size():
         assert model.static == ("mass" not in size), name
         assert model.static or body.inertial.mass == size["mass"], name
         assert body.collisions[0].origin[:3, 3].tolist() == pytest.approx(size["centre"]), name
-        assert "model://%s is not there" % name in model.warning and "line 1" in model.warning
+        assert "model://%s does not exist" % name in model.warning and "line 1" in model.warning
 

@@ -43,7 +43,7 @@ class Pace:
 
     def take(self, time_s):
         """Whether it is due at ``time_s`` [s]; if so, it counts as done."""
-        # Asked at every tick, and nearly always in vain.
+        # Called at every tick; nearly always nothing is due.
         if self._last_s <= time_s < self._next_s - _TOLERANCE_S:
             return False
         self.took(time_s)
@@ -70,7 +70,7 @@ class Schedule:
 
     def due(self, time_s):
         """Whether a new period has begun at time_s [s]; after the clock went back, it is due at once."""
-        # Asked at every tick, and nearly always in vain.
+        # Called at every tick; nearly always nothing is due.
         if self._begin_s <= time_s < self.next_s:
             return False
         period = math.floor(time_s * self.rate_hz + 1e-6)

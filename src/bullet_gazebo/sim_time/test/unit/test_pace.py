@@ -30,7 +30,7 @@ def test_who_was_late_does_not_catch_up():
     assert taken(pace, [0.0, 5.0, 5.05, 5.1]) == [0.0, 5.0, 5.1]
 
 
-def test_time_that_goes_back_begins_anew():
+def test_time_that_goes_back_restarts():
     pace = Pace(10.0)
     assert taken(pace, [5.0, 5.05, 0.02, 0.05, 0.12]) == [5.0, 0.02, 0.12]
     pace.restart()

@@ -53,12 +53,12 @@ def test_nothing_is_due_before_the_time_that_a_schedule_tells(rate_hz, tick_s):
             assert told.due(now) == due
 
 
-def test_a_clock_that_went_back_begins_anew():
+def test_a_clock_that_went_back_restarts():
     schedule = Schedule(10.0)
     assert due_at(schedule, [5.0, 5.1, 0.0, 0.05, 0.1, 0.15]) == [5.0, 5.1, 0.0, 0.1]
 
 
-def test_another_rate_begins_anew():
+def test_another_rate_restarts():
     schedule = Schedule(1.0)
     assert due_at(schedule, [3.0, 3.5]) == [3.0]
     schedule.set_rate(10.0)
