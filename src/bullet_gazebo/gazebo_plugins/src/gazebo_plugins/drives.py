@@ -37,12 +37,12 @@ class Drive(ModelPlugin):
         self.model = context.model
         rate = self.number(self.rate_tag, self.rate)
         self._pace = Pace(max(0.0, rate))
-        self._odometry_frame = context.element_text("odometryFrame", "odom")
-        self._base_frame = context.element_text("robotBaseFrame", "base_footprint")
+        self._odometry_frame = self.text("odometryFrame", "odom")
+        self._base_frame = self.text("robotBaseFrame", "base_footprint")
         self._wanted = (0.0, 0.0, 0.0)
         self.configure()
-        self._commands = context.subscription(context.element_text("commandTopic", "cmd_vel"), Twist)
-        self._odometry = context.publisher(context.element_text("odometryTopic", "odom"), Odometry)
+        self._commands = context.subscription(self.text("commandTopic", "cmd_vel"), Twist)
+        self._odometry = context.publisher(self.text("odometryTopic", "odom"), Odometry)
         self._tf = context.publisher("/tf", TFMessage) if self.flag(self.tf_tag, True) else None
 
     # -- of each kind ------------------------------------------------------------------------------------------------
@@ -74,7 +74,7 @@ class Drive(ModelPlugin):
         if all(map(math.isfinite, wanted)):
             self._wanted = wanted
         else:
-            self.context.log.warn_throttle(5.0, "%s: a command of %g, %g m/s and %g rad/s is no number and ignored"
+            self.context.log.warn_throttle(5.0, "%s: a command of %g, %g m/s and %g rad/s is not a number and ignored"
                                            % (self.what, *wanted))
 
     def publish(self, time_s):
@@ -118,9 +118,13 @@ class Drive(ModelPlugin):
 
     # -- elements ----------------------------------------------------------------------------------------------------
 
+    def text(self, tag, default=None):
+        """The text of an element, or ``default``. Kinds whose elements have other names override it."""
+        return self.context.element_text(tag, default)
+
     def number(self, tag, default):
         """A finite number, 0 or more."""
-        text = self.context.element_text(tag)
+        text = self.text(tag)
         try:
             value = default if text is None else float(text)
         except ValueError:
@@ -138,7 +142,7 @@ class Drive(ModelPlugin):
 
     def flag(self, tag, default):
         """true, false, 1 or 0."""
-        text = self.context.element_text(tag)
+        text = self.text(tag)
         if text is None:
             return default
         known = {"true": True, "1": True, "false": False, "0": False}
@@ -148,7 +152,7 @@ class Drive(ModelPlugin):
 
     def joint(self, tag, default):
         """The name of one of the model's joints."""
-        name = unscoped(self.model.name, self.context.element_text(tag, default))
+        name = unscoped(self.model.name, self.text(tag, default))
         if name not in self.model.joint_names:
             raise PluginError("%s: <%s> is '%s', expected one of the joints %s"
                               % (self.what, tag, name, ", ".join(self.model.joint_names) or "(there are none)"))
@@ -198,7 +202,7 @@ class DiffDrive(_Wheels):
     def sides(self):
         names = [self.joint("leftJoint", "left_joint")], [self.joint("rightJoint", "right_joint")]
         if self.flag("legacyMode", True):
-            if self.context.element_text("legacyMode") is None:
+            if self.text("legacyMode") is None:
                 self.context.log.warn("%s says no <legacyMode>, so left and right are exchanged, as in Gazebo; give "
                                       "false where that is wrong" % self.what)
             return names[::-1]
@@ -209,7 +213,7 @@ class DiffDrive(_Wheels):
         self._separation = self.positive("wheelSeparation", 0.34)
         self._radius = self.positive("wheelDiameter", 0.15) / 2.0
         self.acceleration = self.number("wheelAcceleration", 0.0)
-        source = self.context.element_text("odometrySource", "world").lower()
+        source = self.text("odometrySource", "world").lower()
         if source not in ("world", "encoder", "0", "1"):
             raise PluginError("%s: <odometrySource> is '%s', expected world or encoder" % (self.what, source))
         self._counted = WheelOdometry() if source in ("encoder", "0") else None
@@ -224,7 +228,11 @@ class DiffDrive(_Wheels):
             return
         before, self._turned = self._turned, self._angles()
         left, right = self._radius * (self._turned - before)
-        self._counted.move((left + right) / 2.0, (right - left) / self._separation, dt)
+        self._counted.move((left + right) / 2.0, self.turn(left, right, dt), dt)
+
+    def turn(self, left, right, dt):
+        """The angle [rad] that odometry counts for a step in which the rims moved by ``left`` and ``right`` [m]."""
+        return (right - left) / self._separation
 
     def where(self):
         counted = self._counted
@@ -294,6 +302,22 @@ class PlanarMove(Drive):
         heading = math.atan2(pose[1, 0], pose[0, 0])
         cosine, sine = math.cos(heading), math.sin(heading)
         self.model.set_base_twist((x * cosine - y * sine, x * sine + y * cosine, 0.0), (0.0, 0.0, turn))
+
+
+class ForceBasedMove(PlanarMove):
+    """``libgazebo_ros_force_based_move.so`` and its kin: as :class:`PlanarMove`, but the model falls, tips and climbs.
+
+    ``publishOdometryTf`` (true) takes the place of ``publishOdomTF``. The gains have no effect: it moves as commanded.
+    """
+
+    tf_tag = "publishOdometryTf"
+
+    def drive(self, x, y, turn, dt):
+        along, across = self.model.base_pose().matrix()[:3, :2].T
+        linear, angular = (np.asarray(part) for part in self.model.base_twist())
+        up = np.cross(along, across)
+        linear = linear + (x - linear @ along) * along + (y - linear @ across) * across
+        self.model.set_base_twist(tuple(linear), tuple(angular + (turn - angular @ up) * up))
 
 
 def _quaternion(pose):

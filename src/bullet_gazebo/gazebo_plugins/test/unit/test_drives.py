@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 from geometry_msgs.msg import Twist, Vector3
+from std_msgs.msg import Empty
 
 from bullet_sim import Pose, World
-from gazebo_plugins.drives import DiffDrive, PlanarMove, SkidSteer
+from gazebo_plugins.drives import DiffDrive, ForceBasedMove, PlanarMove, SkidSteer
+from gazebo_plugins.kobuki import Kobuki
 from gazebo_ros.model_plugin import PluginContext, PluginError, PluginSource
 from gazebo_ros.urdf_extras import plugins
 from loop_ros.testing import FakeLog, FakeRos
@@ -17,6 +19,7 @@ DT = 0.002
 INERTIA = '<inertial><mass value="%s"/><inertia ixx="%s" iyy="%s" izz="%s" ixy="0" ixz="0" iyz="0"/></inertial>'
 COLLISION = "<collision><geometry><%s/></geometry></collision>"
 BODY = '<link name="base">%s%s</link>' % (INERTIA % (5, 0.05, 0.05, 0.08), COLLISION % 'box size="0.3 0.3 0.1"')
+SMOOTH_BODY = BODY + '<gazebo reference="base"><mu1>0.0</mu1><mu2>0.0</mu2></gazebo>'
 CASTER = """<link name="caster">%s%s</link><joint name="caster" type="fixed"><parent link="base"/><child link="caster"/>
 <origin xyz="-0.12 0 -0.05"/></joint><gazebo reference="caster"><mu1>0.0</mu1><mu2>0.0</mu2></gazebo>""" % (
     INERTIA % (0.1, 1e-4, 1e-4, 1e-4), COLLISION % 'sphere radius="0.05"')
@@ -33,7 +36,7 @@ def urdf(wheels, elements, caster=True):
     inside = "".join("<%s>%s</%s>" % (tag, text, tag) for tag, text in elements.items() if text is not None)
     body = INERTIA % (0.5, 0.002, 0.002, 0.003) + COLLISION % 'cylinder radius="0.1" length="0.04"'
     return '<robot name="r">%s%s%s<gazebo><plugin name="p" filename="x.so">%s</plugin></gazebo></robot>' % (
-        BODY, CASTER if caster else "",
+        BODY if wheels else SMOOTH_BODY, CASTER if caster else "",
         "".join(WHEEL % {"name": name, "x": x, "y": y, "body": body} for name, (x, y) in wheels.items()), inside)
 
 
@@ -49,8 +52,8 @@ class Vehicle:
         context = PluginContext(self.world, self.model, source, self.log, self.ros, {})
         self.plugin = plugin_class(context)
 
-    def command(self, x=0.0, turn=0.0, y=0.0):
-        self.ros.subscriptions["/ns/cmd_vel"].put(Twist(Vector3(x, y, 0), Vector3(0, 0, turn)))
+    def command(self, x=0.0, turn=0.0, y=0.0, topic="/ns/cmd_vel"):
+        self.ros.subscriptions[topic].put(Twist(Vector3(x, y, 0), Vector3(0, 0, turn)))
 
     def run(self, seconds):
         for _ in range(round(seconds / DT)):
@@ -109,7 +112,7 @@ def test_the_last_command_counts_until_the_next_one(make):
     assert vehicle.odom.twist.twist.linear.x == pytest.approx(0.4, abs=0.02)
     vehicle.command(math.nan)
     assert vehicle.run(0.5).true_pose()[0] == pytest.approx(1.4, abs=0.1)
-    assert "no number" in vehicle.log.of("warn")[0]
+    assert "not a number" in vehicle.log.of("warn")[0]
     vehicle.command(0.0)
     x = vehicle.run(0.5).true_pose()[0]
     assert vehicle.run(1.0).true_pose()[0] == pytest.approx(x, abs=0.01)
@@ -183,3 +186,48 @@ def test_planar_move_slides_as_commanded(make):
     vehicle.command(0.0, 0.5)
     assert vehicle.run(1.0).true_pose()[2] == pytest.approx(0.5, abs=0.02)
     assert len(vehicle.ros.publishers["/ns/odom"].messages) == pytest.approx(40, abs=2)
+
+
+def test_force_based_move_moves_as_commanded_and_falls(make):
+    vehicle = make(ForceBasedMove, {}, {}, caster=False)
+    vehicle.command(0.3, y=0.2)
+    x, y, _ = vehicle.run(1.0).true_pose()
+    assert (x, y) == pytest.approx((0.3, 0.2), abs=0.01)
+    assert vehicle.model.base_pose().position[2] == pytest.approx(0.05, abs=0.01)
+    vehicle.command(0.0, 0.5)
+    assert vehicle.run(1.0).true_pose()[2] == pytest.approx(0.5, abs=0.02)
+
+
+VELOCITY = "/ns/mobile_base/commands/velocity"
+KOBUKI = {"left_wheel_joint_name": "left", "right_wheel_joint_name": "right", "wheel_separation": 0.36,
+          "wheel_diameter": 0.2, "torque": 1, "velocity_command_timeout": 0.6}
+
+
+def test_kobuki_drives_and_its_odometry_is_true(make):
+    vehicle = make(Kobuki, TWO, KOBUKI)
+    for x, turn in ((0.3, 0.0), (0.2, 0.8), (0.0, 0.8)):
+        for _ in range(10):
+            vehicle.command(x, turn, topic=VELOCITY)
+            vehicle.run(0.2)
+    x, y, heading = vehicle.true_pose()
+    assert math.remainder(heading - 3.2, math.tau) == pytest.approx(0.0, abs=0.2)
+    # The axle, of which odometry tells, is 5 cm ahead of the base.
+    axle = x + 0.05 * (math.cos(heading) - 1.0), y + 0.05 * math.sin(heading)
+    counted = vehicle.counted_pose()
+    assert counted[:2] == pytest.approx(axle, abs=0.05)
+    assert math.remainder(counted[2] - heading, math.tau) == pytest.approx(0.0, abs=0.03)
+    imu = vehicle.ros.publishers["/ns/mobile_base/sensors/imu_data"].messages[-1]
+    assert imu.angular_velocity.z == pytest.approx(0.8, abs=0.05)
+    assert imu.linear_acceleration.z == pytest.approx(9.8, abs=0.5)
+    assert vehicle.ros.publishers["/ns/joint_states"].messages[-1].name == ["left", "right"]
+    assert "/tf" not in vehicle.ros.publishers and "kobuki_msgs" in vehicle.log.of("warn")[0]
+
+
+def test_kobuki_stops_when_commands_end_and_forgets_its_way_when_told(make):
+    vehicle = make(Kobuki, TWO, KOBUKI)
+    vehicle.command(0.3, topic=VELOCITY)
+    x = vehicle.run(1.0).true_pose()[0]
+    assert 0.1 < x < 0.25
+    assert vehicle.run(1.0).true_pose()[0] == pytest.approx(x, abs=0.01)
+    vehicle.ros.subscriptions["/ns/mobile_base/commands/reset_odometry"].put(Empty())
+    assert np.abs(vehicle.run(0.1).counted_pose()).max() < 0.01
