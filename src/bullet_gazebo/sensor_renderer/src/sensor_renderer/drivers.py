@@ -128,7 +128,7 @@ class Driver:
         """A ROS name: relative ones live in the sensor's namespace. Raises :class:`SensorError` for an invalid name."""
         name = text if text.startswith("/") else "%s/%s" % (self.entry.namespace, text)
         if not is_legal_name(name):
-            raise SensorError("%s: '%s' is no name in ROS; expected letters, digits and _ between slashes"
+            raise SensorError("%s: '%s' is not a name in ROS; expected letters, digits and _ between slashes"
                               % (self.entry, name))
         return name
 

@@ -5,7 +5,7 @@ Everything here belongs to the thread that made the renderer.
 """
 import os
 import weakref
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from sensor_renderer.light import MOST_LAMPS, Lamp
 _SHADOW_CENTRE = np.array([0.3, 0.0, 0.7])
 _SHADOW_HALF_M = 2.2
 _SHADOW_PIXELS = 512
+# A link of which the radius in the picture is larger than this [pixels] is drawn with its fine meshes: smaller ones
+# would show no difference.
+_FINE_FROM_PX = 40.0
 _NO_LAMP = Lamp((0.0,) * 4, (0.0,) * 3, (0.0,) * 4, (0.0,) * 3, (0.0,) * 3)
 
 # Light without shadows, of up to MOST_LAMPS lamps. In software, even an empty loop costs as much as the rest of a
@@ -142,13 +145,17 @@ void main() { seen = texture(picture, place); }
 """
 
 
-class _Link(NamedTuple):
-    """The geometry of one draw call: vertex arrays for colour and for depth only, and a bounding sphere."""
+@dataclass
+class _Link:
+    """The geometry of one draw call: vertex arrays for colour and for depth only, coarse and fine; a bounding sphere;
+    its parts. The fine arrays are made when the link is first seen so near."""
 
     arrays: tuple
     centre: np.ndarray
     radius: float
     is_floor: bool
+    parts: tuple = ()
+    fine: tuple | None = None
 
 
 class GlRenderer:
@@ -197,7 +204,8 @@ class GlRenderer:
         to_clip = pinhole.clip_matrix() @ view
         if mirror.light != self._lit_by:
             self._light_by(mirror.light)
-        seen = _visible(self._everything(mirror), pinhole, view)
+        seen = [(self._arrays(link, matrix, pinhole, view), packed, link.is_floor)
+                for link, matrix, packed in _visible(self._everything(mirror), pinhole, view)]
         buffer, depth_texture = self._framebuffer(pinhole.width, pinhole.height)
         picture = distance = None
         if colour:
@@ -209,7 +217,7 @@ class GlRenderer:
             for program, floor in ((self._program, False), (self._floor_program, True)):
                 program["to_clip"].write(_bytes(to_clip))
                 program["eye"].value = tuple(pose[:3, 3])
-                self._draw(program, [entry for entry in seen if entry[0].is_floor == floor], 0)
+                self._draw(program, [(arrays[0], packed) for arrays, packed, is_floor in seen if is_floor == floor])
             if screens:
                 self._screen_program["to_clip"].write(_bytes(to_clip))
             for texture, matrix in screens:
@@ -222,7 +230,7 @@ class GlRenderer:
             buffer.use()
             buffer.clear(depth=1.0)
             self._shadow_program["to_clip"].write(_bytes(to_clip))
-            self._draw(self._shadow_program, seen, 1)
+            self._draw(self._shadow_program, [(arrays[1], packed) for arrays, packed, _ in seen])
         if depth:
             raw = np.frombuffer(depth_texture.read(alignment=1), np.float32)
             distance = pinhole.depth_from_buffer(raw.reshape(pinhole.height, pinhole.width))
@@ -251,8 +259,8 @@ class GlRenderer:
                 program["lamp_" + name].write(values.tobytes())
 
     def _compile(self, lamps):
-        for drawn in (*(array for link in self._links.values() for array in link.arrays), self._program,
-                      self._floor_program):
+        for drawn in (*(array for link in self._links.values() for array in (*link.arrays, *(link.fine or ()))),
+                      self._program, self._floor_program):
             if drawn is not None:
                 drawn.release()
         self._links = {}
@@ -300,15 +308,15 @@ class GlRenderer:
         if not mirror.light.shadows:
             return
         self._shadow_program["to_clip"].write(_bytes(self._shadow_matrix))
-        casting = [entry for entry in self._everything(mirror) if not entry[0].is_floor]
-        self._draw(self._shadow_program, casting, 1)
+        self._draw(self._shadow_program, [(link.arrays[1], packed) for link, _, packed in self._everything(mirror)
+                                          if not link.is_floor])
 
     @staticmethod
-    def _draw(program, links, which):
+    def _draw(program, listed):
         body = program["body"]
-        for link, _, packed in links:
+        for array, packed in listed:
             body.write(packed)
-            link.arrays[which].render()
+            array.render()
 
     def _everything(self, mirror):
         """The links to draw: (:class:`_Link`, matrix, the same as OpenGL reads it), one for each link that has
@@ -326,18 +334,28 @@ class GlRenderer:
         key = tuple((part.key, part.colour) for part in parts)
         found = self._links.get(key)
         if found is None:
-            # One call for each link: in software a call costs as much as some hundred triangles.
-            rows = np.concatenate([np.hstack([part.triangles, np.tile(np.float32(part.colour[:3]),
-                                                                      (len(part.triangles), 1))]) for part in parts])
+            rows = _rows(parts, [part.triangles for part in parts])
             is_floor = any(part.is_floor for part in parts)
-            program = self._floor_program if is_floor else self._program
-            arrays = (self._vertex_array(program, rows, "3f 3f 3f", "position", "normal", "colour"),
-                      self._vertex_array(self._shadow_program, rows[:, :3], "3f", "position"))
             low, high = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
             centre = (low + high) / 2.0
             radius = float(np.linalg.norm(rows[:, :3] - centre, axis=1).max())
-            found = self._links[key] = _Link(arrays, centre, radius, is_floor)
+            found = self._links[key] = _Link(self._arrays_of(rows, is_floor), centre, radius, is_floor, tuple(parts))
         return found
+
+    def _arrays(self, link, matrix, pinhole, view):
+        """The vertex arrays of the level of detail that the link's size in the picture asks for."""
+        distance = np.linalg.norm((view @ matrix @ [*link.centre, 1.0])[:3])
+        if link.radius * pinhole.fx <= _FINE_FROM_PX * distance or not any(part.fine for part in link.parts):
+            return link.arrays
+        if link.fine is None:
+            rows = _rows(link.parts, [part.fine() if part.fine else part.triangles for part in link.parts])
+            link.fine = self._arrays_of(rows, link.is_floor)
+        return link.fine
+
+    def _arrays_of(self, rows, is_floor):
+        program = self._floor_program if is_floor else self._program
+        return (self._vertex_array(program, rows, "3f 3f 3f", "position", "normal", "colour"),
+                self._vertex_array(self._shadow_program, rows[:, :3], "3f", "position"))
 
     def _vertex_array(self, program, rows, layout, *names):
         """The GPU processes shared vertices once."""
@@ -352,6 +370,13 @@ class GlRenderer:
             buffer = self._context.framebuffer(self._context.renderbuffer((width, height), 4), depth)
             self._buffers[width, height] = buffer, depth
         return self._buffers[width, height]
+
+
+def _rows(parts, triangles):
+    """(n, 9) position, normal, colour of the corners of all parts. One call draws a link: in software a call costs as
+    much as some hundred triangles."""
+    return np.concatenate([np.hstack([rows, np.tile(np.float32(part.colour[:3]), (len(rows), 1))])
+                           for part, rows in zip(parts, triangles, strict=True)])
 
 
 def _visible(listed, pinhole, view):

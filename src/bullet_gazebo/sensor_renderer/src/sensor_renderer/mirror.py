@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The world for the renderer: the bodies of the snapshot, posed by our own forward kinematics. ROS-free."""
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,7 @@ from sensor_renderer import triangles
 from sensor_renderer.light import Light
 from urdf_model import Mesh, merge_fixed, parse_urdf
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, rigid
-from world_picture.drawing import DrawingError
+from world_picture.drawing import DrawingError, read_fine
 from world_picture.shared_picture import PictureReader
 from world_picture.snapshot import SnapshotError
 
@@ -19,12 +20,14 @@ FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
 
 
 class Part(NamedTuple):
-    """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1."""
+    """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1. ``fine()``: more
+    triangles of the same shape, for a near view; None where there are none."""
 
     key: tuple
     triangles: np.ndarray
     colour: tuple
     is_floor: bool = False
+    fine: Callable | None = None
 
 
 class Screen(NamedTuple):
@@ -56,6 +59,16 @@ class Body:
         """Number of this body's values in a snapshot."""
         return 7 + len(self._joints)
 
+    @property
+    def link_names(self):
+        """The names of the links, parents first, as in ``parts`` and ``matrices``."""
+        return list(self._index)
+
+    @property
+    def joint_names(self):
+        """The names of the joints, in the snapshot's order."""
+        return [joint.name for joint in self._joints]
+
     def set_state(self, values):
         """Set the poses of all links from ``values``, in the snapshot's order. Returns whether anything has moved."""
         if self._shown is not None and np.array_equal(values, self._shown):
@@ -64,17 +77,34 @@ class Body:
         matrices = self.matrices
         matrices[0] = rigid(matrix_from_quaternion(values[3:7]), values[:3])
         for number, (joint, position) in enumerate(zip(self._joints, values[7:].tolist(), strict=True), 1):
-            motion = np.eye(4)
-            if joint.type == "prismatic":
-                motion[:3, 3] = joint.axis * position
-            else:
-                motion[:3, :3] = axis_rotation(joint.axis, position)
-            matrices[number] = matrices[self._index[joint.parent]] @ joint.origin @ motion
+            matrices[number] = matrices[self._index[joint.parent]] @ joint.origin @ _motion(joint, position)
         return True
+
+    def moved(self, positions):
+        """Poses in the world if the joints ``positions`` {name: [rad or m]} stood there, and the others as shown.
+
+        Returns {link's number: pose (4, 4)} of the links that these joints move. Any thread may call it.
+        """
+        values, matrices, found = self._shown, self.matrices.copy(), {}
+        for number, joint in enumerate(self._joints, 1):
+            parent = self._index[joint.parent]
+            if joint.name in positions or parent in found:
+                position = positions.get(joint.name, 0.0 if values is None else values[6 + number])
+                found[number] = matrices[number] = matrices[parent] @ joint.origin @ _motion(joint, position)
+        return found
 
     def link_matrix(self, name):
         """Pose (4, 4) of a body link's frame in the world; ``KeyError`` for an unknown one."""
         return self.matrices[self._index[name]]
+
+
+def _motion(joint, position):
+    motion = np.eye(4)
+    if joint.type == "prismatic":
+        motion[:3, 3] = joint.axis * position
+    else:
+        motion[:3, :3] = axis_rotation(joint.axis, position)
+    return motion
 
 
 class Mirror:
@@ -148,17 +178,23 @@ class Mirror:
             return []
         scale = np.diag([*geometry.scale, 1.0])
         return [self._placed((part.path, geometry.scale), lambda part=part: triangles.of_wavefront(part.path),
-                             shape.origin @ scale, part.colour or colour) for part in found]
+                             shape.origin @ scale, part.colour or colour,
+                             lambda part=part: triangles.of_mesh(*read_fine(part.fine))) for part in found]
 
-    def _placed(self, what, make, origin, colour):
+    def _placed(self, what, make, origin, colour, make_fine=None):
         key = (*what, origin.tobytes())
         if key not in self._parts:
-            raw = make()
-            points = raw[:, :3] @ origin[:3, :3].T + origin[:3, 3]
-            normals = raw[:, 3:] @ np.linalg.inv(origin[:3, :3])
-            normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
-            self._parts[key] = np.hstack([points, normals]).astype(np.float32)
-        return Part(key, self._parts[key], tuple(colour))
+            self._parts[key] = _at(origin, make())
+        fine = None if make_fine is None else lambda: _at(origin, make_fine())
+        return Part(key, self._parts[key], tuple(colour), fine=fine)
+
+
+def _at(origin, rows):
+    """The triangles ``rows`` (3 m, 6) at ``origin`` (4, 4), which may scale them."""
+    points = rows[:, :3] @ origin[:3, :3].T + origin[:3, 3]
+    normals = rows[:, 3:] @ np.linalg.inv(origin[:3, :3])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
+    return np.hstack([points, normals]).astype(np.float32)
 
 
 def _floor():

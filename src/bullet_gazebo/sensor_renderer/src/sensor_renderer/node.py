@@ -98,9 +98,9 @@ class SensorRenderer:
         except rospy.ROSException:
             return  # the node is shutting down
         except Exception as error:  # noqa: BLE001  (one sensor that fails must not blind the others)
-            self._begin_anew(driver, time_s, error)
+            self._restart_or_stop(driver, time_s, error)
 
-    def _begin_anew(self, driver, time_s, error):
+    def _restart_or_stop(self, driver, time_s, error):
         """A sensor has failed: restart it, or, if restarting has not helped, leave it out until the time is reset."""
         entry, what = driver.entry, "%s: %s" % (type(error).__name__, error)
         keys = [key for key, other in self._sensors.items() if other is driver]
@@ -110,7 +110,7 @@ class SensorRenderer:
         self._failed_at[keys[0]] = failed_at
         driver.close()
         if len(failed_at) < FAILURES:
-            rospy.logerr("%s failed and begins anew: %s" % (entry, what))
+            rospy.logerr("%s failed and is restarted: %s" % (entry, what))
             # It is made again at the next check of the scene.
             self._revision = None
         else:

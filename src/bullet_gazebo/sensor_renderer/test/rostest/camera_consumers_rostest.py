@@ -94,7 +94,7 @@ class CameraConsumersTest(unittest.TestCase):
         screen = virtual_screen.open_for(self)
         command = ["rosrun", "image_view", "image_view", "image:=/deep/rgb/image_raw", "_autosize:=true"]
         viewer = subprocess.Popen(command, env=screen.environment, start_new_session=True)
-        self.addCleanup(viewer.wait, 20.0)
+        self.addCleanup(viewer.wait, TIMEOUT_S)
         self.addCleanup(os.killpg, viewer.pid, signal.SIGTERM)
 
         def shown():

@@ -76,7 +76,7 @@ class SensorRendererTest(unittest.TestCase):
             rospy.ServiceProxy("/gazebo/delete_model", DeleteModel)(name)
         counts = [len(part) for part in seen]
         wait_until(lambda: all(len(part) > count + 5 for part, count in zip(seen, counts, strict=True)))
-        for text in ("a picture of 99999999 x 120 pixels is out of range", "'/no name!/image_raw' is no name in ROS"):
+        for text in ("picture of 99999999 x 120 pixels is out of range", "'/no name!/image_raw' is not a name in ROS"):
             wait_until(lambda text=text: any(text in line for line in said), text)
             self.assertEqual(sum(text in line for line in said), 1, "said once: %s" % text)
 

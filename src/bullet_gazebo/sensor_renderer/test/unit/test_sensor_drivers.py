@@ -135,7 +135,7 @@ def test_settings_are_served_once_and_felt_at_once(monkeypatch):
 
 
 def test_names_that_are_none_are_refused():
-    with pytest.raises(SensorError, match="'/n s/eye' is no name in ROS"):
+    with pytest.raises(SensorError, match="'/n s/eye' is not a name in ROS"):
         drivers.Driver(SensorEntry("robot", {
             "link": "base", "member": "head", "offset": np.eye(4).ravel().tolist(), "plugin": 0, "namespace": "/n s",
             "xml": SENSOR % ("10", "", "0")})).name("eye")

@@ -84,7 +84,7 @@ def test_a_mesh_of_a_package_that_came_later_is_drawn(simulator, tmp_path, monke
     assert corners(STAND.replace(box, '<mesh filename="package://made_later/part.obj" scale="2 2 2"/>')) == 3
 
 
-def test_a_sensor_that_fails_begins_anew_and_is_left_out_at_the_third_time_until_a_reset(simulator, monkeypatch):
+def test_a_sensor_that_fails_restarts_and_is_left_out_at_the_third_time_until_a_reset(simulator, monkeypatch):
     made, failing = [], [True] * 4
 
     class Weak(Eye):
@@ -107,11 +107,11 @@ def test_a_sensor_that_fails_begins_anew_and_is_left_out_at_the_third_time_until
                 renderer._turn(reader)
 
     go_on([100, 200])
-    assert len(made) == 3 and renderer._sensors, "made anew twice"
+    assert len(made) == 3 and renderer._sensors, "made again twice"
     go_on([300, 400, 500])
     assert len(made) == 3 and not renderer._sensors and len(failing) == 1, "left out"
     simulator.resets += 1
     go_on([10, 110])
-    assert len(made) == 5 and renderer._sensors and not failing, "made for the reset, failed once, made anew"
+    assert len(made) == 5 and renderer._sensors and not failing, "made for the reset, failed once, made again"
     go_on([210])
     assert made[-1].taken

@@ -6,7 +6,9 @@ import sys
 import numpy as np
 import pybullet
 import pytest
+import trimesh
 
+from lab_testing.meshes import sphere
 from sensor_renderer import triangles
 from sensor_renderer.errors import SensorError
 from sensor_renderer.gl_renderer import GlRenderer
@@ -16,6 +18,8 @@ from sensor_renderer.tiny_renderer import TinyRenderer
 from urdf_model import Box, Cylinder, Sphere
 from urdf_model.transforms import inverse, pose_matrix
 from world_picture.drawing import DrawingCache
+
+pytestmark = pytest.mark.once
 
 CUBE_M = 0.1
 CUBE = """<robot name="cube"><link name="link"><visual><geometry><box size="0.1 0.1 0.1"/></geometry>
@@ -36,6 +40,10 @@ ARM = """<robot name="arm">
 </visual></link></robot>"""
 
 
+BALL = """<robot name="ball"><link name="link"><visual><geometry><mesh filename="%s"/></geometry>
+<material name="r"><color rgba="0.9 0 0 1"/></material></visual></link></robot>"""
+
+
 @pytest.fixture(params=[GlRenderer, TinyRenderer])
 def renderer(request):
     made = request.param()
@@ -54,6 +62,11 @@ def world(bodies, tmp_path):
 def looking_down_on(x, y, height):
     """Optical pose (4, 4), slanted, that looks at about (x, y, 0)."""
     return pose_matrix((x - 0.5 * height, y + 0.1, height), (0.0, 1.0, -0.1)) @ OPTICAL
+
+
+def looking_at_origin(distance):
+    """Optical pose (4, 4) on the x axis, `distance` [m] away."""
+    return pose_matrix((-distance, 0.0, 0.0), (0.0, 0.0, 0.0)) @ OPTICAL
 
 
 def reddish(picture):
@@ -104,6 +117,33 @@ def test_depth_agrees_with_rays(renderer, tmp_path):
         assert depth[v, u] == pytest.approx(hit[2] * 50.0, abs=0.005)
     pybullet.disconnect(physicsClientId=client)
     assert hits >= 50
+
+
+def test_a_near_mesh_is_drawn_finely_and_a_far_one_coarsely(tmp_path):
+    """A ball of many triangles: near, its outline is round within a pixel; of coarse triangles it is not."""
+    vertices, faces = sphere(120)
+    trimesh.Trimesh(0.3 * vertices, faces).export(str(tmp_path / "ball.stl"))
+    urdf = BALL % (tmp_path / "ball.stl")
+    mirror = Mirror(DrawingCache(tmp_path / "cache", triangles=100), lambda uri: uri, pytest.fail)
+    mirror.set_scene([{"name": "ball", "urdf": urdf, "joints": []}])
+    mirror.set_state(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    renderer = GlRenderer()
+    pinhole = Pinhole.from_field_of_view(600, 600, 1.0, 0.05, 100.0)
+
+    def roundness(distance):
+        """The largest difference from a disc of the same area [pixels]."""
+        rows, columns = np.nonzero(reddish(renderer.render(mirror, pinhole, looking_at_origin(distance))[0]))
+        away = np.hypot(rows - rows.mean(), columns - columns.mean())
+        return away.max() - np.sqrt(len(rows) / np.pi)
+
+    far = roundness(12.0)
+    link, = renderer._links.values()
+    assert link.fine is None and far < 2.0
+    near = roundness(1.0)
+    assert link.fine is not None and near < 3.0
+    link.fine = link.arrays
+    assert roundness(1.0) > near + 2.0, "coarse triangles would show"
+    renderer.close()
 
 
 def test_the_camera_looks_along_z_with_x_to_the_right_and_y_down(renderer, tmp_path):

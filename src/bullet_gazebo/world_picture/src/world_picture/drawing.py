@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Meshes simplified for software rendering: split by colour, decimated, cached on disk. ROS-free."""
+"""Meshes simplified for software rendering: split by colour, in two levels of detail, cached on disk. ROS-free."""
 import hashlib
 import json
 import os
@@ -21,15 +21,33 @@ from urdf_model import read_file
 TRIANGLES = 800
 USUAL_M = 0.35
 _LEAST, _MOST = 0.5, 2.5
+#: As many times more triangles has the fine level, for links that are large in the picture.
+FINE = 3.0
+# Vertices within this share of a mesh's size are one: files often have a vertex for each corner of each triangle.
+_WELD = 1e-5
+# Reduction by quadric error tears loose sheets: it counts only if the surface keeps its area within this share.
+_AREA_KEPT = 0.06
+# It also stops early at seams; more triangles than this times the target are too many.
+_OVER_TARGET = 1.7
+# fast_simplification's threshold grows by this power: 7 is quick and coarse, 1 exact and often short of the target.
+_AGGRESSIVENESS = 3
 # Part of the names of cached files: increase it when the result for the same mesh changes.
-_VERSION = 4
+_VERSION = 5
 
 
 class MeshPart(NamedTuple):
-    """One colour of a mesh: a Wavefront file in metres; red, green, blue, alpha from 0 to 1, or None for no colour."""
+    """One colour of a mesh: a Wavefront file in metres; red, green, blue, alpha from 0 to 1, or None for no colour; the
+    file of its fine level, for :func:`read_fine`."""
 
     path: str
     colour: tuple
+    fine: str
+
+
+def read_fine(path):
+    """(vertices (n, 3) [m], faces (m, 3)) of the fine level of a :class:`MeshPart`."""
+    with np.load(path) as stored:
+        return stored["vertices"], stored["faces"]
 
 
 class DrawingError(Exception):
@@ -57,7 +75,8 @@ class DrawingCache:
         if not index.exists():
             index = self._make(path, key)
         listed = json.loads(index.read_text(encoding="utf-8"))
-        return [MeshPart(str(index.parent / name), tuple(colour) if colour else None) for name, colour in listed]
+        return [MeshPart(str(index.parent / name), tuple(colour) if colour else None, str(index.parent / fine))
+                for name, colour, fine in listed]
 
     def _make(self, path, key):
         try:
@@ -89,12 +108,53 @@ def write_parts(path, folder, triangles):
     kept = triangles * min(max(size / USUAL_M, _LEAST), _MOST)
     listed = []
     for number, (vertices, faces, colour) in enumerate(pieces):
-        vertices, faces = thin_out(vertices, faces, max(20, round(kept * len(faces) / total)))
-        if len(faces):
-            name = "part%d.obj" % number
-            (Path(folder) / name).write_text(_wavefront(vertices, faces), encoding="ascii")
-            listed.append((name, colour))
+        share = kept * len(faces) / total
+        coarse = reduced(vertices, faces, max(20, round(share)))
+        if len(coarse[1]):
+            name, fine = "part%d.obj" % number, "part%d.npz" % number
+            (Path(folder) / name).write_text(_wavefront(*coarse), encoding="ascii")
+            vertices, faces = reduced(vertices, faces, max(20, round(FINE * share)))
+            np.savez(Path(folder) / fine, vertices=vertices.astype(np.float32), faces=faces.astype(np.int32))
+            listed.append((name, colour, fine))
     (Path(folder) / "parts.json").write_text(json.dumps(listed), encoding="utf-8")
+
+
+def reduced(vertices, faces, target):
+    """(vertices, faces) with about the same surface as vertices (n, 3) and faces (m, 3) and about ``target`` triangles.
+
+    Edges are collapsed in the order of their quadric error (Garland and Heckbert, "Surface simplification using quadric
+    error metrics", 1997): flat parts become large triangles and outlines stay. Where that loses surface, as with loose
+    sheets and many small parts, vertices are merged on a grid instead (`bullet_sim.thinning`).
+    """
+    import fast_simplification
+
+    welded, joined = _welded(vertices, faces)
+    if len(joined) <= target:
+        return welded, joined
+    smooth = fast_simplification.simplify(welded.astype(np.float32), joined.astype(np.int32), target_count=int(target),
+                                          agg=_AGGRESSIVENESS)
+    merged = thin_out(vertices, faces, target)
+    lost, lost_by_merging = (abs(1.0 - _area(*mesh) / max(_area(vertices, faces), 1e-12)) for mesh in (smooth, merged))
+    if len(smooth[1]) <= _OVER_TARGET * target and (lost < _AREA_KEPT or lost < lost_by_merging):
+        return smooth
+    return merged
+
+
+def _welded(vertices, faces):
+    """The mesh with equal vertices merged; triangles that lose a corner, and repeated ones, are left out."""
+    size = max(float(np.ptp(vertices, axis=0).max()), 1e-9)
+    _, first, of = np.unique(np.round(vertices / (_WELD * size)).astype(np.int64), axis=0, return_index=True,
+                             return_inverse=True)
+    faces = of.reshape(-1)[faces]
+    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 0] != faces[:, 2])]
+    _, once = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return vertices[first], faces[np.sort(once)]
+
+
+def _area(vertices, faces):
+    corners = vertices[faces]
+    return 0.5 * float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),
+                                      axis=1).sum())
 
 
 def _read(path):

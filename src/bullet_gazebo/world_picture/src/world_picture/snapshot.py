@@ -78,7 +78,7 @@ def _remove(folder, descriptor):
 
 @contextlib.contextmanager
 def _own_folder(folder):
-    """Open a folder that belongs to this user and is no link; returns the descriptor. Raises ``OSError``."""
+    """Open a folder that belongs to this user and is not a link; returns the descriptor. Raises ``OSError``."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         _check_owner(os.fstat(descriptor), folder)
@@ -279,7 +279,7 @@ class SnapshotReader:
         except (OSError, ValueError) as error:
             raise SnapshotError("no snapshot in %s: %s" % (folder, error)) from error
         if len(self._memory) < _HEADER.size + 2 * _SLOT_BYTES or _HEADER.unpack_from(self._memory, 0)[0] != MAGIC:
-            raise SnapshotError("%s/state is no snapshot of this version" % folder)
+            raise SnapshotError("%s/state is not a snapshot of this version" % folder)
 
     @property
     def is_alive(self):

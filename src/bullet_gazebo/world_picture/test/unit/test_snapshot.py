@@ -217,7 +217,7 @@ def test_what_belongs_to_somebody_else_is_neither_removed_nor_opened(tmp_path, m
 
 
 def test_a_state_that_is_too_short_is_none(tmp_path):
-    with pytest.raises(SnapshotError, match="no snapshot of this version"):
+    with pytest.raises(SnapshotError, match="not a snapshot of this version"):
         SnapshotReader(left_over(tmp_path))
 
 
@@ -274,7 +274,7 @@ def test_a_picture_that_is_shorter_than_it_says_is_refused(tmp_path):
         PictureReader(tmp_path / "screen1")
 
 
-@pytest.mark.skipif(os.getuid() != 0, reason="mounts a file system of its own")
+@pytest.mark.skipif(os.getuid() != 0, reason="mounts a separate file system")
 def test_a_full_file_system_ends_no_process(tmp_path):
     """As root: a real tmpfs with 64 kB left, where a write to unreserved memory would kill the process (SIGBUS)."""
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(tmp_path)], check=False).returncode:

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A mirror of the world that follows one simulator's snapshot. ROS-free."""
+from model_files.resources import ResourceFinder
+from sensor_renderer.mirror import Mirror
+from world_picture.drawing import DrawingCache
+from world_picture.snapshot import SnapshotReader
+
+
+class WorldFollower:
+    """Use it in the thread that made it. ``mirror``: the :class:`sensor_renderer.mirror.Mirror`; ``revision``: the
+    number of the scene that it shows, None before the first; ``warn(text)``.
+    """
+
+    def __init__(self, folder, warn):
+        """Raises world_picture.snapshot.SnapshotError if there is no snapshot in ``folder``."""
+        self._reader = SnapshotReader(folder)
+        self._finder = ResourceFinder()
+        self.mirror = Mirror(DrawingCache(), self._finder, warn)
+        self.revision = None
+
+    @property
+    def is_alive(self):
+        """False once the simulator has ended."""
+        return self._reader.is_alive
+
+    def follow(self):
+        """Move the mirror's bodies to the newest state. Returns whether there is one that fits its scene. Raises
+        SnapshotError.
+        """
+        snapshot = self._reader.read()
+        if snapshot is None:
+            return False
+        if snapshot.revision != self.revision:
+            scene = self._reader.scene()
+            if scene.revision != snapshot.revision:
+                return False  # a state of the new scene follows
+            self._finder.forget_missing()
+            self.mirror.set_scene(scene.bodies, scene.light)
+            self.revision = scene.revision
+        self.mirror.set_state(snapshot.values)
+        return True
