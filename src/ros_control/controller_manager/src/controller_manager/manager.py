@@ -133,7 +133,7 @@ class ControllerManager:
         for loaded in self._loaded.values():
             running = loaded.state == RUNNING
             if running and loaded in stopping and loaded in starting:
-                raise Refused("conflicting switching command: '%s' is running and shall be started and stopped; one "
+                raise Refused("conflicting switching command: '%s' is running and should be started and stopped; one "
                               "call cannot restart it" % loaded.name)
             if strict and not running and loaded in stopping:
                 raise Refused("cannot stop controller '%s': it is %s, not running" % (loaded.name, loaded.state))
@@ -161,7 +161,7 @@ class ControllerManager:
             try:
                 loaded.controller.stopping(time_s)
                 loaded.controller.starting(time_s)
-            except _SURVIVED as error:  # a controller is anybody's code; the others go on
+            except _SURVIVED as error:  # a controller is foreign code; the others continue
                 self._fail(loaded, "restart", error)
 
     def update(self, time_s, dt, reset_controllers=False):
@@ -175,7 +175,7 @@ class ControllerManager:
         for loaded in self._running:
             try:
                 loaded.controller.update(time_s, dt)
-            except _SURVIVED as error:  # a controller is anybody's code; the others go on
+            except _SURVIVED as error:  # a controller is foreign code; the others continue
                 # A client that waits for the end of a goal is told.
                 with contextlib.suppress(*_SURVIVED):
                     loaded.controller.stopping(time_s)
@@ -285,7 +285,7 @@ class ControllerManager:
 
     def _fail(self, loaded, where, error):
         self._log.error("controller '%s' failed in %s() with %s: %s; it is stopped and its joints are held, the others "
-                        "go on. It can be started again: rosservice call .../controller_manager/switch_controller"
+                        "continue. It can be started again: rosservice call .../controller_manager/switch_controller"
                         % (loaded.name, where, type(error).__name__, error))
         self._set_state(loaded, ABORTED)
         try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The services of a controller manager: each request in a thread of its own, the work in the loop's."""
+"""The services of a controller manager: each request in a separate thread, the work in the loop's."""
 import contextlib
 import threading
 from concurrent.futures import CancelledError

@@ -33,22 +33,38 @@ class ControlledJoint:
 def read_transmissions(urdf_xml, known_joints):
     """Return (list of :class:`ControlledJoint`, list of warnings), in the order of the document.
 
-    A transmission that lacks a part is left out with a warning; several may share a name. Raises
-    :class:`HardwareError` for a hardware interface that does not exist and a joint that is not in ``known_joints``.
+    A transmission is left out with a warning if it lacks a part, if its hardware interface is not known, if its joint
+    is not in ``known_joints``, or if its joint already has one; the others count. Several may share a name. Raises
+    :class:`HardwareError` for a description that is not XML.
     """
-    joints, warnings = {}, []
+    joints, warnings = {}, _Warnings()
     for element in _root(urdf_xml).iterchildren("transmission"):
-        found = _transmission(element, warnings)
+        where = _where(element)
+        found = _transmission(element, where, warnings)
         if found is None:
             continue
         if found.name not in known_joints:
-            raise HardwareError("%s names joint '%s', which the model does not have or which does not move; its joints "
-                                "are %s" % (_where(element), found.name, ", ".join(known_joints)))
-        if found.name in joints:
-            warnings.append("%s is left out: joint '%s' already has a transmission" % (_where(element), found.name))
-            continue
-        joints[found.name] = found
-    return list(joints.values()), warnings
+            warnings.add("%s for joint '%s'" % (where, found.name), "left out, since the model does not have these "
+                         "joints or they do not move; its joints are %s" % ", ".join(known_joints))
+        elif found.name in joints:
+            warnings.add("%s for joint '%s'" % (where, found.name),
+                         "left out, since these joints already have a transmission")
+        else:
+            joints[found.name] = found
+    return list(joints.values()), warnings.lines()
+
+
+class _Warnings:
+    """Warnings, one line for all transmissions with the same one: a robot may have three for each of its joints."""
+
+    def __init__(self):
+        self._places = {}  # text -> where
+
+    def add(self, where, text):
+        self._places.setdefault(text, []).append(where)
+
+    def lines(self):
+        return ["%s: %s" % (", ".join(places), text) for text, places in self._places.items()]
 
 
 def read_soft_limits(urdf_xml):
@@ -88,28 +104,26 @@ def _where(element):
     return "transmission '%s' (line %s)" % (element.get("name", ""), element.sourceline)
 
 
-def _transmission(element, warnings):
-    where = _where(element)
+def _transmission(element, where, warnings):
     kind = (element.findtext("type") or element.get("type") or "").strip()
     joints, actuators = element.findall("joint"), element.findall("actuator")
     missing = [part for part, there in (
         ("a name", element.get("name")), ("<type>", kind), ("a <joint> with a name", joints and joints[0].get("name")),
         ("an <actuator>", actuators)) if not there]
     if missing:
-        warnings.append("%s is left out: it lacks %s" % (where, " and ".join(missing)))
+        warnings.add(where, "left out, since it lacks %s" % " and ".join(missing))
         return None
-    if kind not in _TYPES:
-        warnings.append("%s has the type '%s', expected one of %s; it is taken as a SimpleTransmission"
-                        % (where, kind, ", ".join(_TYPES)))
-    if len(joints) > 1:
-        warnings.append("%s has %d joints; only the first one, '%s', is used"
-                        % (where, len(joints), joints[0].get("name")))
     interface = _interface(joints[0], actuators[0], where, warnings)
     if interface is None:
         return None
+    if kind not in _TYPES:
+        warnings.add(where, "the type '%s' is not one of %s; it is taken as a SimpleTransmission"
+                     % (kind, ", ".join(_TYPES)))
+    if len(joints) > 1:
+        warnings.add(where, "of %d joints only the first one, '%s', is used" % (len(joints), joints[0].get("name")))
     reduction = _figure(actuators[0], "mechanicalReduction", 1.0, where, warnings)
     if reduction == 0.0:
-        warnings.append("%s: mechanicalReduction is 0, expected another number; it has no effect here" % where)
+        warnings.add(where, "mechanicalReduction is 0, expected another number; it has no effect here")
     return ControlledJoint(joints[0].get("name"), interface, reduction,
                            _figure(joints[0], "offset", 0.0, where, warnings))
 
@@ -119,17 +133,19 @@ def _interface(joint, actuator, where, warnings):
     if not names:
         names = [(found.text or "").strip() for found in actuator.findall("hardwareInterface")]
         if not names:
-            warnings.append("%s is left out: joint '%s' lacks <hardwareInterface>" % (where, joint.get("name")))
+            warnings.add(where, "left out, since its joint lacks <hardwareInterface>")
             return None
-        warnings.append("%s: <hardwareInterface> belongs into <joint>, not into <actuator>" % where)
+        warnings.add(where, "<hardwareInterface> belongs into <joint>, not into <actuator>")
     if len(names) > 1:
-        warnings.append("%s: only the first of the hardware interfaces %s is used" % (where, ", ".join(names)))
+        warnings.add(where, "only the first of the hardware interfaces %s is used" % ", ".join(names))
     name = names[0]
     if name in _DEPRECATED:
-        warnings.append("%s: hardware interface '%s' is an old name; write '%s'" % (where, name, _DEPRECATED[name]))
+        warnings.add(where, "hardware interface '%s' is an old name; write '%s'" % (name, _DEPRECATED[name]))
         name = _DEPRECATED[name]
     if name not in _INTERFACES:
-        raise HardwareError("%s has the hardware interface '%s'; known are %s" % (where, name, ", ".join(_INTERFACES)))
+        warnings.add("%s with '%s'" % (where, name), "left out, since their hardware interfaces are not known; known "
+                     "are %s" % ", ".join(_INTERFACES))
+        return None
     return _INTERFACES[name]
 
 
@@ -139,7 +155,7 @@ def _figure(element, tag, default, where, warnings):
         return default
     number = _number(text)
     if number is None:
-        warnings.append("%s: %s is '%s', expected a number; it has no effect here" % (where, tag, text.strip()))
+        warnings.add(where, "%s is '%s', expected a number; it has no effect here" % (tag, text.strip()))
         return default
     return number
 

@@ -250,8 +250,32 @@ def test_only_the_first_interface_and_transmission_of_a_joint_counts():
     assert [j.interface for j in joints] == [POSITION] and len(warnings) == 2
 
 
-def test_unknown_interface_and_unknown_joint_are_errors():
-    with pytest.raises(HardwareError, match=r"'tran1' \(line 1\).*'hardware_interface/LaserJointInterface'; known are"):
-        read(transmission(interface=INTERFACE % "Laser"))
-    with pytest.raises(HardwareError, match="names joint 'c', which the model does not have.*a, b"):
-        read(transmission("c"))
+def test_an_unknown_interface_leaves_out_its_transmission_alone():
+    """As Franka's description: two transmissions of a driver of its own beside those of the joints."""
+    joints, warnings = read(transmission("a", "state", interface=INTERFACE % "Laser"), transmission("a", "t_a"),
+                            transmission("b", "model", interface=INTERFACE % "Radar"), transmission("b", "t_b"))
+    assert [(j.name, j.interface) for j in joints] == [("a", POSITION), ("b", POSITION)]
+    assert len(warnings) == 1, "one for all of them"
+    for part in ("'state' (line 1) with 'hardware_interface/LaserJointInterface'", "'model'", "known are"):
+        assert part in warnings[0]
+
+
+def test_an_unknown_joint_leaves_out_its_transmission_alone():
+    joints, warnings = read(transmission("c"), transmission("a"))
+    assert [j.name for j in joints] == ["a"] and len(warnings) == 1
+    assert "joint 'c'" in warnings[0] and "its joints are a, b" in warnings[0]
+
+
+def test_further_transmissions_of_all_joints_are_one_warning():
+    further = [transmission(joint, interface=INTERFACE % "Effort") for joint in "ab"]
+    joints, warnings = read(transmission("a"), transmission("b"), *further, *further)
+    assert [j.interface for j in joints] == [POSITION] * 2
+    assert len(warnings) == 1 and warnings[0].count("for joint") == 4
+
+
+def test_old_names_of_all_joints_are_one_warning_of_each_kind():
+    """As a hand's description with 20 transmissions."""
+    old = "".join("<hardwareInterface>%sJointInterface</hardwareInterface>" % name for name in ("Effort", "Position"))
+    joints, warnings = read(transmission("a", "t_a", interface=old), transmission("b", "t_b", interface=old))
+    assert [j.interface for j in joints] == [EFFORT] * 2
+    assert len(warnings) == 2 and all("'t_a' (line 1), transmission 't_b' (line 3)" in line for line in warnings)

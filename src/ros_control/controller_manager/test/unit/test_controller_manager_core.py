@@ -269,7 +269,7 @@ def test_strict_refuses_to_start_what_runs(robot):
     assert "already running" in robot.refused(start=["one"])
 
 
-def test_best_effort_starts_what_runs_anew(robot):
+def test_best_effort_starts_what_runs_again(robot):
     calls = robot.load("one").calls
     robot.switch(["one"])
     robot.switch(["one"], strictness=BEST_EFFORT)

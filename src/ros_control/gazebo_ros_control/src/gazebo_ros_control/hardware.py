@@ -41,6 +41,9 @@ class SimulatedHardware(RobotHardware):
     effort
         the effort acts
 
+    A velocity or an effort of 0 is written once and not again, so that another plugin may drive a joint whose interface
+    no controller uses. A velocity of 0 holds the joint until then.
+
     Until the first command joints with a position interface stay where they were spawned.
     """
 
@@ -105,6 +108,9 @@ class SimulatedHardware(RobotHardware):
     def let_go(self, claims):
         if self._held is not None:
             self._held[self._braked(claims)] = False
+            # The next commands take the brakes off, zeros too.
+            for group in self._groups:
+                group.write_all()
             self._held = self._held if self._held.any() else None
 
     def hold_all(self):
@@ -205,6 +211,10 @@ class _Group:
 
     def reset(self):
         self.limiter.reset()
+        self.write_all()
+
+    def write_all(self):
+        """Write the next commands, whatever they are."""
 
 
 class _PositionGroup(_Group):
@@ -238,14 +248,33 @@ class _CarriedGroup(_Group):
         self._model.carry(self._model_index, command)
 
 
-class _VelocityGroup(_Group):
+class _YieldingGroup(_Group):
+    """Only the first of several zeros is written."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self._due = np.ones(len(self.index), dtype=bool)  # joints whose next command is written even if it is 0
+
+    def write_all(self):
+        self._due[:] = True
+
     def drive(self, command, position, velocity, dt):
-        self._model.drive_velocity(self._model_index, command, self._effort)
+        acts = command != 0.0
+        written, self._due = acts | self._due, acts
+        if written.all():
+            self._write(self._model_index, command, self._effort)
+        elif written.any():
+            self._write(self._model_index[written], command[written], self._effort[written])
 
 
-class _EffortGroup(_Group):
-    def drive(self, command, position, velocity, dt):
-        self._model.drive_effort(self._model_index, command)
+class _VelocityGroup(_YieldingGroup):
+    def _write(self, model_index, command, effort):
+        self._model.drive_velocity(model_index, command, effort)
+
+
+class _EffortGroup(_YieldingGroup):
+    def _write(self, model_index, command, effort):
+        self._model.drive_effort(model_index, command)
 
 
 class _PidGroup(_Group):

@@ -29,7 +29,7 @@ PID_GAINS = "gazebo_ros_control/pid_gains"
 class GazeboRosControl(ModelPlugin):
     """Elements: robotNamespace, robotParam, controlPeriod [s], eStopTopic, robotSimType; legacyModeNS has no effect.
 
-    A description without hardware gives one error in the log; the model stays, without controllers.
+    A description that cannot be used gives one error in the log; the model stays, without controllers.
     """
 
     def __init__(self, context):
@@ -52,7 +52,8 @@ class GazeboRosControl(ModelPlugin):
             context.model, robot, urdf_xml, context.param("joint_limits"),
             context.param(PID_GAINS), context.namespace, context.log)
         if not hardware.joint_names:
-            context.log.warn("model '%s': its description has no <transmission>, so no joint can be controlled"
+            context.log.warn("model '%s': its description has no <transmission> that can be used, so no joint can be "
+                             "controlled"
                              % context.model.name)
         hardware.sensors = simulated_sensors(context.world, context.model)
         for pid, joints in hardware.pids:

@@ -24,7 +24,7 @@ from std_srvs.srv import Empty
 from lab_testing.waiting import wait_until
 
 BEST_EFFORT, STRICT = 1, 2
-DEADLINE_S = 20.0
+DEADLINE_S = 90.0
 POSITION = "hardware_interface::PositionJointInterface"
 
 
@@ -85,7 +85,7 @@ class Joints:
 
 
 class ControlCase(unittest.TestCase):
-    """Each test has the robot `one`, spawned anew, and leaves an empty world."""
+    """Each test has the robot `one`, freshly spawned, and leaves an empty world."""
 
     @classmethod
     def setUpClass(cls):

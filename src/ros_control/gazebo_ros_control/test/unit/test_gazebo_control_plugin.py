@@ -197,15 +197,23 @@ def test_joints_that_were_set_stay_and_a_command_before_the_next_tick_counts(sim
         assert simulator.model.read_joints()[0][0] == pytest.approx(0.2, abs=1e-4)
 
 
-@pytest.mark.parametrize(("found", "other", "text"), [
-    ("PositionJoint", "MagicJoint", "'hardware_interface/MagicJointInterface'; known are"),
-    ('Transmission</type><joint name="j">', 'Transmission</type><joint name="k">', "names joint 'k'")])
-def test_a_description_without_hardware_is_one_error(simulate, found, other, text):
-    urdf = (URDF % 2).replace(found, other)
-    simulator = simulate(urdf=urdf)
+def test_a_description_that_cannot_be_used_is_one_error(simulate):
+    simulator = simulate(urdf=(URDF % 2).replace("</joint>", '<safety_controller k_velocity="much"/></joint>', 1))
     simulator.run(3)
     assert len(simulator.log.lines) == 1 and simulator.ros.served() == []
-    assert "model 'arm' has no controllers" in simulator.log.of("error")[0] and text in simulator.log.of("error")[0]
+    error = simulator.log.of("error")[0]
+    assert "model 'arm' has no controllers" in error and "k_velocity='much', expected a number" in error
+
+
+@pytest.mark.parametrize(("found", "other", "text"), [
+    ("PositionJoint", "MagicJoint", "'hardware_interface/MagicJointInterface': left out, since their hardware"),
+    ('Transmission</type><joint name="j">', 'Transmission</type><joint name="k">', "for joint 'k'")])
+def test_a_description_without_usable_transmissions_has_a_manager(simulate, found, other, text):
+    simulator = simulate(urdf=(URDF % 2).replace(found, other))
+    simulator.run(3)
+    warnings = simulator.log.of("warn")
+    assert text in warnings[0] and "no <transmission> that can be used" in warnings[1] and len(simulator.log.lines) == 2
+    assert len(simulator.ros.served()) == 6
 
 
 @pytest.mark.parametrize(("found", "other", "text"), [
@@ -213,7 +221,10 @@ def test_a_description_without_hardware_is_one_error(simulate, found, other, tex
      "transmission 't' (line 5): mechanicalReduction is 'ten', expected a number"),
     ("</robot>", """<transmission name="u"><type>transmission_interface/SimpleTransmission</type><joint>
   <hardwareInterface>hardware_interface/PositionJointInterface</hardwareInterface></joint><actuator name="m"/>
-</transmission></robot>""", "transmission 'u' (line 7) is left out: it lacks a <joint> with a name")])
+</transmission></robot>""", "transmission 'u' (line 7): left out, since it lacks a <joint> with a name"),
+    ("</robot>", """<transmission name="u"><type>its_driver/StateInterface</type><joint name="j">
+  <hardwareInterface>its_driver/StateInterface</hardwareInterface></joint><actuator name="m"/>
+</transmission></robot>""", "transmission 'u' (line 7) with 'its_driver/StateInterface'")])
 def test_a_faulty_transmission_is_one_line_and_the_robot_lives(simulate, found, other, text):
     simulator = simulate(urdf=(URDF % 2).replace(found, other))
     assert len(simulator.log.lines) == 1 and text in simulator.log.of("warn")[0]

@@ -298,3 +298,29 @@ def test_joints_whose_controller_has_failed_are_held_until_another_one_starts(ma
     if kind == EFFORT:
         arm.run(0.5, 0.0, kind)
         assert np.abs(arm.hardware.position - start).max() > 0.05, "free again"
+
+
+@pytest.mark.parametrize("interface", ["Effort", "Velocity"])
+def test_an_unused_interface_leaves_a_joint_to_another_plugin(make, interface):
+    """As on a vehicle with transmissions on wheels that a skid steer plugin drives."""
+    arm = make(interface, mass=0.1, inertia=0.01, start=-1.0)
+    for _ in range(100):
+        arm.model.drive_velocity(arm.all[:1], np.array([2.0]), np.array([50.0]))
+        arm.run(DT)
+    assert arm.hardware.velocity[0] == pytest.approx(2.0, abs=0.01)
+
+
+def test_an_unused_velocity_interface_holds_its_joints(make):
+    arm = make("Velocity", mass=1.0, inertia=0.02)
+    arm.run(0.2, 0.5, VELOCITY)
+    arm.run(DT, 0.0, VELOCITY)
+    here = arm.hardware.position.copy()
+    assert arm.run(2.0) == pytest.approx(here, abs=0.01)
+
+
+def test_an_effort_ends_with_its_command(make):
+    arm = make("Effort")
+    arm.run(5 * DT, [0.03, 0.02], EFFORT)
+    assert arm.hardware.effort == pytest.approx([0.03, 0.02])
+    arm.run(5 * DT, [0.0, 0.02], EFFORT)
+    assert arm.hardware.effort == pytest.approx([0.0, 0.02])

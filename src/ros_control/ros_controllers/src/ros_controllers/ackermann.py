@@ -23,7 +23,7 @@ class AckermannSteeringController(VehicleController):
         self._wheel, = self.claim(VELOCITY, [rear])
         self._steer, = self.claim(POSITION, [front])
         self._radius = (self._length("wheel_radius", lambda: self._wheel_radius(rear),
-                                     "the wheel's radius (its collision is no cylinder and no sphere)")
+                                     "the wheel's radius (its collision is neither a cylinder nor a sphere)")
                         * self._positive("wheel_radius_multiplier", 1.0, "times"))
         self._base = (self._length("wheel_separation_h", lambda: self._apart(front, rear),
                                    "how far its axles are apart")

@@ -14,9 +14,9 @@ class GripperController(Controller):
     """control_msgs/GripperCommand on the action ``gripper_cmd``: position [m or rad], max_effort [N or Nm].
 
     Parameters: ``joint``, required; ``goal_tolerance`` (0.01) of the position; ``max_effort`` (0), which applies until
-    the first goal and while holding; ``stall_velocity_threshold`` (0.001) and ``stall_timeout`` (1 s): slower than the
-    one for longer than the other is a stall. A goal succeeds within the tolerance and is aborted in a stall; the drive
-    continues. Base of the classes below.
+    the first goal and while holding; ``stall_velocity_threshold`` (0.001) and ``stall_timeout`` (1 s): a motion slower
+    than the threshold for longer than the timeout is a stall. A goal succeeds within the tolerance and is aborted in a
+    stall; the drive continues. Base of the classes below.
     """
 
     interface = None

@@ -23,7 +23,8 @@ class VehicleController(Controller):
     ``base_frame_id`` (base_link), ``odom_frame_id`` (odom), ``enable_odom_tf`` (true), ``open_loop`` (false; if true,
     odometry uses commands instead of wheels), ``velocity_rolling_window_size`` (10), ``pose_covariance_diagonal`` and
     ``twist_covariance_diagonal`` (six numbers each, zeros), ``publish_cmd`` (false: the limited command on
-    ``cmd_vel_out``), and the limits below ``linear/x`` and ``angular/z``, see :mod:`.speed_limits`.
+    ``cmd_vel_out``), ``allow_multiple_cmd_vel_publishers`` (true; if false, commands while several nodes publish them
+    are a stop), and the limits below ``linear/x`` and ``angular/z``, see :mod:`.speed_limits`.
     """
 
     def __init__(self, name, hardware, context):
@@ -41,7 +42,9 @@ class VehicleController(Controller):
         self._configure()
         self._commands = context.subscription("cmd_vel", Twist)
         self._odom_publisher = context.publisher("odom", Odometry)
-        self._tf_publisher = context.publisher("/tf", TFMessage) if context.flag("enable_odom_tf", True) else None
+        self._tf_publisher = None
+        self._send_transform(context.flag("enable_odom_tf", True))
+        self._one_sender = not context.flag("allow_multiple_cmd_vel_publishers", True)
         self._out_publisher = None
         if context.flag("publish_cmd", False):
             self._out_publisher = context.publisher("cmd_vel_out", TwistStamped)
@@ -58,7 +61,8 @@ class VehicleController(Controller):
         raise NotImplementedError
 
     def _driven(self):
-        """Motion by the wheels since the last call: (distance [m], turn [rad])."""
+        """Motion by the wheels since the last call: distance [m], turn [rad]; for a kind that moves sideways, that [m],
+        too."""
         raise NotImplementedError
 
     def _commanded(self, dt):
@@ -84,8 +88,9 @@ class VehicleController(Controller):
     def update(self, time_s, dt):
         driven, commanded = self._driven(), self._commanded(dt)
         if dt > 0.0:
-            self._odometry.move(*(commanded if self._open_loop else driven), dt)
-        self._commands.handle(lambda message: self._take_command(message, time_s))
+            distance, turn, *sideways = commanded if self._open_loop else driven
+            self._odometry.move(distance, turn, dt, *sideways)
+        self._take_commands(time_s)
         if time_s - self._commanded_s > self._timeout_s:
             self._wanted = (0.0, 0.0)
         speeds = []
@@ -102,10 +107,26 @@ class VehicleController(Controller):
             message.twist.linear.x, message.twist.angular.z = speeds
             self._out_publisher.publish(message)
 
+    def _send_transform(self, wanted):
+        if wanted and self._tf_publisher is None:
+            self._tf_publisher = self.context.publisher("/tf", TFMessage)
+        elif not wanted and self._tf_publisher is not None:
+            self._tf_publisher.close()
+            self._tf_publisher = None
+
+    def _take_commands(self, time_s):
+        """Take new messages of all topics of commands."""
+        self._commands.handle(lambda message: self._take_command(message, time_s))
+
     def _take_command(self, message, time_s):
         wanted = message.linear.x, message.angular.z
+        if self._one_sender and self._commands.senders() > 1:
+            self.log.error_throttle(1.0, "%s: %d nodes publish commands and allow_multiple_cmd_vel_publishers is "
+                                    "false: it stops" % (self.context.resolve("cmd_vel"), self._commands.senders()))
+            self._wanted = (0.0, 0.0)
+            return
         if not all(map(math.isfinite, wanted)):
-            self.log.warn_throttle(5.0, "%s: a velocity of %g m/s and %g rad/s is no number; the command is ignored"
+            self.log.warn_throttle(5.0, "%s: a velocity of %g m/s and %g rad/s is not a number; the command is ignored"
                                    % (self.context.resolve("cmd_vel"), *wanted))
             return
         self._wanted, self._commanded_s = wanted, time_s
@@ -124,7 +145,8 @@ class VehicleController(Controller):
             message.pose.pose.position.x, message.pose.pose.position.y = odometry.x, odometry.y
             message.pose.pose.orientation = turned
             message.pose.covariance = self._pose_covariance
-            message.twist.twist.linear.x, message.twist.twist.angular.z = odometry.linear, odometry.angular
+            twist = message.twist.twist
+            twist.linear.x, twist.linear.y, twist.angular.z = odometry.linear, odometry.lateral, odometry.angular
             message.twist.covariance = self._twist_covariance
             self._odom_publisher.publish(message)
         if self._tf_publisher is not None and self._tf_publisher.has_listeners:

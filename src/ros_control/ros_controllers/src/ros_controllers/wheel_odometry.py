@@ -8,38 +8,43 @@ _STRAIGHT_RAD = 1e-6
 
 
 class WheelOdometry:
-    """Pose (x, y [m], heading [rad]) since the start, and speeds (linear [m/s], angular [rad/s]), means over a window.
+    """Pose (x, y [m], heading [rad]) since the start, and speeds (linear, lateral [m/s], angular [rad/s]), means over a
+    window.
 
-    Attributes: ``x``, ``y``, ``heading``, ``linear``, ``angular``.
+    Attributes: ``x``, ``y``, ``heading``, ``linear``, ``lateral``, ``angular``.
     """
 
     def __init__(self, window=10):
         """``window``: number of ticks in the average of the speeds."""
         self.x = self.y = self.heading = 0.0
-        self._linears, self._angulars = deque(maxlen=window), deque(maxlen=window)
+        self._linears, self._laterals, self._angulars = (deque(maxlen=window) for _ in range(3))
         self.rest()
 
     def rest(self):
         """The vehicle rests."""
-        self.linear = self.angular = 0.0
-        self._linears.clear()
-        self._angulars.clear()
+        self.linear = self.lateral = self.angular = 0.0
+        for speeds in (self._linears, self._laterals, self._angulars):
+            speeds.clear()
 
-    def move(self, distance, turn, dt):
-        """The vehicle has gone ``distance`` [m] along its path while it turned by ``turn`` [rad], in ``dt`` [s].
+    def move(self, distance, turn, dt, sideways=0.0):
+        """The vehicle has gone ``distance`` [m] forwards and ``sideways`` [m] to its left while it turned by ``turn``
+        [rad], in ``dt`` [s].
 
         The path is the arc of a circle, whose chord this adds exactly.
         """
         if abs(turn) < _STRAIGHT_RAD:
             middle = self.heading + turn / 2.0
-            self.x += distance * math.cos(middle)
-            self.y += distance * math.sin(middle)
+            along, across = math.cos(middle), math.sin(middle)
         else:
-            radius, after = distance / turn, self.heading + turn
-            self.x += radius * (math.sin(after) - math.sin(self.heading))
-            self.y += radius * (math.cos(self.heading) - math.cos(after))
+            after = self.heading + turn
+            along = (math.sin(after) - math.sin(self.heading)) / turn
+            across = (math.cos(self.heading) - math.cos(after)) / turn
+        self.x += distance * along - sideways * across
+        self.y += distance * across + sideways * along
         self.heading += turn
         self._linears.append(distance / dt)
+        self._laterals.append(sideways / dt)
         self._angulars.append(turn / dt)
         self.linear = sum(self._linears) / len(self._linears)
+        self.lateral = sum(self._laterals) / len(self._laterals)
         self.angular = sum(self._angulars) / len(self._angulars)

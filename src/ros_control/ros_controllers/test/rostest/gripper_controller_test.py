@@ -13,7 +13,7 @@ from std_srvs.srv import SetBool
 from lab_testing import subtests
 from lab_testing.waiting import wait_until
 
-WAIT_S = 20.0
+WAIT_S = 90.0
 GRIPPERS = ("position_gripper", "effort_gripper")
 TOLERANCE = 0.01  # the default of goal_tolerance
 

@@ -28,7 +28,7 @@ from lab_testing.waiting import stretched, wait_until
 JOINTS = ["shoulder", "elbow"]
 ACTION = "/robot/arm/follow_joint_trajectory"
 START_S = stretched(60.0)  # for the joints and their controller manager to come
-WAIT_S = stretched(20.0)
+WAIT_S = stretched(90.0)
 R = FollowJointTrajectoryResult
 
 

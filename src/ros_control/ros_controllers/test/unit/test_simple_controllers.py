@@ -94,14 +94,37 @@ def test_joint_states_of_chosen_and_extra_joints():
 
 @pytest.mark.parametrize(("parameters", "text"), [
     ({}, "/robot/arm/publish_rate is missing; give the rate"),
-    ({"publish_rate": 0}, "expected a rate above 0"),
     ({"publish_rate": 50, "joints": ["d"]}, "joint 'd'.*a"),
-    ({"publish_rate": 50, "extra_joints": ["x"]}, "extra_joints has the entry 'x', expected {name"),
-    ({"publish_rate": 50, "extra_joints": [{"name": "x", "position": "far"}]}, "joint 'x'.*expected numbers"),
 ])
 def test_wrong_joint_state_parameters_are_named(parameters, text):
     with pytest.raises(ControllerError, match=text):
         joint_states(**parameters)
+
+
+def test_joint_states_are_not_published_at_a_rate_of_zero():
+    running = joint_states(publish_rate=0)
+    running.run(500, step=False)
+    assert running.ros.publishers["/robot/joint_states"].messages == []
+    assert "publish_rate is 0" in running.context.log.of("warn")[0]
+
+
+@pytest.mark.parametrize(("entry", "text"), [
+    ("x", "'x' is no {name"), ({"nickname": "x"}, "is no {name"), ({"name": "a"}, "there is already a joint 'a'"),
+    ({"name": "x", "position": "far"}, "joint 'x' has ['far', 0.0, 0.0], expected numbers"),
+    ({"name": "y"}, "there is already a joint 'y'"),
+])
+def test_wrong_extra_joints_are_left_out(entry, text):
+    running = joint_states(publish_rate=50, extra_joints=[{"name": "y", "velocity": 2}, entry])
+    running.run(step=False)
+    message = running.ros.publishers["/robot/joint_states"].messages[0]
+    assert message.name == ["a", "b", "c", "y"] and message.velocity == (0.0, 0.0, 0.0, 2.0)
+    assert text in running.context.log.of("warn")[0]
+
+
+def test_extra_joints_that_are_no_list_are_ignored():
+    running = joint_states(publish_rate=50, extra_joints="x")
+    running.run(step=False)
+    assert running.ros.publishers["/robot/joint_states"].messages[0].name == ["a", "b", "c"]
 
 
 # -- forwarding -----------------------------------------------------------------------------------------------------

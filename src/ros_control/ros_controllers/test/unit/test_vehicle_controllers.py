@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter
+from dynamic_reconfigure.srv import ReconfigureRequest
+from four_wheel_steering_msgs.msg import FourWheelSteering
 from geometry_msgs.msg import Twist, Vector3
 
 from controller_manager import POSITION, VELOCITY, ControllerError, ControllerTable
@@ -12,6 +15,8 @@ from controller_manager.testing import FakeHardware, fake_context
 from ros_controllers.speed_limits import SpeedLimits
 from ros_controllers.wheel_odometry import WheelOdometry
 from urdf_model import parse_urdf
+
+pytestmark = pytest.mark.tree
 
 DT = 0.01
 RADIUS, APART, LONG = 0.11, 0.4, 0.6
@@ -129,7 +134,7 @@ def test_what_is_no_number_is_ignored_and_said(bad):
     vehicle.send(bad)
     vehicle.drive(0.01)
     assert vehicle.command("left") == pytest.approx(0.5 / RADIUS)
-    assert "no number" in vehicle.context.log.of("warn")[0]
+    assert "not a number" in vehicle.context.log.of("warn")[0]
 
 
 def test_a_start_forgets_old_commands_and_keeps_the_pose():
@@ -142,6 +147,41 @@ def test_a_start_forgets_old_commands_and_keeps_the_pose():
     vehicle.drive(0.1)
     assert vehicle.command("left") == 0.0
     assert vehicle.odom.pose.pose.position.x == pytest.approx(x, abs=0.02)
+
+
+def reconfigure(vehicle, doubles=(), bools=()):
+    config = Config(doubles=[DoubleParameter(*pair) for pair in doubles])
+    config.bools = [BoolParameter(*pair) for pair in bools]
+    return vehicle.ros.services["/robot/base/set_parameters"](ReconfigureRequest(config)).config
+
+
+def test_sizes_rate_and_transform_change_at_run_time():
+    vehicle = diff_drive(enable_odom_tf=False)
+    before = reconfigure(vehicle)
+    assert [(each.name, each.value) for each in before.doubles] == [
+        ("left_wheel_radius_multiplier", 1.0), ("right_wheel_radius_multiplier", 1.0),
+        ("wheel_separation_multiplier", 1.0), ("publish_rate", 50.0)]
+    assert [(each.name, each.value) for each in before.bools] == [("enable_odom_tf", False)]
+    reconfigure(vehicle, [("left_wheel_radius_multiplier", 0.8), ("wheel_separation_multiplier", 1.2),
+                          ("publish_rate", 20.0)], [("enable_odom_tf", True)])
+    vehicle.drive(1.0, 0.5, 0.4)
+    half = 0.4 * 1.2 * APART / 2.0
+    assert vehicle.command("left") == pytest.approx((0.5 - half) / (0.8 * RADIUS))
+    assert vehicle.command("right") == pytest.approx((0.5 + half) / RADIUS)
+    assert vehicle.odom.twist.twist.angular.z == pytest.approx(0.4, abs=1e-6)
+    assert len(vehicle.ros.publishers["/tf"].messages) == pytest.approx(20, abs=1)
+    reconfigure(vehicle, bools=[("enable_odom_tf", False)])
+    assert "/tf" not in vehicle.ros.publishers
+
+
+@pytest.mark.parametrize(("allowed", "speed"), [(True, 0.3), (False, 0.0)])
+def test_commands_of_two_nodes_stop_it_where_one_is_allowed(allowed, speed):
+    vehicle = diff_drive(allow_multiple_cmd_vel_publishers=allowed).drive(0.5, 0.3)
+    assert vehicle.command("left") == pytest.approx(0.3 / RADIUS)
+    commands, = vehicle.ros.subscriptions["/robot/base/cmd_vel"].all
+    commands.senders = lambda: 2
+    vehicle.drive(0.1, 0.3)
+    assert vehicle.command("left") == pytest.approx(speed / RADIUS)
 
 
 def test_open_loop_counts_commands():
@@ -303,3 +343,56 @@ def test_four_wheels_within_limits_and_after_the_time_out():
 def test_four_wheels_want_two_joints_of_each_kind():
     with pytest.raises(ControllerError, match="front_steering has 1 joints, expected a left and a right one"):
         four_wheels(front_steering=["steer_front_left"])
+
+
+def steer(vehicle, seconds, speed, front, rear):
+    for _ in range(round(seconds / DT)):
+        vehicle.ros.subscriptions["/robot/base/cmd_four_wheel_steering"].put(
+            FourWheelSteering(speed=speed, front_steering_angle=front, rear_steering_angle=rear))
+        vehicle.drive(DT)
+    return vehicle
+
+
+# The cases of ros_controllers, on this vehicle: its axles are 0.6 m apart.
+SYMMETRIC = math.atan(0.1 * LONG)  # radius 5 m
+
+
+@pytest.mark.parametrize(("speed", "front", "rear", "x", "y", "turn"), [
+    (0.2, 0.0, 0.0, 0.2, 0.0, 0.0),
+    (-0.2, 0.0, 0.0, -0.2, 0.0, 0.0),
+    (0.2, math.pi / 8.0, math.pi / 8.0, 0.2 * math.cos(math.pi / 8.0), 0.2 * math.sin(math.pi / 8.0), 0.0),
+    (0.2, -math.pi / 2.0, -math.pi / 2.0, 0.0, -0.2, 0.0),
+    (math.pi / 2.0, SYMMETRIC, -SYMMETRIC, math.pi / 2.0, 0.0, 0.2 * math.pi / 2.0),
+    # tan(front) + tan(rear) is twice the slope of the middle's way, their difference the turn.
+    (1.0, -math.atan(0.22), math.atan(0.16), math.cos(0.03), -math.sin(0.03), -0.38 / LONG),
+])
+@pytest.mark.parametrize("options", [{}, {"open_loop": True}])
+def test_axles_may_be_steered_each(speed, front, rear, x, y, turn, options):
+    vehicle = steer(four_wheels(**options), 2.0, speed, front, rear)
+    twist = vehicle.odom.twist.twist
+    assert (twist.linear.x, twist.linear.y, twist.angular.z) == pytest.approx((x, y, turn), abs=1e-3)
+    assert vehicle.heading == pytest.approx(2.0 * turn, abs=0.02)
+    assert math.hypot(vehicle.odom.pose.pose.position.x, vehicle.odom.pose.pose.position.y) == pytest.approx(
+        abs(2.0 * speed * math.sin(turn) / turn if turn else 2.0 * speed), abs=0.04)
+
+
+def test_axles_steer_at_rest_and_straighten_after_the_time_out():
+    vehicle = steer(four_wheels(beside=0.0), 0.1, 0.0, 0.3, 0.3)
+    assert [vehicle.command("steer_" + name, POSITION) for name in _ENDS] == pytest.approx([0.3] * 4)
+    assert [vehicle.command("roll_" + name) for name in _ENDS] == [0.0] * 4
+    vehicle.drive(0.6)
+    assert [vehicle.command("steer_" + name, POSITION) for name in _ENDS] == [0.0] * 4
+
+
+def test_the_newest_command_of_both_topics_counts():
+    vehicle = steer(four_wheels(), 0.1, 0.2, 0.3, 0.3).drive(0.1, 0.4)
+    assert vehicle.command("steer_front_left", POSITION) == 0.0
+    assert vehicle.command("roll_front_left") == pytest.approx(0.4 / RADIUS)
+    steer(vehicle, 0.1, 0.2, 0.3, 0.3)
+    assert vehicle.command("steer_front_left", POSITION) == pytest.approx(0.3)
+    assert vehicle.command("roll_front_left") == pytest.approx(0.2 / RADIUS)
+
+
+def test_an_angle_that_is_no_number_is_ignored():
+    vehicle = steer(steer(four_wheels(), 0.1, 0.2, 0.3, 0.3), 0.1, 0.2, math.nan, 0.3)
+    assert vehicle.command("steer_front_left", POSITION) == pytest.approx(0.3)
