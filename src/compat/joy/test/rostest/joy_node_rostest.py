@@ -11,7 +11,7 @@ from sensor_msgs.msg import Joy
 
 from lab_testing.fake_joystick import FakeJoystick
 
-LONGEST_S = 20.0
+LONGEST_S = 90.0
 
 
 class JoyNodeTest(unittest.TestCase):
