@@ -4,4 +4,4 @@ from distutils.core import setup
 from catkin_pkg.python_setup import generate_distutils_setup
 
 setup(**generate_distutils_setup(packages=["baxter_model"], package_dir={"": "src"},
-                                 package_data={"baxter_model": ["poses.yaml"]}))
+                                 package_data={"baxter_model": ["interface.yaml", "poses.yaml"]}))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 class GripperKind(NamedTuple):
     """One kind.
 
-    name: as Gripper.type() and the description's arguments have it; ui_type, id: as in EndEffectorProperties and
+    name: as in Gripper.type() and the description's arguments; ui_type, id: as in EndEffectorProperties and
     EndEffectorCommand; parameters: {name: value at the start}.
     """
 
