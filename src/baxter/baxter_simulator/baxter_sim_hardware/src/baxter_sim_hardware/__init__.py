@@ -3,7 +3,8 @@
 
 `plugin.BaxterPlugin` runs it in a world; it is not imported here, because it needs ROS.
 """
-from .arms.control import Arms, Drives
+from .arms.control import Arms
+from .arms.drives import Drives
 from .arms.joint_command import JointLimits, Mode
 from .errors import CommandRefused, HardwareError
 from .robot import Baxter

@@ -11,7 +11,10 @@ import yaml
 
 from .errors import HardwareError
 
-NAMES = ("lag", "noise")
+NAMES = ("lag", "noise", "safety", "delay", "states", "uncalibrated")
+#: Sections of the file: those of the effects; "senses", of the effect "noise" beside the joints; "body", of the effect
+#: "safety"; "serial", how robots differ.
+SECTIONS = (*NAMES, "senses", "body", "serial")
 ALL, NONE = "all", "none"
 
 
@@ -35,13 +38,16 @@ def chosen(words):
 
 
 def read(path):
-    """{effect: {number: {joint: value}}} of a YAML file. Raises HardwareError for what is missing or no number."""
+    """{section: {number: {name: value}}} of a YAML file, by names of joints and others.
+
+    Raises HardwareError for what is missing or no number.
+    """
     try:
         table = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
     except (OSError, yaml.YAMLError) as error:
         raise HardwareError("%s cannot be read: %s" % (path, error)) from error
     found = {}
-    for effect in NAMES:
+    for effect in SECTIONS:
         rows = table.get(effect) if isinstance(table, dict) else None
         if not isinstance(rows, dict):
             raise HardwareError("%s has no section '%s'" % (path, effect))
@@ -50,18 +56,31 @@ def read(path):
             values = row.get("values") if isinstance(row, dict) else None
             if not isinstance(values, dict) or not all(
                     isinstance(value, (int, float)) and np.isfinite(value) for value in values.values()):
-                raise HardwareError("%s: %s.%s must have 'values' with a finite number for each joint"
+                raise HardwareError("%s: %s.%s must have 'values' with a finite number for each name"
                                     % (path, effect, number))
             found[effect][number] = values
     return found
 
 
-def per_joint(rows, number, names):
-    """(n,) the value of `number` for the joints `names`, such as left_s0. Raises HardwareError for what is missing."""
+def row(rows, number):
+    """{name: value} of `number`. Raises HardwareError where it is missing."""
     try:
-        values = rows[number]
+        return rows[number]
     except KeyError:
         raise HardwareError("there is no '%s' among %s" % (number, ", ".join(sorted(rows)))) from None
+
+
+def positive(rows, number, name):
+    """The value of `number` for `name`. Raises HardwareError for what is missing or not greater than 0."""
+    value = row(rows, number).get(name)
+    if value is None or value <= 0.0:
+        raise HardwareError("'%s' of %s is %s; it must be greater than 0" % (number, name, value))
+    return float(value)
+
+
+def per_joint(rows, number, names):
+    """(n,) the value of `number` for the joints `names`, such as left_s0. Raises HardwareError for what is missing."""
+    values = row(rows, number)
     try:
         return np.array([values[name.rsplit("_", 1)[1]] for name in names], dtype=float)
     except (KeyError, IndexError) as error:

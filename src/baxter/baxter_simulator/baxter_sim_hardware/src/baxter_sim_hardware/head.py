@@ -16,11 +16,12 @@ TURNING_SPEED = 0.01  # [rad/s] from which the head counts as turning
 class Head:
     """Set-point of the pan joint, and the clock of a nod.
 
-    lower, upper: limits of the joint [rad]; pan: where it is now [rad]; dt: length of a tick [s].
+    lower, upper: limits of the joint [rad]; pan: where it is now [rad]; dt: length of a tick [s]; dead_band: so far
+    from its target it stops [rad], and it does not start for less.
     """
 
-    def __init__(self, lower, upper, pan, dt=0.002):
-        self._lower, self._upper, self._dt = lower, upper, dt
+    def __init__(self, lower, upper, pan, dt=0.002, dead_band=0.0):
+        self._lower, self._upper, self._dt, self._dead_band = lower, upper, dt, dead_band
         self._acceleration = np.array([ACCELERATION])
         self.reset(pan)
 
@@ -50,7 +51,9 @@ class Head:
         if enable is not None:
             self.pan_enabled = enable
         if self.pan_enabled:
-            self._target[0] = min(max(target, self._lower), self._upper)
+            wanted = min(max(target, self._lower), self._upper)
+            way = wanted - self._position[0]
+            self._target[0] = wanted - math.copysign(min(abs(way), self._dead_band), way)
             self._speed[0] = FULL_SPEED * min(speed_ratio or 1.0, 1.0)
         else:
             self._target[0] = self._position[0]
@@ -63,6 +66,11 @@ class Head:
 
     def is_nodding(self, time_s):
         return self._nod_start is not None and 0.0 <= time_s - self._nod_start < NOD_S
+
+    @property
+    def commanded_position(self):
+        """Where the set-point is now [rad]."""
+        return float(self._position[0])
 
     def update(self):
         """One tick: the set-point's (position (1,) [rad], velocity (1,) [rad/s]); None once it rests."""

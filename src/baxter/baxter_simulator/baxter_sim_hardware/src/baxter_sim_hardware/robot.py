@@ -8,7 +8,7 @@ import numpy as np
 from .arms.actuators import Wanted
 from .arms.control import COMMAND_TIMEOUT_S, SPEED_RATIO, Arms
 from .arms.effort_bounds import REACH_RAD
-from .errors import HardwareError
+from .errors import CommandRefused, HardwareError
 from .robot_state import RobotState
 
 INERTIA_TICKS = 50  # the inertias of links about their joints change that slowly
@@ -42,13 +42,15 @@ class Baxter:
         self.profile = profile
         self.state = RobotState() if state is None else RobotState(state)
         self.measured, self.actuators, self._dt = measured, actuators, dt
-        self._inertia, self._inertia_due = None, 0
+        # Angles, speeds, and inertias about their joints, of the links.
+        self._links, self._inertia_due = np.zeros((3, len(measured.position))), 0
         # Behind actuators the set-points run ahead, and these bring a joint back that was pushed.
         self.arms = Arms(limbs, limits, self.measured, speed_ratio=SPEED_RATIO[profile], dt=dt,
                          reach_rad=REACH_RAD if actuators is None else math.inf)
         self.arms.stop()
         self._sinks = disabled == "sink"
         self._speed_ratio = SPEED_RATIO[profile]
+        self._halted_until = {}  # {side: [s]}
 
     def take_over(self):
         """Start with moving arms: forget every command, bring them to rest, and hold them."""
@@ -58,6 +60,7 @@ class Baxter:
     def put_elsewhere(self):
         """The joints were put elsewhere: forget every command, and hold them there."""
         self.arms.reset()
+        self._halted_until.clear()
         if self.actuators is not None:
             self.actuators.forget()
             self._inertia_due = 0
@@ -77,9 +80,25 @@ class Baxter:
             self.arms.set_timeout(side, COMMAND_TIMEOUT_S)
 
     def command(self, side, mode, names, values):
-        """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled."""
+        """Pass one joint command to a limb, as `Arms.command`. Raises CommandRefused also while disabled, and while the
+        limb stands after a collision."""
         self.state.require_enabled()
+        if self.halted(side):
+            raise CommandRefused("the arm has collided and stands; it takes commands again in %.2f s"
+                                 % (self._halted_until[side] - self.measured.time_s))
         return self.arms.command(side, mode, names, values)
+
+    def halt(self, side, seconds):
+        """One limb has collided: hold it where it is now, and refuse its commands for so long."""
+        self.arms.hold_here(side)
+        if self.actuators is not None:
+            joints = self.arms.joints_of(side)
+            self.actuators.hold(joints, self.measured.position[joints])
+        self._halted_until[side] = self.measured.time_s + seconds
+
+    def halted(self, side):
+        """Whether a limb stands because it has collided."""
+        return self.measured.time_s < self._halted_until.get(side, -math.inf)
 
     @property
     def moves_by_gravity(self):
@@ -102,8 +121,13 @@ class Baxter:
         wanted = Wanted(driven, arms.commanded_position, arms.said_velocity, arms.in_position_mode, arms.known_gravity,
                         effort)
         if self._inertia_due == 0:
-            self._inertia = np.diagonal(measured.dynamics(measured.velocity)[0])
+            self._links[2] = np.diagonal(measured.dynamics(measured.velocity)[0])
         self._inertia_due = (self._inertia_due + 1) % INERTIA_TICKS
-        links = np.array([measured.position, measured.velocity, self._inertia])
-        torques = self.actuators.torques(wanted, links, self._dt)
-        return drives._replace(position_driven=index[:0], effort_driven=index, exerted=torques[index])
+        self._links[0], self._links[1] = measured.position, measured.velocity
+        torques = self.actuators.torques(wanted, self._links, self._dt)
+        drives = drives._replace(position_driven=index[:0], effort_driven=index, exerted=torques[index])
+        pushed = drives.velocity_driven
+        if not len(pushed):
+            return drives
+        push = self.actuators.bounded(np.copysign(drives.push_effort, drives.push_velocity), measured.position, pushed)
+        return drives._replace(push_velocity=np.copysign(drives.push_velocity, push), push_effort=np.abs(push))

@@ -22,6 +22,6 @@ def check_fragment(link, joint, xml, links):
     try:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError as error:
-        raise CommandRefused("urdf fragment is no XML: %s" % error) from None
+        raise CommandRefused("urdf fragment is not XML: %s" % error) from None
     if root.tag != "robot" or root.find("link") is None:
         raise CommandRefused("urdf fragment is <%s>; it must be a <robot> with a link" % root.tag)

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The whole robot without a ROS master: the plugin on a real physics world, its topics as plain lists."""
+"""The whole robot without a ROS master: the plugin on a real physics world, its topics as plain lists.
+
+A test file's HEARD has patterns (of fnmatch) of the topics that it reads; the others have no subscriber there. Without
+HEARD all topics have one, and making their messages takes most of a tick.
+"""
+import fnmatch
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -47,8 +52,10 @@ class Lab:
     ``subscriptions``, ``publishers``, ``services``: by the plugin's names.
     """
 
-    def __init__(self, robot, pose="neutral", parameters=None, angles=None, meshes=False):
-        """meshes: whether the body has its collision meshes; without them it has no contacts, and loads faster."""
+    def __init__(self, robot, pose="neutral", parameters=None, angles=None, meshes=False, heard=("*",)):
+        """meshes: whether the body has its collision meshes; without them it has no contacts, and loads faster. heard:
+        patterns of the topics that have a subscriber.
+        """
         self.world = World(time_step_s=TICK_S, **({"find_mesh": ResourceFinder()} if meshes else {}))
         element = ElementTree.fromstring("<plugin/>")
         options = BaxterPlugin.spawn_options(robot, element)
@@ -60,12 +67,23 @@ class Lab:
         angles = np.clip(angles, self.model.lower[self.arm], self.model.upper[self.arm])
         self.model.set_joint_positions(self.arm, angles)
         self.log = FakeLog()
-        self.ros = FakeRos(heard=lambda topic: topic != NAMESPACE + "/sim/screen", clock=lambda: self.world.time_s)
+        self._heard = heard
+        self.ros = FakeRos(heard=self._is_heard, clock=lambda: self.world.time_s)
         source = PluginSource(robot, element, NAMESPACE)
         self.context = PluginContext(self.world, self.model, source, self.log, self.ros,
                                      {"baxter_sim_hardware": parameters or {}}, PluginHost(self._screen))
         self.plugin = BaxterPlugin(self.context)
         self.effort_limit = self.model.max_effort[self.arm]
+
+    def _is_heard(self, topic):
+        return topic != NAMESPACE + "/sim/screen" and any(
+            fnmatch.fnmatchcase(topic.removeprefix(NAMESPACE + "/"), pattern) for pattern in self._heard)
+
+    def hear(self, *patterns):
+        """From now on these topics have a subscriber, and no others."""
+        self._heard = patterns
+        for topic, publisher in self.ros.publishers.items():
+            publisher.has_listeners = self._is_heard(topic)
 
     def _screen(self, link, place, size_m, pixels):
         self.drawn = _Drawn(link, place, size_m, pixels)
@@ -155,13 +173,18 @@ def robot(robot_file):
     return parse_urdf(xacro.process_file(robot_file).toxml(), source=robot_file)
 
 
+def heard_in(request):
+    """The HEARD of the test's file."""
+    return getattr(request.module, "HEARD", ("*",))
+
+
 @pytest.fixture
-def make_lab(robot):
+def make_lab(request, robot):
     """Function that makes a Lab: make_lab(model=..., pose=..., parameters={...}, angles=..., meshes=...)."""
     labs = []
 
     def make(model=robot, **options):
-        labs.append(Lab(model, **options))
+        labs.append(Lab(model, heard=heard_in(request), **options))
         return labs[-1]
 
     yield make
@@ -170,9 +193,9 @@ def make_lab(robot):
 
 
 @pytest.fixture(scope="module")
-def one_lab(robot):
+def one_lab(request, robot):
     """One Lab for all tests of a file, which may leave it in any state; making a robot takes longer than the tests."""
-    made = Lab(robot)
+    made = Lab(robot, heard=heard_in(request))
     yield made
     made.close()
 

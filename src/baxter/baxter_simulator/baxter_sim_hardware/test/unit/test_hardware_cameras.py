@@ -62,8 +62,8 @@ def test_light_controls_change_levels():
 
 
 @pytest.mark.parametrize(("settings", "text"), [
-    (CaptureSettings(800, 800, 25.0, {}), "800 x 800 is no resolution"),
-    (CaptureSettings(-1, 10**9, 25.0, {}), "no resolution"),
+    (CaptureSettings(800, 800, 25.0, {}), "800 x 800 is not a resolution"),
+    (CaptureSettings(-1, 10**9, 25.0, {}), "not a resolution"),
     (CaptureSettings(320, 200, -3.0, {}), "-3 pictures"), (CaptureSettings(320, 200, 1e6, {}), "pictures a second"),
     (CaptureSettings(320, 200, float("nan"), {}), "nan pictures"),
     (CaptureSettings(320, 200, 25.0, {EXPOSURE: 101}), "exposure of 101"),

@@ -51,7 +51,13 @@ def test_out_of_range_is_clamped(side, mode, value, expected):
     name = side + "_s1"
     command = parser(side).parse(mode, [name], [value])
     assert command.values == pytest.approx([expected])
-    assert command.clamped == (name,)
+    unit = {Mode.VELOCITY: "rad/s", Mode.TORQUE: "Nm"}.get(mode, "rad")
+    assert command.clamped == ("%s: %.5g became %.5g %s" % (name, value, expected, unit),)
+
+
+def test_only_joints_out_of_range_are_told():
+    command = parser("left").parse(Mode.POSITION, ["left_s0", "left_s1", "left_e1"], [45.0, 0.5, -30.0])
+    assert command.clamped == ("left_s0: 45 became 1.7017 rad", "left_e1: -30 became -0.05 rad")
 
 
 @pytest.mark.parametrize("side", SIDES)

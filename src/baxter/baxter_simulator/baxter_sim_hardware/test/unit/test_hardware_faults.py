@@ -15,6 +15,8 @@ from gazebo_ros.simulation import HostedPlugin, Simulation
 from loop_ros.faults import Faults
 from loop_ros.request_queue import RequestQueue
 
+pytestmark = pytest.mark.tree
+
 TICK_S = 0.002
 INPUTS = [(row, name) for row in interface.TOPICS if not row.is_published for _, name in row.names()]
 OUTPUTS = [name for row in interface.TOPICS if row.is_published and row.rate != interface.LATCHED
@@ -99,8 +101,8 @@ def test_no_gripper_command_ends_the_robot(loop):
 
 def test_a_handler_that_raises_costs_its_message_only(loop):
     topics, send = loop.plugin._handling._topics, loop.lab.send
-    for queue, (place, key, component, _) in list(topics.items()):
-        topics[queue] = place, key, component, fail
+    for queue, entry in list(topics.items()):
+        topics[queue] = entry._replace(handler=fail)
     for row, topic in INPUTS:
         loop.lab.faults.clear()
         send(topic, roslib.message.get_message_class(row.type)())
@@ -154,7 +156,7 @@ def test_a_tick_that_raises_brings_the_arms_to_rest_and_the_robot_goes_on(loop, 
     assert len(lab.publishers["sim/started"].messages) == 1
 
 
-def test_a_resting_robot_does_not_move_when_it_begins_anew(loop, monkeypatch):
+def test_a_resting_robot_does_not_move_when_it_restarts(loop, monkeypatch):
     loop.run(0.5)
     start = loop.lab.model.read_joints()[0]
     for _ in range(2):

@@ -10,6 +10,8 @@ from std_msgs.msg import Bool
 from baxter_sim_hardware import CommandRefused
 from baxter_sim_hardware.head import ACCELERATION, FULL_SPEED, NOD_S, Head
 
+pytestmark = pytest.mark.tree
+HEARD = ("head/head_state", "joint_states")
 LIMIT = math.pi / 2
 
 
@@ -44,6 +46,16 @@ def test_targets_are_clamped_to_the_limits():
     head = Head(-LIMIT, LIMIT, 0.0)
     head.command_pan(-4.0, 1.0)
     assert travel(head)[-1] == -LIMIT
+
+
+def test_a_coarse_head_stops_short_and_does_not_start_for_less():
+    head = Head(-LIMIT, LIMIT, 0.0, dead_band=0.05)
+    head.command_pan(0.8, 1.0)
+    assert travel(head)[-1] == pytest.approx(0.75)
+    head.command_pan(0.79, 1.0)
+    assert np.ptp(travel(head)) < 1e-9
+    head.command_pan(-4.0, 1.0)
+    assert travel(head)[-1] == pytest.approx(-LIMIT + 0.05)
 
 
 @pytest.mark.parametrize("target, ratio", [(math.nan, 1.0), (math.inf, 1.0), (0.5, math.nan), (0.5, -0.1)])

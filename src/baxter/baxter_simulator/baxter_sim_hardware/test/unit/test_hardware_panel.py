@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Buttons, lights, wheels: the core's rules, and the topics and the service that show and move them."""
+from pathlib import Path
+
 import pytest
 from baxter_core_msgs.msg import AnalogOutputCommand, DigitalOutputCommand
 from bullet_sim_msgs.srv import PressRequest
 from std_msgs.msg import Empty
 
 from baxter_sim_hardware import CommandRefused
-from baxter_sim_hardware.sensing.panel import DIGITAL, NAVIGATORS, Panel
+from baxter_sim_hardware.sensing.panel import ANALOG, BLOWERS, DIGITAL, LIGHTS, NAVIGATORS, PUMPS, Panel
 
 
 def test_outputs_follow_and_inputs_refuse():
@@ -15,7 +17,7 @@ def test_outputs_follow_and_inputs_refuse():
     assert panel.digital["torso_left_outer_light"]
     assert sum(panel.digital.values()) == 1
     for name in ("left_lower_cuff", "left_light", ""):
-        with pytest.raises(CommandRefused, match="'%s' is no digital output; choices are" % name):
+        with pytest.raises(CommandRefused, match="'%s' is not a digital output; choices are" % name):
             panel.set_digital(name, True)
 
 
@@ -29,7 +31,7 @@ def test_analog_outputs_keep_the_integer(value):
 @pytest.mark.parametrize("name, value", [("torso_fan", -1), ("torso_fan", 65536), ("left_wheel", 3), ("fan", 3)])
 def test_bad_analog_commands_change_nothing(name, value):
     panel = Panel()
-    with pytest.raises(CommandRefused, match="must be from 0 to 65535|is no analog output; choices are torso_fan"):
+    with pytest.raises(CommandRefused, match="must be from 0 to 65535|is not an analog output; choices are torso_fan"):
         panel.set_analog(name, value)
     assert not any(panel.analog.values())
 
@@ -50,9 +52,9 @@ def test_navigator_is_its_buttons_wheel_and_lights(navigator):
 
 def test_fingers_press_only_what_is_there():
     panel = Panel()
-    with pytest.raises(CommandRefused, match="'left_inner_light' is no digital input; choices are left_button_back"):
+    with pytest.raises(CommandRefused, match="'left_inner_light' is not a digital input; choices are left_button_back"):
         panel.press("left_inner_light")
-    with pytest.raises(CommandRefused, match="'torso_fan' is no wheel; choices are left_wheel"):
+    with pytest.raises(CommandRefused, match="'torso_fan' is not a wheel; choices are left_wheel"):
         panel.turn("torso_fan", 1)
 
 
@@ -89,7 +91,7 @@ def test_refused_output_is_said_in_the_log(make_lab):
     lab.send("digital_io/command", DigitalOutputCommand("left_lower_cuff", True))
     lab.run(0.02)
     assert lab.last("digital_io/left_lower_cuff/state").state == 0
-    assert "digital_io_command refused: 'left_lower_cuff' is no digital output" in lab.log.lines[-1]
+    assert "digital_io_command refused: 'left_lower_cuff' is not a digital output" in lab.log.lines[-1]
 
 
 def test_press_service(make_lab):
@@ -108,7 +110,7 @@ def test_press_service(make_lab):
     answer = press(PressRequest("left_lower_cuff", "squeeze", 0))
     assert not answer.success and "choices are press, release, turn" in answer.status_message
     answer = press(PressRequest("left_cuff", "press", 0))
-    assert not answer.success and "'left_cuff' is no digital input" in answer.status_message
+    assert not answer.success and "'left_cuff' is not a digital input" in answer.status_message
 
 
 def test_reset_of_the_world_releases_everything(make_lab):
@@ -136,3 +138,15 @@ def test_the_emergency_stop_button_stops_until_it_is_released_and_reset(lab):
     assert fields() == (False, True, 3, 1)
     lab.send("set_super_reset", Empty())
     assert fields() == (False, False, 0, 0)
+
+
+def test_the_interfaces_page_lists_each_output_that_nothing_follows_from():
+    page = (Path(__file__).resolve().parents[6] / "docs" / "interface.md").read_text(encoding="utf-8")
+    section = page.split("### Outputs without effect")[1].split("\n### ")[0]
+    for name, is_input in {**DIGITAL, **ANALOG}.items():
+        navigator = next((one for one in NAVIGATORS for light in LIGHTS if name == "%s_%s_light" % (one, light)), None)
+        said = "<navigator>" + name.removeprefix(navigator) if navigator else name
+        said = "<limb>" + name[name.index("_"):] if name in (*PUMPS.values(), *BLOWERS.values()) else said
+        if name.startswith("torso_ui_output"):
+            said = "torso_ui_output"
+        assert ("`" + said in section) == (not is_input), name

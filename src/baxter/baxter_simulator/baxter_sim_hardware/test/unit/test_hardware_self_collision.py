@@ -5,6 +5,8 @@ import pytest
 
 from baxter_model import JOINTS
 
+pytestmark = pytest.mark.tree
+HEARD = ()
 POSITION = 1
 SIDES = ("left", "right")
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)

@@ -13,7 +13,9 @@ from baxter_sim_hardware.sensing import sensors
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 
-pytestmark = pytest.mark.once
+pytestmark = pytest.mark.tree
+HEARD = ("range/*", "/sim/laserscan/*", "analog_io/*_hand_range/*", "sonar/*", "accelerometer/*", "/robustcontroller/*",
+         "/usb/*", "/updater/*", "/update/*", "/diagnostics*", "*joint_states", "limb/*endpoint_state", "urdf")
 
 SIDES = ("left", "right")
 WALL = """<robot name="wall"><link name="wall"><collision><geometry><box size="0.02 0.6 0.6"/></geometry></collision>
@@ -52,6 +54,29 @@ def test_hand_range_measures_what_is_before_it(lab, side):
     assert message.header.frame_id == name and message.radiation_type == message.INFRARED
     assert (message.min_range, message.max_range) == pytest.approx((0.004, 0.4))
     assert lab.last("analog_io/%s/state" % name).isInputOnly
+
+
+def test_noisy_hands_say_counts_about_the_truth_and_the_same_for_the_same_seed(make_lab):
+    said = []
+    for _ in range(2):
+        lab = make_lab(parameters={"enable": True, "effects": "noise", "serial": 2})
+        lab.hear("range/left*", "accelerometer/left*")
+        wall_before(lab, "left_hand_range", 0.25)
+        lab.run(2.0)
+        ranges = [message.range for message in lab.publishers["range/left_hand_range/state"].messages]
+        forces = np.array([(message.linear_acceleration.x, message.linear_acceleration.y, message.linear_acceleration.z)
+                           for message in lab.publishers["accelerometer/left_accelerometer/state"].messages])
+        said.append((ranges, forces.tolist()))
+    assert said[0] == said[1]
+    millimetres = 1e3 * np.array(ranges)
+    np.testing.assert_allclose(millimetres, np.round(millimetres), atol=1e-6)
+    assert 1.0 < millimetres.std() < 6.0 and abs(millimetres.mean() - 250.0) < 2.0
+    # 50 measurements a second, each of them published twice.
+    assert len(ranges) >= 200 and np.count_nonzero(np.diff(millimetres)) <= 101
+    still = forces[100:]
+    np.testing.assert_allclose(still / 0.0144, np.round(still / 0.0144), atol=1e-6)
+    assert 0.015 < still.std(axis=0).max() < 0.06
+    assert np.linalg.norm(still.mean(axis=0)) == pytest.approx(9.81, abs=0.02)
 
 
 @pytest.mark.parametrize("hit, reported", [(None, 65.535), (0.0, 0.004), (0.1, 0.1), (0.4, 0.4)])
@@ -186,6 +211,13 @@ def test_a_senseless_picture_is_refused(make_lab, message, reason):
 
 # -- maintenance
 
+@pytest.fixture
+def quiet_lab(lab):
+    """Procedures take long, and only what they say of themselves is read."""
+    lab.hear("/robustcontroller/*")
+    return lab
+
+
 def ask(lab, name, side, wanted):
     kind = {"Tare": TareEnable, "CalibrateArm": CalibrateArmEnable}[name]
     lab.send("/robustcontroller/%s/%s/enable" % (side, name), kind(isEnabled=wanted, uid="sdk"))
@@ -205,7 +237,8 @@ def keep_asking(name, side):
 
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("name", ["Tare", "CalibrateArm"])
-def test_a_procedure_runs_its_dialogue(lab, name, side):
+def test_a_procedure_runs_its_dialogue(quiet_lab, name, side):
+    lab = quiet_lab
     lab.run(0.2)
     assert not status(lab, name, side).isEnabled
     lab.run(1.0, before=keep_asking(name, side))
@@ -232,7 +265,19 @@ def test_a_procedure_runs_its_dialogue(lab, name, side):
     assert not any(status(lab, *other).isEnabled for other in others)
 
 
-def test_a_procedure_whose_client_goes_away_times_out(lab):
+def test_taring_a_physical_arm_takes_longer_and_succeeds(make_lab):
+    lab = make_lab(parameters={"enable": True, "profile": "robot"})
+    lab.hear("/robustcontroller/*/Tare/*")
+    lab.run(1.0, before=keep_asking("Tare", "left"))
+    begin = lab.world.time_s
+    while status(lab, "Tare", "left").complete == 0 and lab.world.time_s < begin + 100.0:
+        lab.run(0.1, before=keep_asking("Tare", "left"))
+    assert status(lab, "Tare", "left").complete == 2, status(lab, "Tare", "left")
+    assert 12.0 < lab.world.time_s - begin < 40.0
+
+
+def test_a_procedure_whose_client_goes_away_times_out(quiet_lab):
+    lab = quiet_lab
     ask(lab, "Tare", "left", True)
     lab.run(1.0)
     assert status(lab, "Tare", "left").isEnabled
@@ -247,7 +292,8 @@ def test_a_procedure_fails_on_a_disabled_robot(make_lab):
     assert status(lab, "CalibrateArm", "right").errorCodes == ["the robot is disabled"]
 
 
-def test_a_tare_fails_when_something_leans_on_the_arm(lab):
+def test_a_tare_fails_when_something_leans_on_the_arm(quiet_lab):
+    lab = quiet_lab
     go_on = keep_asking("Tare", "left")
 
     def lean(lab):
@@ -260,7 +306,8 @@ def test_a_tare_fails_when_something_leans_on_the_arm(lab):
     assert "feels" in status(lab, "Tare", "left").errorCodes[0]
 
 
-def test_a_tare_that_is_ended_stops_the_arm(lab):
+def test_a_tare_that_is_ended_stops_the_arm(quiet_lab):
+    lab = quiet_lab
     lab.run(1.0, before=keep_asking("Tare", "left"))
     go_on = keep_asking("Tare", "left")
     for _ in range(100):
@@ -276,7 +323,8 @@ def test_a_tare_that_is_ended_stops_the_arm(lab):
     assert status(lab, "Tare", "left").complete == 0 and not status(lab, "Tare", "left").isEnabled
 
 
-def test_a_tare_whose_arm_is_held_fails(lab):
+def test_a_tare_whose_arm_is_held_fails(quiet_lab):
+    lab = quiet_lab
     lab.send("limb/left/set_speed_ratio", Float64(0.0))
     lab.run(40.0, before=keep_asking("Tare", "left"))
     assert status(lab, "Tare", "left").complete == 1
@@ -345,7 +393,7 @@ def test_a_urdf_fragment_is_passed_on_once(make_lab):
 
 @pytest.mark.parametrize("link, joint, xml, reason", [
     ("nose", "j", FRAGMENT, "link 'nose'"), ("left_hand", "", FRAGMENT, "names no joint"),
-    ("left_hand", "j", "<robot", "is no XML"), ("left_hand", "j", "<model/>", "is <model>; it must be a <robot>")])
+    ("left_hand", "j", "<robot", "is not XML"), ("left_hand", "j", "<model/>", "is <model>; it must be a <robot>")])
 def test_a_senseless_urdf_fragment_is_refused(make_lab, link, joint, xml, reason):
     lab = make_lab()
     lab.send("urdf", URDFConfiguration(Time(3), link, joint, xml))

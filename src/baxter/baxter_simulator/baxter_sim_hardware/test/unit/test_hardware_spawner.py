@@ -21,6 +21,7 @@ def spawner(monkeypatch):
     module.parameters = {}
     monkeypatch.setattr(module.rospy, "has_param", lambda name: name in module.parameters)
     monkeypatch.setattr(module.rospy, "get_param", module.parameters.__getitem__)
+    monkeypatch.setattr(module.rospy, "set_param", module.parameters.__setitem__)
     return module
 
 
@@ -40,3 +41,14 @@ def test_lists_the_poses(spawner):
     spawner.parameters["robot_description"] = "<robot name='empty'><link name='base'/></robot>"
     with pytest.raises(SystemExit, match="unknown pose 'banana'; choices are start, neutral"):
         spawner.main(["banana", *WORDS])
+
+
+def test_tells_where_the_arms_are_mounted(spawner, monkeypatch):
+    spawner.parameters["robot_description"] = """<robot name="r"><link name="torso"/><link name="left_arm_mount"/>
+        <joint name="left_torso_arm_mount" type="fixed"><origin xyz="0.02 0.21 0.11" rpy="0 0 0.7854"/>
+        <parent link="torso"/><child link="left_arm_mount"/></joint></robot>"""
+    monkeypatch.setattr(spawner.os, "execv", lambda *_: None)
+    monkeypatch.setattr(spawner, "joint_arguments", lambda pose, limits: [])
+    spawner.main(["start", *WORDS])
+    origin = "/robot_config/jcb_urdf_config/torso_t0/joint/left_torso_arm_mount/origin/"
+    assert (spawner.parameters[origin + "xyz"], spawner.parameters[origin + "rpy"]) == ("0.02 0.21 0.11", "0 0 0.7854")

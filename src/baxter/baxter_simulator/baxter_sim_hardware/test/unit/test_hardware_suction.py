@@ -14,6 +14,9 @@ from baxter_sim_hardware.grippers.suction import SuctionGripper
 from bullet_sim import Pose
 from urdf_model import parse_urdf
 
+pytestmark = pytest.mark.tree
+HEARD = ("end_effector/*", "analog_io/*", "digital_io/*")
+
 SIDES = ("left", "right")
 AREA_M2 = np.pi * 0.015**2
 BOX = """<robot name="box"><link name="box">

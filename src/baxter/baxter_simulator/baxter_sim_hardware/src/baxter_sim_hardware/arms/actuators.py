@@ -10,6 +10,9 @@ Each joint is a series elastic actuator. Its controller sees the motor, not the 
 m, w: angle and speed of the motor, seen at the joint; q, v: of the link. So a load that the controller does not know
 bends the spring for good, and the error of the motor itself goes away by I, which acts at rest only.
 
+Effort is told from how far the spring is bent, with hysteresis: after a way of some `hysteresis_way` in one direction
+all of `effort_hysteresis` is added to it, in that direction.
+
 A bare wrist is so light that its spring would shake it at the length of a tick. So the spring's torque is that of the
 tick's end, where a link of the given inertia will be (linearly implicit Euler).
 """
@@ -29,11 +32,13 @@ PARTS = 4
 REST_SPEED = 0.03
 NUMBERS = ("spring_stiffness", "spring_damping", "motor_inertia", "proportional_gain", "motor_damping", "friction",
            "set_point_filter", "position_mode_filter", "integral_rate", "integral_deadband", "torque_limit",
-           "counterbalance_offset", "counterbalance_stiffness")
+           "counterbalance_offset", "counterbalance_stiffness", "effort_hysteresis", "hysteresis_way")
+_LIMIT, _OFFSET, _STIFFNESS, _HYSTERESIS = (NUMBERS.index(name) for name in (
+    "torque_limit", "counterbalance_offset", "counterbalance_stiffness", "effort_hysteresis"))
 
 
 class Wanted(NamedTuple):
-    """What the actuators shall do in one tick, (n,) each.
+    """Commands of the actuators for one tick, (n,) each.
 
     driven: which of them follow `position` [rad]; velocity: what set-points are said to move at, 0 where nobody says
     [rad/s]; in_position_mode; known_load: torque that the controller adds for gravity [Nm]; effort: what a drive may
@@ -56,19 +61,25 @@ class Actuators:
 
     def __init__(self, rows, names):
         self._numbers = np.array([effects.per_joint(rows, number, names) for number in NUMBERS])
-        for number, least in (("spring_stiffness", 1.0), ("motor_inertia", 1e-4)):
+        for number, least in (("spring_stiffness", 1.0), ("motor_inertia", 1e-4), ("hysteresis_way", 1e-6)):
             values = self._numbers[NUMBERS.index(number)]
             if values.min() < least:
                 raise effects.HardwareError("%s is %g; it must be at least %g" % (number, values.min(), least))
         if self._numbers.min() < 0.0:
             raise effects.HardwareError("%s is negative" % NUMBERS[int(np.argwhere(self._numbers < 0.0)[0, 0])])
-        # Motor's angle and speed, filtered set-point, integral, set-point of the tick before.
-        self._state = np.zeros((5, len(names)))
+        # Motor's angle and speed, filtered set-point, integral, set-point of the tick before, share of the hysteresis,
+        # what the controller adds to the known load.
+        self._state = np.zeros((7, len(names)))
         self._begun = np.zeros(len(names), dtype=bool)
 
     def forget(self):
         """The joints were put elsewhere: begin where they are."""
         self._begun[:] = False
+        self._state[5] = 0.0
+
+    def hold(self, joints, position):
+        """Forget what the set-points of `joints` were: they are at position (k,) [rad]."""
+        self._state[2, joints] = position
 
     def torques(self, wanted, links, dt):
         """(n,) [Nm] what drives the links in this tick, the counterbalance among it; 0 for joints that are not driven.
@@ -80,17 +91,42 @@ class Actuators:
 
     def counterbalance(self, position):
         """(n,) [Nm] what springs beside the actuators take off them at `position` (n,) [rad]."""
-        return self._numbers[-2] + self._numbers[-1] * position
+        return self._numbers[_OFFSET] + self._numbers[_STIFFNESS] * position
+
+    def bounded(self, torque, position, joints):
+        """(k,) [Nm] what the motors of `joints`, with what springs beside them carry, can do of `torque` (k,) at
+        position (n,) [rad]."""
+        carried, limit = self.counterbalance(position)[joints], self._numbers[_LIMIT][joints]
+        return np.minimum(np.maximum(torque, -limit - carried), limit - carried)
+
+    @property
+    def hysteresis_share(self):
+        """(n,) -1 to 1, how much of its hysteresis a joint's effort has now, and in which direction."""
+        return self._state[5]
+
+    @property
+    def hysteresis(self):
+        """(n,) [Nm] what hysteresis adds to the efforts that are told."""
+        return self._numbers[_HYSTERESIS] * self._state[5]
+
+    @property
+    def added(self):
+        """(n,) [Nm] what the controllers asked for beside the known load in the last tick; 0 for joints that are not
+        driven."""
+        return self._state[6]
 
 
 @_compiled
 def _turn(state, begun, numbers, wanted, links, dt):
     motor, speed, filtered, integral, last = state[0], state[1], state[2], state[3], state[4]
     torques = np.zeros(links.shape[1])
+    share, added = state[5], state[6]
     part = dt / PARTS
     for j in range(links.shape[1]):
+        kept = math.exp(-abs(links[1, j]) * dt / numbers[14, j])
+        share[j] = kept * share[j] + math.copysign(1.0 - kept, links[1, j])
         if not wanted.driven[j]:
-            begun[j] = False
+            begun[j], added[j] = False, 0.0
             continue
         stiffness, damping, inertia, gain, motor_damping, friction = (
             numbers[0, j], numbers[1, j], numbers[2, j], numbers[3, j], numbers[4, j], numbers[5, j])
@@ -122,5 +158,6 @@ def _turn(state, begun, numbers, wanted, links, dt):
             speed[j] = math.copysign(braked, free)
             motor[j] += part * speed[j]
             total += spring
+            added[j] = asked - known
         torques[j] = total / PARTS - balance
     return torques

@@ -16,8 +16,8 @@ CUFF, GRAVITY = "suppress_cuff_interaction", "suppress_gravity_compensation"
 SUPPRESSIONS = {
     AVOIDANCE: "an arm that touches the robot itself does not yield, and nothing is listed",
     BODY_AVOIDANCE: "the same for the body alone; the other arm still counts",
-    CONTACT: "joints that feel too much are no collision",
-    OVERWRENCH: "a hand that feels more than 100 N or 30 Nm is no collision",
+    CONTACT: "a load on joints does not count as a collision",
+    OVERWRENCH: "a load on the hand above 100 N or 30 Nm does not count as a collision",
     CUFF: "a squeezed cuff does not make the arm float",
     GRAVITY: "torque mode without the torque that balances gravity: the arm falls",
 }

@@ -21,17 +21,16 @@ other joints continue with their last command; a command in another mode makes t
 A set-point never runs away from its joint: while a joint is pushed or blocked, its set-point stays near, so the arm
 returns at the speed of its mode, without a jump.
 """
-from typing import NamedTuple
-
 import numpy as np
 
 from baxter_sim_hardware.errors import CommandRefused
 
+from .drives import NO_JOINTS, Drives
 from .effort_bounds import REACH_RAD, EffortBounds
 from .joint_command import CommandParser, Mode
 from .joint_modes import POSITION, RAW_POSITION, VELOCITY, JointModes
 from .raw_stream import RawStream
-from .setpoint import MovingAverage, SetPoints, any_beyond, follow, stopping_point
+from .setpoint import MovingAverage, SetPoints, any_beyond, approach_rates, follow, stopping_point
 from .stopping import hardest_stop
 
 COMMAND_TIMEOUT_S = 0.2  # the robot's own
@@ -50,28 +49,6 @@ SMOOTHING_S = 0.02  # see setpoint.MovingAverage
 AT_LIMIT = 0.999  # fraction of the velocity limit from which torque mode watches the limit
 SINK_DAMPING = 150.0  # [Nm s/rad] an unpowered arm with `disabled:=sink` gives way to gravity against this
 SINK_FRICTION = 1.0  # [Nm] what still damps a joint whose gravity torque vanishes
-
-
-_NONE = np.zeros(0, dtype=int)
-
-
-class Drives(NamedTuple):
-    """What the joint drives shall do in this tick; indices count the joints of the limits.
-
-    position_driven: indices of joints that follow position [rad] and velocity [rad/s] with up to effort [Nm];
-    velocity_driven: indices of joints that are pushed towards push_velocity [rad/s] by no more than push_effort [Nm];
-    effort_driven: indices of joints on which exerted [Nm] acts.
-    """
-
-    position_driven: np.ndarray
-    position: np.ndarray
-    velocity: np.ndarray
-    effort: np.ndarray
-    velocity_driven: np.ndarray
-    push_velocity: np.ndarray
-    push_effort: np.ndarray
-    effort_driven: np.ndarray = _NONE
-    exerted: np.ndarray = np.zeros(0)
 
 
 class _Limb:
@@ -105,7 +82,7 @@ class Arms:
         self._limbs = {limb.side: _Limb(limb, limits, speed_ratio) for limb in limbs}
         self._dt = dt
         count = len(limits.names)
-        self._all = np.arange(count)
+        self._all, self._still = np.arange(count), np.zeros(count)
         points = self._points = SetPoints(count)
         points.acceleration[:] = [ACCELERATION[name.rsplit("_", 1)[1]] for name in limits.names]
         points.stopping[:] = points.acceleration
@@ -142,6 +119,11 @@ class Arms:
     def sides(self):
         return tuple(self._limbs)
 
+    @property
+    def dt(self):
+        """Length of a tick [s]."""
+        return self._dt
+
     def joints_of(self, side):
         """(k,) indices of one limb's joints, torso to wrist."""
         return self._limbs[side].index
@@ -168,7 +150,9 @@ class Arms:
     @property
     def said_velocity(self):
         """(n,) [rad/s] the feed-forward velocities of joints that follow a stream of raw set-points, else 0."""
-        return np.where(self._modes.mode == RAW_POSITION, self._stream.said_velocity(self._measured.time_s), 0.0)
+        if not self._points.streams.any():
+            return self._still
+        return np.where(self._points.streams, self._stream.said_velocity(self._measured.time_s), 0.0)
 
     @property
     def known_gravity(self):
@@ -184,6 +168,11 @@ class Arms:
     def commanded_velocity(self):
         """(n,) [rad/s] how fast the set-points move now."""
         return self._points.output_rate
+
+    @property
+    def commanded_acceleration(self):
+        """(n,) [rad/s^2] how fast that changes."""
+        return self._points.output_change
 
     @property
     def commanded_torque(self):
@@ -262,11 +251,9 @@ class Arms:
 
         0 for joints in modes without collision avoidance.
         """
-        points, index = self._points, self._limbs[side].index
-        ahead = points.target[index] - points.position[index]
-        governed = (self._modes.mode[index] == POSITION) | (self._modes.mode[index] == VELOCITY)
-        speed = np.minimum(self._nominal_speed[index], np.sqrt(2.0 * points.acceleration[index] * np.abs(ahead)))
-        return np.where(governed, np.copysign(speed, ahead), 0.0)
+        points = self._points
+        return approach_rates(self._limbs[side].index, points.target, points.position, points.acceleration,
+                              self._nominal_speed, self._modes.is_governed)
 
     def set_slowing(self, side, share):
         """Set the share of the speed, 0 to 1, that a limb's set-points may have in position and velocity mode."""
@@ -295,6 +282,9 @@ class Arms:
         else:
             self._hold(limb.joints)
 
+    def floats(self, side):
+        return self._limbs[side].floats
+
     def feed_forward(self, side, velocities):
         """Take the velocities (7,) [rad/s] that belong to the raw set-points of this moment.
 
@@ -312,6 +302,11 @@ class Arms:
         limb = self._limbs[side]
         limb.mode = Mode.POSITION
         self._hold(limb.joints)
+
+    def hold_here(self, side):
+        """Stop one limb's joints and hold them where they are, wherever their set-points were."""
+        self._follow_joint(self._limbs[side].joints)
+        self.stop_limb(side)
 
     def stop(self):
         """Stop every joint as hard as its torques allow, and hold it where it comes to rest."""
@@ -351,7 +346,7 @@ class Arms:
 
         bound = self._efforts.bound(measured.gravity, self._modes.mode)
         if self._is_settled or not self._modes.any_in_torque:
-            return Drives(self._all, points.output, points.output_rate, bound, _NONE, _NONE, _NONE)
+            return Drives(self._all, points.output, points.output_rate, bound, NO_JOINTS, NO_JOINTS, NO_JOINTS)
         in_torque = self._modes.in_torque
         self._follow_joint(in_torque)
         pushed = np.flatnonzero(in_torque)
@@ -368,7 +363,7 @@ class Arms:
         limits, position, gravity = self.limits, self._measured.position, self._measured.gravity
         fall = np.clip(-gravity / SINK_DAMPING, -limits.velocity, limits.velocity)
         at_end = ((position <= limits.lower) & (fall < 0.0)) | ((position >= limits.upper) & (fall > 0.0))
-        return Drives(_NONE, _NONE, _NONE, _NONE,
+        return Drives(NO_JOINTS, NO_JOINTS, NO_JOINTS, NO_JOINTS,
                       self._all, np.where(at_end, 0.0, fall),
                       np.minimum(np.abs(gravity) + SINK_FRICTION, limits.effort))
 
@@ -405,6 +400,7 @@ class Arms:
         # Nothing to do until the next command or push: every set-point rests on its target.
         if rests and self._modes.all_in_position:
             points.output[:] = points.target
+            points.output_change[:] = 0.0
             self._is_settled = True
             self._modes.settle()
         return leads

@@ -24,6 +24,9 @@ class Mode(IntEnum):
     RAW_POSITION = 4
 
 
+_UNITS = {Mode.POSITION: "rad", Mode.VELOCITY: "rad/s", Mode.TORQUE: "Nm", Mode.RAW_POSITION: "rad"}
+
+
 @dataclass(frozen=True)
 class JointLimits:
     """Limits of n joints, from the robot's URDF.
@@ -68,7 +71,7 @@ class JointCommand:
     mode: Mode
     index: np.ndarray
     values: np.ndarray
-    clamped: tuple = ()  # names of the joints whose value was out of range by more than WORTH_TELLING
+    clamped: tuple = ()  # a text for each joint that was out of range by more than WORTH_TELLING
 
 
 class CommandParser:
@@ -96,7 +99,8 @@ class CommandParser:
         clamped = ()
         if (values != wanted).any():
             outside = np.abs(values - wanted) > WORTH_TELLING
-            clamped = tuple(name for name, told in zip(names, outside, strict=True) if told)
+            clamped = tuple("%s: %.5g became %.5g %s" % (names[i], wanted[i], values[i], _UNITS[mode])
+                            for i in np.flatnonzero(outside))
         return JointCommand(mode, index, values, clamped)
 
     def _check(self, mode, names, values):

@@ -11,7 +11,8 @@ POSITION, VELOCITY, TORQUE, RAW_POSITION = (
 
 class JointModes:
     """mode: (n,) ints of `Mode`; value: (n,) commanded velocity [rad/s] or torque [Nm], 0 in the other modes;
-    in_torque: (n,) bool; any_in_torque, all_in_position: of all joints."""
+    in_torque: (n,) bool; is_governed: (n,) bool, in modes with collision avoidance; any_in_torque, all_in_position: of
+    all joints."""
 
     def __init__(self, count):
         self.mode = np.full(count, POSITION)
@@ -42,5 +43,6 @@ class JointModes:
 
     def _look(self):
         self.in_torque = self.mode == TORQUE
+        self.is_governed = (self.mode == POSITION) | (self.mode == VELOCITY)
         self.any_in_torque = bool(self.in_torque.any())
         self.all_in_position = bool((self.mode == POSITION).all())

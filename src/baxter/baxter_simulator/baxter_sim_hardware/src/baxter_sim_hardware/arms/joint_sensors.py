@@ -1,8 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a physical arm's joints say of themselves: in counts, and with noise."""
+"""What a physical arm's joints say of themselves: in counts, with noise, and with the error of their sensors' gears.
+
+A joint's controller reads the same sensor. So the error of the gear is not in what joint states say of a joint at rest:
+it is the link that is elsewhere.
+"""
+import math
+
 import numpy as np
 
 from baxter_sim_hardware import effects
+from baxter_sim_hardware.individual import DRAWING, drawn
+from baxter_sim_hardware.numbered_random import NumberedRandom
+from numba_cache import compiler
+
+_compiled = compiler("baxter_sim_hardware", [__file__], error_model="numpy")
 
 QUANTITIES = ("position", "velocity", "effort")
 
@@ -11,26 +22,47 @@ class JointSensors:
     """The sensors of n joints.
 
     rows: {number: {joint: value}} as `effects.read` has them for "noise"; names: of the joints; seed: integer of the
-    noise, 0 or more. Raises HardwareError.
+    noise, 0 or more; serial: of the robot, from which its gears follow; robot 0 has none. Raises HardwareError.
     """
 
-    def __init__(self, rows, names, seed):
+    def __init__(self, rows, names, seed, serial):
         self._quanta = [effects.per_joint(rows, "%s_quantum" % quantity, names) for quantity in QUANTITIES]
         for quantity, quantum in zip(QUANTITIES, self._quanta, strict=True):
             if quantum.min() <= 0.0:
                 raise effects.HardwareError("%s_quantum is %g; it must be greater than 0" % (quantity, quantum.min()))
         self._noise = {quantity: effects.per_joint(rows, "%s_noise" % quantity, names)
                        for quantity in ("position", "effort")}
-        self._seed = seed
+        self._gear = np.array([*(effects.per_joint(rows, number, names) for number in ("gear_error", "gear_waves")),
+                               [2.0 * math.pi * drawn(serial, name, "gear").random() for name in names]])
+        if serial == DRAWING:
+            self._gear[0] = 0.0
+        self._random = NumberedRandom(seed)
+
+    def felt(self, position):
+        """(n,) [rad] where the sensors are, without noise, when the links are at position (n,) [rad]."""
+        return position + _error(self._gear, position)
+
+    def reached(self, felt, joints):
+        """(k,) [rad] where the links of `joints` are when their sensors are at felt (k,) [rad]."""
+        gear = self._gear[:, joints]
+        return felt - _error(gear, felt - _error(gear, felt))
 
     def read(self, tick, position, velocity, effort):
         """What is read of the joints in this tick: the same three (n,), [rad], [rad/s] and [Nm].
 
         The noise of a tick follows from its number, so it does not depend on who listens, and when.
         """
-        of_position, of_effort = np.random.Generator(
-            np.random.Philox(key=self._seed, counter=[0, tick, 0, 0])).standard_normal((2, len(position)))
-        position = position + self._noise["position"] * of_position
+        of_position, of_effort = self._random.at(tick, 0, 0).standard_normal((2, len(position)))
+        position = self.felt(position) + self._noise["position"] * of_position
         effort = effort + self._noise["effort"] * of_effort
         return tuple(quantum * np.round(values / quantum)
                      for quantum, values in zip(self._quanta, (position, velocity, effort), strict=True))
+
+
+@_compiled
+def _error(gear, position):
+    """(k,) [rad] that gears add; gear: (3, k) size [rad], waves in a turn, phase [rad]; position: (k,) [rad]."""
+    error = np.empty(len(position))
+    for j in range(len(position)):
+        error[j] = gear[0, j] * math.sin(gear[1, j] * position[j] + gear[2, j])
+    return error

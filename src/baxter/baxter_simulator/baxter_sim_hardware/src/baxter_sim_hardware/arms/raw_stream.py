@@ -5,7 +5,7 @@ import numpy as np
 from .joint_modes import RAW_POSITION
 
 STREAM_GAP_S = 0.05  # raw commands that follow each other within this are one stream
-FEED_FORWARD_S = 0.05  # for so long a feed-forward velocity belongs to the raw commands that come in
+FEED_FORWARD_S = 0.05  # time that a feed-forward velocity belongs to the raw commands that come in
 
 
 class RawStream:

@@ -46,17 +46,17 @@ class SetPoints:
 
     position [rad], velocity [rad/s]: state of the set-points. target [rad]: where they go, at most at speed [rad/s] and
     with acceleration [rad/s^2], or, where `braking`, with stopping [rad/s^2]. Where `streams`, the target itself moves
-    to goal [rad], by at most pace [rad/s] (of either sign). output [rad], output_rate [rad/s]: set-points of the
-    drives, with the position smoothed.
+    to goal [rad], by at most pace [rad/s] (of either sign). output [rad], output_rate [rad/s], output_change [rad/s^2]:
+    set-points of the drives, with the position smoothed.
 
-    All are views of two arrays, `numbers` and `flags`: passing fifteen arrays to a compiled function takes longer than
+    All are views of two arrays, `numbers` and `flags`: passing sixteen arrays to a compiled function takes longer than
     moving fourteen joints.
     """
 
     def __init__(self, count):
-        self.numbers, self.flags = np.zeros((10, count)), np.zeros((2, count), dtype=bool)
+        self.numbers, self.flags = np.zeros((11, count)), np.zeros((2, count), dtype=bool)
         (self.position, self.velocity, self.target, self.speed, self.acceleration, self.stopping, self.goal, self.pace,
-         self.output, self.output_rate) = self.numbers
+         self.output, self.output_rate, self.output_change) = self.numbers
         self.braking, self.streams = self.flags
 
 
@@ -72,9 +72,9 @@ def follow(numbers, flags, window, oldest, measured, reach, dt):
     Returns whether every set-point rests on its target; whether some were braking when the tick began; whether some are
     too far from their joints.
     """
-    position, velocity, target, speed, acceleration, stopping, goal, pace, output, output_rate = (
+    position, velocity, target, speed, acceleration, stopping, goal, pace, output, output_rate, output_change = (
         numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8],
-        numbers[9])
+        numbers[9], numbers[10])
     braking, streams = flags[0], flags[1]
     rests, braked, leads = True, False, False
     for i in range(len(position)):
@@ -97,7 +97,9 @@ def follow(numbers, flags, window, oldest, measured, reach, dt):
         for k in range(len(window)):
             mean += window[k, i]
         mean /= len(window)
-        output_rate[i] = (mean - output[i]) / dt
+        rate = (mean - output[i]) / dt
+        output_change[i] = (rate - output_rate[i]) / dt
+        output_rate[i] = rate
         output[i] = mean
         braked |= braking[i]
         rests &= velocity[i] == 0.0 and abs(mean - target[i]) < 1e-12
@@ -113,6 +115,18 @@ def any_beyond(reach, position, velocity, measured, dt):
         if abs(position[i] - velocity[i] * dt - measured[i]) > reach:
             return True
     return False
+
+
+@_compiled
+def approach_rates(index, target, position, acceleration, speed, moves):
+    """(k,) [rad/s] speeds at which joints `index` (k,) of n would go to their targets, or slow before them; 0 where
+    `moves` (n,) is false. The other arrays are (n,) [rad, rad/s, rad/s^2]."""
+    rates = np.zeros(len(index))
+    for i, joint in enumerate(index):
+        if moves[joint]:
+            ahead = target[joint] - position[joint]
+            rates[i] = math.copysign(min(speed[joint], math.sqrt(2.0 * acceleration[joint] * abs(ahead))), ahead)
+    return rates
 
 
 def stopping_point(position, velocity, acceleration):

@@ -3,6 +3,7 @@
 import math
 
 from baxter_model.readiness import NOT_ENABLED
+from baxter_sim_hardware.arms.hand_load import read_load
 from baxter_sim_hardware.errors import CommandRefused
 from rospy_limits.json_object import JsonRefused, read_object
 
@@ -14,7 +15,8 @@ class Gripper:
     """Commands and parameters of one kind of gripper. Kinds derive from it and fill the two tables.
 
     Attributes: command, sender, sequence: of the last valid command, as its acknowledgement;
-    parameters: {name: value}; flags: {flag of the state message: whether it is set}, details: the JSON text in it.
+    parameters: {name: value}; flags: {flag of the state message: whether it is set}, details: the JSON text in it;
+    load: `arms.hand_load.HandLoad` that a client has told of, or None.
     """
 
     flags = {}
@@ -29,6 +31,7 @@ class Gripper:
 
     def forget(self):
         """As at the start: no command, parameters at their defaults."""
+        self.load = None
         self.command, self.sender, self.sequence = "", "", 0
         self.parameters = {name: start for name, (start, _) in self.PARAMETERS.items()}
 
@@ -62,12 +65,16 @@ class Gripper:
         """Do nothing; the command is still acknowledged."""
 
     def configure(self, values):
-        """Change all parameters in `values`, or none if one is invalid. Raises CommandRefused."""
+        """Change all parameters in `values`, or none if one is invalid; `urdf` among them tells the weight on the hand
+        (see `arms.hand_load.read_load`). Raises CommandRefused."""
+        values = dict(values)
+        load = read_load(values.pop("urdf")) if "urdf" in values else self.load
         for name, value in values.items():
             if name not in self.PARAMETERS or not (is_number(value) and 0.0 <= value <= self.PARAMETERS[name][1]):
                 raise CommandRefused("%s: %s is %r; parameters are %s" % (self.command, name, value, ", ".join(
                     "%s (0 to %g)" % (known, upper) for known, (_, upper) in self.PARAMETERS.items()) or "none"))
         self.parameters.update(values)
+        self.load = load
 
 
 class CustomGripper(Gripper):

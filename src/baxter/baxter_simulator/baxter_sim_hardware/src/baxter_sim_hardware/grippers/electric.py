@@ -13,10 +13,10 @@ REACH = 0.1  # share of the travel by which the set-point may lead fingers that 
 STILL = 0.05  # [travels/s] below which the fingers stand, and half of the commanded speed where that is less
 PRESSING = 1.15  # force that moving fingers use, per moving force, which is what they must exceed to grip
 MOST = 95.0  # [%] force that counts as exceeding any moving force
-PUSHING = 0.5  # share of the allowed force from which fingers that stand for long are stopped by something all the same
+PUSHING = 0.5  # share of the allowed force above which fingers that stand for long are stopped by an obstacle
 LOOSE = 0.25  # share of the allowed force below which what was held is gone
-SETTLE_S = 0.04  # for so long they must stand, or what is held be gone
-CONFIRM_S = 0.1  # for so long they must press: clients that look at the force, 20 times a second, shall see it
+SETTLE_S = 0.04  # time that they must stand, or that the held object must be missing
+CONFIRM_S = 0.1  # time that they must press: clients that read the force 20 times per second must see it
 GIVE_UP_S = 0.5  # after which fingers that stand short of their target, with nothing between them, are left there
 END_STOP = 0.02  # share of the travel within which a calibration must find the ends
 OPEN, CLOSED = 1.0, 0.0
@@ -33,7 +33,8 @@ class Phase(Enum):
 class ElectricGripper(Gripper):
     """Positions are shares of the fingers' travel, 0 closed to 1 open, unless given in percent.
 
-    travel: of one finger [m]; position: present position of the fingers; dt: length of a tick [s].
+    travel: of one finger [m]; position: present position of the fingers; dt: length of a tick [s]; calibrated: whether
+    it begins calibrated, as in the vendor's simulator. The physical robot's does not.
     Attributes: calibrated, error, missed: flags of the state message.
     """
 
@@ -54,16 +55,17 @@ class ElectricGripper(Gripper):
     }
     ONCE = ("calibrate", "reboot")
 
-    def __init__(self, travel, position, dt=0.002):
+    def __init__(self, travel, position, dt=0.002, calibrated=True):
         self._travel, self._dt = travel, dt
         self._position = position
+        self._is_calibrated_at_start, self.calibrated = calibrated, False
         super().__init__()
         self.reset(position)
 
     def reset(self, position):
-        """As at the start: calibrated, as the vendor's simulator is, and holding `position`."""
+        """As at the start, holding `position`; it stays calibrated if it was."""
         self.forget()
-        self.calibrated, self.error = True, False
+        self.calibrated, self.error = self.calibrated or self._is_calibrated_at_start, False
         self._stand_at(position)
 
     def stop(self, position):

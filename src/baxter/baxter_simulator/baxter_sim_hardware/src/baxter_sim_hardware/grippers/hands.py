@@ -18,11 +18,12 @@ LOOK_TICKS = 5  # how often fingers at rest are looked at: whether somebody move
 class FingersHand:
     """The electric gripper of one side: two finger joints that move as one, as on a common pinion.
 
-    model: of bullet_sim; openings: {finger joint: where it is open [m]}; dt: length of a tick [s].
+    model: of bullet_sim; openings: {finger joint: where it is open [m]}; dt: length of a tick [s]; calibrated: whether
+    it is, at the start.
     Attribute `gripper`: its core.
     """
 
-    def __init__(self, model, side, openings, dt):
+    def __init__(self, model, side, openings, dt, calibrated=True):
         self._model = model
         self._index = model.index(openings)
         self._openings = np.array(list(openings.values()))
@@ -35,7 +36,7 @@ class FingersHand:
             model.couple(first, second, self._openings[1] / self._openings[0])
         for link in self._links:
             model.grip_firmly(link)
-        self.gripper = ElectricGripper(float(np.abs(self._openings).max()), self._position(), dt)
+        self.gripper = ElectricGripper(float(np.abs(self._openings).max()), self._position(), dt, calibrated)
         self._unseen_ticks = 0
 
     def readings(self, positions):
@@ -162,9 +163,10 @@ class NoHand:
         self.gripper.forget()
 
 
-def hand_of(world, model, side, dt):
-    """The hand of one arm in the description, an object of one of the classes above."""
+def hand_of(world, model, side, dt, calibrated=True):
+    """The hand of one arm in the description, an object of one of the classes above; calibrated: whether an electric
+    gripper is, at the start."""
     openings, cup = openings_of(model.robot, side), cup_of(model.robot, side)
     if openings:
-        return FingersHand(model, side, openings, dt)
+        return FingersHand(model, side, openings, dt, calibrated)
     return CupHand(world, model, cup, dt) if cup else NoHand()

@@ -48,7 +48,7 @@ class CaptureSettings(NamedTuple):
     def checked(self):
         """These settings with a rate; raises :class:`CameraRefused` for impossible settings."""
         if (self.width, self.height) not in MODES:
-            raise CameraRefused(errno.EINVAL, "%d x %d is no resolution of this camera; choose from %s"
+            raise CameraRefused(errno.EINVAL, "%d x %d is not a resolution of this camera; choose from %s"
                                 % (self.width, self.height, ", ".join("%d x %d" % mode for mode in MODES)))
         rate = self.rate or DEFAULT_HZ
         if not 0.0 < rate <= FASTEST_HZ:

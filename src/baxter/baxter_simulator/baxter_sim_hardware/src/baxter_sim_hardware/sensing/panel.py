@@ -36,7 +36,7 @@ ANALOG = {**dict.fromkeys((*WHEELS, *VACUUM_SENSORS.values(), *RANGE_SENSORS.val
           "torso_fan": False, "torso_lighting": False}
 
 
-ESTOP = "estop"  # the emergency stop button, which is no channel of its own
+ESTOP = "estop"  # the emergency stop button, which is not a separate channel
 
 
 def navigator_name(navigator):
@@ -74,7 +74,7 @@ class Panel:
 
     def set_digital(self, name, value):
         """Switch an output. Raises CommandRefused for an unknown name, for an input, and if its valve refuses."""
-        _require(name, DIGITAL, "digital output", is_input=False)
+        _require(name, DIGITAL, "a digital output", is_input=False)
         if name in self._valves:
             self._valves[name][1](bool(value))
         else:
@@ -82,19 +82,19 @@ class Panel:
 
     def set_analog(self, name, value):
         """Set an output to an integer, 0 to 65535. Raises CommandRefused for another value, and for an input."""
-        _require(name, ANALOG, "analog output", is_input=False)
+        _require(name, ANALOG, "an analog output", is_input=False)
         if not 0 <= value <= ANALOG_MAX:
-            raise CommandRefused("%s is told %s; it must be from 0 to %d" % (name, value, ANALOG_MAX))
+            raise CommandRefused("%s is set to %s; it must be from 0 to %d" % (name, value, ANALOG_MAX))
         self.analog[name] = int(value)
 
     def press(self, name, pressed=True):
         """Press or release a digital input. Raises CommandRefused for an unknown name and for an output."""
-        _require(name, DIGITAL, "digital input", is_input=True)
+        _require(name, DIGITAL, "a digital input", is_input=True)
         self.digital[name] = pressed
 
     def turn(self, name, steps):
         """Turn a wheel by a number of counts. Raises CommandRefused for an unknown wheel."""
-        _require(name, dict.fromkeys(WHEELS, True), "wheel", is_input=True)
+        _require(name, dict.fromkeys(WHEELS, True), "a wheel", is_input=True)
         self.analog[name] = (self.analog[name] + steps) % WHEEL_COUNTS
 
     def navigator(self, navigator):
@@ -106,5 +106,5 @@ class Panel:
 
 def _require(name, table, kind, is_input):
     if table.get(name) is not is_input:
-        raise CommandRefused("'%s' is no %s; choices are %s" % (
+        raise CommandRefused("'%s' is not %s; choices are %s" % (
             name, kind, ", ".join(sorted(known for known, known_input in table.items() if known_input is is_input))))

@@ -3,13 +3,15 @@
 import numpy as np
 from baxter_core_msgs.msg import JointCommand
 
-from baxter_model import BASE_FRAME, tip_of
+from baxter_model import BASE_FRAME, JOINTS, tip_of
 from baxter_sim_hardware.arms import endpoint
 from baxter_sim_hardware.arms.joint_command import Mode
 from baxter_sim_hardware.errors import CommandRefused
 
 from . import convert
 from .row import JOINT_STATE_RATE, STATE_RATE_HZ, Part, Topic
+
+SPRING_JOINT = JOINTS.index("s1")  # the one with the spring; the message has one state of hysteresis for all joints
 
 # The vendor's simulator had a controller for each joint and mode, which programs written for it command one by one.
 # {name of a group of controllers: (mode, quantity)}
@@ -39,6 +41,7 @@ class ArmTopics(Part):
     def __init__(self, baxter, chains, limb_index, warnings):
         self._baxter, self._chains, self._limb_index = baxter, chains, limb_index
         self._warnings = warnings
+        self._arm_index = np.concatenate([limb_index[side] for side in baxter.arms.sides])
         names = np.array(baxter.arms.limits.names)
         self._order = np.argsort(names)
         self._reference_message = convert.JointStates(names[self._order].tolist())
@@ -55,9 +58,10 @@ class ArmTopics(Part):
 
     def _endpoint_state(self, time_s, side, snapshot):
         index = self._limb_index[side]
-        pose, jacobian = self._chains[side].fk_and_jacobian(snapshot.position[index])
+        position, velocity, _ = snapshot.sensed
+        pose, jacobian = self._chains[side].fk_and_jacobian(position[index])
         return convert.endpoint_state(
-            time_s, BASE_FRAME, pose, endpoint.twist(jacobian, snapshot.velocity[index]),
+            time_s, BASE_FRAME, pose, endpoint.twist(jacobian, velocity[index]),
             endpoint.contact_wrench(jacobian, snapshot.effort[index], snapshot.own_effort[index]))
 
     def _commanded_endpoint(self, time_s, side, snapshot):
@@ -68,17 +72,40 @@ class ArmTopics(Part):
                                       endpoint.twist(jacobian, arms.commanded_velocity[joints]), np.zeros(6))
 
     def _gravity_compensation(self, time_s, side, snapshot):
-        index, arms = self._limb_index[side], self._baxter.arms
-        joints = arms.joints_of(side)
+        index, arms, actuators = self._limb_index[side], self._baxter.arms, self._baxter.actuators
+        joints, gravity = arms.joints_of(side), snapshot.gravity[index]
+        nothing = np.zeros(len(joints))
+        acceleration, effort = nothing, arms.commanded_torque[joints]
+        model = gravity, gravity, nothing, nothing, 0.0
+        if actuators is not None:
+            acceleration, effort = arms.commanded_acceleration[joints], effort + actuators.added[joints]
+            # What the springs beside the actuators carry is told with the hysteresis. s1's has the largest share.
+            hysteresis = (actuators.counterbalance(snapshot.position[self._arm_index]) + actuators.hysteresis)[joints]
+            model = (gravity + hysteresis, gravity, hysteresis, nothing,
+                     actuators.hysteresis_share[joints[SPRING_JOINT]])
         return convert.sea_joint_state(
             time_s, BASE_FRAME, self._chains[side].joint_names,
-            (arms.commanded_position[joints], arms.commanded_velocity[joints], arms.commanded_torque[joints]),
-            tuple(values[index] for values in snapshot.sensed), snapshot.gravity[index])
+            (arms.commanded_position[joints], arms.commanded_velocity[joints], acceleration, effort),
+            tuple(values[index] for values in snapshot.sensed), model)
 
     def _reference_joint_states(self, time_s, component, snapshot):
         arms, order = self._baxter.arms, self._order
         return self._reference_message.message(
             time_s, arms.commanded_position[order], arms.commanded_velocity[order], arms.commanded_torque[order])
+
+    def _position_state(self, time_s, limb_joint, snapshot):
+        return self._controller_state(time_s, limb_joint, self._baxter.arms.commanded_position, snapshot, 0)
+
+    def _velocity_state(self, time_s, limb_joint, snapshot):
+        return self._controller_state(time_s, limb_joint, self._baxter.arms.commanded_velocity, snapshot, 1)
+
+    def _controller_state(self, time_s, limb_joint, set_points, snapshot, quantity):
+        side = limb_joint[0]
+        place, arms = self._chains[side].joint_names.index("%s_%s" % limb_joint), self._baxter.arms
+        index = self._limb_index[side][place]
+        return convert.joint_controller_state(
+            time_s, set_points[arms.joints_of(side)[place]], snapshot.sensed[quantity][index],
+            snapshot.sensed[2][index], arms.dt)
 
     # -- in
 
@@ -98,7 +125,7 @@ class ArmTopics(Part):
         pose, jacobian = chain.fk_and_jacobian(self._baxter.measured.position[joints])
         linear, angular = msg.twist.linear, msg.twist.angular
         twist = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
-        # Old names of tf begin with a slash; a slash alone is no name.
+        # Old names of tf begin with a slash; a slash alone is not a name.
         frame = msg.header.frame_id.removeprefix("/")
         if frame == tip_of(side):
             twist = np.concatenate([pose[:3, :3] @ twist[:3], pose[:3, :3] @ twist[3:]])
@@ -126,7 +153,7 @@ class ArmTopics(Part):
         for observe in self.command_observers:
             observe(side, msg, command)
         if command is not None and command.clamped:
-            self._warnings.warn(time_s, (side, "clamped"), "%s limb: joint command clamped to the limits of %s" % (
+            self._warnings.warn(time_s, (side, "clamped"), "%s limb: joint command clamped to the limits: %s" % (
                 side, ", ".join(command.clamped)))
 
     TOPICS = (
@@ -135,7 +162,8 @@ class ArmTopics(Part):
               "wrench that the surroundings exert on the tip"),
         Topic("gravity_compensation_torques", "limb/{limb}/gravity_compensation_torques",
               "baxter_core_msgs/SEAJointState", STATE_RATE_HZ, _gravity_compensation,
-              "per joint, torso to wrist: set-points, measured state, torque that balances gravity"),
+              "per joint, torso to wrist: set-points, measured state, torque that balances gravity; with the effect "
+              "`lag` also what the controller adds, and the spring and the hysteresis in the effort"),
         Topic("ref_joint_states", "ref_joint_states", "sensor_msgs/JointState", JOINT_STATE_RATE,
               _reference_joint_states,
               "set-points of the arms' joints, in alphabetical order; effort is what torque mode adds to gravity"),
@@ -159,4 +187,10 @@ class ArmTopics(Part):
                 _single(mode),
                 "%s, as a joint command with this joint alone: for programs made for the vendor's simulator" % meaning)
           for key, (mode, meaning) in CONTROLLERS.items()),
+        *(Topic(key + "_state", "{limb}_%s/joints/{limb}_{joint}_controller/state" % key,
+                "control_msgs/JointControllerState", STATE_RATE_HZ, function,
+                "set-point, measured value, error [%s] and effort [Nm] in any mode; gains are 0: for programs made for "
+                "the vendor's simulator" % unit)
+          for key, unit, function in (("joint_position_controller", "rad", _position_state),
+                                      ("joint_velocity_controller", "rad/s", _velocity_state))),
     )

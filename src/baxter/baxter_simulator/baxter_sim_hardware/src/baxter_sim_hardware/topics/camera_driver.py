@@ -13,13 +13,18 @@ from baxter_core_msgs.srv import (
 )
 from std_srvs.srv import Empty, EmptyResponse
 
+from baxter_sim_hardware import effects, individual
+from baxter_sim_hardware.errors import HardwareError
 from baxter_sim_hardware.sensing.cameras import FLIP, MIRROR, CameraRefused, CaptureSettings, Rack
+from baxter_sim_hardware.sensing.optics import Optics
 from sensor_renderer import convert
 from sensor_renderer.drivers import ColourTopics, Driver
+from sensor_renderer.errors import SensorError
 from sim_time.pace import Pace
 
 # Two of the robot's three cameras can have power (baxter_interface 1.1.0).
 _ROBOT_POWERS, _ALL = 2, 3
+_PARAMETERS = "/baxter_sim_hardware/"
 # State of the robot's cameras after its start: both hands' are open.
 _ROBOT_MODE = (640, 400, 25.0)
 _HEAD = "head_camera"
@@ -40,10 +45,11 @@ class CameraServices:
         return cls._by_namespace[namespace]
 
     def __init__(self, namespace):
-        profile = rospy.get_param("/baxter_sim_hardware/profile", "sim")
+        profile = rospy.get_param(_PARAMETERS + "profile", "sim")
         #: Whether the cameras start as on the physical robot, or as in the vendor's simulator.
         self.as_robot = profile == "robot"
-        powered = rospy.get_param("/baxter_sim_hardware/powered_cameras", _ROBOT_POWERS if self.as_robot else _ALL)
+        powered = rospy.get_param(_PARAMETERS + "powered_cameras", _ROBOT_POWERS if self.as_robot else _ALL)
+        self._effects = rospy.get_param(_PARAMETERS + "effects", effects.ALL if self.as_robot else effects.NONE)
         self._rack = Rack(powered)
         self._drivers = {}
         self._namespace = namespace
@@ -51,6 +57,15 @@ class CameraServices:
         self._services = [rospy.Service("%s/%s" % (namespace, name), kind, handler) for name, kind, handler in (
             ("list", ListCameras, self._list), ("open", OpenCamera, self._open), ("close", CloseCamera, self._close),
             ("reset", Empty, self._reset))]
+
+    def optics(self, name):
+        """The `Optics` of a camera. Raises SensorError."""
+        try:
+            return Optics(name, effects.chosen(self._effects),
+                          individual.checked(rospy.get_param(_PARAMETERS + "serial", individual.DRAWING)),
+                          rospy.get_param("/gazebo/seed", 0))
+        except HardwareError as error:
+            raise SensorError("%s: %s" % (name, error)) from error
 
     def add(self, driver):
         """Add a camera."""
@@ -123,6 +138,7 @@ class BaxterCamera(Driver):
         self._frame = entry.text("frameName", entry.member)
         self._use = None
         self._services = CameraServices.of(entry.namespace)
+        self._optics = self._services.optics(self.camera_name)
         pinhole = camera.pinhole
         controls = _UPRIGHT if self.camera_name == _HEAD else {}
         if self._services.as_robot:
@@ -141,9 +157,10 @@ class BaxterCamera(Driver):
             for topic in old:
                 topic.close()
             return
-        pinhole = self._camera.pinhole
+        whole = pinhole = self._camera.pinhole
         if settings is not self.first_settings or self._services.as_robot:
-            pinhole = settings.pinhole(pinhole.fx, pinhole.near, pinhole.far)
+            pinhole = settings.pinhole(whole.fx, whole.near, whole.far)
+        pinhole = self._optics.pinhole(pinhole, whole.fx)
         topics = self._use[0] if self._use is not None else ColourTopics(
             self.name("%s/image" % self.camera_name),
             [self.name("%s/%s" % (self.camera_name, name)) for name in ("camera_info", "camera_info_std")])
@@ -159,7 +176,7 @@ class BaxterCamera(Driver):
         picture = None
         if topics.want_picture:
             picture, _ = draw(pinhole, link_pose @ self._camera.offset, True, False)
-            picture = settings.developed(picture)
+            picture = settings.developed(self._optics.seen(picture, pinhole, time_s))
         topics.publish(time_s, self._frame, picture, self._encoding, info)
 
     def close(self):

@@ -7,7 +7,7 @@ from std_msgs.msg import Header
 from baxter_model import BASE_FRAME, SIDES
 from baxter_model.description import arm_radius, head_guards
 from baxter_model.self_collision import BODY
-from baxter_sim_hardware.arms import avoidance, collision
+from baxter_sim_hardware.arms import avoidance, collision, safety
 from sim_time.pace import Schedule
 from sim_time.stamps import stamp
 
@@ -35,6 +35,9 @@ class CollisionTopics(Part):
     """world, model: of bullet_sim; baxter: `robot.Baxter`; chains: {side: Chain}; guards: `avoidance.Guards`; feel:
     function (side, snapshot) -> (torques (7,), wrench (6,)) from outside; is_squeezed: function(side) -> whether its
     cuff is.
+
+    Attributes: `safety`: `arms.safety.Safety`, or None where collisions are only reported; `warn`: function(time_s,
+    kind, text) for the log.
     """
 
     def __init__(self, world, model, baxter, chains, guards, feel, is_squeezed):
@@ -44,15 +47,27 @@ class CollisionTopics(Part):
         self._feel, self._is_squeezed = feel, is_squeezed
         self.suppressions = {side: collision.Suppressions() for side in SIDES}
         self._schedule = Schedule(CHECK_RATE_HZ)
+        self.safety, self.warn = None, None
+
+    def forget(self):
+        """The joints were put elsewhere."""
+        if self.safety is not None:
+            self.safety.forget()
 
     def reset(self):
         for suppressions in self.suppressions.values():
             suppressions.reset()
 
-    def update(self, time_s, enabled):
-        """Before a step: let the arms yield, float or fall, depending on contacts, cuffs and messages."""
+    def update(self, time_s, enabled, joints):
+        """Before a step: let the arms yield, float, stop or fall, depending on contacts, loads, cuffs and messages.
+
+        joints: (position, velocity, effort) of the whole model.
+        """
+        if self.safety is not None:
+            self.safety.load.note(joints)
         if not self._schedule.due(time_s):
             return
+        self._find_frames()
         contacts = self._contacts()
         for side, suppressions in self.suppressions.items():
             self._arms.set_yielding(side, bool(contacts and self._touched(contacts, side, time_s)[0]))
@@ -61,16 +76,41 @@ class CollisionTopics(Part):
             self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
             floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
             self._arms.set_floating(side, floats)
+        felt = self.safety.felt() if self.safety is not None else None
+        if felt is not None:
+            for side in self.suppressions:
+                self._stop_if_it_collides(side, time_s, felt, enabled)
+
+    def _find_frames(self):
+        """Where the arms are, and with safety also where they are commanded to be: {side: frames of joints} each."""
+        postures = [self._baxter.measured.position]
+        if self.safety is not None:
+            postures.append(self._arms.commanded_position)
+        self._frames = [{side: chain.joint_frames(posture[self._arms.joints_of(side)])
+                         for side, chain in self._chains.items()} for posture in postures]
+
+    def _stop_if_it_collides(self, side, time_s, felt, enabled):
+        why = safety.reason(*self._feel(side, felt), lambda kind: self.suppressions[side].active(kind, time_s))
+        self.safety.collides[side] = bool(why)
+        if why and enabled and not self._arms.floats(side) and not self._baxter.halted(side):
+            self._baxter.halt(side, self.safety.hold_s)
+            self.warn(time_s, (side, "collision"), "%s limb stops, a collision: %s. It takes commands again in %g s" % (
+                side, why, self.safety.hold_s))
 
     def _field(self, side, time_s):
-        if any(self.suppressions[side].active(kind, time_s)
-               for kind in (collision.AVOIDANCE, collision.BODY_AVOIDANCE)):
+        active, rates = self.suppressions[side].active, self._arms.wanted_rates(side)
+        if active(collision.AVOIDANCE, time_s):
             return avoidance.FREE
-        position = self._baxter.measured.position[self._arms.joints_of(side)]
-        return avoidance.field(self._guards, *self._chains[side].joint_frames(position), self._arms.wanted_rates(side))
+        found = avoidance.FREE
+        if not active(collision.BODY_AVOIDANCE, time_s):
+            found = avoidance.field(self._guards, *self._frames[0][side], rates)
+            if self.safety is not None:
+                found = self.safety.around(found, side, self._frames, rates)
+        return found if self.safety is None else self.safety.between(found, side, self._frames, rates)
 
     def too_near(self):
         """Which arms are in the field around the head, so that a physical robot could not be enabled; "" for none."""
+        self._find_frames()
         near = ["the %s arm (%s)" % (side, ", ".join(field.near)) for side in SIDES
                 if (field := self._field(side, self._world.time_s)).near]
         if not near:
@@ -93,25 +133,29 @@ class CollisionTopics(Part):
 
     def _avoidance(self, time_s, side, snapshot):
         links, other_arm = self._touched(self._contacts(), side, time_s)
-        near = sorted((*links, *self.fields[side].near))
-        return CollisionAvoidanceState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME), other_arm, near)
+        field = self.fields[side]
+        near = sorted({*links, *field.near, *field.other, *field.body})
+        return CollisionAvoidanceState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME),
+                                       other_arm or bool(field.other), near)
 
     def _detection(self, time_s, side, snapshot):
-        suppressions = self.suppressions[side]
-        torques, wrench = self._feel(side, snapshot)
-        collides = ((collision.is_squeezed(torques) and not suppressions.active(collision.CONTACT, time_s))
-                    or (collision.is_overloaded(wrench) and not suppressions.active(collision.OVERWRENCH, time_s)))
+        if self.safety is not None:
+            collides = self.safety.collides[side] or self._baxter.halted(side)
+        else:
+            active = self.suppressions[side].active
+            collides = bool(safety.reason(*self._feel(side, snapshot), lambda kind: active(kind, time_s)))
         return CollisionDetectionState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME), collides)
 
     TOPICS = (
         Topic("collision_avoidance_state", "limb/{limb}/collision_avoidance_state",
               "baxter_core_msgs/CollisionAvoidanceState", STATE_RATE_HZ, _avoidance,
               "the links of the robot that this arm touches, whether the other arm is among them, and the guards of "
-              "the head (`collision_head_link_1`, `_2`) that it is within 0.03 m of"),
+              "the head (`collision_head_link_1`, `_2`) that it is within 0.03 m of; with the effect `safety` also the "
+              "links of the other arm, torso and pedestal, that it is kept away from"),
         Topic("collision_detection_state", "limb/{limb}/collision_detection_state",
               "baxter_core_msgs/CollisionDetectionState", STATE_RATE_HZ, _detection,
               "whether a joint feels more than 16 Nm (s0, e0, e1), 24 Nm (s1), 7 Nm (wrist) from outside, or the hand "
-              "more than 100 N or 30 Nm"),
+              "more than 100 N or 30 Nm; with the effect `safety` such an arm stops for 2 s"),
         *(Topic(kind, "limb/{limb}/" + kind, "std_msgs/Empty", None, _suppress(kind), "for 0.6 s: " + meaning)
           for kind, meaning in collision.SUPPRESSIONS.items()),
     )

@@ -3,6 +3,7 @@
 import struct
 
 from baxter_core_msgs.msg import AssemblyState, EndpointState, SEAJointState
+from control_msgs.msg import JointControllerState
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3, Wrench
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -56,16 +57,22 @@ def endpoint_state(time_s, frame, pose, twist, wrench):
                          Twist(Vector3(*linear), Vector3(*angular)), Wrench(Vector3(*force), Vector3(*torque)))
 
 
-def sea_joint_state(time_s, frame, names, commanded, measured, gravity):
+def sea_joint_state(time_s, frame, names, commanded, measured, model):
     """SEAJointState of k joints.
 
-    commanded: (position, velocity, effort), measured: (position, velocity, effort), gravity: all (k,). Accelerations
-    are not commanded, and the joints have neither hysteresis nor crosstalk: zeros.
+    commanded: (position, velocity, acceleration, effort), measured: (position, velocity, effort), model: (gravity with
+    all corrections, gravity alone, hysteresis, crosstalk): all (k,); at last the state of the hysteresis, a number.
     """
-    nothing = [0.0] * len(names)
-    commanded_position, commanded_velocity, commanded_effort = (values.tolist() for values in commanded)
-    position, velocity, effort = (values.tolist() for values in measured)
-    gravity = gravity.tolist()
+    *efforts, state = model
     return SEAJointState(Header(stamp=stamp(time_s), frame_id=frame), names,
-                         commanded_position, commanded_velocity, nothing, commanded_effort,
-                         position, velocity, effort, gravity, gravity, nothing, nothing, 0.0)
+                         *(values.tolist() for values in (*commanded, *measured, *efforts)), float(state))
+
+
+def joint_controller_state(time_s, set_point, measured, effort, dt):
+    """JointControllerState of one joint without gains, which its drive has not.
+
+    set_point, measured: floats of the same quantity; effort: what the drive exerts [Nm]; dt: length of a tick [s].
+    """
+    return JointControllerState(header=Header(stamp=stamp(time_s)), set_point=float(set_point),
+                                process_value=float(measured), error=float(set_point - measured),
+                                time_step=dt, command=float(effort))

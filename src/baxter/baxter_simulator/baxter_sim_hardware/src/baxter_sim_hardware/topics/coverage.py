@@ -4,6 +4,7 @@ from collections import Counter, defaultdict
 from fnmatch import fnmatchcase
 
 from baxter_model import SIDES
+from baxter_model.interface import group_of, physical_robot
 
 from .interface import TOPICS
 
@@ -14,21 +15,14 @@ def served(namespace="/robot"):
             for row in TOPICS for _, name in row.names()}
 
 
-def physical(table):
-    """{topic: type} of the physical robot, from the parsed content of config/physical_robot_topics.yaml."""
-    return {name.format(limb=side): kind for name, kind in table["topics"].items() for side in SIDES}
-
-
-def group_of(name):
-    """The group that a topic is counted in: the part of its name below /robot, or its first part."""
-    parts = name.strip("/").split("/")
-    if parts[0] != "robot":
-        return "/" + parts[0] if len(parts) > 1 else "/"
-    return "/robot/" + parts[1] if len(parts) > 2 else "/robot"
+def physical():
+    """{topic: type} of the physical robot."""
+    robot = physical_robot()
+    return dict(sorted({**robot.published, **robot.listened}.items()))
 
 
 def elsewhere(name, table):
-    """Which other node serves a topic, or None."""
+    """Which other node serves a topic, or None. table: the parsed content of config/topics_not_served.yaml."""
     return next((node for pattern, node in table["elsewhere"].items() if fnmatchcase(name, pattern)), None)
 
 
@@ -45,7 +39,7 @@ def markdown(table):
     """The coverage section of docs/interface.md: counts by group, then what is left out."""
     here = served()
     counts, left_out = defaultdict(Counter), defaultdict(list)
-    for name, kind in physical(table).items():
+    for name, kind in physical().items():
         count = counts[group_of(name)]
         count["physical"] += 1
         if name in here:
@@ -55,7 +49,7 @@ def markdown(table):
         else:
             count["left out"] += 1
             left_out[reason_to_leave_out(name, kind, table)].append(name)
-    for name in set(here) - set(physical(table)):
+    for name in set(here) - set(physical()):
         counts[group_of(name)]["more"] += 1
     columns = ("physical", "here", "elsewhere", "left out", "more")
     lines = ["| Group | Physical robot | Served here | By other nodes | Left out | Here beyond it |",

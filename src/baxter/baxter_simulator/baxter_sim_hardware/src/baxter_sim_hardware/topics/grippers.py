@@ -42,7 +42,7 @@ class GripperTopics(Part):
         self._state = state
         self._hands = hands
         self._properties = {side: _PROPERTIES[type(hand.gripper)] for side, hand in self._hands.items()}
-        self._told = {}  # {side: EndEffectorState of a tool that only a client knows}
+        self._custom_states = {}  # {side: EndEffectorState of a tool that only a client knows}
 
     def update(self, joints):
         """One tick; joints: (position, velocity, effort) of the whole model."""
@@ -58,6 +58,10 @@ class GripperTopics(Part):
         """The world went back to its start, or the joints were put elsewhere."""
         for hand in self._hands.values():
             hand.reset()
+
+    def told_load(self, side):
+        """The `arms.hand_load.HandLoad` that a client has told of, or None."""
+        return self._hands[side].gripper.load
 
     def attach_sensors(self, panel):
         """Attach the vacuum sensors, 0 to 255, and the valves of suction grippers to the panel's channels."""
@@ -91,7 +95,7 @@ class GripperTopics(Part):
     def _set_state(self, side, msg, time_s):
         self._require_custom(side)
         _require_short(msg)
-        self._told[side] = msg
+        self._custom_states[side] = msg
 
     def _require_custom(self, side):
         if not isinstance(self._hands[side], NoHand):
@@ -99,7 +103,7 @@ class GripperTopics(Part):
                                  "what it is" % side)
 
     def _gripper_state(self, time_s, side, snapshot):
-        hand, told = self._hands[side], self._told.get(side)
+        hand, told = self._hands[side], self._custom_states.get(side)
         gripper = hand.gripper
         if told is not None:
             message = copy.copy(told)
@@ -129,7 +133,8 @@ class GripperTopics(Part):
               "`ui_type` 1 suction, 2 electric, 3 where the arm carries no gripper; else what `set_properties` said"),
         Topic("gripper_command", "end_effector/{limb}_gripper/command", "baxter_core_msgs/EndEffectorCommand", None,
               _command, "configure, calibrate, clear_calibration, reset, reboot, go, stop, release, grip, "
-              "prepare_to_grip, set, no_op; arguments as a JSON object"),
+              "prepare_to_grip, set, no_op; arguments as a JSON object; `urdf` of configure tells what the hand "
+              "weighs"),
         Topic("gripper_set_properties", "end_effector/{limb}_gripper/rsdk/set_properties",
               "baxter_core_msgs/EndEffectorProperties", None, _set_properties,
               "what a tool is that only the client knows, on an arm without a gripper"),

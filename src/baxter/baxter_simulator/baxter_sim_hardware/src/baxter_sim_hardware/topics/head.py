@@ -5,19 +5,20 @@ from baxter_core_msgs.msg import HeadPanCommand, HeadState
 from baxter_model import HEAD_JOINT
 from baxter_sim_hardware.head import TURNING_SPEED, Head
 
+from . import convert
 from .row import STATE_RATE_HZ, Part, Topic
 
 _REQUESTS = {HeadPanCommand.REQUEST_PAN_ENABLE: True, HeadPanCommand.REQUEST_PAN_DISABLE: False}
 
 
 class HeadTopics(Part):
-    """model: of bullet_sim; state: the robot's RobotState."""
+    """model: of bullet_sim; state: the robot's RobotState; dead_band: as of `Head`."""
 
-    def __init__(self, model, state, dt):
-        self._model, self._state = model, state
+    def __init__(self, model, state, dt, dead_band=0.0):
+        self._model, self._state, self._dt = model, state, dt
         self._index = model.index([HEAD_JOINT])
         joint = self._index[0]
-        self._head = Head(model.lower[joint], model.upper[joint], self._pan(), dt)
+        self._head = Head(model.lower[joint], model.upper[joint], self._pan(), dt, dead_band)
 
     def _pan(self):
         return self._model.read_joints()[0][self._index[0]]
@@ -57,6 +58,11 @@ class HeadTopics(Part):
         return HeadState(snapshot.position[joint], bool(abs(snapshot.velocity[joint]) > TURNING_SPEED),
                          self._head.is_nodding(time_s), self._head.pan_enabled)
 
+    def _controller_state(self, time_s, component, snapshot):
+        joint = self._index[0]
+        return convert.joint_controller_state(
+            time_s, self._head.commanded_position, snapshot.position[joint], snapshot.effort[joint], self._dt)
+
     TOPICS = (
         Topic("head_state", "head/head_state", "baxter_core_msgs/HeadState", STATE_RATE_HZ, _head_state,
               "pan [rad], turning, nodding, panning enabled"),
@@ -66,4 +72,8 @@ class HeadTopics(Part):
               "true begins a nod of 1 s"),
         Topic("head_position_controller", "head_position_controller/joints/head_controller/command", "std_msgs/Float64",
               None, _command_position, "pan [rad] at full speed: for programs made for the vendor's simulator"),
+        Topic("head_position_controller_state", "head_position_controller/joints/head_controller/state",
+              "control_msgs/JointControllerState", STATE_RATE_HZ, _controller_state,
+              "set-point, measured value, error [rad] and effort [Nm]; gains are 0: for programs made for the vendor's "
+              "simulator"),
     )

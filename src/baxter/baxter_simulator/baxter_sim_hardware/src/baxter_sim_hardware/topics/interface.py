@@ -21,6 +21,10 @@ TOPICS = tuple(row for part in PARTS for row in part.TOPICS)
 #: joint commands are handled after both.
 HANDLED_LAST = ("set_super_reset", "set_super_enable", "set_super_stop", "joint_command", *CONTROLLERS)
 
+#: What the effect `delay` holds up: the commands of arms.
+DELAYED = ("joint_command", "inverse_dynamics_command", "command_twist_stamped", "command_velocity_tozero",
+           *CONTROLLERS)
+
 
 def markdown_table(namespace="/robot"):
     """The table as docs/interface.md prints it."""

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Publish each of the robot's topics at its rate, and none without a subscriber."""
+import itertools
 import math
 
+from baxter_sim_hardware.message_delay import Late
 from sim_time.pace import Schedule
 
 
@@ -12,12 +14,23 @@ class Publishing:
         """take_snapshot: function -> `snapshot.Snapshot`; survived: function(what was being done, exception)."""
         self._take_snapshot, self._survived = take_snapshot, survived
         self._groups = {}  # rate of the table's rows -> (Schedule, [(function, component, publisher)])
+        self._late, self._delay_of, self._delayed = Late(), None, ()
         self._idle_since_s, self._idle_until_s = math.inf, -math.inf  # between these nothing is due
 
     def add(self, rate, hz, function, component, publisher):
-        """Publish ``function(time_s, component, snapshot)`` at `hz`. rate: the row's, which names the group."""
+        """Publish ``function(time_s, component, snapshot)``, a message or a tuple of them, at `hz`. rate: the row's,
+        which names the group."""
         group = self._groups.setdefault(rate, (Schedule(hz), []))[1]
         group.append((function, component, publisher))
+
+    def delay(self, rates, delay_of):
+        """The messages of groups `rates` take delay_of() [s], asked at each time that one is due, until they are
+        sent."""
+        self._delayed, self._delay_of = rates, delay_of
+
+    def forget(self):
+        """Drop what is on its way."""
+        self._late.drop()
 
     def set_rate(self, rate, hz):
         """Publish a group at another rate [Hz]."""
@@ -25,22 +38,38 @@ class Publishing:
         self._idle_until_s = -math.inf
 
     def publish(self, time_s):
-        """Publish the messages that are due at time_s [s]; one that cannot be made is left out. Returns whether one was
-        due."""
+        """Publish the messages that are due at time_s [s], and those that were on their way; one that cannot be made is
+        left out. Returns whether one was due."""
+        if self._late:
+            self._send(self._late.arrived(time_s))
         if self._idle_since_s <= time_s < self._idle_until_s:
             return False
         snapshot = None
-        for schedule, topics in self._groups.values():
+        for rate, (schedule, topics) in self._groups.items():
             if not schedule.due(time_s):
                 continue
-            for function, component, publisher in topics:
-                if publisher.has_listeners:
-                    if snapshot is None:
-                        snapshot = self._take_snapshot()
-                    try:
-                        publisher.publish(function(time_s, component, snapshot))
-                    except Exception as error:  # noqa: BLE001  (the robot goes on without one of its topics)
-                        self._survived("publishing %s" % publisher.topic, error)
+            ready = []
+            # Mostly nobody listens to any of them: the comprehension takes half the time of a loop.
+            for function, component, publisher in [row for row in topics if row[2].has_listeners]:
+                if snapshot is None:
+                    snapshot = self._take_snapshot()
+                try:
+                    messages = function(time_s, component, snapshot)
+                    ready += [(publisher, message)
+                              for message in (messages if isinstance(messages, tuple) else (messages,))]
+                except Exception as error:  # noqa: BLE001  (the robot goes on without one of its topics)
+                    self._survived("publishing %s" % publisher.topic, error)
+            if rate in self._delayed:
+                self._late.send(time_s, self._delay_of(), ready)
+            elif ready:
+                self._send([ready])
         self._idle_since_s = time_s
         self._idle_until_s = min(schedule.next_s for schedule, _ in self._groups.values())
         return True
+
+    def _send(self, groups):
+        for publisher, message in itertools.chain.from_iterable(groups):
+            try:
+                publisher.publish(message)
+            except Exception as error:  # noqa: BLE001  (the robot goes on without one of its topics)
+                self._survived("publishing %s" % publisher.topic, error)

@@ -11,23 +11,25 @@ from baxter_sim_hardware.robot_state import Event
 from . import convert
 from .row import JOINT_STATE_RATE, LATCHED, STATE_RATE_HZ, Part, Topic
 
+# Joints that the physical robot lists, always at 0: it nods without an angle, and its torso turns on no joint.
+WITHOUT_SENSOR = ("head_nod", "torso_t0")
 # Next number on `sim/resets`. Shared by all robots of this process, so that a replaced robot publishes another number.
 _resets = itertools.count(1)
 
 
 class RobotTopics(Part):
     """baxter: `robot.Baxter`; joint_names: of the whole model; measure: function that renews baxter.measured;
-    set_joint_state_rate: function(Hz).
+    set_joint_state_rate: function(Hz); as_robot: whether joint states come as the physical robot sends them: arms, head
+    and torso in one message, grippers in another.
 
     Attributes. `on_disabled`: functions that are called when the robot was disabled. `what_keeps_disabled`: function
     that returns why the robot may not be enabled with its arms where they are, or "".
     """
 
-    def __init__(self, baxter, joint_names, measure, set_joint_state_rate, context, warnings):
+    def __init__(self, baxter, joint_names, measure, set_joint_state_rate, context, warnings, as_robot=False):
         self._baxter, self._measure, self._set_rate = baxter, measure, set_joint_state_rate
         self._world, self._log, self._warnings = context.world, context.log, warnings
-        self._order = np.argsort(joint_names)
-        self._joint_states_message = convert.JointStates([joint_names[i] for i in self._order])
+        self._joints = self._messages_of_joints(list(joint_names), as_robot)
         self.on_disabled = []
         self.what_keeps_disabled = str
 
@@ -62,9 +64,19 @@ class RobotTopics(Part):
 
     # -- out
 
+    @staticmethod
+    def _messages_of_joints(names, as_robot):
+        """[(`convert.JointStates`, indices of its joints; the number of joints means one without a sensor)]."""
+        groups = [sorted(names)]
+        if as_robot:
+            fingers = sorted(name for name in names if name.endswith("_finger_joint"))
+            groups = [sorted({*names, *WITHOUT_SENSOR} - {*fingers}), fingers]
+        return [(convert.JointStates(group), np.array([names.index(name) if name in names else len(names)
+                                                       for name in group])) for group in groups if group]
+
     def _joint_states(self, time_s, component, snapshot):
-        order = self._order
-        return self._joint_states_message.message(time_s, *(values[order] for values in snapshot.sensed))
+        sensed = [np.append(values, 0.0) for values in snapshot.sensed]
+        return tuple(states.message(time_s, *(values[order] for values in sensed)) for states, order in self._joints)
 
     def _assembly(self, time_s, component, snapshot):
         return convert.assembly_state(self._baxter.state.assembly)
@@ -95,7 +107,8 @@ class RobotTopics(Part):
     TOPICS = (
         Topic("joint_states", "joint_states", "sensor_msgs/JointState", JOINT_STATE_RATE, _joint_states,
               "all movable joints, names in alphabetical order [rad, m; rad/s, m/s; Nm, N]; "
-              "15 without grippers, 19 with two electric ones"),
+              "15 without grippers, 19 with two electric ones; with the effect `states` 17 and `head_nod`, `torso_t0` "
+              "among them, and a second message for the fingers"),
         Topic("joint_state_publish_rate", "joint_state_publish_rate", "std_msgs/UInt16", None,
               _joint_state_publish_rate, "[Hz] 1 to 1000: rate of joint_states"),
         Topic("state", "state", "baxter_core_msgs/AssemblyState", STATE_RATE_HZ, _assembly,

@@ -26,13 +26,14 @@ def accelerometer_frame(side):
 
 class SensorTopics(Part):
     """world, model: of bullet_sim; robot: urdf_model.Robot; limb_index:
-    {side: (7,) indices of its joints in the model's}; dt: length of a tick [s].
+    {side: (7,) indices of its joints in the model's}; dt: length of a tick [s]; hands: `sensing.noise.HandSensors`, or
+    None where sensors are exact.
 
     If the description lacks a sensor's frame, that sensor reports no echo and zero acceleration.
     """
 
-    def __init__(self, world, model, robot, limb_index, dt):
-        self._world, self._model, self._limb_index, self._dt = world, model, limb_index, dt
+    def __init__(self, world, model, robot, limb_index, dt, hands=None):
+        self._world, self._model, self._limb_index, self._dt, self._hands = world, model, limb_index, dt, hands
         self._links = set(robot.links)
         self._chains = {side: Chain.from_robot(robot, base=BASE_FRAME, tip=accelerometer_frame(side))
                         for side in SIDES if accelerometer_frame(side) in robot.links}
@@ -56,7 +57,10 @@ class SensorTopics(Part):
         matrix = self._model.link_pose(RANGE_SENSORS[side]).matrix()
         start = matrix[:3, 3]
         fraction = self._world.ray_test_batch([start], [start + sensors.RANGE_MAX_M * matrix[:3, 0]])[0]
-        return None if fraction >= 1.0 else float(fraction) * sensors.RANGE_MAX_M
+        if fraction >= 1.0:
+            return None
+        distance = float(fraction) * sensors.RANGE_MAX_M
+        return distance if self._hands is None else self._hands.range(side, self._world.time_s, distance)
 
     def _range(self, time_s, side, snapshot):
         return Range(Header(stamp=stamp(time_s), frame_id=RANGE_SENSORS[side]), Range.INFRARED, sensors.RANGE_FIELD_RAD,
@@ -77,6 +81,8 @@ class SensorTopics(Part):
                 velocities.append(jacobian[:3] @ velocity[index])
             to_base = self._model.link_pose(BASE_FRAME).matrix()[:3, :3].T
             force = sensors.specific_force(*velocities, to_base @ np.array(self._world.gravity), pose[:3, :3], self._dt)
+            if self._hands is not None:
+                force = self._hands.acceleration(side, self._world.tick, force)
         return Imu(header=Header(stamp=stamp(time_s), frame_id=accelerometer_frame(side)),
                    orientation_covariance=_UNKNOWN, angular_velocity_covariance=_UNKNOWN,
                    linear_acceleration=Vector3(*force.tolist()))

@@ -6,14 +6,15 @@ class Snapshot:
     """The model's joints after a step; expensive values are computed once, and only on demand.
 
     position [rad, m], velocity, effort [Nm, N]: (n,) each, in the model's order; before: the same three when the step
-    began; sense: function (position, velocity, effort) -> the same three as the robot says them.
+    began; sense: function (position, velocity, effort) -> the same three as the robot says them; correct: function
+    (efforts, position) that makes efforts of the whole description those that the robot's controllers know of.
     """
 
-    def __init__(self, model, before, dt, sense):
+    def __init__(self, model, before, dt, sense, correct):
         self.position, self.velocity, self.effort = model.read_joints()
         self.before = before
         self._model, self._dt = model, dt
-        self._sense = sense
+        self._sense, self._correct = sense, correct
         self._gravity = self._own_effort = self._sensed = None
 
     @property
@@ -25,9 +26,10 @@ class Snapshot:
 
     @property
     def gravity(self):
-        """(n,) effort that balances gravity [Nm, N]."""
+        """(n,) effort that balances gravity, as far as the robot knows it [Nm, N]."""
         if self._gravity is None:
             self._gravity = self._model.gravity_efforts(self.position)
+            self._correct(self._gravity, self.position)
         return self._gravity
 
     @property
@@ -39,4 +41,5 @@ class Snapshot:
             acceleration = (self.velocity - velocity) / self._dt
             self._own_effort = self._model.inverse_dynamics(position, velocity, acceleration)
             self._own_effort += self._model.damping * velocity
+            self._correct(self._own_effort, position)
         return self._own_effort

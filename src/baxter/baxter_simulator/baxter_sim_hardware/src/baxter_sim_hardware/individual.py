@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One robot among many: how the robot with a serial number differs from the drawing.
+
+Robot 0 is the drawing. Every difference follows from the serial number and the name of the part, so a robot is the same
+on every machine, with or without its other parts.
+"""
+import zlib
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import numpy as np
+
+from baxter_model import SIDES
+
+from . import effects
+from .errors import HardwareError
+
+#: Differences are normally distributed, and cut off at so many standard deviations: parts pass an inspection.
+CUT_OFF = 2.0
+DRAWING = 0
+_AXES = ("x", "y", "z")
+_MOUNTS = tuple("%s_torso_arm_mount" % side for side in SIDES)
+#: {fixed joint: the numbers that its difference comes from}
+PLACED = {
+    **dict.fromkeys(_MOUNTS, "mount"),
+    **dict.fromkeys(("head_camera", *("%s_hand_camera" % side for side in SIDES)), "camera"),
+    **dict.fromkeys(("%s_gripper_base" % side for side in SIDES), "gripper"),
+}
+#: Where a robot publishes what its factory has measured.
+ROBOT_CONFIG = "/robot_config/jcb_urdf_config/torso_t0/joint/"
+#: What a parameter of the master can hold (XML-RPC).
+LARGEST_SERIAL = 2 ** 31 - 1
+
+
+def checked(serial):
+    """A serial number as an integer. Raises HardwareError unless it is a whole number from 0 to LARGEST_SERIAL."""
+    try:
+        number = int(str(serial))
+    except ValueError:
+        number = -1
+    if not 0 <= number <= LARGEST_SERIAL or isinstance(serial, bool):
+        raise HardwareError("serial is %r; it must be a whole number, 0 (the drawing) to %d" % (serial, LARGEST_SERIAL))
+    return number
+
+
+def difference(serial, part, rows, number):
+    """{name: value} by how much `part`, any text, of the robot `serial` differs; zeros for robot 0.
+
+    rows: section "serial" of `effects.read`; number: a row of it, whose values are standard deviations. Raises
+    HardwareError.
+    """
+    deviations = effects.row(rows, number)
+    if serial == DRAWING:
+        return dict.fromkeys(deviations, 0.0)
+    values = np.clip(drawn(serial, part, number).standard_normal(len(deviations)), -CUT_OFF, CUT_OFF)
+    return {name: float(deviations[name] * value) for name, value in zip(sorted(deviations), values, strict=True)}
+
+
+def drawn(serial, part, number):
+    """The random numbers of one property (`number`, any text) of `part` of the robot `serial`."""
+    return np.random.default_rng([serial, zlib.crc32(("%s %s" % (part, number)).encode())])
+
+
+def described(urdf_xml, serial, rows):
+    """The description (URDF text) of the robot `serial`: mounts of arms, cameras and grippers are where its own are.
+
+    rows: as for `difference`. Robot 0's is the text as given. Raises HardwareError for a text that is no XML.
+    """
+    if serial == DRAWING:
+        return urdf_xml
+    root = _parsed(urdf_xml)
+    for joint in root.findall("joint"):
+        kind = PLACED.get(joint.get("name"))
+        if kind is None:
+            continue
+        origin = joint.find("origin")
+        if origin is None:
+            origin = ElementTree.SubElement(joint, "origin")
+        for attribute, number in (("xyz", "position"), ("rpy", "orientation")):
+            moved = difference(serial, joint.get("name"), rows, "%s_%s" % (kind, number))
+            values = [float(word) for word in origin.get(attribute, "0 0 0").split()]
+            origin.set(attribute, " ".join("%.7g" % (value + moved[axis])
+                                           for value, axis in zip(values, _AXES, strict=True)))
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def robot_config(urdf_xml):
+    """{parameter: text} of what the factory has measured: origins of the arms' mounts as the description has them.
+
+    Raises HardwareError for a text that is no XML.
+    """
+    found = {}
+    for joint in _parsed(urdf_xml).findall("joint"):
+        if joint.get("name") in _MOUNTS:
+            origin = joint.find("origin")
+            for attribute in ("xyz", "rpy"):
+                found["%s%s/origin/%s" % (ROBOT_CONFIG, joint.get("name"), attribute)] = (
+                    "0 0 0" if origin is None else origin.get(attribute, "0 0 0"))
+    return found
+
+
+class Lens(NamedTuple):
+    """How a camera's lens differs: factors of the focal lengths, shift of the principal point [pixels of the array]."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+    @classmethod
+    def of(cls, serial, camera, rows):
+        """The lens of `camera`, "left_hand_camera" for instance. Raises HardwareError."""
+        focal = difference(serial, camera, rows, "focal_length")
+        centre = difference(serial, camera, rows, "principal_point")
+        both = 1.0 + focal["both"]
+        return cls(both, both * (1.0 + focal["aspect"]), centre["x"], centre["y"])
+
+    def before(self, pinhole, scale):
+        """The pinhole (of sensor_renderer) behind this lens; scale: pixels of its picture for one of the array."""
+        return pinhole._replace(fx=self.fx * pinhole.fx, fy=self.fy * pinhole.fy, cx=pinhole.cx + scale * self.cx,
+                                cy=pinhole.cy + scale * self.cy)
+
+
+def _parsed(urdf_xml):
+    try:
+        return ElementTree.fromstring(urdf_xml)
+    except ElementTree.ParseError as error:
+        raise HardwareError("the robot's description is no XML: %s" % error) from error

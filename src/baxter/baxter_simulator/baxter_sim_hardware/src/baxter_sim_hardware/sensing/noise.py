@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Noise and counts of the sensors in the hands. Without ROS.
+
+The noise of a moment follows from its number and the sensor's name, so it does not depend on who listens, and when.
+"""
+import zlib
+
+import numpy as np
+
+from baxter_model import SIDES
+from baxter_sim_hardware import effects
+from baxter_sim_hardware.individual import difference
+
+_AXES = ("x", "y", "z")
+
+
+def generator(seed, name, number):
+    """The random numbers of one sensor in one moment. seed, number: integers from 0."""
+    return np.random.Generator(np.random.Philox(key=[seed, zlib.crc32(name.encode())], counter=[0, number, 0, 0]))
+
+
+class HandSensors:
+    """What ranges and accelerometers of the hands say.
+
+    rows: {section: rows} of `effects.read`; serial: of the robot; seed: integer from 0. Raises HardwareError.
+    """
+
+    def __init__(self, rows, serial, seed):
+        senses = rows["senses"]
+        self._seed = seed
+        self._range = [effects.positive(senses, number, "hand_range")
+                       for number in ("range_noise", "range_quantum", "range_period")]
+        self._noise, self._quantum = (np.array([effects.positive(senses, number, axis) for axis in _AXES])
+                                      for number in ("acceleration_noise", "acceleration_quantum"))
+        self._turned = {side: difference(serial, "%s_accelerometer" % side, rows["serial"], "accelerometer_axes")
+                        for side in SIDES}
+
+    def range(self, side, time_s, distance):
+        """A hand's range [m] for a surface `distance` [m] away, at time_s [s]."""
+        noise, quantum, period = self._range
+        drawn = generator(self._seed, "%s range" % side, int(time_s / period + 1e-6)).standard_normal()
+        return quantum * round((distance + noise * drawn) / quantum)
+
+    def acceleration(self, side, tick, force):
+        """(3,) [m/s^2] that an accelerometer says for the specific force (3,) [m/s^2] in its frame, in a tick."""
+        turn = np.array([self._turned[side][axis] for axis in _AXES])
+        drawn = generator(self._seed, "%s accelerometer" % side, tick).standard_normal(3)
+        said = force + np.cross(force, turn) + self._noise * drawn
+        return self._quantum * np.round(said / self._quantum)
