@@ -13,7 +13,7 @@ from bullet_sim import World
 
 
 class BulletChecker:
-    """Checks in a world of its own, or in a given one, whether a robot touches itself or another model.
+    """Checks in a separate world, or in a given one, whether a robot touches itself or another model.
 
     One thread at a time. Only contacts that the given joints can change count: the other arm's contact with a table
     does not.
@@ -31,7 +31,7 @@ class BulletChecker:
 
     @classmethod
     def of_robot(cls, robot, self_collision_pairs=None, margin_m=0.0, find_mesh=None, mesh_cuts=None):
-        """Return a checker with a world of its own, in which ``robot`` (urdf_model.Robot) stands fixed at the origin.
+        """Return a checker with a separate world, in which ``robot`` (urdf_model.Robot) stands fixed at the origin.
 
         ``find_mesh``: as for ``bullet_sim.World``; ``mesh_cuts``: as for its ``spawn``.
         """

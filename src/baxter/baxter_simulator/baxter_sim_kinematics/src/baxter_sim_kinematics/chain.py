@@ -196,7 +196,7 @@ def _rotation_taking_z_to(axis, joint_name):
     axis = np.asarray(axis, dtype=float)
     length = float(np.linalg.norm(axis))
     if not math.isfinite(length) or length < 1e-9:
-        raise ChainError("joint '%s' has axis %s, which is no direction" % (joint_name, axis))
+        raise ChainError("joint '%s' has axis %s, which is not a direction" % (joint_name, axis))
     x, y, z = axis / length
     if z < -1.0 + 1e-12:
         return np.diag([1.0, -1.0, -1.0])

@@ -60,7 +60,7 @@ def _chain(options):
     return robot, Chain.from_robot(robot, base, options.tip or tip_of(options.side))
 
 
-def _told(main):
+def _run_command(main):
     """Run a command; its own errors become one line and exit status 1."""
     try:
         return main()
@@ -88,7 +88,7 @@ def fk():
     parser.add_argument("--degrees", action="store_true", help="the joint values are in degrees")
     parser.add_argument("--jacobian", action="store_true", help="print the Jacobian as well")
     parser.add_argument("--json", action="store_true", help="print JSON")
-    return _told(lambda: _fk(parser.parse_args()))
+    return _run_command(lambda: _fk(parser.parse_args()))
 
 
 def _fk(options):
@@ -134,7 +134,7 @@ def ik():
     parser.add_argument("--solutions", type=int, default=1, metavar="N", help="up to N distinct ones (default: 1)")
     parser.add_argument("--clear", action="store_true", help="only postures where the robot does not touch itself")
     parser.add_argument("--json", action="store_true", help="print JSON")
-    return _told(lambda: _ik(parser, parser.parse_args()))
+    return _run_command(lambda: _ik(parser, parser.parse_args()))
 
 
 def _ik(parser, options):
@@ -185,8 +185,8 @@ def reach():
     """Entry point of ``rosrun baxter_sim_kinematics reach``."""
     parser = _numbers(_parser(
         "Map what an arm reaches: in each cell of a volume the share of orientations that the tip can have\n"
-        "there, and the mean manipulability. Writes reach.csv, reach.npz and reach.png. Interrupted, it goes on\n"
-        "when called again.\n\n"
+        "there, and the mean manipulability. Writes reach.csv, reach.npz and reach.png. If interrupted, it continues\n"
+                    "when called again.\n\n"
         "  rosrun baxter_sim_kinematics reach --volume 0.2 1.2 -0.4 1.0 -0.4 0.8 --tool 0 0 -1 --out map"))
     parser.add_argument("--volume", type=float, nargs=6, default=(-0.4, 1.3, -0.8, 1.4, -0.6, 1.3),
                         metavar=("X0", "X1", "Y0", "Y1", "Z0", "Z1"), help="[m] (default: all of Baxter's left arm)")
@@ -197,7 +197,7 @@ def reach():
     parser.add_argument("--starts", type=int, default=40, help="random starts before a pose counts as out of reach")
     parser.add_argument("--out", type=Path, default=Path("reach"), help="folder (default: reach)")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
-    return _told(lambda: _reach(parser.parse_args()))
+    return _run_command(lambda: _reach(parser.parse_args()))
 
 
 def _reach(options):

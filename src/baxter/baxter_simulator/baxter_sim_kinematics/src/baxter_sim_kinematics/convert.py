@@ -18,13 +18,13 @@ _VERDICTS = {
 
 
 def pose_matrix(pose):
-    """Return the (4, 4) matrix of a geometry_msgs/Pose. Raises InvalidTarget when it is no pose."""
+    """Return the (4, 4) matrix of a geometry_msgs/Pose. Raises InvalidTarget when it is not a pose."""
     point, turn = pose.position, pose.orientation
     return pose_from_quaternion((point.x, point.y, point.z), (turn.x, turn.y, turn.z, turn.w))
 
 
 def transform_matrix(transform):
-    """Return the (4, 4) matrix of a geometry_msgs/Transform. Raises InvalidTarget when it is no transform."""
+    """Return the (4, 4) matrix of a geometry_msgs/Transform. Raises InvalidTarget when it is not a transform."""
     return pose_matrix(Pose(position=transform.translation, orientation=transform.rotation))
 
 

@@ -21,6 +21,8 @@ _SHORTER = 0.95
 _PULLS = 5
 # Number of solutions without limits, among which the one with the least excess is chosen.
 _UNLIMITED = 48
+# A target that is so many times as far away as the arm is long was probably meant in other units.
+_OTHER_UNITS = 10.0
 
 
 def beyond_reach(chain, target):
@@ -37,6 +39,8 @@ def beyond_reach(chain, target):
             "target or move it"
     if over <= 0.0:
         return ""
+    if over > _OTHER_UNITS * chain.tip_reach_m:
+        text = "positions are in metres: " + text
     return (text + " towards the shoulder at (%.3f %.3f %.3f) in %s") % (over, *chain.shoulder, chain.base)
 
 

@@ -25,7 +25,7 @@ def solve(chain, target, seed, *, posture=None, budget=USUAL, checker=None):
     is returned. Joint limits are never broken; a seed outside of them is clamped. The random postures depend only on
     the request, so the same request gives the same answer bit for bit.
 
-    checker: a :class:`CollisionChecker`; postures with contacts are no solutions.
+    checker: a :class:`CollisionChecker`; postures with contacts are not solutions.
 
     Raises NoSolution, which says why; InvalidTarget; InvalidPosture for a seed or posture that does not fit the chain.
     """

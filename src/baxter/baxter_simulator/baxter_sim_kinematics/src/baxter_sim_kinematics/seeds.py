@@ -33,7 +33,7 @@ def seed_mode(number):
 
 class SeedRequest(NamedTuple):
     """The seeds of a request. given: (joint names, positions) per pose, as far as the caller sent them; a pair of empty
-    lists is no seed. poses: number of poses in the request.
+    lists is not a seed. poses: number of poses in the request.
     """
 
     mode: SeedMode
@@ -99,7 +99,7 @@ class SeedPolicy:
             # answer.
             if str(error) != self._reported:
                 self._reported = str(error)
-                remarks.append("%s; the neutral posture stands in for the current one" % error)
+                remarks.append("%s; the neutral posture replaces the current one" % error)
             return self._neutral
         self._reported = None
         return current

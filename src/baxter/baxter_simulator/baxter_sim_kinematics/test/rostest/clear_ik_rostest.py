@@ -38,8 +38,8 @@ class ClearIk(unittest.TestCase):
             poses[-1].header.frame_id = "base"
         answer = rospy.ServiceProxy(name + "IKService", SolvePositionIK)(SolvePositionIKRequest(pose_stamp=poses))
         self.assertEqual(answer.isValid, [False, True])
-        # Latched, so it comes whenever the connection is made.
-        wait_until(lambda: reports, "the report", WAIT_S)
+        # Latched, so it comes whenever the connection is made; and before it perhaps the one of an earlier request.
+        wait_until(lambda: reports and len(reports[-1].verdicts) == len(poses), "the report", WAIT_S)
         inside, clear = reports[-1].verdicts
         self.assertEqual((inside.verdict, clear.verdict), (IKVerdict.SELF_COLLISION, IKVerdict.SOLVED))
         self.assertIn("base", inside.links)

@@ -33,7 +33,7 @@ LAB_ANGLES = (-1.0051802515115758, -1.0358377913378556, -0.33102594774694544, 1.
               0.8610601980794869, -1.4742358938106646)
 TOO_FAR = ((3.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
 SHELF_IN_BASE = (0.2, -0.1, 0.3)
-WAIT_S = 20.0
+WAIT_S = 90.0
 # Number of joint states sent at once, and the deadline for the last to be used: handled one by one they would take
 # twice as long.
 BURST = 1000
@@ -255,7 +255,8 @@ class PositionKinematics(unittest.TestCase):
         answer = self.assert_logged("cannot relate frame 'nowhere'",
                                     lambda: self.ask("left", [pose(*LAB_POSE, "nowhere")] * 20))
         self.assert_invalid(answer, 19, 20)
-        self.assertLess(time.monotonic() - start, 5.0)
+        # A second for each of the poses would be 20.
+        self.assertLess(time.monotonic() - start, 15.0)
 
     def test_many_connections_at_once_get_the_same_answer(self):
         def answer(_):

@@ -152,7 +152,7 @@ def test_chains_that_cannot_be_are_refused():
         return [("j", kind, "tip", np.eye(4), axis, lower, upper)]
 
     for bad, text in ((steps(kind="floating"), "is floating"), (steps(kind="fixed"), "no joint moves"),
-                      (steps(axis=(0, 0, 0)), "no direction"), (steps(lower=2.0), "above its upper limit")):
+                      (steps(axis=(0, 0, 0)), "not a direction"), (steps(lower=2.0), "above its upper limit")):
         with pytest.raises(ChainError, match=text):
             Chain("base", "tip", bad)
 

@@ -14,6 +14,8 @@ import pytest
 
 from lab_testing.waiting import wait_until
 
+pytestmark = pytest.mark.once
+
 PACKAGE = Path(__file__).resolve().parents[2]
 NODE = "/ik_node_that_ends"
 # rospy's own thread for new connections may still be waiting on the socket that its shutdown has just closed.
@@ -87,7 +89,7 @@ def test_a_signal_during_a_registration_ends_the_node(master, call, subject, num
     try:
         assert reached.wait(60.0), "the node does not get as far as %s of %s" % (call, subject)
         # A node that waits for a lock of its own main thread never ends; a loaded machine may take seconds.
-        output, _ = node.communicate(timeout=30.0)
+        output, _ = node.communicate(timeout=90.0)
         assert "Traceback" not in SHUTDOWN_OF_ROSPY.sub("", output)
     finally:
         node.kill()

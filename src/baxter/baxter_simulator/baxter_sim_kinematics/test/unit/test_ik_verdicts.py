@@ -36,6 +36,17 @@ def assert_mostly(right):
     assert sum(right) >= RIGHT * len(right), "%d of %d are right" % (sum(right), len(right))
 
 
+def test_millimetres_are_told_as_such_and_a_far_target_is_not(chain):
+    home = chain.fk(np.zeros(len(chain.joint_names)))
+    for factor, told in ((3.0, False), (1000.0, True)):
+        target = home.copy()
+        target[:3, 3] *= factor
+        with pytest.raises(NoSolution) as caught:
+            solve(chain, target, np.zeros(len(chain.joint_names)))
+        assert caught.value.reason is Reason.OUT_OF_REACH
+        assert ("positions are in metres" in str(caught.value)) == told
+
+
 def test_pose_beyond_the_outstretched_arm_is_out_of_reach(chain):
     """No joint angles bridge more than the lengths of the links; the nearest pose is no farther than that says."""
     rng = np.random.default_rng(31)

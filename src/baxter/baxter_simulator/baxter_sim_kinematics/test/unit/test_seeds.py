@@ -104,7 +104,7 @@ def test_neutral_stands_in_for_an_unknown_posture_and_that_is_said_once(policy, 
     robot.problem = "nothing heard"
     for _ in range(3):
         assert tried(policy, SeedMode.CURRENT, remarks=remarks) == [NEUTRAL]
-    assert remarks == ["nothing heard; the neutral posture stands in for the current one"]
+    assert remarks == ["nothing heard; the neutral posture replaces the current one"]
     robot.problem = None
     assert tried(policy, SeedMode.CURRENT, remarks=remarks) == [CURRENT]
     robot.problem = "nothing heard"

@@ -25,7 +25,7 @@ def test_the_order_of_asking_is_the_order_of_turns_also_for_a_thread_that_comes_
             threads[-1].start()
             wait_until(lambda number=number: len(turns._gates) == number + 1, "thread %d to ask" % number)
     for thread in threads:
-        thread.join(30.0)
+        thread.join(90.0)
     assert order == [0, 1, 2, 3] * 3
 
 
@@ -43,7 +43,7 @@ def test_one_at_a_time_and_free_at_the_end():
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(30.0)
+        thread.join(90.0)
     assert len(most) == 1600 and max(most) == 1
     with turns:
         pass
