@@ -99,13 +99,13 @@ class BaxterWorldTest(unittest.TestCase):
         robot.restart()
         self.assertTrue(robot.state.ready)
         robot.super_stop.publish()
-        wait_until(lambda: robot.state.stopped, "stopped", 3.0)
+        wait_until(lambda: robot.state.stopped, "stopped")
         self.assertFalse(robot.state.enabled or robot.state.ready)
         robot.super_enable.publish(True)
         robot.wait_sim(0.3)
         self.assertTrue(robot.state.stopped and not robot.state.enabled)
         robot.super_reset.publish()
-        wait_until(lambda: not robot.state.stopped, "reset", 3.0)
+        wait_until(lambda: not robot.state.stopped, "reset")
         self.assertEqual((robot.state.enabled, robot.state.error, robot.state.estop_button, robot.state.estop_source),
                          (False, False, 0, 0))
         robot.set_enabled(True)
@@ -162,7 +162,7 @@ class BaxterWorldTest(unittest.TestCase):
 
     def test_e_gravity_compensation_torques(self):
         for side in SIDES:
-            message = rospy.wait_for_message("/robot/limb/%s/gravity_compensation_torques" % side, SEAJointState, 10.0)
+            message = rospy.wait_for_message("/robot/limb/%s/gravity_compensation_torques" % side, SEAJointState, 90.0)
             self.assertEqual(list(message.name), joints(side))
             self.assertEqual(len(message.gravity_model_effort), len(SUFFIXES))
             self.assertGreater(abs(message.gravity_model_effort[1]), 1.0)
@@ -175,8 +175,8 @@ class BaxterWorldTest(unittest.TestCase):
         self.assertFalse(light.message.isInputOnly)
         for value in (True, False):
             command.publish("left_outer_light", value)
-            wait_until(lambda value=value: light.message.state == value, "light is %s" % value, 2.0)
-            wait_until(lambda value=value: navigator.message.lights == [False, value], "navigator: %s" % value, 2.0)
+            wait_until(lambda value=value: light.message.state == value, "light is %s" % value)
+            wait_until(lambda value=value: navigator.message.lights == [False, value], "navigator: %s" % value)
 
     def test_e_the_fan_echoes_the_integer(self):
         fan = Latest("/robot/analog_io/torso_fan/state", AnalogIOState)
@@ -184,23 +184,23 @@ class BaxterWorldTest(unittest.TestCase):
         wait_until(lambda: fan.message and command.get_num_connections(), "the fan's topics")
         for value in (70, 0):
             command.publish("torso_fan", value)
-            wait_until(lambda value=value: fan.message.value == value, "fan at %d" % value, 2.0)
+            wait_until(lambda value=value: fan.message.value == value, "fan at %d" % value)
 
     def test_e_buttons_and_wheels_are_pressed_and_turned(self):
         cuff = Latest("/robot/digital_io/left_lower_cuff/state", DigitalIOState)
         navigator = Latest("/robot/navigators/torso_right_navigator/state", NavigatorState)
-        rospy.wait_for_service("/robot/sim/press", 10.0)
+        rospy.wait_for_service("/robot/sim/press", 90.0)
         press = rospy.ServiceProxy("/robot/sim/press", Press)
         self.assertTrue(press("left_lower_cuff", "press", 0).success)
-        wait_until(lambda: cuff.message and cuff.message.state == 1 and cuff.message.isInputOnly, "cuff squeezed", 5.0)
+        wait_until(lambda: cuff.message and cuff.message.state == 1 and cuff.message.isInputOnly, "cuff squeezed")
         subprocess.run(["rosrun", "baxter_sim_hardware", "press", "--release", "left_lower_cuff"], check=True)
-        wait_until(lambda: cuff.message.state == 0, "cuff released", 5.0)
+        wait_until(lambda: cuff.message.state == 0, "cuff released")
         self.assertTrue(press("torso_right_wheel", "turn", -2).success)
-        wait_until(lambda: navigator.message and navigator.message.wheel == 254, "wheel turned back by 2", 5.0)
+        wait_until(lambda: navigator.message and navigator.message.wheel == 254, "wheel turned back by 2")
         self.assertEqual(navigator.message.button_names, ["ok", "back", "show"])
         refused = press("torso_right_inner_light", "press", 0)
         self.assertFalse(refused.success)
-        self.assertIn("is no digital input", refused.status_message)
+        self.assertIn("is not a digital input", refused.status_message)
 
     def test_e_head_pans_and_nods(self):
         self.robot.restart()
@@ -212,10 +212,10 @@ class BaxterWorldTest(unittest.TestCase):
         for target, ratio in ((1.0, 0.1), (0.0, 0.0)):
             pan.publish(target, ratio, HeadPanCommand.REQUEST_PAN_ENABLE)
             wait_until(lambda target=target: abs(head.message.pan - target) < 1e-2 and not head.message.isTurning,
-                     "head at %g rad" % target, 10.0)
+                     "head at %g rad" % target)
         nod.publish(True)
-        wait_until(lambda: head.message.isNodding, "nodding", 5.0)
-        wait_until(lambda: not head.message.isNodding, "nod over", 5.0)
+        wait_until(lambda: head.message.isNodding, "nodding")
+        wait_until(lambda: not head.message.isNodding, "nod over")
 
     def test_e_grippers_go_and_acknowledge(self):
         self.robot.restart()
@@ -232,12 +232,12 @@ class BaxterWorldTest(unittest.TestCase):
                 wait_until(lambda state=state, sequence=sequence: (
                     (state.message.command_sender, state.message.command_sequence) == ("test_go", sequence)), "echo")
                 wait_until(lambda state=state, percent=percent: (
-                    abs(state.message.position - percent) < 2.0 and not state.message.moving), "%g %%" % percent, 5.0)
+                    abs(state.message.position - percent) < 2.0 and not state.message.moving), "%g %%" % percent)
 
     def test_e_aggregates(self):
         for name, kind, count in (("digital_io_states", DigitalIOStates, 57), ("analog_io_states", AnalogIOStates, 10),
                                   ("navigators_states", NavigatorStates, 4)):
-            message = rospy.wait_for_message("/robot/" + name, kind, 5.0)
+            message = rospy.wait_for_message("/robot/" + name, kind, 90.0)
             self.assertEqual((len(message.names), len(message.states)), (count, count), name)
 
     def test_f_a_thousand_malformed_commands_do_nothing_and_a_good_one_works_at_once(self):
@@ -253,7 +253,7 @@ class BaxterWorldTest(unittest.TestCase):
         self.assertLess(robot.error(NEUTRAL), 1e-3)
         wait_until(lambda: any("this limb's joints are left_s0, left_s1" in line for line in robot.lines),
                  "a log line with the right names")
-        robot.move({"left_w1": 1.0, "right_w1": 1.0}, timeout_s=5.0)
+        robot.move({"left_w1": 1.0, "right_w1": 1.0})
 
 
 def malformed_command(numbers, side, number):

@@ -26,11 +26,12 @@ class BaxterWorldVariantTest(unittest.TestCase):
             for name, angle in zip(joints(side), UNTUCKED[side], strict=True):
                 self.assertAlmostEqual(state[name], angle, delta=SEEN_RAD, msg=name)
 
-    def test_b_joint_states_have_15_names_at_100_hz(self):
+    def test_b_joint_states_have_17_names_at_100_hz(self):
         robot = self.robot
         robot.wait_sim(1.0)
         messages = list(robot.history)
-        self.assertEqual(messages[-1].name, sorted(["head_pan", *joints("left"), *joints("right")]))
+        self.assertEqual(messages[-1].name, sorted(
+            ["head_nod", "head_pan", "torso_t0", *joints("left"), *joints("right")]))
         stamps = [message.header.stamp.to_sec() for message in messages][1:]
         for earlier, later in zip(stamps, stamps[1:], strict=False):
             self.assertAlmostEqual(later - earlier, 0.01, delta=1e-6)

@@ -58,7 +58,7 @@ class Robot:
         self.commands = {side: publisher("limb/%s/joint_command" % side, JointCommand) for side in SIDES}
         self.timeouts = {side: publisher("limb/%s/joint_command_timeout" % side, Float64) for side in SIDES}
         self.ratios = {side: publisher("limb/%s/set_speed_ratio" % side, Float64) for side in SIDES}
-        wait_until(lambda: self._started, "/robot/sim/started", 60.0)
+        wait_until(lambda: self._started, "/robot/sim/started")
         everything = [self.super_enable, self.super_stop, self.super_reset]
         everything += [*self.commands.values(), *self.timeouts.values(), *self.ratios.values()]
         wait_until(lambda: all(topic.get_num_connections() for topic in everything), "the robot listens to its topics")
@@ -88,11 +88,11 @@ class Robot:
     def wait_sim(self, seconds):
         """Wait for this much simulation time."""
         end = self.now() + seconds
-        wait_until(lambda: self.now() >= end, "%g s of simulation" % seconds, 10.0 + 5.0 * seconds)
+        wait_until(lambda: self.now() >= end, "%g s of simulation" % seconds, 60.0 + 30.0 * seconds)
 
     def set_enabled(self, on):
         self.super_enable.publish(on)
-        wait_until(lambda: self.state.enabled == on, "enabled is %s" % on, 5.0)
+        wait_until(lambda: self.state.enabled == on, "enabled is %s" % on)
 
     def restart(self):
         """From any state to enabled, with the defaults of both limbs.
@@ -101,7 +101,7 @@ class Robot:
         """
         if self.state.stopped or self.state.error:
             self.super_reset.publish()
-            wait_until(lambda: not (self.state.stopped or self.state.error), "reset", 5.0)
+            wait_until(lambda: not (self.state.stopped or self.state.error), "reset")
         elif self.state.enabled:
             self.set_enabled(False)
         for side in SIDES:
@@ -123,7 +123,7 @@ class Robot:
             self.command(mode, values() if callable(values) else values)
             return self.now() >= end
 
-        wait_until(step, "%g s of simulation" % seconds, 10.0 + 5.0 * seconds)
+        wait_until(step, "%g s of simulation" % seconds, 60.0 + 30.0 * seconds)
 
     def wait_setting(self, name, value):
         """Until the diagnostics show the value under ``name`` for both arms: a command could overtake a setting."""
@@ -131,7 +131,7 @@ class Robot:
             shown = [pair.value for status in diagnostics.status for pair in status.values if pair.key == name]
             return shown == ["%g" % value] * len(SIDES)
 
-        wait_for_message("/diagnostics", DiagnosticArray, taken, 30.0)
+        wait_for_message("/diagnostics", DiagnosticArray, taken)
 
     def fastest(self, joint, since):
         """Largest speed of a joint [rad/s] after the simulation time ``since`` [s]."""
@@ -143,7 +143,7 @@ class Robot:
         positions = self.positions
         return max(abs(positions[name] - angle) for name, angle in goal.items())
 
-    def move(self, goal, timeout_s=20.0):
+    def move(self, goal, timeout_s=90.0):
         """Position mode: send {joint: angle} once and wait until it is reached."""
         self.command(POSITION, goal)
         wait_until(lambda: self.error(goal) < 2e-3 and max(map(abs, self.velocities.values())) < 1e-3,
