@@ -16,8 +16,10 @@ _WIDTHS_M, _HEIGHTS_M, _MASSES_KG = (0.04, 0.08), (0.06, 0.22), (0.1, 0.4)
 # Free between a thing and whatever stands beside it; the fingers reach in there.
 _GAP_M = 0.02
 # How far the hand may lean [rad] while its fingers stay along faces of the block.
-_LEANS_RAD = (0.0, 0.35, -0.35)
-# A grasp or place loses so much quality for each radian it leans or turns away from where the arm is at ease.
+_LEANS_RAD = (0.0, 0.2, -0.2, 0.35, -0.35, 0.5, -0.5)
+# Leans that differ by less are the same [rad].
+_SAME_LEAN_RAD = 0.1
+# A grasp or place loses this much quality for each radian it leans or turns away from where the arm is at ease.
 _PER_LEAN, _PER_TURN = 0.5, 0.1
 # The block is let go from so high above the table [m].
 _DROP_M = 0.002
@@ -107,8 +109,22 @@ def grasps(spot):
     return found
 
 
+def lean_of(orientation):
+    """The angle [rad] between straight down and the z axis of a hand with a quaternion x, y, z, w."""
+    x, y, _, _ = orientation
+    return math.acos(max(-1.0, min(1.0, 2.0 * (x * x + y * y) - 1.0)))
+
+
+def held_otherwise(offered, orientation):
+    """Those Grasps whose hand leans otherwise than one with a quaternion x, y, z, w.
+
+    Only these put the block down with the hand elsewhere: a turn by quarters about the vertical is a landing's, too.
+    """
+    return [one for one in offered if abs(lean_of(one.orientation) - lean_of(orientation)) > _SAME_LEAN_RAD]
+
+
 def landings(spot):
-    """Spots at which the block stands where it shall, however it is turned by quarters, a hair above the table."""
+    """Spots at which the block stands on its target, however it is turned by quarters, a hair above the table."""
     return [Spot(spot.x, spot.y, spot.z + _DROP_M, spot.yaw + quarters * math.pi / 2.0) for quarters in range(4)]
 
 

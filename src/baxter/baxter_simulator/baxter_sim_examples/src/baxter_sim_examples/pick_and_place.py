@@ -14,9 +14,17 @@ from baxter_model import arm_angles
 START_ANGLES = {"s0": -0.08000397926829805, "s1": -0.9999781166910306, "e0": -1.189968899785275,
                 "e1": 1.9400238130755056, "w0": 0.6699952259595108, "w1": 1.030009435085784,
                 "w2": -0.4999997247485215}
+# The other arm waits turned outwards [rad]: where it begins, its elbow would be within the distance at which a physical
+# robot's collision avoidance stops both arms.
+ASIDE_ANGLES = {**START_ANGLES, "s0": 0.7}
 
 HOVER_M = 0.15  # above a spot: free to move sideways
-NEAR_M = 0.05  # above a spot: from here on straight down and slowly, from here up straight
+NEAR_M = 0.05  # above a spot: from here on straight down and slowly, up to here straight and slowly
+# In so many steps. The joints of a physical arm lag by different times, so on its way the tool leaves the straight
+# line: by 11 mm in one motion of 50 mm, which is more than the room beside the fingers; by a part of a short step.
+_STEPS = 4
+_DOWN = tuple(NEAR_M * (_STEPS - step) / _STEPS for step in range(_STEPS + 1))
+_UP = _DOWN[-2::-1]
 _QUARTER = math.pi / 2.0
 
 
@@ -39,6 +47,11 @@ def start_angles(limb):
     return arm_angles(limb, START_ANGLES)
 
 
+def aside_angles(limb):
+    """Angles by joint name [rad] in which an arm, "left" or "right", is out of the other one's way."""
+    return arm_angles(limb, ASIDE_ANGLES)
+
+
 def tool_down(yaw):
     """Quaternion (x, y, z, w) of a tool that looks straight down, its fingers along y turned by `yaw` [rad]."""
     return math.cos(yaw / 2.0), math.sin(yaw / 2.0), 0.0, 0.0
@@ -57,18 +70,18 @@ def pick_and_place(arm, source, target):
     """
     arm.open()
     pose = arm.move_to(start_angles(arm.name))
-    for height in (HOVER_M, NEAR_M, 0.0):
+    for height in (HOVER_M, *_DOWN):
         pose = _go(arm, source, height, pose)
     arm.close()
     _require_block(arm, "after the fingers closed")
-    for height in (NEAR_M, HOVER_M):
+    for height in (*_UP, HOVER_M):
         pose = _go(arm, source, height, pose)
     _require_block(arm, "after it was lifted")
-    for height in (HOVER_M, NEAR_M, 0.0):
+    for height in (HOVER_M, *_DOWN):
         pose = _go(arm, target, height, pose)
     _require_block(arm, "on the way")
     arm.open()
-    for height in (NEAR_M, HOVER_M):
+    for height in (*_UP, HOVER_M):
         pose = _go(arm, target, height, pose)
 
 

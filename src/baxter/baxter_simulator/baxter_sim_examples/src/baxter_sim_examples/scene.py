@@ -13,6 +13,9 @@ TABLE_SIZE_M = 0.913  # of its square top
 BLOCK_SIZE_M = 0.04
 # Where the left arm takes and puts blocks: x and y [m] in `base`.
 NEAREST_M, FARTHEST_M = (0.60, -0.05), (0.75, 0.35)
+# What an arm that looks is told: the middle of that area, and roughly the table's height [m], in `base`.
+MIDDLE_M = ((NEAREST_M[0] + FARTHEST_M[0]) / 2.0, (NEAREST_M[1] + FARTHEST_M[1]) / 2.0)
+ABOUT_M = TABLE_TOP_M - BASE_HEIGHT_M + 0.02
 APART_M = 0.10  # source and target at least
 MASSES_KG = (0.05, 0.3)
 FRICTIONS = (0.4, 1.0)

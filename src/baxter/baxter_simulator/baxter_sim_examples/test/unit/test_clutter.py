@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from baxter_sim_examples import BASE_HEIGHT_M, BLOCK_SIZE_M, TABLE_TOP_M, Spot, Trial
-from baxter_sim_examples.clutter import THINGS, clutter, grasps, landings
+from baxter_sim_examples.clutter import THINGS, clutter, grasps, held_otherwise, landings, lean_of
 from urdf_model import parse_urdf
 from urdf_model.transforms import matrix_from_quaternion
 
@@ -42,15 +42,27 @@ def test_descriptions_can_be_read():
 def test_hands_look_down_with_their_fingers_along_the_blocks_faces():
     spot = Spot(0.7, 0.1, -0.13, 2.3)
     found = grasps(spot)
-    assert len({grasp.orientation for grasp in found}) == len(found) == 12
+    assert len({grasp.orientation for grasp in found}) == len(found) == 28
     faces = [np.array((math.cos(spot.yaw + k * math.pi / 2.0), math.sin(spot.yaw + k * math.pi / 2.0), 0.0))
              for k in range(4)]
     for grasp in found:
         turn = matrix_from_quaternion(np.array(grasp.orientation))
-        assert turn[2, 2] < -math.cos(0.36), "it looks down"
+        assert turn[2, 2] < -math.cos(0.51), "it looks down"
         assert max(turn[:, 1] @ face for face in faces) == pytest.approx(1.0), "fingers close along y"
     best = max(found, key=lambda grasp: grasp.quality)
     assert matrix_from_quaternion(np.array(best.orientation))[2, 2] == pytest.approx(-1.0)
+
+
+def test_other_grasps_are_those_that_lean_otherwise():
+    found = grasps(Spot(0.7, 0.1, -0.13, 2.3))
+    leans = [round(lean_of(grasp.orientation), 6) for grasp in found]
+    assert sorted(leans) == [0.0] * 4 + [0.2] * 8 + [0.35] * 8 + [0.5] * 8
+    upright, leaning = found[leans.index(0.0)], found[leans.index(0.35)]
+    for hand, others in ((upright, {0.2, 0.35, 0.5}), (leaning, {0.0, 0.2, 0.5})):
+        assert {round(lean_of(one.orientation), 6) for one in held_otherwise(found, hand.orientation)} == others
+    # A hand that is on its way there is a little off.
+    x, y, z, w = upright.orientation
+    assert len(held_otherwise(found, (x, y, z + 0.01, w + 0.01))) == 24
 
 
 def test_a_block_lands_on_its_target_turned_by_quarters():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baxter_sim_examples import BLOCK_SIZE_M, BlockLost, Spot, Trial, block_urdf, pick_and_place, tool_down
-from baxter_sim_examples.pick_and_place import HOVER_M, grip_yaw, start_angles
+from baxter_sim_examples.pick_and_place import HOVER_M, aside_angles, grip_yaw, start_angles
 from urdf_model import parse_urdf
 from urdf_model.transforms import matrix_from_quaternion
 
@@ -54,6 +54,16 @@ def test_fingers_open_and_close_on_the_spots_and_nowhere_else(limb):
     assert arm.did[-1]["position"] == (TARGET.x, TARGET.y, TARGET.z + HOVER_M)
 
 
+def test_between_the_fingers_the_tool_goes_in_short_steps():
+    """A physical arm leaves the straight line by a part of a step, and there are 8 mm beside each finger."""
+    arm = FakeArm()
+    pick_and_place(arm, SOURCE, TARGET)
+    places = [step["position"] for step in arm.did if "position" in step]
+    near = [(a, b) for a, b in zip(places, places[1:], strict=False) if min(a[2], b[2]) < SOURCE.z + BLOCK_SIZE_M]
+    assert len(near) > 8
+    assert all(a[:2] == b[:2] and abs(a[2] - b[2]) < 0.013 for a, b in near)
+
+
 @pytest.mark.parametrize("question, when", [(1, "after the fingers closed"), (2, "lifted"), (3, "on the way")])
 def test_a_block_that_is_lost_is_noticed(question, when):
     arm = FakeArm(slips_at=question)
@@ -66,6 +76,12 @@ def test_right_arm_begins_as_the_mirror_image():
     left, right = start_angles("left"), start_angles("right")
     assert right["right_s0"] == -left["left_s0"]
     assert right["right_s1"] == left["left_s1"]
+
+
+@pytest.mark.parametrize(("limb", "outwards"), [("left", 1.0), ("right", -1.0)])
+def test_aside_is_turned_outwards(limb, outwards):
+    aside, start = aside_angles(limb), start_angles(limb)
+    assert outwards * (aside[limb + "_s0"] - start[limb + "_s0"]) > 0.5
 
 
 @pytest.mark.parametrize("yaw", np.linspace(-7.0, 7.0, 29))

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Find a block on a table in a camera's picture, and the table's height by a range sensor. Free of ROS."""
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from .pick_and_place import Spot, start_angles, tool_down
+from .scene import BLOCK_SIZE_M
+
+# Wood is reddish: its blue is less than this share of its red. The block's wood is lighter than what is around it.
+_WOODEN, _LIGHTER = 0.7, 1.2
+# "Around it": so many times the block's size.
+_AROUND = 3.0
+# Sides that a block may seem to have, as shares of its true side.
+_SIDES = (0.75, 1.3)
+# Range readings of which this many, or more, tell something [m].
+_LEAST_READINGS, _NOTHING_M = 5, 1.0
+# A reading that is farther from the others is wrong, or is that of another surface [m].
+_OUTLIER_M = 0.015
+
+
+# From where the arm looks: above what it looks for, the tool pointing down; the second look from nearer [m].
+_HIGH_M, _LOW_M = 0.22, 0.14
+# So far beside the middle it feels for the table first, because the block may lie under one of the places [m].
+_ASIDE_M = 0.08
+# From there it looks again, by x and y beside the middle [m]: a finger may have hidden the block.
+_ELSEWHERE_M = ((0.0, -0.12), (0.0, 0.12), (-0.1, 0.0))
+
+
+class NotSeen(Exception):
+    """What was looked for is not there, or is not seen; the text says what was."""
+
+
+class View(NamedTuple):
+    """A picture and where it was taken: `picture` (height, width, 3) uint8 red, green, blue; `matrix` (3, 3), K of the
+    camera; `pose` (4, 4) of the optical frame in `base` [m]."""
+
+    picture: np.ndarray
+    matrix: np.ndarray
+    pose: np.ndarray
+
+    def on_plane(self, pixels, height):
+        """(n, 2) x and y [m] in `base` of the points at `height` [m] that pixels (n, 2) show."""
+        pixels = np.column_stack([np.asarray(pixels, dtype=float), np.ones(len(pixels))])
+        rays = np.linalg.solve(self.matrix, pixels.T).T @ self.pose[:3, :3].T
+        lengths = (height - self.pose[2, 3]) / rays[:, 2]
+        return self.pose[:2, 3] + lengths[:, None] * rays[:, :2]
+
+    def scale(self, height):
+        """Pixels for one metre at `height` [m] below or above the camera."""
+        return abs(self.matrix[0, 0]) / max(abs(self.pose[2, 3] - height), 1e-3)
+
+
+def find_block(view, table_m, side_m=BLOCK_SIZE_M):
+    """The Spot of the block on a table whose top is at height `table_m` [m] in `base`. Raises NotSeen.
+
+    The block's upper face is the lighter patch of wood whose outline, seen at the height of that face, is a square of
+    `side_m` [m].
+    """
+    top = table_m + side_m
+    colours = cv2.GaussianBlur(view.picture, (3, 3), 0).astype(np.float32)
+    red, wooden = colours[:, :, 0], (colours[:, :, 2] < _WOODEN * colours[:, :, 0]).astype(np.float32)
+    window = (2 * int(0.5 * _AROUND * side_m * view.scale(top)) + 1,) * 2
+    around = cv2.blur(red * wooden, window) / np.maximum(cv2.blur(wooden, window), 1e-3)
+    light = ((red > _LIGHTER * around) & (wooden > 0.0)).astype(np.uint8)
+    outlines, _ = cv2.findContours(light, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    seen, best = [], None
+    for outline in outlines:
+        if len(outline) < 8:
+            continue
+        place = view.on_plane(outline[:, 0, :], top)
+        (x, y), sides, degrees = cv2.minAreaRect((1e3 * place).astype(np.float32))
+        # The outline runs through the middles of pixels.
+        sides = np.array(sides) / 1e3 + 1.0 / view.scale(top)
+        seen.append("%.0f x %.0f mm" % tuple(1e3 * sides))
+        share = sides / side_m
+        if _SIDES[0] < share.min() and share.max() < _SIDES[1]:
+            off = float(np.abs(share - 1.0).max())
+            if best is None or off < best[0]:
+                best = off, Spot(x / 1e3, y / 1e3, table_m + side_m / 2.0, float(np.radians(degrees)))
+    if best is None:
+        raise NotSeen("no block of %.0f mm is seen on the table; light patches: %s" % (
+            1e3 * side_m, ", ".join(seen) or "none"))
+    return best[1]
+
+
+def table_height(sensor_m, readings):
+    """Height [m] of what is below a range sensor that looks straight down from height `sensor_m` [m]: by the mean of
+    those of its readings [m] that are near their median. Raises NotSeen where fewer than five say something."""
+    heard = [reading for reading in readings if reading < _NOTHING_M]
+    if len(heard) < _LEAST_READINGS:
+        raise NotSeen("the range sensor at %.2f m sees no table: %d of %d readings have an echo" % (
+            sensor_m, len(heard), len(readings)))
+    heard = np.array(heard)
+    return sensor_m - float(heard[np.abs(heard - np.median(heard)) < _OUTLIER_M].mean())
+
+
+def locate(arm, middle, about_m):
+    """The Spot of the block that lies somewhere around `middle` (x, y) [m] in `base`, by looking and feeling.
+
+    arm: as for `pick_and_place`, with `look()` -> View and `feel()` -> (height of the range sensor in `base` [m], list
+    of its readings [m]); about_m: where the table's top is, roughly [m]. Raises NotSeen, and the arm's errors.
+    """
+    pose, heights = start_angles(arm.name), []
+    for aside in (_ASIDE_M, 0.0):
+        pose = _go(arm, (middle[0], middle[1] + aside, about_m + _HIGH_M), pose)
+        heights.append(table_height(*arm.feel()))
+    # What stands on a table is higher than the table. The lowest of noisy heights is too low, their mean is not.
+    table_m = float(np.mean([height for height in heights if height < min(heights) + BLOCK_SIZE_M / 2.0]))
+    spot, pose = _seen(arm, middle, table_m, pose)
+    _go(arm, (spot.x, spot.y, table_m + _LOW_M), pose)
+    return find_block(arm.look(), table_m)
+
+
+def _seen(arm, middle, table_m, pose):
+    """(Spot, the arm's angles) from the first place from which the block is seen; the arm is above the middle."""
+    for x, y in _ELSEWHERE_M:
+        try:
+            return find_block(arm.look(), table_m), pose
+        except NotSeen:
+            pose = _go(arm, (middle[0] + x, middle[1] + y, table_m + _HIGH_M), pose)
+    return find_block(arm.look(), table_m), pose
+
+
+def _go(arm, place, seed):
+    return arm.move_to(arm.ik(place, tool_down(0.0), seed))
