@@ -14,7 +14,7 @@ LOOK_UP_S = 0.2
 
 
 class RosClock:
-    """ROS time (wall time, or /clock under use_sim_time), with a warning when simulated time stands still.
+    """ROS time (wall time, or /clock under use_sim_time), with a warning when simulation time does not advance.
 
     `gives_up()` is called several times a second and ends a sleep when it is true; by default at shutdown.
     """
@@ -33,8 +33,8 @@ class RosClock:
         return rospy.is_shutdown()
 
     def sleep(self, duration_s):
-        """Sleep for `duration_s` of ROS time. Returns early when `gives_up()` is true; time that jumps back is no
-        error."""
+        """Sleep for `duration_s` of ROS time. Returns early when `gives_up()` is true; time that jumps back is not
+        an error."""
         if rospy.rostime.is_wallclock():
             time.sleep(max(0.0, duration_s))
             return
@@ -47,11 +47,11 @@ class RosClock:
             if self.now() != last_s:
                 last_s, moved_at_s = self.now(), time.monotonic()
             elif time.monotonic() - moved_at_s > STALL_NOTICE_S:
-                _tell_of_silence(last_s)
+                _log_silence(last_s)
                 moved_at_s = time.monotonic()
 
 
-def _tell_of_silence(time_s):
+def _log_silence(time_s):
     """Log that simulated time stands still at `time_s`; shut this node down if there is a new master.
 
     A node registers once; a restarted master does not know it, and would never connect it to anything.

@@ -22,9 +22,34 @@ class Stopwatch:
         """Read the stopwatch at clock reading `now_s` [s]."""
         step_s = now_s - self._last_s
         if self._last_s > 0.0 and step_s > 0.0:
-            self._elapsed_s += step_s
+            self._elapsed_s += self._counted_s(step_s)
         self._last_s = now_s
         return self._elapsed_s
+
+    def _counted_s(self, step_s):
+        """How much of a step between two readings counts."""
+        return step_s
+
+
+# A step counts at most as this many periods of the loop or usual steps; the weight of a step in the usual one.
+_MOST_PERIODS, _MOST_USUAL_STEPS, _WEIGHT = 3.0, 2.0, 0.1
+
+
+class LoopStopwatch(Stopwatch):
+    """A Stopwatch that a loop reads once per `period_s` [s].
+
+    A step that is much longer than the ones before counts less: a loop that is held up continues where it was. A loop
+    that is always slow keeps up with the clock.
+    """
+
+    def __init__(self, now_s, period_s):
+        super().__init__(now_s)
+        self._period_s = self._usual_s = period_s
+
+    def _counted_s(self, step_s):
+        counted_s = min(step_s, max(_MOST_PERIODS * self._period_s, _MOST_USUAL_STEPS * self._usual_s))
+        self._usual_s += _WEIGHT * (counted_s - self._usual_s)
+        return counted_s
 
 
 class Ticker:

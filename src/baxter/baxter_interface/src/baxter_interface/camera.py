@@ -52,7 +52,8 @@ class CameraController:
 
     @property
     def resolution(self):
-        """Width and height [pixels], one of MODES. Raises ValueError, AttributeError for something that is no pair."""
+        """Width and height [pixels], one of MODES. Raises ValueError, AttributeError for something that is not a
+        pair."""
         return self._settings.resolution
 
     @resolution.setter
@@ -74,7 +75,7 @@ class CameraController:
     def window(self):
         """Left upper corner (x, y) [pixels] of the part of the sensor that is shown; (-1, -1) if never set.
 
-        Raises AttributeError for something that is no pair, ValueError for one outside the sensor.
+        Raises AttributeError for something that is not a pair, ValueError for one outside the sensor.
         """
         return self._settings.get("window_x"), self._settings.get("window_y")
 

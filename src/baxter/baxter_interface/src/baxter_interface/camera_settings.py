@@ -57,7 +57,7 @@ class CameraSettings:
         self.values[name] = number
 
     def set_resolution(self, resolution):
-        """Set width and height [pixels]. Raises AttributeError for something that is no pair, ValueError."""
+        """Set width and height [pixels]. Raises AttributeError for something that is not a pair, ValueError."""
         if len(resolution) != 2:
             raise AttributeError("a camera's resolution is a pair (width, height), got %r" % (resolution,))
         if tuple(resolution) not in MODES:
@@ -74,7 +74,7 @@ class CameraSettings:
     def set_window(self, window):
         """Set the left upper corner of the part of the sensor that is shown, x and y [pixels].
 
-        Raises AttributeError for something that is no pair, ValueError.
+        Raises AttributeError for something that is not a pair, ValueError.
         """
         if len(window) != 2:
             raise AttributeError("a camera's window is a pair (x, y), got %r" % (window,))

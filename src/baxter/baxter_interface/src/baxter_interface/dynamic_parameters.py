@@ -7,7 +7,7 @@ from dynamic_reconfigure.server import Server
 
 # dynamic_reconfigure's names of types -> the Python types of their values.
 _KINDS = {"double": (int, float), "int": (int,), "bool": (bool,), "str": (str,)}
-# Entries of a configuration that are no parameters.
+# Entries of a configuration that are not parameters.
 _GROUPS = "groups"
 
 

@@ -49,8 +49,8 @@ def require_number(value, what):
 def require_joint_values(values, known, unit):
     """Return `values` (joint name → number [unit]) as a dict of finite floats.
 
-    Raises UnknownNameError for a joint that is not `known`, ValueError for a value that is no finite number,
-    TypeError for something that is no mapping.
+    Raises UnknownNameError for a joint that is not `known`, ValueError for a value that is not a finite number,
+    TypeError for something that is not a mapping.
     """
     if not isinstance(values, Mapping):
         raise TypeError(
@@ -60,6 +60,15 @@ def require_joint_values(values, known, unit):
         require_joint(name, known): require_number(value, "%s [%s]" % (name, unit))
         for name, value in values.items()
     }
+
+
+def beyond_a_turn(angles):
+    """Why `angles` (joint name → rad) cannot be reached: one is beyond a full turn, as degrees are; "" if none is."""
+    for name, angle in angles.items():
+        if abs(angle) > math.tau:
+            return ("%s cannot turn to %g rad, more than a full turn. If these are degrees: math.radians(%g) is %.4f"
+                    % (name, angle, angle, math.radians(angle)))
+    return ""
 
 
 def require_count(value, largest, what):

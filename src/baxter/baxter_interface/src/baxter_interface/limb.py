@@ -16,7 +16,14 @@ from baxter_dataflow.waiting import Stopwatch, Ticker, is_unlimited
 from baxter_model import BASE_FRAME, poses
 
 from . import settings, startup
-from .joint_checks import limb_joint_names, require_joint, require_joint_values, require_number, require_side
+from .joint_checks import (
+    beyond_a_turn,
+    limb_joint_names,
+    require_joint,
+    require_joint_values,
+    require_number,
+    require_side,
+)
 from .joint_motion import Move
 from .resets import PUT_ELSEWHERE, Resets
 from .services import call_service
@@ -24,6 +31,7 @@ from .services import call_service
 # Commands per second during a move; the robot's own time-out asks for more than 5.
 COMMAND_RATE_HZ = 100.0
 IK_TIMEOUT_S = 5.0
+IK_REPORT = "/ExternalTools/%s/PositionKinematicsNode/IKReport"
 
 
 class NoIKSolution(ValueError):
@@ -141,10 +149,12 @@ class Limb:
         Parameters:
             positions: dict of joint name to rad; joints left out keep their set-points.
             raw: bypass the robot's own smoothing and collision avoidance; the commands must be smooth then.
-        Raises UnknownNameError, ValueError for a number that is not finite, TypeError for something that is no dict.
+        Raises UnknownNameError, ValueError for a number that is not finite, TypeError for something that is not a dict.
         """
         mode = JointCommand.RAW_POSITION_MODE if raw else JointCommand.POSITION_MODE
-        self._command(mode, positions, "rad")
+        sent = self._command(mode, positions, "rad")
+        if why := beyond_a_turn(sent):
+            rospy.logwarn_throttle(5.0, "%s arm: %s. The robot goes to its limit" % (self.name, why))
 
     def set_joint_velocities(self, velocities):
         """Command joint speeds, a dict of name to rad/s; to be repeated within the command time-out. Raises the same
@@ -179,13 +189,18 @@ class Limb:
             threshold: error of each joint below which it has arrived [rad].
             test: called at every step; when it returns True the arm stops.
         Returns True on arrival: the exact target is commanded last and held. Returns False on time-out, when `test`
-        stopped it, when the robot is not enabled, when its simulation was reset, and when no joints were given; one
-        logged line has the reason and the joint with the largest error. Raises as set_joint_positions;
+        stopped it, when the robot is not enabled, when its simulation was reset, when no joints were given, and when an
+        angle is beyond a full turn (nothing moves then); one logged line has the reason and the joint with the largest
+        error. Raises as set_joint_positions;
         rospy.ROSInterruptException when the node is shut down meanwhile.
         """
         target = require_joint_values(positions, self._joint_names, "rad")
         if not target:
-            rospy.logerr("%s arm: no joints given: did IK find a solution?", self.name)
+            rospy.logerr("%s arm: no joints given: did IK find a solution? rostopic echo -n 1 %s says why not",
+                         self.name, IK_REPORT % self.name)
+            return False
+        if why := beyond_a_turn(target):
+            rospy.logerr("%s arm: %s", self.name, why)
             return False
         threshold = require_number(threshold, "the threshold [rad]")
 
@@ -229,17 +244,20 @@ class Limb:
         if not answer.result_type or answer.result_type[0] == answer.RESULT_INVALID:
             point = request.pose_stamp[0].pose.position
             raise NoIKSolution("the %s arm has no solution for the end-point at x y z %.3f %.3f %.3f in %s with this "
-                               "orientation; the log of the kinematics node says why"
-                               % (self.name, point.x, point.y, point.z, request.pose_stamp[0].header.frame_id))
+                               "orientation; rostopic echo -n 1 %s says why"
+                               % (self.name, point.x, point.y, point.z, request.pose_stamp[0].header.frame_id,
+                                  IK_REPORT % self.name))
         return dict(zip(answer.joints[0].name, answer.joints[0].position, strict=True))
 
     def _command(self, mode, values, unit):
+        """Send one command; returns its values by joint name."""
         values = require_joint_values(values, self._joint_names, unit)
         if not values:
             rospy.logwarn_throttle(5.0, "%s arm: a command without joints is not sent" % self.name)
-            return
+            return values
         self._command_publisher.publish(
             JointCommand(mode=mode, names=list(values), command=list(values.values())))
+        return values
 
     def _angles_by_name(self):
         with self._lock:

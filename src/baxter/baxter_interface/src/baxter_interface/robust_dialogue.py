@@ -101,4 +101,4 @@ class Dialogue:
             self.state = State.IDLE
         elif elapsed_s - self._stopping_since_s >= ANSWER_TIMEOUT_S:
             self.state = State.IDLE
-            self.failure = self.failure or (errno.ETIMEDOUT, "it is complete, but did not stop when it was told to")
+            self.failure = self.failure or (errno.ETIMEDOUT, "it is complete, but did not stop when requested")

@@ -58,7 +58,7 @@ def wait_for_start(conditions, timeout_s=None):
     rospy.init_node.
     """
     if not rospy.core.is_initialized():
-        raise rospy.ROSInitException("this program is no ROS node yet: call rospy.init_node(name) first")
+        raise rospy.ROSInitException("this program is not a ROS node yet: call rospy.init_node(name) first")
     wait_in_order([master_answers(), *conditions, clock_runs()], STARTUP_TIMEOUT_S if timeout_s is None else timeout_s,
                   LINE, simulator_is_coming(), rospy.is_shutdown)
 

@@ -17,7 +17,7 @@ from std_msgs.msg import UInt16
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from baxter_dataflow.ros_clock import RosClock
-from baxter_dataflow.waiting import Stopwatch, Ticker
+from baxter_dataflow.waiting import LoopStopwatch, Ticker
 from baxter_interface import Limb
 from baxter_interface.goal_loop import SHORTEST_GOAL_S, start
 from baxter_interface.joint_limits import read_joint_limits
@@ -55,9 +55,10 @@ class JointTrajectoryActionServer:
         rate: commands per second [Hz].
         mode: "position_w_id" (raw positions, with velocities and accelerations beside them), "position", "velocity".
     Each goal ends once: succeeded, aborted with an error_code and an error_string, or preempted. An invalid one is
-    aborted before anything moves, and does not disturb others. After a goal its end is held, until the next one, or
-    until the robot is disabled, the cuff is squeezed, another node commands the arm, or clean_shutdown(). Waits up to
-    30 s of wall time for the robot, and raises, as Limb does.
+    aborted before anything moves, and does not disturb others. While the process gets no processor, the
+    trajectory waits; no part of it is skipped. After a goal its end is held, until the next one, or until the robot is
+    disabled, the cuff is squeezed, another node commands the arm, or clean_shutdown(). Waits up to 30 s of wall time
+    for the robot, and raises, as Limb does.
     """
 
     def __init__(self, limb, reconfig_server, rate=100.0, mode="position_w_id"):
@@ -74,7 +75,8 @@ class JointTrajectoryActionServer:
         self._clock = RosClock(gives_up=lambda: (
             self._ending or self._requests or self._watch.was_interrupted() or self._watch.is_gone()))
         self._ticker = Ticker(self._clock, rate)
-        self._stopwatch = Stopwatch(self._clock.now())
+        # A command far ahead of the last one would take the arm off its path: each joint lags by its own time.
+        self._stopwatch = LoopStopwatch(self._clock.now(), 1.0 / rate)
         self._was_gone = False
 
         prefix = "robot/limb/%s/" % limb
@@ -178,7 +180,7 @@ class JointTrajectoryActionServer:
             yield self._requests.popleft()
 
     def _now_s(self):
-        """The loop's own time [s], which never goes back."""
+        """The loop's own time [s], which never goes back, and hardly goes on while the loop is held up."""
         return self._stopwatch.elapsed_s(self._clock.now())
 
     def _measured(self):

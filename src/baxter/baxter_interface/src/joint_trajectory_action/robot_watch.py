@@ -12,7 +12,7 @@ from baxter_interface.presence import Presence
 from baxter_interface.resets import PUT_ELSEWHERE, Resets
 from baxter_model.readiness import STATES_KEPT, lost, why_not_ready
 
-# Joint states come 50 times a second or more; older ones [s, ROS time] are no basis for motion.
+# Joint states come 50 times a second or more; older ones [s, ROS time] are not basis for motion.
 STALE_AFTER_S = 0.5
 
 

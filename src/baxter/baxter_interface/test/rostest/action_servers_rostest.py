@@ -32,8 +32,9 @@ NEUTRAL = [0.0, -0.55, 0.0, 0.75, 0.0, 1.26, 0.0]
 # The example trajectory of the robot's documentation, for the left arm, in less time.
 WAYPOINT = np.array([-0.11, -0.62, -1.15, 1.32, 0.80, 1.27, 2.39])
 MIRRORED = np.array([-1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
-# Joint states are 10 to 30 ms old when they are compared with the trajectory, on a busy machine.
-MEAN_ERROR_RAD = {"position_w_id": 0.05, "position": 0.1, "velocity": 0.05}
+# Joint states are 10 to 30 ms old when they are compared with the trajectory, and older on a busy machine; a benchmark
+# measures how well the arms follow.
+MEAN_ERROR_RAD = {"position_w_id": 0.1, "position": 0.2, "velocity": 0.1}
 EXIT_TIMEOUT_S = 60.0
 
 

@@ -19,6 +19,7 @@ from baxter_sim_hardware.grippers.hands import NoHand
 from baxter_sim_hardware.grippers.suction import SuctionGripper
 from baxter_sim_hardware.robot_state import RobotState, State
 from baxter_sim_hardware.topics.grippers import GripperTopics
+from lab_testing.waiting import beats
 
 SIDE = "left"
 RATE_HZ = 100.0
@@ -100,11 +101,10 @@ class FakeGripper:
         return TriggerResponse(success=True)
 
     def run(self):
-        while not rospy.is_shutdown():
+        for _ in beats(RATE_HZ, rospy.is_shutdown):
             with self._lock:
                 self._topics.update(None)
                 self._publish()
-            time.sleep(1.0 / RATE_HZ)
 
     def _publish(self):
         arguments = time.monotonic(), SIDE, SimpleNamespace(position=())

@@ -27,6 +27,7 @@ from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.robot_state import RobotState, State
 from baxter_sim_hardware.topics.head import HeadTopics
 from baxter_sim_hardware.topics.panel import PanelTopics
+from lab_testing.waiting import beats
 
 RATE_HZ = 100.0
 KNOBS = {
@@ -104,7 +105,7 @@ class FakeParts:
         return TriggerResponse(success=True)
 
     def run(self):
-        while not rospy.is_shutdown():
+        for _ in beats(RATE_HZ, rospy.is_shutdown):
             with self._lock:
                 self._head.update()
                 now = time.monotonic()
@@ -114,7 +115,6 @@ class FakeParts:
                         self._nods_on = not self._knobs["nod_ends"] and (self._nods_on or message.isNodding)
                         message.isNodding |= self._nods_on
                     publisher.publish(message)
-            time.sleep(1.0 / RATE_HZ)
 
     def _take(self, message, key_and_knob):
         key, knob = key_and_knob

@@ -14,6 +14,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Empty, Float64
 from std_srvs.srv import Trigger, TriggerResponse
 
+from lab_testing.waiting import beats
+
 RATE_HZ = 100.0
 SIDES = ("left", "right")
 JOINTS = ("e0", "e1", "s0", "s1", "w0", "w1", "w2")  # alphabetical, as a robot reports them
@@ -76,11 +78,10 @@ class FakeRobot:
 
     def run(self):
         begin_s = time.monotonic()
-        while not rospy.is_shutdown():
+        for _ in beats(RATE_HZ, rospy.is_shutdown):
             with self._lock:
                 self._step(1.0 / RATE_HZ)
                 self._publish(time.monotonic() - begin_s)
-            time.sleep(1.0 / RATE_HZ)
 
     def _step(self, dt):
         for name, target in self._targets.items():

@@ -24,6 +24,7 @@ from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 
 from baxter_sim_hardware.sensing.cameras import CameraRefused, CaptureSettings, Rack
+from lab_testing.waiting import beats
 
 RATE_HZ = 20.0
 SIDES = ("left", "right")
@@ -131,10 +132,9 @@ class FakeServices:
                           lambda request, side=side: self._on_ik(side, request)) for side in SIDES]
 
     def run(self):
-        while not rospy.is_shutdown():
+        for _ in beats(RATE_HZ, rospy.is_shutdown):
             for stepper in self._steppers:
                 stepper.step()
-            time.sleep(1.0 / RATE_HZ)
 
     def _on_open(self, request):
         if request.name not in knob("cameras") or knob("refuse_cameras"):

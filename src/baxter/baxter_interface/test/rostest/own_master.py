@@ -62,5 +62,11 @@ class OwnMasterTest(unittest.TestCase):
     def start_robot(self, **knobs):
         return self.start(sys.executable, str(FAKE_ROBOT), *("_%s:=%s" % knob for knob in knobs.items()))
 
+    def start_ready_robot(self, **knobs):
+        """A robot that publishes already, for programs that do not wait long."""
+        process = self.start_robot(**knobs)
+        wait_until(lambda: "/robot/state" in dict(self.master.getPublishedTopics("")), "the robot", DEADLINE_S)
+        return process
+
     def wait_for_text(self, process, text):
         wait_until(lambda: text in process.output(), lambda: "%r in: %s" % (text, process.output()), DEADLINE_S)

@@ -97,7 +97,7 @@ class RestartTest(OwnMasterTest):
         self.end(robot)
         self.expect_end(client, "lost the robot: it has reported nothing")
 
-    def test_master_that_is_started_anew_ends_the_program_with_one_line(self):
+    def test_master_that_is_restarted_ends_the_program_with_one_line(self):
         master = self.start_master()
         robot = self.start_simulation()
         client = self.start_loop()

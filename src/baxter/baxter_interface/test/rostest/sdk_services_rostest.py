@@ -14,7 +14,7 @@ from baxter_dataflow import wait_for
 from baxter_interface import CameraController, Limb, NoIKSolution, RobustController
 from baxter_interface.services import call_service
 
-DEADLINE_S = 5.0
+DEADLINE_S = 60.0
 
 
 def set_knobs(**knobs):

@@ -77,7 +77,7 @@ class StartupTest(OwnMasterTest):
 
     def test_missing_version_parameter_ends_with_the_name(self):
         self.start_master()
-        self.start_robot(version="unset")
+        self.start_ready_robot(version="unset")
         self.expect_failure(self.start_client(IMPATIENT + FIRST_ROBOT),
                             "waited 2 s for the parameter /rethink/software_version", "it is not set")
 
@@ -98,7 +98,7 @@ class StartupTest(OwnMasterTest):
 
     def test_wrong_namespace_is_recognised(self):
         self.start_master()
-        self.start_robot()
+        self.start_ready_robot()
         client = self.start_client(IMPATIENT + FIRST_NODE, versioned=False, ROS_NAMESPACE="/elsewhere")
         self.expect_failure(client, "/elsewhere/robot/state", "wrong namespace")
 
@@ -112,7 +112,7 @@ class StartupTest(OwnMasterTest):
     def test_missing_clock_is_named(self):
         self.start_master()
         self.master.setParam("/use_sim_time", True)
-        self.start_robot()
+        self.start_ready_robot()
         self.expect_failure(self.start_client(IMPATIENT + FIRST_ROBOT),
                             "nobody publishes /clock", "rosparam set use_sim_time false")
 

@@ -6,6 +6,7 @@ import pytest
 
 from baxter_interface.joint_checks import (
     UnknownNameError,
+    beyond_a_turn,
     limb_joint_names,
     require_joint,
     require_joint_values,
@@ -65,6 +66,17 @@ def test_joint_of_the_other_arm_is_refused():
 def test_something_that_is_no_dict_is_refused_with_a_hint(values):
     with pytest.raises(TypeError, match="dict of joint name"):
         require_joint_values(values, LEFT, "rad")
+
+
+@pytest.mark.parametrize("degrees", [45.0, -90.0])
+def test_degrees_are_told_with_the_radians_that_were_meant(degrees):
+    said = beyond_a_turn({"left_s0": 0.5, "left_s1": degrees})
+    assert "left_s1" in said and "%g rad" % degrees in said
+    assert said.endswith("is %.4f" % math.radians(degrees))
+
+
+def test_angles_within_a_turn_are_left_to_the_robot():
+    assert beyond_a_turn({"left_s0": 3.5, "left_w2": -6.28}) == ""
 
 
 def test_numbers_of_any_kind_become_floats():

@@ -72,5 +72,5 @@ def test_a_loop_that_waits_is_woken(queue, wake, taken):
     thread = threading.Thread(target=lambda: got.append(queue.take(60.0)))
     thread.start()
     wake(queue)
-    thread.join(30.0)
+    thread.join(90.0)
     assert got == [taken]

@@ -3,9 +3,10 @@
 import errno
 import math
 
+import numpy as np
 import pytest
 
-from baxter_dataflow.waiting import Stopwatch, Ticker, wait_on
+from baxter_dataflow.waiting import LoopStopwatch, Stopwatch, Ticker, wait_on
 from baxter_interface.patience import Condition, wait_in_order
 
 
@@ -78,6 +79,21 @@ def test_clock_that_jumps_back_loses_no_time_and_gains_none():
     assert watch.elapsed_s(51.0) == 1.0
     assert watch.elapsed_s(0.5) == 1.0
     assert watch.elapsed_s(0.75) == 1.25
+
+
+def test_loop_that_is_held_up_continues_where_it_was():
+    watch = LoopStopwatch(50.0, 0.01)
+    assert watch.elapsed_s(50.01) == pytest.approx(0.01)
+    assert watch.elapsed_s(50.51) == pytest.approx(0.04)
+    assert watch.elapsed_s(50.52) == pytest.approx(0.05)
+
+
+def test_loop_that_is_always_slow_keeps_up():
+    watch = LoopStopwatch(50.0, 0.01)
+    times = 50.0 + 0.08 * np.arange(1, 101)
+    readings = np.diff([watch.elapsed_s(now_s) for now_s in times])
+    assert readings[0] == pytest.approx(0.03)
+    assert readings[60:] == pytest.approx(0.08)
 
 
 @pytest.mark.parametrize("jump_s", [-90.0, 900.0])
