@@ -24,7 +24,7 @@ def move(side):
             goal.command.position, goal.command.max_effort = position, effort
             client.send(goal)
             result = client.wait(TIMEOUT_S)
-            print("told %.0f %%: the %s gripper is at %.1f %%" % (position, side, result.position), flush=True)
+            print("commanded %.0f %%: the %s gripper is at %.1f %%" % (position, side, result.position), flush=True)
 
 
 def main():

@@ -11,7 +11,7 @@ from baxter_examples.mounted_grippers import mounted_grippers
 from baxter_interface.programs import EnabledRobot, run
 from baxter_model import SIDES
 
-# For the left gripper; for the right one the same with Shift. (A key, what it does, the method, its arguments.)
+# For the left gripper; for the right one the same with Shift. (Key, description, method, arguments.)
 KEYS = (
     ("r", "restart", "reboot"), ("c", "calibrate", "calibrate"), ("q", "close", "close"), ("w", "open", "open"),
     ("[", "velocity 100 %", "set_velocity", 100.0), ("]", "velocity 30 %", "set_velocity", 30.0), ("s", "stop", "stop"),

@@ -26,7 +26,7 @@ class Player:
         for side in SIDES:
             joints, _ = record.side(side)
             self._parts.append((Limb(side) if joints else None, joints, grippers.get(side), side + "_gripper"))
-        self._told = {}
+        self._sent = {}
 
     def go_to(self, row):
         """Move the arms to `row` gently."""
@@ -39,9 +39,9 @@ class Player:
         for limb, joints, gripper, column in self._parts:
             if limb:
                 limb.set_joint_positions({name: row[name] for name in joints})
-            if gripper and abs(self._told.get(column, float("inf")) - row[column]) > GRIPPER_STEP_PERCENT:
+            if gripper and abs(self._sent.get(column, float("inf")) - row[column]) > GRIPPER_STEP_PERCENT:
                 gripper.command_position(row[column])
-                self._told[column] = row[column]
+                self._sent[column] = row[column]
 
 
 def play(path, loops):
@@ -69,7 +69,7 @@ def play(path, loops):
 def main():
     parser = new_parser(__doc__)
     add_file(parser, "the recording")
-    parser.add_argument("-l", "--loops", type=int, default=1, help="times; below 1 for ever (default: %(default)s)")
+    parser.add_argument("-l", "--loops", type=int, default=1, help="repetitions, below 1: endless (%(default)d)")
     arguments = parse(parser)
     return run("rsdk_joint_position_file_playback", lambda: play(arguments.file, arguments.loops))
 

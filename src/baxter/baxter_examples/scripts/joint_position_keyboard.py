@@ -11,7 +11,7 @@ from baxter_examples.mounted_grippers import mounted_grippers
 from baxter_interface.programs import EnabledRobot, run
 from baxter_model import JOINTS, SIDES
 
-# For the joints from shoulder to wrist: the key that adds, the key that takes away.
+# For the joints from shoulder to wrist: the key that increases the angle, and the key that decreases it.
 JOINT_KEYS = {"left": ("96", "87", "oy", "iu", "lh", "kj", ".n"), "right": ("41", "32", "rq", "ew", "fa", "ds", "vz")}
 GRIPPER_KEYS = {
     "left": ((",", "close"), ("m", "open"), ("/", "calibrate")),

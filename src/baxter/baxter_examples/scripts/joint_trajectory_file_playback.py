@@ -91,7 +91,7 @@ def play(path, loops):
 def main():
     parser = new_parser(__doc__)
     add_file(parser, "the recording")
-    parser.add_argument("-l", "--loops", type=int, default=1, help="times; 0 for ever (default: %(default)s)")
+    parser.add_argument("-l", "--loops", type=int, default=1, help="repetitions; 0: endless (default: %(default)s)")
     arguments = parse(parser)
     return run("rsdk_joint_trajectory_file_playback", lambda: play(arguments.file, arguments.loops))
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tell the robot a piece of its description, such as that of a tool in its hand, until Ctrl-C."""
+"""Publish a fragment of the robot's description, such as a tool in its hand, until Ctrl-C."""
 import sys
 import xml.etree.ElementTree as ElementTree
 
@@ -21,9 +21,9 @@ def send(path, link, joint):
     try:
         ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise ProgramFailed("%s is no XML: %s" % (path, error)) from error
+        raise ProgramFailed("%s is not XML: %s" % (path, error)) from error
     publisher = rospy.Publisher("/robot/urdf", URDFConfiguration, queue_size=10)
-    # A new time means a new configuration to the robot: the same message is sent again and again.
+    # For the robot, a new time means a new configuration, so the same message is sent repeatedly.
     message = URDFConfiguration(time=rospy.get_rostime(), link=link, joint=joint, urdf=text)
     print("sending %s as %s to link %s, until Ctrl-C" % (path, joint, link), flush=True)
     ticker = Ticker(RosClock(), RATE_HZ)

@@ -21,7 +21,7 @@ HAND_OVER_S = 1.0
 def show(path, delay_s):
     picture = cv2.imread(str(path))
     if picture is None:
-        raise ProgramFailed("%s: %s" % (path, "this is no picture that OpenCV reads" if path.is_file()
+        raise ProgramFailed("%s: %s" % (path, "this is not a picture that OpenCV reads" if path.is_file()
                                         else "there is no such file"))
     publisher = rospy.Publisher("/robot/xdisplay", Image, latch=True, queue_size=1)
     RosClock().sleep(delay_s)

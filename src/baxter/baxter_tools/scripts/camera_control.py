@@ -22,7 +22,7 @@ def resolution(text):
     except ValueError:
         width = height = 0
     if (width, height) not in MODES:
-        raise argparse.ArgumentTypeError("%r is no resolution; choose from %s" % (text, _modes()))
+        raise argparse.ArgumentTypeError("%r is not a resolution; choose from %s" % (text, _modes()))
     return width, height
 
 

@@ -12,10 +12,10 @@ class GripperSteps:
         return getattr(self._gripper, name)
 
     def change(self, parameter, step):
-        """Add `step` [%] to the parameter, kept within 0 to 100; a gripper without it logs that."""
+        """Add `step` [%] to the parameter, within 0 to 100; a gripper without the parameter logs that."""
         value = self._gripper.parameters().get(parameter, 0.0) + step
         self._gripper.set_parameters({parameter: max(0.0, min(100.0, value))})
 
     def move(self, step):
-        """Move by `step` [%] from where it is, kept within 0 to 100."""
+        """Move by `step` [%] from the present position, within 0 to 100."""
         self._gripper.command_position(max(0.0, min(100.0, self._gripper.position() + step)))

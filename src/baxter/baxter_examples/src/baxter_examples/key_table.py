@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keys (or joystick controls) with their actions, and the help that lists them. Free of ROS."""
+"""Keys (or joystick controls) with their actions, and the help that lists them. No ROS needed."""
 
 
 class KeyTable:
@@ -11,7 +11,7 @@ class KeyTable:
         self._actions = {}
 
     def add(self, key, text, action, *arguments):
-        """Let `key` call `action(*arguments)`; `text` says what it does. Raises ValueError for a key in use."""
+        """Let `key` call `action(*arguments)`; `text` describes it. Raises ValueError for a key in use."""
         if key in self._actions:
             raise ValueError("the key %r is in use for: %s" % (key, self._actions[key][0]))
         self._actions[key] = (text, action, arguments)

@@ -14,7 +14,7 @@ COLUMNS = ["time", *(name for side in SIDES for name in (*limb_joint_names(side)
 
 
 class BadRecording(ValueError):
-    """The file is no valid recording; the text says where and why."""
+    """The file is not a valid recording; the text says where and why."""
 
 
 class Recording:
@@ -59,7 +59,15 @@ def write_row(stream, values):
 def read(path):
     """Read a recording. Raises BadRecording, OSError."""
     with open(path, newline="", encoding="utf-8") as stream:
+        return parse(stream, path)
+
+
+def parse(stream, path):
+    """The recording in a stream of lines; ``path`` names it in errors. Raises BadRecording."""
+    try:
         lines = list(csv.reader(stream))
+    except csv.Error as error:
+        raise BadRecording("%s is no text of columns: %s" % (path, error)) from None
     if not lines or lines[0][:1] != ["time"]:
         raise BadRecording("%s: the first line must name the columns: time,left_s0,... as joint_recorder.py writes it"
                            % path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Run an example as users do, in a terminal of its own: type keys, read its output, end it with Ctrl-C."""
+"""Run an example as users do, in a separate terminal: type keys, read its output, end it with Ctrl-C."""
 import contextlib
 import functools
 import os

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Distances of the arms to each other and to the body, from the robot's description. Free of ROS messages and masters.
 
-It uses the simulator's shapes and collision pairs, in a physics world of its own.
+It uses the simulator's shapes and collision pairs, in a separate physics world.
 """
 import numpy as np
 

@@ -28,7 +28,7 @@ def set_knobs(**knobs):
         rospy.delete_param("/fake_robot")
     for name, value in knobs.items():
         rospy.set_param("/fake_robot/" + name, value)
-    rospy.wait_for_service("/fake_robot/reload", 10.0)
+    rospy.wait_for_service("/fake_robot/reload", DEADLINE_S)
     rospy.ServiceProxy("/fake_robot/reload", Trigger)()
 
 

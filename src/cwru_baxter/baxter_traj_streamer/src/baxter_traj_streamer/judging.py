@@ -109,7 +109,7 @@ def _pace(names, bounds, settings):
 def _judge_names(names):
     for index, name in enumerate(names):
         if name not in KNOWN_JOINTS:
-            raise GoalRefused("joints", "joint_names has %r, which is no joint of an arm; they are %s and the same of "
+            raise GoalRefused("joints", "joint_names has %r, which is not an arm joint; they are %s and the same of "
                               "the left arm" % (name, ", ".join(arm_joint_names("right"))), joint=name)
         if name in names[:index]:
             raise GoalRefused("joints", "joint_names has %s more than once" % name, joint=name)

@@ -32,7 +32,7 @@ class Playfile(NamedTuple):
         try:
             text = path.read_text(encoding="utf-8")
         except UnicodeDecodeError as error:
-            raise PlayfileError("%s is no text: %s" % (path, error)) from error
+            raise PlayfileError("%s is not a text: %s" % (path, error)) from error
         return cls.parse(text, str(path))
 
     @classmethod

@@ -13,7 +13,7 @@ from traj_rostest_kit import DEADLINE_S, Client, FakeRobotTest, wait_until
 from baxter_traj_streamer.settings import arm_joint_names
 
 ARM = arm_joint_names("right")
-# Sends a goal that bends an elbow in 8 s, and stays.
+# Sends a goal that bends an elbow in 20 s, and stays.
 SENDER = """
 import rospy
 from traj_rostest_kit import Client
@@ -21,7 +21,7 @@ rospy.init_node("sender", anonymous=True)
 client = Client()
 here = [float(number) for number in %r.split()]
 there = [angle + 0.4 if i == 3 else angle for i, angle in enumerate(here)]
-client.send([], [(0.0, here), (8.0, there)])
+client.send([], [(0.0, here), (20.0, there)])
 rospy.spin()
 """
 

@@ -20,7 +20,7 @@ from baxter_traj_streamer.traj_client import SentGoal
 from baxter_traj_streamer.versions import NOTES, version
 from lab_testing import waiting
 
-DEADLINE_S = 30.0
+DEADLINE_S = 90.0
 
 
 wait_until = functools.partial(waiting.wait_until, timeout_s=DEADLINE_S)

@@ -29,7 +29,7 @@ DEADLINE_S = stretched(90.0)
 PRE_POSE_RIGHT = [-0.907528, -0.111813, 2.06622, 1.8737, -1.295, 2.00164, -2.87179]
 TOLERANCE = 0.01
 # Number of goals with faults, and the largest motion that they may cause [rad].
-SPOILT, STILL = 500, 0.001
+SPOILT, STILL = 150, 0.001
 # Largest stopping distance when the robot is stopped or disabled at 0.25 rad/s [rad].
 COASTING = 0.05
 
@@ -44,7 +44,7 @@ class TrajInTheWorldTest(unittest.TestCase):
     def stop(process):
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGINT)
-            process.wait(timeout=20)
+            process.wait(timeout=DEADLINE_S)
 
     def test_1_right_arm_then_left_arm(self):
         client = self.start("baxter_traj_streamer", "traj_action_client_pre_pose")

@@ -63,7 +63,7 @@ def test_bad_files_are_refused_by_line(text, words):
 def test_file_that_is_no_text_is_refused(tmp_path):
     path = tmp_path / "picture.jsp"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(PlayfileError, match="picture.jsp is no text"):
+    with pytest.raises(PlayfileError, match="picture.jsp is not a text"):
         Playfile.read(path)
 
 
