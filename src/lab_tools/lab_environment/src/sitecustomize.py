@@ -9,6 +9,7 @@ import sys
 # Module that is amended on import -> our module, whose `amend(module)` is called then.
 AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_environment.last_messages",
            "rospy.impl.tcpros_base": "lab_environment.refused_connections",
+           "rospy.impl.masterslave": "lab_environment.one_connection",
            "roslaunch.parent": "lab_environment.launch_guard"}
 
 

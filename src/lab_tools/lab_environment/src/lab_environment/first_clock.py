@@ -63,7 +63,7 @@ class ClockWait:
         if now_s < self._end_s:
             return False
         if not has_time:
-            self.complaint = ("/use_sim_time is true, but nothing has come on /clock for %.0f s: going on with the "
+            self.complaint = ("/use_sim_time is true, but nothing has come on /clock for %.0f s: continuing with the "
                               "time at 0. Start the simulator, or without one: rosparam set use_sim_time false"
                               % self.waited_s)
         return True

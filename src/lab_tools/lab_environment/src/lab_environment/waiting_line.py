@@ -3,7 +3,7 @@
 import sys
 import time
 
-# Shortest time between two lines on a stream that is no terminal [s].
+# Shortest time between two lines on a stream that is not a terminal [s].
 AGAIN_AFTER_S = 30.0
 
 

@@ -5,11 +5,12 @@
 Parameters: ~start_s, the first time on /clock; ~paused, whether time stays there.
 """
 import threading
-import time
 
 import rospy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+
+from lab_testing.waiting import beats
 
 STEP_S = 0.01
 CONNECT_S = 0.5
@@ -29,12 +30,11 @@ def main():
     clock = rospy.Publisher("/clock", Clock, queue_size=1)
     states = rospy.Publisher("/robot/joint_states", JointState, listeners, queue_size=1)
     time_s, paused = rospy.get_param("~start_s"), rospy.get_param("~paused", False)
-    while not rospy.is_shutdown():
+    for _ in beats(1.0 / STEP_S, rospy.is_shutdown):
         clock.publish(rospy.Time.from_sec(time_s))
         if listeners.heard.is_set():
             states.publish(JointState())
         time_s += 0.0 if paused else STEP_S
-        time.sleep(STEP_S)
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ def ends():
     transport.done = True
     with connection._lock:
         connection._cond_data_available.notify()
-    connection._thread.join(10.0)
+    connection._thread.join(60.0)
     ours.close()
 
 

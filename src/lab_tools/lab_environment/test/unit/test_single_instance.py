@@ -82,11 +82,11 @@ def test_no_master_is_an_error():
 
 
 TAKE_AND_STAY = """
-import sys, time
+import signal, sys
 from lab_environment.single_instance import Claim
 claim = Claim(sys.argv[1], sys.argv[2])
 print(claim.take(), flush=True)
-time.sleep(600)
+signal.pause()
 """
 
 

@@ -56,7 +56,7 @@ class _Pending:
 
 
 class HeaderRefused(Exception):
-    """A client's data is no valid handshake header; the text says why."""
+    """A client's data is not a valid handshake header; the text says why."""
 
 
 def _notice_lost_peers(connection):
@@ -172,7 +172,7 @@ class HandshakeServer:
                 self._wait_for(pending)
             return
         except OSError:
-            self._drop(pending)  # the client has closed it, which is no error
+            self._drop(pending)  # the client has closed it, which is not an error
             return
         except HeaderRefused as error:
             self._drop(pending)

@@ -7,7 +7,7 @@ import json
 import re
 
 LONGEST = 10000  # characters of a text; the robot's longest is about 100
-DEEPEST = 8  # objects and lists within each other; no message of the robot's has more than one
+DEEPEST = 8  # objects and lists within each other; a tool.s weight takes six
 MOST_DIGITS = 18  # of an integer: what 64 bits hold
 LARGEST = 1e15  # magnitude of a number
 SHOWN = 100  # characters of a text that an error quotes
@@ -18,7 +18,7 @@ _BRACKETS = {"{": 1, "[": 1, "}": -1, "]": -1}
 
 
 class JsonRefused(ValueError):
-    """The text is no JSON object, or exceeds a limit; the message says what was found and what is allowed."""
+    """The text is not a JSON object, or exceeds a limit; the message says what was found and what is allowed."""
 
 
 def read_object(text):
@@ -34,9 +34,9 @@ def read_object(text):
     try:
         values = json.loads(text, parse_int=_integer, parse_float=_number)
     except (ValueError, RecursionError) as error:
-        raise JsonRefused("%s is no JSON object (%s)" % (_quoted(text), error)) from None
+        raise JsonRefused("%s is not a JSON object (%s)" % (_quoted(text), error)) from None
     if not isinstance(values, dict):
-        raise JsonRefused("%s is no JSON object" % _quoted(text))
+        raise JsonRefused("%s is not a JSON object" % _quoted(text))
     return values
 
 

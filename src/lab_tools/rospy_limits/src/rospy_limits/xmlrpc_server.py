@@ -27,22 +27,22 @@ class Connections:
         self._events = events
         self._clock = clock
         self._lock = threading.Lock()
-        self._deadlines = collections.OrderedDict()  # {socket: (address, deadline)}, the longest unchanged first
+        self._deadlines = collections.OrderedDict()  # {socket: (address, deadline, quiet)}, the longest unchanged first
 
     def add(self, connection, host):
         """Add a connection of address ``host``. If there are too many, the longest idle one is closed."""
         with self._lock:
-            of_host = [other for other, (its_host, _) in self._deadlines.items() if its_host == host]
+            of_host = [other for other, (its_host, *_) in self._deadlines.items() if its_host == host]
             if len(of_host) >= limits.XMLRPC_PER_ADDRESS:
-                self._end(of_host[0], host)
-            self._deadlines[connection] = host, self._clock() + limits.XMLRPC_FIRST_S
+                self._end(of_host[0], host, "one of more than %d" % limits.XMLRPC_PER_ADDRESS)
+            self._deadlines[connection] = host, self._clock() + limits.XMLRPC_FIRST_S, False
 
-    def allow(self, connection, time_s):
-        """The connection was active: keep it open for another ``time_s`` [s]."""
+    def allow(self, connection, time_s, quiet=False):
+        """The connection was active: keep it open for another ``time_s`` [s]. ``quiet``: its end then is no event."""
         with self._lock:
             if connection in self._deadlines:
-                host, _ = self._deadlines.pop(connection)
-                self._deadlines[connection] = host, self._clock() + time_s
+                host, *_ = self._deadlines.pop(connection)
+                self._deadlines[connection] = host, self._clock() + time_s, quiet
 
     def remove(self, connection):
         """The connection is closed."""
@@ -53,24 +53,24 @@ class Connections:
         """Close the expired ones."""
         now = self._clock()
         with self._lock:
-            for connection, (host, deadline) in list(self._deadlines.items()):
+            for connection, (host, deadline, quiet) in list(self._deadlines.items()):
                 if now >= deadline:
-                    self._end(connection, host)
+                    self._end(connection, host, "" if quiet else "no request came in time")
 
     def make_room(self, reason):
         """Close the quarter that was idle longest."""
         self._events.add("xmlrpc files", "no XML-RPC connection can be accepted: %s; those that have waited longest "
                          "are closed" % reason)
         with self._lock:
-            for connection, (host, _) in list(self._deadlines.items())[:1 + len(self._deadlines) // 4]:
-                self._end(connection, host)
+            for connection, (host, *_) in list(self._deadlines.items())[:1 + len(self._deadlines) // 4]:
+                self._end(connection, host, "no room")
 
-    def _end(self, connection, host):
+    def _end(self, connection, host, why):
         del self._deadlines[connection]
         with contextlib.suppress(OSError):
             connection.shutdown(socket.SHUT_RDWR)
-        self._events.add(("xmlrpc", host), "XML-RPC connection from %s closed: idle, or one of more than %d"
-                         % (host, limits.XMLRPC_PER_ADDRESS))
+        if why:
+            self._events.add(("xmlrpc", host), "XML-RPC connection from %s closed: %s" % (host, why))
 
 
 class _RequestHandler(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler):
@@ -88,7 +88,8 @@ class _RequestHandler(rosgraph.xmlrpc.SilenceableXMLRPCRequestHandler):
                             % (self.headers.get("Content-Length"), limits.MESSAGE_BYTES))
             return
         super().do_POST()
-        connections.allow(self.connection, limits.XMLRPC_IDLE_S)
+        # rospy's clients keep a connection after its last request.
+        connections.allow(self.connection, limits.XMLRPC_IDLE_S, quiet=True)
 
 
 def limited_server(events):

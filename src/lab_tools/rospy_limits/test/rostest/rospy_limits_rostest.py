@@ -22,7 +22,7 @@ from std_srvs.srv import SetBool
 from lab_testing.waiting import wait_until
 
 NODE = "/limited"
-DEADLINE_S = 30.0
+DEADLINE_S = 90.0
 LIMIT_BYTES = 1_000_000
 SILENT = 500
 
@@ -61,7 +61,7 @@ class RospyLimits(unittest.TestCase):
         connection.sendall(data)
         return connection
 
-    def shake_hands(self, **header):
+    def handshake(self, **header):
         connection = self.connect(self.tcpros)
         write_ros_handshake_header(connection, {"callerid": "/stranger", "md5sum": "*", **header})
         return connection
@@ -103,12 +103,12 @@ class RospyLimits(unittest.TestCase):
 
     def test_services_that_are_connected_and_never_asked(self):
         for _ in range(SILENT):
-            self.shake_hands(service="/serve", persistent="1")
+            self.handshake(service="/serve", persistent="1")
         self.check_alive()
 
     def test_a_subscriber_that_does_not_read_a_latched_message(self):
         for _ in range(3):
-            self.shake_hands(topic="/latched", type="*")
+            self.handshake(topic="/latched", type="*")
         self.check_alive()
 
     def test_garbage(self):
@@ -131,7 +131,7 @@ class RospyLimits(unittest.TestCase):
 
     def test_a_service_request_that_announces_too_much_is_refused_with_the_reason(self):
         for announced in (LIMIT_BYTES + 1, 10**9, 2**32 - 1):
-            client = self.shake_hands(service="/serve")
+            client = self.handshake(service="/serve")
             client.sendall(struct.pack("<I", announced) + b"\x01")
             answer = b""
             with contextlib.suppress(ConnectionResetError):
@@ -145,7 +145,7 @@ class RospyLimits(unittest.TestCase):
         for service, requests in (("/serve", [b""]), (level, [b"", b"\x01", struct.pack("<I", 2**31), b"\xff" * 12])):
             for request in requests:
                 for persistent in "01":
-                    client = self.shake_hands(service=service, persistent=persistent)
+                    client = self.handshake(service=service, persistent=persistent)
                     client.sendall(struct.pack("<I", len(request)) + request)
                     stream = client.makefile("rb")
                     header_bytes, = struct.unpack("<I", stream.read(4))

@@ -42,7 +42,7 @@ class Scene:
         return client
 
     def turn_until(self, condition, what):
-        wait_until(lambda: (self.server.turn(0.0), condition())[1], what, 20.0, 0.0)
+        wait_until(lambda: (self.server.turn(0.0), condition())[1], what, 60.0, 0.0)
 
     def headers(self):
         return [data[4:] for _, _, data in self.served]

@@ -23,8 +23,8 @@ def test_what_python_writes_for_no_number_is_read():
 
 
 @pytest.mark.parametrize("text, found", [
-    ("5", "is no JSON object"), ("[]", "is no JSON object"), ("{", "is no JSON object"),
-    ("\0", "is no JSON object"), ('{"a": 1}x', "is no JSON object"), ("nul", "is no JSON object"),
+    ("5", "is not a JSON object"), ("[]", "is not a JSON object"), ("{", "is not a JSON object"),
+    ("\0", "is not a JSON object"), ('{"a": 1}x', "is not a JSON object"), ("nul", "is not a JSON object"),
     ('{"a":' * 5000, "25000 characters"), ('{"a":' * 1900, "nested deeper than %d" % DEEPEST),
     ("[" * 9000, "nested deeper than"),
     ('{"a":' * 9 + "1" + "}" * 9, "nested deeper than"),

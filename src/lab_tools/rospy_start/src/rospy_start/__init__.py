@@ -36,7 +36,7 @@ def wait_for_param(name, timeout_s):
 def end_on_signals():
     """End the node on Ctrl-C and SIGTERM; for nodes that call ``rospy.init_node`` with ``disable_signals``.
 
-    From a thread of its own: where the main thread is interrupted it may hold a lock of rospy's that the shutdown waits
+    From a separate thread: where the main thread is interrupted it may hold a lock of rospy's that the shutdown waits
     for, and rospy's own handler would then wait for ever.
     """
     def end(number, _frame):
