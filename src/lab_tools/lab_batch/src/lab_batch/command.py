@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`./baxter.sh batch`: run a job for many seeds, continue where it was, and show how it goes."""
+import argparse
+import ast
+import os
+import shlex
+import sys
+import time
+from pathlib import Path
+
+from . import processes, ray_engine
+from .job import JobError, Spec, class_of, parameters_of
+from .records import Records, RecordsError, summary, versions
+from .shipped import JOBS
+
+ROOT = Path(os.environ.get("LAB_ROOT", Path.cwd()))
+PROGRESS_S = 0.5
+ENGINES = {"processes": processes.map_seeds, "ray": ray_engine.map_seeds}
+
+
+def seeds_of(text):
+    """0:1000 is 0 to 999; 5 is 5 alone; 1:3,7 is 1, 2, 7. Raises argparse.ArgumentTypeError."""
+    seeds = []
+    try:
+        for part in text.split(","):
+            first, colon, last = part.partition(":")
+            chosen = range(int(first or 0), int(last)) if colon else [int(first)]
+            if not chosen or chosen[0] < 0:
+                raise ValueError
+            seeds.extend(chosen)
+    except ValueError:
+        raise argparse.ArgumentTypeError("seeds are numbers from 0 on, such as 0:1000, 7 or 0:10,20:30, not %r"
+                                         % text) from None
+    return list(dict.fromkeys(seeds))
+
+
+def setting_of(text):
+    """NAME=VALUE, where VALUE is a Python literal, or else a text. Raises argparse.ArgumentTypeError."""
+    name, equals, value = text.partition("=")
+    if not (name.isidentifier() and equals):
+        raise argparse.ArgumentTypeError("a parameter is NAME=VALUE, not %r" % text)
+    try:
+        return name, ast.literal_eval(value)
+    except (ValueError, SyntaxError):
+        return name, value
+
+
+def positive(kind):
+    def convert(text):
+        try:
+            value = kind(text)
+        except ValueError:
+            value = 0
+        if not 0 < value < float("inf"):
+            raise argparse.ArgumentTypeError("must be %s greater than 0, not %s" % (
+                "an integer" if kind is int else "a number", text or "nothing"))
+        return value
+    return convert
+
+
+def parse(argv):
+    parser = argparse.ArgumentParser(
+        prog="./baxter.sh batch", description=__doc__,
+        epilog="JOB is a name of --list, or package.module:Class (a class that derives from lab_batch.Job). "
+               "Exit status: 0 all episodes ended well, 1 some failed or the job cannot start, 2 wrong options, "
+               "130 after Ctrl-C.")
+    parser.add_argument("job", nargs="?", metavar="JOB")
+    parser.add_argument("--list", action="store_true", help="the jobs that come with this workspace")
+    parser.add_argument("--seeds", type=seeds_of, metavar="A:B", help="0:1000 is 0 to 999; also 7, or 0:10,20:30")
+    parser.add_argument("--set", type=setting_of, action="append", default=[], metavar="NAME=VALUE",
+                        help="a parameter of the job; may be repeated")
+    parser.add_argument("--engine", choices=ENGINES, default="processes", help="default: processes of this machine")
+    parser.add_argument("--address", metavar="HOST:PORT", help="the head of a Ray cluster; without it Ray runs here")
+    parser.add_argument("--workers", type=positive(int), default=os.cpu_count(), metavar="N",
+                        help="processes at a time (default: one for each processor, %(default)s)")
+    parser.add_argument("--time-limit", type=positive(float), metavar="S", help="longest wall time of an episode")
+    parser.add_argument("--recycle", type=positive(int), default=200, metavar="N",
+                        help="a worker is replaced after N episodes (default %(default)s)")
+    parser.add_argument("--retry-failed", action="store_true", help="also run seeds again that failed before")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="default: .baxter/batch/JOB.jsonl")
+    options = parser.parse_args(argv)
+    if not options.list and not (options.job and options.seeds):
+        parser.error("JOB and --seeds are needed, or --list")
+    return options
+
+
+def repeating_line(job, settings, seed):
+    """The command that runs one episode again."""
+    words = ["./baxter.sh", "batch", job, "--seeds", str(seed)]
+    for name, value in settings:
+        words += ["--set", "%s=%s" % (name, value if isinstance(value, str) else repr(value))]
+    return shlex.join([*words, "--out", "/dev/null"])
+
+
+class Progress:
+    """One line on a terminal that says how far the batch is; nothing elsewhere."""
+
+    def __init__(self, total, stream=None):
+        self._stream = sys.stderr if stream is None else stream
+        self._total, self._count, self._failed = total, 0, 0
+        self._began, self._shown = time.monotonic(), 0.0
+
+    def step(self, outcome):
+        self._count += 1
+        self._failed += not outcome.is_done
+        now = time.monotonic()
+        if self._stream.isatty() and (now - self._shown >= PROGRESS_S or self._count == self._total):
+            self._shown = now
+            rest = (self._total - self._count) * (now - self._began) / self._count
+            self._stream.write("\r\x1b[K%d of %d, %d failed, %.0f s left" % (
+                self._count, self._total, self._failed, rest))
+            self._stream.flush()
+
+    def end(self):
+        if self._stream.isatty() and self._count:
+            self._stream.write("\n")
+
+
+def list_jobs():
+    for name, (target, text) in JOBS.items():
+        print("%-14s %s" % (name, text))
+        for parameter, default in parameters_of(class_of(target)).items():
+            print("%-14s   --set %s=%s" % ("", parameter, default))
+
+
+def run(options):
+    settings = options.set
+    spec = Spec(JOBS[options.job][0] if options.job in JOBS else options.job, dict(settings))
+    class_of(spec.name)  # a wrong name is told before anything starts
+    path = options.out or ROOT / ".baxter" / "batch" / ("%s.jsonl" % options.job.replace("/", "_").replace(":", "."))
+    records = Records(path, spec, versions(ROOT))
+    try:
+        known = {seed for seed, one in records.outcomes.items() if one.is_done or not options.retry_failed}
+        left = [seed for seed in options.seeds if seed not in known]
+        if len(left) < len(options.seeds):
+            print("%d of %d seeds have results in %s" % (len(options.seeds) - len(left), len(options.seeds), path))
+        began = time.monotonic()
+        _run_left(options, spec, left, records)
+        seconds = time.monotonic() - began
+        chosen = [records.outcomes[seed] for seed in options.seeds]
+        return report(options, chosen, path, len(left), seconds)
+    finally:
+        records.close()
+
+
+def _run_left(options, spec, left, records):
+    progress = Progress(len(left))
+    limits = processes.Limits(min(options.workers, max(1, len(left))), options.time_limit, options.recycle)
+    extra = {"address": options.address} if options.engine == "ray" else {}
+    try:
+        for outcome in ENGINES[options.engine](spec, left, limits, **extra):
+            progress.step(records.add(outcome))
+    finally:
+        progress.end()
+
+
+def report(options, outcomes, path, count, seconds):
+    failed = [one for one in outcomes if not one.is_done]
+    for line in summary(outcomes):
+        print(line)
+    for one in failed:
+        print("seed %d failed: %s\n  %s" % (one.seed, one.error, repeating_line(options.job, options.set, one.seed)))
+    print("%d ended well, %d failed; %d run now in %.1f s; results in %s" % (
+        len(outcomes) - len(failed), len(failed), count, seconds, path))
+    return 1 if failed else 0
+
+
+def main(argv=None):
+    options = parse(argv)
+    # Errors of jobs hold any text.
+    sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        if options.list:
+            list_jobs()
+            return 0
+        return run(options)
+    except (JobError, RecordsError, OSError) as error:
+        print("batch: %s" % error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("batch: stopped; the same command continues", file=sys.stderr)
+        return 130

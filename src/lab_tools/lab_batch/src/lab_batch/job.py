@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A job: a class of which each instance runs episodes, one for each seed."""
+import importlib
+import inspect
+import time
+import traceback
+from dataclasses import dataclass, field
+
+# sys.exit() in a job, or in a library that it calls, ends an episode and not its worker.
+_OF_JOBS = (Exception, SystemExit)
+
+
+class JobError(Exception):
+    """A job cannot be found, or cannot start; the text says why."""
+
+
+class Job:
+    """Base class of jobs; one instance lives in each worker process.
+
+    A subclass takes its parameters as named arguments of __init__, with defaults. The result of an episode must depend
+    on parameters and seed alone, because seeds are given to workers in any order.
+    """
+
+    def start(self):
+        """Prepare what all episodes share, such as a model or compiled code. Called once, before the first episode."""
+
+    def run(self, seed):
+        """Run one episode; return its results as {name: value that JSON can hold}. seed: int >= 0.
+
+        An exception makes the episode a failed one; the worker continues with the next seed.
+        """
+        raise NotImplementedError
+
+    def end(self):
+        """Release what start() took. Not called in a worker that died or was stopped."""
+
+
+@dataclass(frozen=True)
+class Spec:
+    """Which job: "package.module:Class", and its parameters as {name: value that JSON can hold}."""
+
+    name: str
+    parameters: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one episode ended. result is {} and error says why where it failed. seconds: wall time."""
+
+    seed: int
+    result: dict
+    error: str = ""
+    seconds: float = 0.0
+
+    @property
+    def is_done(self):
+        return not self.error
+
+
+def class_of(name):
+    """The class of "package.module:Class". Raises JobError."""
+    module, colon, attribute = name.partition(":")
+    if not (module and colon and attribute):
+        raise JobError("a job is named package.module:Class or by a name of --list, not %r" % name)
+    try:
+        found = importlib.import_module(module)
+    # Code of others, and any text as its name.
+    except _OF_JOBS as error:
+        raise JobError("job %s: cannot import %s: %s" % (name, module, _text_of(error))) from error
+    try:
+        found = getattr(found, attribute)
+    except AttributeError:
+        raise JobError("job %s: module %s has no %s" % (name, module, attribute)) from None
+    if not (inspect.isclass(found) and issubclass(found, Job)):
+        raise JobError("job %s: %s is no class that derives from lab_batch.Job" % (name, attribute))
+    return found
+
+
+def parameters_of(kind):
+    """{name: default} of a job's parameters."""
+    return {name: one.default for name, one in inspect.signature(kind).parameters.items()
+            if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)}
+
+
+def load(spec):
+    """Return an instance of the job that is ready for run(). Raises JobError."""
+    kind = class_of(spec.name)
+    known = parameters_of(kind)
+    unknown = sorted(set(spec.parameters) - set(known))
+    if unknown:
+        raise JobError("job %s has no parameter %s; it has %s" % (
+            spec.name, ", ".join(unknown), ", ".join(known) or "none"))
+    try:
+        job = kind(**spec.parameters)
+        job.start()
+    except _OF_JOBS as error:
+        raise JobError("job %s cannot start: %s" % (spec.name, _text_of(error))) from error
+    return job
+
+
+def run_episode(job, seed):
+    """Return the Outcome of one episode; an exception of the job is its error, with the line where it was raised."""
+    started = time.monotonic()
+    try:
+        result = job.run(seed)
+        if not isinstance(result, dict):
+            raise TypeError("run() returned %s; a dictionary of results was expected" % type(result).__name__)
+        return Outcome(seed, result, "", time.monotonic() - started)
+    except _OF_JOBS as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        text = "%s (%s, line %d)" % (_text_of(error), where.filename, where.lineno)
+        return Outcome(seed, {}, text, time.monotonic() - started)
+
+
+def _text_of(error):
+    try:
+        return "%s: %s" % (type(error).__name__, error)
+    # A job's exception may have a __str__ that fails.
+    except Exception:
+        return type(error).__name__

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The engine for several machines: Ray (https://ray.io), which is installed on first use."""
+import contextlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from itertools import islice
+from pathlib import Path
+
+from .job import JobError, Outcome, load, run_episode
+from .processes import ONE_THREAD, SEEDS_AHEAD, TRIES
+
+# Beside this file. Ray gets a separate folder, so that the rest of the workspace does not see its dependencies.
+REQUIREMENTS = Path(__file__).with_name("requirements-ray.txt")
+# Ray's own limits for the start of its processes (15 to 30 s) are too short for a busy machine. Usage is not reported,
+# and the tokens that Ray asks for by default stay in force for clusters: they are Ray's own setting.
+ENVIRONMENT = {"RAY_agent_register_timeout_ms": "180000", "RAY_worker_register_timeout_seconds": "180",
+               "RAY_raylet_start_wait_time_s": "180", "RAY_USAGE_STATS_ENABLED": "0"}
+# Ray gives its first process 30 s, which a busy machine may miss.
+STARTS = 3
+
+
+def ensure_installed(root: Path):
+    """Make Ray importable here and in its workers; install it below root/.baxter on first use. Raises JobError."""
+    folder = root / ".baxter" / "ray"
+    if importlib.util.find_spec("ray") is None and not (folder / "ray").is_dir():
+        print("batch: Ray is installed into %s (80 MB from PyPI)" % folder, file=sys.stderr)
+        done = subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(folder),
+                               "-r", str(REQUIREMENTS)])
+        if done.returncode != 0:
+            raise JobError("pip could not install Ray from %s (exit code %d); the engine `processes` needs nothing" % (
+                REQUIREMENTS, done.returncode))
+    if importlib.util.find_spec("ray") is None:
+        sys.path.append(str(folder))
+        os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [os.environ.get("PYTHONPATH"), str(folder)]))
+        importlib.invalidate_caches()
+
+
+class _Episodes:
+    """A Ray actor: one worker with its job."""
+
+    def __init__(self, spec):
+        self._job = load(spec)
+
+    def run(self, seed):
+        return run_episode(self._job, seed)
+
+
+def map_seeds(spec, seeds, limits, address=None):
+    """Yield an Outcome for each seed, as processes.map_seeds.
+
+    address: HOST:PORT of a cluster's head; None: a Ray of its own on this machine. limits.workers is the number of
+    actors, of one processor each. Raises JobError.
+    """
+    ensure_installed(Path(os.environ.get("LAB_ROOT", Path.cwd())))
+    for name, value in ENVIRONMENT.items():
+        os.environ.setdefault(name, value)
+    import ray
+
+    with contextlib.ExitStack() as ending:
+        _start(ray, limits, address, ending)
+        yield from _Actors(ray, spec, seeds, limits).outcomes()
+
+
+def _start(ray, limits, address, ending):
+    """Connect to a cluster, or start a Ray here; `ending` (contextlib.ExitStack) ends it. Raises JobError."""
+    options = {"include_dashboard": False, "log_to_driver": False, "configure_logging": False}
+    tries = STARTS
+    if address:
+        options["address"], tries = address, 1
+    else:
+        folder = tempfile.mkdtemp(prefix="ray-")  # for its logs and sockets, which it would keep
+        ending.callback(shutil.rmtree, folder, ignore_errors=True)
+        options.update(num_cpus=limits.workers, _node_ip_address="127.0.0.1", _temp_dir=folder)
+    ending.callback(ray.shutdown)
+    for left in reversed(range(tries)):
+        try:
+            ray.init(**options)
+            return
+        except Exception as error:  # Ray raises a bare Exception where its processes do not start in time
+            ray.shutdown()
+            if not left:
+                raise JobError("no Ray at %s: %s" % (address or "this machine", error)) from error
+
+
+class _Actors:
+    def __init__(self, ray, spec, seeds, limits):
+        self._ray, self._spec, self._limits = ray, spec, limits
+        self._seeds, self._again, self._tries = iter(seeds), [], {}
+        self._kind = ray.remote(num_cpus=1, runtime_env={"env_vars": ONE_THREAD})(_Episodes)
+        self._running = {}  # {reference: (actor, seed)}
+
+    def outcomes(self):
+        for _ in range(self._limits.workers):
+            if not self._start():
+                break
+        while self._running:
+            done, _ = self._ray.wait(list(self._running), num_returns=1, timeout=self._limits.episode_s)
+            if not done:
+                yield from self._stop_all()
+                continue
+            yield from self._take(done[0])
+
+    def _next(self):
+        return self._again.pop() if self._again else next(self._seeds, None)
+
+    def _start(self):
+        """A new actor with its first seeds; False where no seed is left."""
+        first = self._next()
+        if first is None:
+            return False
+        actor = self._kind.remote(self._spec)
+        self._give(actor, first)
+        for seed in islice(iter(self._next, None), SEEDS_AHEAD - 1):
+            self._give(actor, seed)
+        return True
+
+    def _give(self, actor, seed):
+        self._running[actor.run.remote(seed)] = (actor, seed)
+
+    def _take(self, reference):
+        actor, seed = self._running.pop(reference)
+        errors = self._ray.exceptions
+        try:
+            yield self._ray.get(reference)
+        except errors.RayActorError as error:
+            yield from self._died(actor, seed, error)
+            return
+        except errors.RayTaskError as error:
+            raise JobError(str(error.cause)) from error
+        following = self._next()
+        if following is not None:
+            self._give(actor, following)
+
+    def _died(self, actor, seed, error):
+        if "JobError" in str(error):
+            raise JobError(str(error).strip().splitlines()[-1])
+        lost = [ref for ref, (one, _) in self._running.items() if one is actor]
+        self._again += [self._running.pop(ref)[1] for ref in lost]
+        self._tries[seed] = self._tries.get(seed, 1) + 1
+        if self._tries[seed] <= TRIES:
+            self._again.append(seed)
+        else:
+            yield Outcome(seed, {}, "its worker died twice: %s" % str(error).strip().splitlines()[0], 0.0)
+        self._start()
+
+    def _stop_all(self):
+        """Nothing ended within the limit of an episode: the actors hang."""
+        actors = {id(actor): (actor, seed) for actor, seed in reversed(self._running.values())}
+        text = "took more than the limit of %g s" % self._limits.episode_s
+        failed = {seed for _, seed in actors.values()}
+        self._again += [seed for _, seed in self._running.values() if seed not in failed]
+        self._running.clear()
+        for actor, seed in actors.values():
+            self._ray.kill(actor)
+            yield Outcome(seed, {}, text, self._limits.episode_s)
+        for _ in actors:
+            self._start()

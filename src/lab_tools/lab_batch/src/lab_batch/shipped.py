@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The jobs that come with the workspace. What a job needs is imported when it starts."""
+import json
+import os
+import shlex
+import signal
+import subprocess
+import tempfile
+from pathlib import Path
+
+from lab_environment.ports import free_port
+
+from .job import Job
+
+TAIL = 400  # characters of a program's output in the error of an episode
+STOP_TIMEOUT_S = 20.0
+
+
+class InverseKinematics(Job):
+    """Solves random reachable poses of one of Baxter's arms, as the IK service does."""
+
+    def __init__(self, side="left", poses=200, tolerance=1e-5):
+        self._side, self._poses, self._tolerance = side, poses, tolerance
+
+    def start(self):
+        import rospkg
+
+        import xacro
+        from baxter_model import BASE_FRAME, SIDES, tip_of
+        from baxter_sim_kinematics import Chain, warm_up
+        from urdf_model import parse_urdf
+
+        if self._side not in SIDES:
+            raise ValueError("side is %r, not left or right" % (self._side,))
+        file = Path(rospkg.RosPack().get_path("baxter_description")) / "urdf" / "baxter.urdf.xacro"
+        robot = parse_urdf(xacro.process_file(str(file)).toxml(), source=str(file))
+        self._chain = Chain.from_robot(robot, BASE_FRAME, tip_of(self._side))
+        warm_up(self._chain)
+
+    def run(self, seed):
+        import numpy as np
+
+        from baxter_sim_kinematics import Budget, NoSolution, solve
+
+        rng = np.random.default_rng(seed)
+        chain = self._chain
+        middle = 0.5 * (chain.lower + chain.upper)
+        budget = Budget(tolerance_m=self._tolerance, tolerance_rad=self._tolerance)
+        solved, farthest = 0, 0.0
+        for _ in range(self._poses):
+            target = chain.fk(rng.uniform(chain.lower, chain.upper))
+            try:
+                found = solve(chain, target, middle, budget=budget)
+            except NoSolution:
+                continue
+            solved += 1
+            farthest = max(farthest, float(np.abs(chain.fk(found.q)[:3, 3] - target[:3, 3]).max()))
+        return {"poses": self._poses, "solved": solved, "all_solved": solved == self._poses, "farthest_off_m": farthest}
+
+
+class Command(Job):
+    """Runs a program, such as roslaunch, on a ROS master port of its own.
+
+    {seed} in the command is replaced by the seed. Where the last line of its output is a JSON object, its values are
+    results.
+    """
+
+    def __init__(self, command="", exit_codes=(0,)):
+        self._words, self._codes = shlex.split(command), set(exit_codes)
+
+    def start(self):
+        if not self._words:
+            raise ValueError('set command, for instance --set command="roslaunch PACKAGE FILE seed:={seed}"')
+
+    def run(self, seed):
+        words = [word.replace("{seed}", str(seed)) for word in self._words]
+        with tempfile.TemporaryDirectory() as folder:
+            environment = {**os.environ, "ROS_MASTER_URI": "http://localhost:%d" % free_port(),
+                           "ROS_HOSTNAME": "localhost", "ROS_LOG_DIR": folder, "LAB_BATCH_SEED": str(seed)}
+            with tempfile.TemporaryFile() as output:
+                code = _run(words, environment, output)
+                output.seek(0)
+                text = output.read().decode("utf-8", "replace")
+        if code not in self._codes:
+            raise RuntimeError("exit code %s; the end of its output: %s" % (code, text[-TAIL:].strip()))
+        return {"exit_code": code, **_last_object(text)}
+
+
+def _run(words, environment, output):
+    """Exit code of a program; its children end with it."""
+    # setpriv: Ctrl-C for a program whose worker has died.
+    child = subprocess.Popen(["setpriv", "--pdeathsig", "INT", "--", *words], env=environment, stdin=subprocess.DEVNULL,
+                             stdout=output, stderr=subprocess.STDOUT)
+    try:
+        return child.wait()
+    finally:
+        if child.poll() is None:
+            child.send_signal(signal.SIGINT)
+            try:
+                child.wait(STOP_TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                child.kill()
+                child.wait()
+
+
+def _last_object(text):
+    lines = text.strip().splitlines()
+    try:
+        found = json.loads(lines[-1]) if lines else {}
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+# Name: (class, one line for --list).
+JOBS = {
+    "ik": ("lab_batch.shipped:InverseKinematics", "random reachable poses of an arm: how many are solved, how exactly"),
+    "command": ("lab_batch.shipped:Command", "a program with {seed} in its arguments, such as roslaunch"),
+}

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Jobs for the tests of the engines."""
+import os
+import random
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from lab_batch import Job
+
+
+class Square(Job):
+    """The square of a seed, and of a random number of it."""
+
+    def __init__(self, factor=1.0, folder=""):
+        self._factor, self._folder = factor, folder
+
+    def start(self):
+        if self._folder:
+            Path(self._folder, "started-%d" % os.getpid()).touch()
+
+    def run(self, seed):
+        import numpy as np
+
+        print("this is no result")
+        return {"square": self._factor * seed * seed, "drawn": float(np.random.default_rng(seed).random()),
+                "threads": os.environ.get("OMP_NUM_THREADS", "")}
+
+    def end(self):
+        if self._folder:
+            Path(self._folder, "ended-%d" % os.getpid()).touch()
+
+
+class Trouble(Job):
+    """Raises, dies, hangs or returns nonsense, by the seed."""
+
+    def __init__(self, folder="", raises=(), dies=(), dies_once=(), hangs=(), nonsense=(), unwritable=()):
+        self._folder = Path(folder)
+        self._by_kind = {"raises": raises, "dies": dies, "dies_once": dies_once, "hangs": hangs, "nonsense": nonsense,
+                         "unwritable": unwritable}
+
+    def run(self, seed):
+        kind = next((kind for kind, seeds in self._by_kind.items() if seed in seeds), "")
+        if kind == "raises":
+            raise ValueError("seed %d is bad" % seed)
+        if kind == "dies" or (kind == "dies_once" and not (self._folder / str(seed)).exists()):
+            (self._folder / str(seed)).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        if kind == "hangs":
+            child = subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"])
+            (self._folder / "child").write_text(str(child.pid))
+            signal.pause()
+        if kind == "nonsense":
+            return seed
+        if kind == "unwritable":
+            return {"value": float("nan")}
+        return {"good": True, "drawn": random.Random(seed).random()}
+
+
+class Mute(Exception):
+    """Has no text."""
+
+    def __str__(self):
+        raise RuntimeError("no text")
+
+
+class OddErrors(Job):
+    """Raises what programs seldom raise."""
+
+    def run(self, seed):
+        raise (SystemExit(3), SystemExit(0), Mute(), ValueError("half a character: \ud800"))[seed]
+
+
+class ExitsAtStart(Job):
+    """Ends its program."""
+
+    def start(self):
+        sys.exit("wrong option")
+
+
+class CannotStart(Job):
+    """Says so."""
+
+    def start(self):
+        raise OSError("no such robot")
+
+
+class DiesAtStart(Job):
+    """Takes its process with it."""
+
+    def start(self):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class NoJob:
+    """Does not derive from Job."""

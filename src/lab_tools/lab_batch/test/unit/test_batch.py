@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Batches: every seed has one outcome, whatever a job does; results do not depend on the workers; a batch continues."""
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lab_batch import JobError, Outcome, Spec, command, load
+from lab_batch.processes import Limits, map_seeds
+from lab_batch.records import Records, RecordsError, summary
+from lab_batch.shipped import Command
+from lab_testing.waiting import wait_until
+
+HERE = Path(__file__).parent
+SQUARE, TROUBLE = "small_jobs:Square", "small_jobs:Trouble"
+# A worker starts in a new Python, which reads the jobs from this folder.
+pytestmark = pytest.mark.once
+
+
+@pytest.fixture(autouse=True)
+def jobs_can_be_imported(monkeypatch):
+    monkeypatch.syspath_prepend(str(HERE))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")]))
+
+
+def outcomes(name, seeds, limits=None, **parameters):
+    found = list(map_seeds(Spec(name, parameters), seeds, limits or Limits(2)))
+    assert sorted(one.seed for one in found) == sorted(seeds)
+    return {one.seed: one for one in found}
+
+
+def test_results_are_the_same_with_one_worker_and_with_three():
+    alone, together = outcomes(SQUARE, range(9), Limits(1)), outcomes(SQUARE, range(9), Limits(3))
+    assert [alone[seed].result for seed in range(9)] == [together[seed].result for seed in range(9)]
+    assert alone[4].result["square"] == 16.0
+    assert alone[4].result["threads"] == "1"
+
+
+def test_workers_end_the_job_and_are_replaced(tmp_path):
+    outcomes(SQUARE, range(7), Limits(1, episodes=3), folder=str(tmp_path))
+    started, ended = ({path.name.split("-")[1] for path in tmp_path.glob(kind + "-*")} for kind in ("started", "ended"))
+    assert len(started) == 3
+    assert ended == started
+
+
+def test_an_exception_fails_its_episode_alone():
+    found = outcomes(TROUBLE, range(4), raises=(1,), nonsense=(2,))
+    assert "ValueError: seed 1 is bad (" in found[1].error
+    assert "small_jobs.py, line" in found[1].error
+    assert "run() returned int" in found[2].error
+    assert sorted(seed for seed, one in found.items() if one.is_done) == [0, 3]
+
+
+def test_whatever_a_job_raises_is_told(tmp_path, capsys):
+    assert run("small_jobs:OddErrors", "--seeds", "0:4", "--out", tmp_path / "results.jsonl", "--workers", 1) == 1
+    said = capsys.readouterr().out
+    for text in ("seed 0 failed: SystemExit: 3 (", "seed 1 failed: SystemExit: 0 (", "seed 2 failed: Mute (",
+                 "seed 3 failed: ValueError: half a character: \\ud800 (", "0 ended well, 4 failed"):
+        assert text in said
+
+
+def test_a_worker_that_dies_costs_nothing_but_time(tmp_path):
+    found = outcomes(TROUBLE, range(6), dies_once=(1, 4), folder=str(tmp_path))
+    assert all(one.is_done for one in found.values())
+
+
+def test_an_episode_that_kills_every_worker_fails(tmp_path):
+    found = outcomes(TROUBLE, range(4), dies=(2,), folder=str(tmp_path))
+    assert "died twice: signal SIGKILL" in found[2].error
+    assert all(found[seed].is_done for seed in (0, 1, 3))
+
+
+def is_alive(pid):
+    try:
+        return Path("/proc/%d/stat" % pid).read_text().split(")")[-1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_an_episode_over_its_time_is_stopped_with_its_children(tmp_path):
+    found = outcomes(TROUBLE, range(3), Limits(1, episode_s=8.0), hangs=(1,), folder=str(tmp_path))
+    assert found[1].error == "took more than the limit of 8 s"
+    assert found[0].is_done and found[2].is_done
+    child = int((tmp_path / "child").read_text())
+    wait_until(lambda: not is_alive(child), "the episode's own process has ended")
+
+
+def test_closing_the_iterator_stops_the_workers(tmp_path):
+    iterator = map_seeds(Spec(TROUBLE, {"hangs": (1,), "folder": str(tmp_path)}), range(2), Limits(1))
+    assert next(iterator).seed == 0
+    wait_until((tmp_path / "child").exists, "the second episode runs")
+    wait_until((tmp_path / "child").read_text, "its process has a number")
+    iterator.close()
+    wait_until(lambda: not is_alive(int((tmp_path / "child").read_text())), "the episode's own process has ended")
+
+
+@pytest.mark.parametrize("name, parameters, text", [
+    ("no_colon", {}, "package.module:Class"), ("no_such_module:Job", {}, "cannot import no_such_module"),
+    ("./jobs.py:Job", {}, "cannot import ./jobs.py"),
+    ("small_jobs:Missing", {}, "has no Missing"), ("small_jobs:NoJob", {}, "derives from lab_batch.Job"),
+    (SQUARE, {"facto": 1}, "no parameter facto; it has factor, folder"),
+    ("small_jobs:CannotStart", {}, "OSError: no such robot"),
+])
+def test_wrong_jobs_are_refused(name, parameters, text):
+    with pytest.raises(JobError, match="job|--list") as caught:
+        load(Spec(name, parameters))
+    assert text in str(caught.value)
+
+
+@pytest.mark.parametrize("name, text", [("small_jobs:CannotStart", "no such robot"),
+                                        ("small_jobs:ExitsAtStart", "cannot start: SystemExit: wrong option"),
+                                        ("small_jobs:DiesAtStart", "2 workers in a row died at the start: signal SIG")])
+def test_a_job_that_cannot_start_ends_the_batch(name, text):
+    with pytest.raises(JobError, match=text):
+        list(map_seeds(Spec(name), range(100), Limits(2)))
+
+
+# -- records
+
+SPEC = Spec(SQUARE, {"factor": 2.0})
+
+
+def test_records_are_continued(tmp_path):
+    path = tmp_path / "some" / "results.jsonl"
+    records = Records(path, SPEC, {"python": "3"})
+    records.add(Outcome(3, {"square": 9.0}, "", 0.25))
+    records.add(Outcome(4, {}, "bad", 0.5))
+    records.close()
+    with path.open("a") as stream:
+        stream.write('{"seed": 5, "resu')  # a crash
+    again = Records(path, SPEC, {"python": "3"})
+    assert again.outcomes == {3: Outcome(3, {"square": 9.0}, "", 0.25), 4: Outcome(4, {}, "bad", 0.5)}
+    again.add(Outcome(5, {"square": 25.0}))
+    again.close()
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    assert rows[0]["batch"] == {"job": SQUARE, "parameters": {"factor": 2.0}, "versions": {"python": "3"}}
+    assert [row["seed"] for row in rows[1:]] == [3, 4, 5]
+
+
+@pytest.mark.parametrize("text, message", [
+    ("hello\n", "no file of results"), ('{"batch": {"job": "a:B", "parameters": {}}}\n', "has results of job a:B"),
+    (json.dumps({"batch": {"job": SQUARE, "parameters": {"factor": 1.0}}}) + "\n", "parameters"),
+])
+def test_other_files_are_not_touched(tmp_path, text, message):
+    path = tmp_path / "results.jsonl"
+    path.write_text(text)
+    with pytest.raises(RecordsError, match=message):
+        Records(path, SPEC, {})
+    assert path.read_text() == text
+
+
+def test_a_result_that_is_no_json_fails_its_episode(tmp_path):
+    records = Records(tmp_path / "results.jsonl", SPEC, {})
+    assert "cannot be written as JSON" in records.add(Outcome(1, {"value": float("nan")})).error
+    assert "cannot be written as JSON" in records.add(Outcome(2, {"value": object()})).error
+    records.close()
+
+
+def test_summary():
+    found = summary([Outcome(0, {"good": True, "size": 1.0, "name": "a"}), Outcome(1, {"good": False, "size": 3}),
+                     Outcome(2, {}, "failed")])
+    assert found == ["good: 1 of 2", "size: mean 2, from 1 to 3 (2)"]
+
+
+# -- the command
+
+@pytest.mark.parametrize("text, seeds", [("0:3", [0, 1, 2]), (":2", [0, 1]), ("7", [7]), ("1:3,7,2", [1, 2, 7])])
+def test_seeds(text, seeds):
+    assert command.seeds_of(text) == seeds
+
+
+@pytest.mark.parametrize("text", ["", "3:3", "5:2", "a", "-1", "1:", "1.5"])
+def test_wrong_seeds(text):
+    with pytest.raises(argparse.ArgumentTypeError):
+        command.seeds_of(text)
+
+
+def test_settings_are_literals_or_texts():
+    assert command.setting_of("factor=2.5") == ("factor", 2.5)
+    assert command.setting_of("side=left") == ("side", "left")
+    assert command.setting_of("dies=(1, 2)") == ("dies", (1, 2))
+    with pytest.raises(argparse.ArgumentTypeError):
+        command.setting_of("factor")
+
+
+def run(*words):
+    return command.main([str(word) for word in words])
+
+
+def test_a_batch_says_what_failed_and_how_to_repeat_it_and_continues(tmp_path, capsys):
+    out = tmp_path / "results.jsonl"
+    words = (TROUBLE, "--workers", 2, "--out", out, "--set", "raises=[2]", "--set", "folder=%s" % tmp_path)
+    assert run(*words, "--seeds", "0:4") == 1
+    said = capsys.readouterr().out
+    assert "seed 2 failed: ValueError: seed 2 is bad" in said
+    assert ("./baxter.sh batch small_jobs:Trouble --seeds 2 --set 'raises=[2]' --set folder=%s --out /dev/null"
+            % tmp_path in said)
+    assert "good: 3 of 3" in said
+    assert "3 ended well, 1 failed; 4 run now" in said
+    assert run(*words, "--seeds", "0:5") == 1
+    said = capsys.readouterr().out
+    assert "4 of 5 seeds have results" in said
+    assert "1 run now" in said
+    assert len(out.read_text().splitlines()) == 6
+    assert run(*words, "--seeds", "0:2") == 0
+    assert run(*words, "--seeds", "2", "--retry-failed") == 1
+    assert "1 run now" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words, text", [
+    (("--workers", "two"), "an integer greater than 0, not two"), (("--workers", "0"), "an integer greater than 0"),
+    (("--time-limit", "inf"), "a number greater than 0, not inf"), (("--recycle", ""), "not nothing")])
+def test_wrong_options_say_what_is_expected(capsys, words, text):
+    with pytest.raises(SystemExit) as caught:
+        run(SQUARE, "--seeds", "0:2", *words)
+    assert caught.value.code == 2 and text in capsys.readouterr().err
+
+
+def test_a_disk_without_space_ends_the_batch_with_one_line(capsys):
+    assert run(SQUARE, "--seeds", "0:2", "--out", "/dev/full") == 1
+    assert capsys.readouterr().err.startswith("batch: [Errno 28]")
+
+
+def test_a_wrong_job_is_one_line(tmp_path, capsys):
+    assert run("nothing", "--seeds", "1", "--out", tmp_path / "r") == 1
+    assert capsys.readouterr().err.startswith("batch: a job is named package.module:Class")
+    assert not (tmp_path / "r").exists()
+    with pytest.raises(SystemExit) as caught:
+        run("ik")
+    assert caught.value.code == 2
+
+
+def test_list_names_every_job_with_its_parameters(capsys):
+    assert run("--list") == 0
+    said = capsys.readouterr().out
+    assert "--set side=left" in said
+    assert "{seed}" in said
+
+
+def test_ctrl_c_ends_everything_and_the_batch_continues(tmp_path):
+    out = tmp_path / "results.jsonl"
+    words = [sys.executable, "-m", "lab_batch", TROUBLE, "--seeds", "0:3", "--workers", "1", "--out", str(out),
+             "--set", "hangs=[1]", "--set", "folder=%s" % tmp_path]
+    child = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        wait_until((tmp_path / "child").exists, "the second episode runs")
+        wait_until((tmp_path / "child").read_text, "its process has a number")
+        os.killpg(child.pid, signal.SIGINT)
+        said = child.communicate(timeout=60)[1]
+    finally:
+        child.kill()
+    assert child.returncode == 130
+    assert said.strip().endswith("batch: stopped; the same command continues")
+    assert "Traceback" not in said
+    wait_until(lambda: not is_alive(int((tmp_path / "child").read_text())), "the episode's own process has ended")
+    assert [json.loads(line)["seed"] for line in out.read_text().splitlines()[1:]] == [0]
+
+
+def test_a_batch_that_is_killed_leaves_no_worker(tmp_path):
+    words = [sys.executable, "-m", "lab_batch", TROUBLE, "--seeds", "1", "--workers", "1", "--out", str(tmp_path / "r"),
+             "--set", "hangs=[1]", "--set", "folder=%s" % tmp_path]
+    child = subprocess.Popen(words, start_new_session=True)
+    wait_until((tmp_path / "child").exists, "the episode runs")
+    wait_until((tmp_path / "child").read_text, "its process has a number")
+    episode = int((tmp_path / "child").read_text())
+    worker = int(Path("/proc/%d/stat" % episode).read_text().split(")")[-1].split()[1])
+    child.kill()
+    child.wait()
+    wait_until(lambda: not is_alive(worker), "the worker has ended")
+    os.kill(episode, signal.SIGKILL)
+
+
+# -- jobs that come with the workspace
+
+def test_a_program_gets_its_seed_and_a_separate_master():
+    program = ("import os, json; print('noise'); "
+               "print(json.dumps({'uri': os.environ['ROS_MASTER_URI'], 'seed': {seed}}))")
+    job = Command(command="%s -c %s" % (sys.executable, json.dumps(program)))
+    job.start()
+    found = job.run(7)
+    assert (found["exit_code"], found["seed"]) == (0, 7)
+    assert found["uri"] != job.run(8)["uri"]
+
+
+def test_a_program_that_fails_says_how():
+    job = Command(command="%s -c \"raise SystemExit('no robot')\"" % sys.executable)
+    job.start()
+    with pytest.raises(RuntimeError, match="exit code 1; the end of its output: no robot"):
+        job.run(1)
+
+
+def test_inverse_kinematics_solves_reachable_poses():
+    found = outcomes("lab_batch.shipped:InverseKinematics", [5], Limits(1), poses=20)[5]
+    assert found.result["all_solved"], found
+    assert found.result["farthest_off_m"] < 1e-4
