@@ -5,13 +5,10 @@ import math
 import cv2
 import numpy as np
 
-from model_files.resources import ResourceFinder
 from sensor_renderer.errors import RenderingError
+from sensor_renderer.following import WorldFollower
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import Pinhole
-from world_picture.drawing import DrawingCache
-from world_picture.snapshot import SnapshotReader
 
 FIELD_OF_VIEW_RAD = 0.75
 # Default position of the camera, relative to the centre of the scene.
@@ -70,40 +67,17 @@ def draw_frame(pixels, pinhole, view, frame, length, name=""):
         cv2.putText(pixels, name, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (20, 20, 20), 1, cv2.LINE_AA)
 
 
-class Outside:
+class Outside(WorldFollower):
     """Draws the world of one snapshot folder. Use it in the thread that made it."""
 
     def __init__(self, folder, warn):
         """Raises world_picture.snapshot.SnapshotError if there is no snapshot."""
-        self._reader = SnapshotReader(folder)
-        self._finder = ResourceFinder()
-        self._mirror = Mirror(DrawingCache(), self._finder, warn)
-        self._revision = None
+        super().__init__(folder, warn)
         self._renderer = None
-
-    @property
-    def is_alive(self):
-        """False once the simulator has ended."""
-        return self._reader.is_alive
-
-    def follow(self):
-        """Update all poses from the snapshot; returns whether there is a world to draw."""
-        snapshot = self._reader.read()
-        if snapshot is None:
-            return False
-        if snapshot.revision != self._revision:
-            revision, *seen = self._reader.scene()
-            if revision != snapshot.revision:
-                return False  # a state of the new scene follows
-            self._finder.forget_missing()
-            self._mirror.set_scene(*seen)
-            self._revision = revision
-        self._mirror.set_state(snapshot.values)
-        return True
 
     def link_pose(self, link):
         """Pose (4, 4) in the world of a link that is its own body; None if there is none."""
-        for body in self._mirror.bodies.values():
+        for body in self.mirror.bodies.values():
             try:
                 return body.link_matrix(link)
             except KeyError:
@@ -118,7 +92,7 @@ class Outside:
         [m].
         """
         if target is None or eye is None:
-            low, high = extent(self._mirror)
+            low, high = extent(self.mirror)
             middle, radius = (low + high) / 2.0, float(np.linalg.norm(high - low)) / 2.0
             target = middle if target is None else np.asarray(target, dtype=float)
             narrow = FIELD_OF_VIEW_RAD * min(1.0, height / width)
@@ -128,7 +102,7 @@ class Outside:
         pinhole = Pinhole.from_field_of_view(width, height, FIELD_OF_VIEW_RAD, 0.05, 100.0)
         if self._renderer is None:
             self._renderer = _make_renderer()
-        pixels = self._renderer.render(self._mirror, pinhole, pose)[0].copy()
+        pixels = self._renderer.render(self.mirror, pinhole, pose)[0].copy()
         for name, frame in (frames or {}).items():
             draw_frame(pixels, pinhole, np.linalg.inv(pose), frame, length, name)
         return pixels

@@ -39,7 +39,7 @@ _outside = threading.local()
 
 
 class ShowError(Exception):
-    """There is nothing to show; the text says why."""
+    """There is nothing to show; the text gives the reason."""
 
 
 def picture(eye=None, target=None, frames=(), size=(640, 480), length=0.12):

@@ -113,7 +113,7 @@ class Lab:
         if not self.is_ours:
             self._command = command
         elif command != self._command:
-            _say("what runs was started as: roslaunch %s; lab.stop() stops it, and the next connect starts it anew"
+            _say("what runs was started as: roslaunch %s; lab.stop() stops it, and the next connect starts it again"
                  % " ".join(self._command))
 
     def _is_up(self):
@@ -155,7 +155,7 @@ def connect(name, *arguments):
     """Return the :class:`Lab` of that name (a key of :data:`lab_session.labs.LABS`), and make this process a ROS node.
 
     Uses the simulator on the master that ROS_MASTER_URI names; if there is none, starts one there, with further launch
-    `arguments` such as "gui:=false"; if another robot runs there, starts one on a port of its own and sets
+    `arguments` such as "gui:=false"; if another robot runs there, starts one on a separate port and sets
     ROS_MASTER_URI. Calling it again is safe: it finds the lab of the first call, or starts it again with the present
     arguments.
 

@@ -60,4 +60,4 @@ def test_what_runs_goes_on_and_other_arguments_are_told_how_they_come_to_count(a
     assert "lab.stop() stops it, and" not in capsys.readouterr().err
     lab_session.connect("baxter", "gui:=true")
     assert asked[-1][2:] == ["gui:=false"]
-    assert "gui:=false; lab.stop() stops it, and the next connect starts it anew" in capsys.readouterr().err
+    assert "gui:=false; lab.stop() stops it, and the next connect starts it again" in capsys.readouterr().err

@@ -44,7 +44,7 @@ def parse(name, arguments):
 def positive(text):
     value = float(text)
     if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError("%s is no positive number of seconds" % text)
+        raise argparse.ArgumentTypeError("%s is not a positive number of seconds" % text)
     return value
 
 
@@ -142,7 +142,7 @@ def show_window(options):
 
 
 def main(name):
-    """The command ``name``: reads the command line; exits with one line if it cannot go on."""
+    """The command ``name``: reads the command line; exits with a one-line error if it cannot continue."""
     options = parse(name, rospy.myargv()[1:])
     if not rosgraph.is_master_online():
         sys.exit("%s: no ROS master at %s; start roscore or a launch file" % (name, rosgraph.get_master_uri()))

@@ -95,7 +95,7 @@ def curves(topic, tokens, type_name, fields_of):
     numbers = [name for name, kind in fields.items() if kind in NUMBERS]
     if not numbers:
         what = "it has %s" % _listing(fields) if fields else "only numbers can be plotted"
-        raise PlotError("%s (%s) is no number; %s" % (label, here, what))
+        raise PlotError("%s (%s) is not a number; %s" % (label, here, what))
     return [Curve("%s/%s" % (label, name), (*steps, (name, None))) for name in numbers]
 
 
@@ -110,7 +110,7 @@ def _element(label, declared, index):
     array = _ARRAY.fullmatch(declared)
     if array is None:
         if index is not None:
-            raise PlotError("%s: this field is no array but one %s; leave out the index" % (label, declared))
+            raise PlotError("%s: this field is not an array but one %s; leave out the index" % (label, declared))
         return declared
     element, length = array.groups()
     if index is None:

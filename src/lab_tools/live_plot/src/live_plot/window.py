@@ -92,7 +92,7 @@ class PlotWindow(QtWidgets.QWidget):
         for label in labels:
             self._remove_menu.addAction(label, lambda label=label: self._unsubscribe(label))
         if self._waiting:
-            self._remove_menu.addAction("what is waited for", self._waiting.clear)
+            self._remove_menu.addAction("the topics that are waited for", self._waiting.clear)
         if len(labels) > 1:
             self._remove_menu.addAction("all", lambda: [self._unsubscribe(label) for label in labels])
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The window's command in a process of its own, on Qt's offscreen platform, without a ROS master."""
+"""The window's command in a separate process, on Qt's offscreen platform, without a ROS master."""
 import os
 import subprocess
 import sys

@@ -85,13 +85,13 @@ def test_times_are_seconds_and_have_parts():
 @pytest.mark.parametrize("type_name, tokens, text", [
     (JOINTS, ["posit"], r"/t \(sensor_msgs/JointState\) has no field 'posit'; it has header .*position \(float64\["),
     (JOINTS, ["position"], r"/t/position is an array \(float64\[\]\): choose an element, as in /t/position\[0\]"),
-    (JOINTS, ["name[0]"], r"/t/name\[0\] \(string\) is no number; only numbers can be plotted"),
+    (JOINTS, ["name[0]"], r"/t/name\[0\] \(string\) is not a number; only numbers can be plotted"),
     (JOINTS, ["header", "stamp", "hours"], r"/t/header/stamp \(time\) has no field 'hours'; it has secs .*nsecs"),
     (JOINTS, ["position[0]", "x"], r"/t/position\[0\] is one float64 and has no field 'x'"),
-    ("std_msgs/String", [], r"/t \(std_msgs/String\) is no number; it has data \(string\)"),
-    ("geometry_msgs/Point", ["x[0]"], r"/t/x\[0\]: this field is no array but one float64"),
+    ("std_msgs/String", [], r"/t \(std_msgs/String\) is not a number; it has data \(string\)"),
+    ("geometry_msgs/Point", ["x[0]"], r"/t/x\[0\]: this field is not an array but one float64"),
     ("geometry_msgs/PoseWithCovariance", ["covariance[36]"], r"the array has 36 elements, counted from 0"),
-    ("geometry_msgs/PoseWithCovariance", ["pose"], r"is no number; it has position \(geometry_msgs/Point\)")])
+    ("geometry_msgs/PoseWithCovariance", ["pose"], r"is not a number; it has position \(geometry_msgs/Point\)")])
 def test_wrong_field_is_answered_with_the_fields(type_name, tokens, text):
     with pytest.raises(PlotError, match=text):
         labels(type_name, *tokens)

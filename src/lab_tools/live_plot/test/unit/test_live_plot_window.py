@@ -122,7 +122,7 @@ def test_late_topic_is_waited_for(window, application):
     timer = pyqtgraph.QtCore.QElapsedTimer()
     timer.start()
     while "/a/x" not in window.recording.labels:
-        assert timer.elapsed() < 10_000, "the late topic was not plotted within 10 s"
+        assert timer.elapsed() < 60_000, "the late topic was not plotted within a minute"
         application.processEvents(pyqtgraph.QtCore.QEventLoop.ProcessEventsFlag.WaitForMoreEvents, 100)
     assert "waiting" not in status(window)
 
