@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Motion planning for arms described by URDF and SRDF. Free of ROS; the sub-packages are the interface."""
+"""Motion planning for arms described by URDF and SRDF. No ROS needed; the sub-packages are the interface."""

@@ -10,34 +10,34 @@ from baxter_sim_kinematics import Budget, Chain, InvalidTarget, KinematicsError,
 from motion_planning.errors import PlanningError
 from urdf_model.transforms import axis_rotation, inverse, rigid, rotation_angle
 
-# Between two steps the link may be off its line by this much [m], [rad]; steps are halved until it is not.
+# Allowed distance of the link from its line between two steps [m], [rad]; a step is halved if it is exceeded.
 LINE_TOLERANCE_M = 1e-3
 LINE_TOLERANCE_RAD = 1e-2
-# A step is halved so often at most; what is off its line then is a jump of the joints.
+# Greatest number of halvings of a step; a remaining deviation from the line is a jump of the joints.
 _HALVINGS = 8
-# A step turns the link by at most so many radians for each metre that it may move.
+# Greatest rotation of the link in a step, per metre of its greatest translation.
 _RADIANS_PER_METRE = 3.5
-# ``accept`` is asked at joint values at most this far apart [rad or m, in any joint].
+# Greatest distance of joint values between two calls of ``accept`` [rad or m, in any joint].
 _RESOLUTION = 0.05
 _MOST_STEPS = 20000
-# Fewer points say nothing about the mean step, which the jump threshold multiplies.
+# Least number of points for a meaningful mean step, which the jump threshold multiplies.
 _FEWEST_FOR_JUMPS = 10
-# The descent from the step before; then with more starts, of which the nearest to the step before counts.
+# First a descent from the previous step; then more starts, of which the solution nearest to the previous step counts.
 _NEXT = Budget(candidates=1, max_starts=1)
 _THOROUGH = Budget(candidates=16)
 
 
 class CartesianError(PlanningError):
-    """A request that no path can be looked for, with the reason."""
+    """A request for which no path can be computed; the text gives the reason."""
 
 
 class Steps(NamedTuple):
-    """How a line is cut, and which of its points will do.
+    """How a line is divided into steps, and which of its points are valid.
 
-    max_step: distance of two points at most [m]; turns follow in proportion; steps are halved where the link would
-    leave its line in between. jump_threshold: 0, or the most that a step may be of the mean step, in joint space;
-    looked at from ten points on. accept(q (k,)): None, or the sentence that says why not; asked along the steps too.
-    stop(): true ends the search.
+    max_step: greatest distance of two points [m]; rotations in proportion; a step is halved if the link would leave its
+    line in between. jump_threshold: 0, or the greatest ratio of a step to the mean step, in joint space; checked from
+    ten points on. accept(q (k,)): None, or the reason why q is not valid; also called along the steps. stop(): true
+    ends the search.
     """
 
     max_step: float
@@ -59,9 +59,9 @@ def cartesian_path(model, group, start, link, waypoints, steps):
     """Return the :class:`CartesianPath` that moves ``link`` in straight lines through ``waypoints``.
 
     model: PlanningModel; group: name; start: State. waypoints: poses (4, 4) of the link in the planning frame.
-    steps: :class:`Steps`. Each leg of the path counts the same in ``fraction``.
+    steps: :class:`Steps`. Each leg of the path has the same share of ``fraction``.
 
-    Raises CartesianError for a max_step that is not above 0, waypoints that are no poses, a link that the group does
+    Raises CartesianError for a max_step that is not above 0, waypoints that are not poses, a link that the group does
     not move alone, and too many steps.
     """
     max_step, jump_threshold = steps.max_step, steps.jump_threshold
@@ -76,7 +76,7 @@ def cartesian_path(model, group, start, link, waypoints, steps):
     if len(pieces) > _MOST_STEPS or not sum(pieces) / _MOST_STEPS <= max_step:
         raise CartesianError("%d waypoints over %g m in steps of %g m are too many points, the most is %d; make the "
                              "steps larger" % (len(pieces), sum(pieces), max_step, _MOST_STEPS))
-    # The little taken off keeps 0.3 / 0.1 from becoming four.
+    # The small subtraction keeps 0.3 / 0.1 from being rounded up to four.
     counts = [max(1, math.ceil(piece / max_step - 1e-6)) for piece in pieces]
     points, done, reason = [follower.q], [0.0], None
     for leg, (goal, count) in enumerate(zip(waypoints, counts, strict=True)):
@@ -119,14 +119,14 @@ class Line:
     """Poses (4, 4) from one to another: the position on a line, the rotation about one axis."""
 
     def __init__(self, begin, end):
-        """begin, end (4, 4). length [m], angle [rad]: of the whole way."""
+        """begin, end (4, 4). length [m], angle [rad]: of the whole line."""
         self._begin, self._shift = begin, end[:3, 3] - begin[:3, 3]
         turn = begin[:3, :3].T @ end[:3, :3]
         self.length, self.angle = float(np.linalg.norm(self._shift)), rotation_angle(turn)
         self._axis = _axis(turn, self.angle)
 
     def at(self, fraction):
-        """Return the pose at ``fraction`` of the way, 0 to 1."""
+        """Return the pose at ``fraction`` of the line, 0 to 1."""
         rotation = self._begin[:3, :3] @ axis_rotation(self._axis, fraction * self.angle)
         return rigid(rotation, self._begin[:3, 3] + fraction * self._shift)
 
@@ -148,7 +148,7 @@ def _axis(rotation, angle):
 
 
 def _pieces(begin, end):
-    """What steps are cut from [m]: the way, or the turn in proportion where that is more."""
+    """The length that is divided into steps [m]: of the line, or of the rotation in proportion if that is greater."""
     distance = float(np.linalg.norm(end[:3, 3] - begin[:3, 3]))
     angle = rotation_angle(begin[:3, :3].T @ end[:3, :3])
     return max(distance, angle / _RADIANS_PER_METRE)
@@ -157,12 +157,12 @@ def _pieces(begin, end):
 class Follower:
     """Follows a line with the joints of one group that move the link.
 
-    A line is anything that gives the pose at a fraction of the way: ``at(fraction)``. q (k,): where the group has got
-    to; fractions: the line's at each point that was appended.
+    A line is an object with ``at(fraction)``, which returns the pose at a fraction of it. q (k,): the group's present
+    values; fractions: of the line, at each appended point.
     """
 
     def __init__(self, model, group, start, link, accept):
-        """model: PlanningModel; group: Group; start: State; accept: as :class:`Steps` has it. Raises CartesianError."""
+        """model: PlanningModel; group: Group; start: State; accept: as in :class:`Steps`. Raises CartesianError."""
         self._accept, self.link = accept, link
         self._names = group.joints
         self.fractions = []
@@ -178,14 +178,15 @@ class Follower:
         try:
             return Target(waypoint).pose
         except InvalidTarget as error:
-            raise CartesianError("waypoint %d is no pose: %s" % (number + 1, error)) from None
+            raise CartesianError("waypoint %d is not a pose: %s" % (number + 1, error)) from None
 
     def pose_of_link(self, q):
         """Return the pose (4, 4) of the link in the planning frame with the group's joints at ``q`` (k,)."""
         return self._base @ self._chain.fk(q[self._columns])
 
     def advance(self, line, begin, end, points):
-        """Append the points from ``begin`` (excluded) to ``end`` on the line; return None, or why there are none."""
+        """Append the points from ``begin`` (excluded) to ``end`` on the line; return None, or the reason of a
+        failure."""
         before = self.q
         count = len(points)
         reason = self._advance(line, begin, end, points, _HALVINGS)
@@ -238,7 +239,8 @@ class Follower:
 
 
 def _moving(model, group, link):
-    """The link from which on the group's joints move ``link``, and these joints in order. Raises CartesianError."""
+    """The first link of the chain in which the group's joints move ``link``, and these joints in order. Raises
+    CartesianError."""
     if link not in model.robot.links:
         raise CartesianError("the robot has no link '%s'" % link)
     way = model.robot.chain(model.root, link)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pairs of links that need not be checked against each other, found by moving the robot about."""
+"""Pairs of links that need no collision check, found from random states of the robot."""
 from __future__ import annotations
 
 from collections import Counter
@@ -12,16 +12,18 @@ from motion_planning.model.planning_model import pair_of
 from motion_planning.scene import AllowedCollisions, Scene
 from motion_planning.srdf import DisabledPair
 
-#: Random states that tell what touches always, and the share of them in which it has to; of MoveIt's setup assistant.
+#: Number of random states for pairs that always touch, and the share of contacts that counts as always; as in MoveIt's
+#: setup assistant.
 ALWAYS_STATES, ALWAYS_SHARE = 200, 0.95
-#: Random states that tell what never touches.
+#: Number of random states for pairs that never touch.
 TRIALS = 10_000
-# What comes first is the reason that is written down.
+# The first reason that applies is written.
 _REASONS = ("User", "Adjacent", "Default", "Always", "Never")
 
 
 def disabled_pairs(model, meshes, *, trials=TRIALS, share=ALWAYS_SHARE, seed=0):
-    """Return [DisabledPair, ...] of ``model``, sorted by names; what its SRDF disables for reason "User" stays so.
+    """Return [DisabledPair, ...] of ``model``, sorted by names; pairs that its SRDF disables for reason "User" are
+    kept.
 
     ``meshes``: as of ExactChecker. A pair is disabled when its links are neighbours, over joints and over links without
     a shape (Adjacent); when they touch with all joints at 0 or in the middle (Default); in the ``share`` of
@@ -71,7 +73,7 @@ def adjacent_pairs(model):
 
 
 def summary(pairs):
-    """Return how many of ``pairs`` (DisabledPair) there are of each reason, as one line."""
+    """Return the number of ``pairs`` (DisabledPair) for each reason, as one line."""
     counts = Counter(pair.reason for pair in pairs)
     return "%d pairs: %s" % (len(pairs), ", ".join("%d %s" % (counts[reason], reason) for reason in _REASONS
                                                    if counts[reason]))

@@ -32,7 +32,7 @@ def collisions_updater(arguments=None):
     if options.trials < 1 or not 0.0 < options.share <= 1.0:
         parser.error("--trials must be 1 or more, and --min-collision-fraction more than 0 and at most 1")
     if options.srdf.suffix == ".xacro" and options.output is None and not options.lines:
-        parser.error("%s is xacro; say with --output where the SRDF shall go" % options.srdf)
+        parser.error("%s is xacro; name the SRDF file to write with --output" % options.srdf)
     try:
         text = _text(options.srdf)
         model = PlanningModel.from_xml(_text(options.urdf), text)
@@ -52,7 +52,7 @@ def collisions_updater(arguments=None):
 
 
 def prepare_robots(arguments=None):
-    """``prepare_robots``: make the spheres of robots, which planning then finds on disk. Returns the exit status."""
+    """``prepare_robots``: make the spheres of robots, which planning then loads from disk. Returns the exit status."""
     parser = argparse.ArgumentParser(
         prog="prepare_robots", description="Make all that planning needs to know of a robot's shape, so that the "
         "first start of move_group does not wait for it.")
@@ -66,7 +66,7 @@ def prepare_robots(arguments=None):
 
 
 def _prepare_one(path):
-    """Return why the robot of a file cannot be prepared, None where it is."""
+    """Prepare the robot of a file; return None, or the reason of a failure."""
     try:
         model = PlanningModel.from_xml(_text(path), "")
         exact = ExactChecker(model, MeshReader(ResourceFinder()))
@@ -87,5 +87,5 @@ def _text(path):
 
     try:
         return xacro.process_file(str(path)).toprettyxml(indent="  ")
-    except Exception as error:  # its expressions are Python: they can raise anything
+    except Exception as error:  # its expressions are Python, which can raise any exception
         raise PlanningError("xacro cannot expand %s: %s" % (path, " ".join(str(error).split()))) from None

@@ -3,4 +3,4 @@
 
 
 class PlanningError(ValueError):
-    """Something asked of motion planning cannot be done. The text is one sentence: what, with which value."""
+    """A request to motion planning failed. The text is one sentence: what happened, with which value."""

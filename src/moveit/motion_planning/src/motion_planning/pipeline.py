@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From a request to a timed trajectory, or to the reason why there is none."""
+"""From a planning request to a timed trajectory, or to the reason of a failure."""
 import enum
 import itertools
 import math
@@ -15,23 +15,23 @@ from motion_planning.planners import NoPath, Search, first_touching, rrt_connect
 from motion_planning.scene import Scene
 from motion_planning.timing import Timed, time_path
 
-# How far [rad or m] corners may be cut, tried in this order: a curve that meets something is drawn tighter.
+# Allowed cutting of corners [rad or m], tried in this order: a curve in collision gets a smaller one.
 _CORNERS = (0.05, 0.01, 0.001)
-# States of the timed trajectory are checked so far apart at most [rad or m, in any joint]: by exact geometry; where
-# path constraints hold; and those in between, which exact geometry sees only where spheres are not free.
+# Greatest distance of checked states of the timed trajectory [rad or m, in any joint]: by exact geometry; for path
+# constraints; and of states in between, which exact geometry checks only if spheres are not free.
 _RESOLUTION, _CONSTRAINED, _BETWEEN = 0.03, 0.01, 0.003
-# Postures of goals that a planner gets, and how long [s] more than one are looked for.
+# Number of goal postures for a planner, and time limit [s] of the search for more than one.
 _GOALS, _MORE_GOALS_S = 8, 0.02
-# Share of the allowed time for goal postures, and random states around a start that touches something.
+# Share of the allowed time for goal postures, and number of random states around a start in collision.
 _SHARE_FOR_GOALS, _JIGGLES = 0.5, 100
-# Paths that are timed before the request is given up, where one is not valid as it would be played.
+# Number of paths to time before the request fails, if timed trajectories are not valid.
 _MOST_PATHS = 4
-# Contacts that a sentence names.
+# Greatest number of contacts in a sentence.
 _NAMED = 3
 
 
 class Code(enum.IntEnum):
-    """Values of moveit_msgs/MoveItErrorCodes that planning gives."""
+    """Values of moveit_msgs/MoveItErrorCodes that planning returns."""
 
     SUCCESS = 1
     FAILURE = 99999
@@ -53,8 +53,8 @@ class Code(enum.IntEnum):
 
 
 class PlanningFailure(PlanningError):
-    """Why there is no plan. code: a :class:`Code`; contacts: exact.Contacts that are in the way; joints: {joint: value}
-    of those that are."""
+    """Why there is no plan. code: a :class:`Code`; contacts: exact.Contacts of the failure; joints: {joint: value}
+    beyond their limits."""
 
     def __init__(self, code, text, contacts=(), joints=None):
         super().__init__(text)
@@ -63,15 +63,15 @@ class PlanningFailure(PlanningError):
 
 @dataclass(frozen=True, eq=False)
 class PlanQuery:
-    """What is asked for.
+    """A planning request.
 
-    scene: Scene with the robot at the start; group: name; goals: ConstraintSets, of which one has to be met.
-    path_constraints: ConstraintSet that holds all the way, or None. planner: as Search has it. allowed_time [s];
+    scene: Scene with the robot at the start; group: name; goals: ConstraintSets, one of which must be met.
+    path_constraints: ConstraintSet for the whole path, or None. planner: as in Search. allowed_time [s];
     attempts: plans of which the shortest counts. velocity_scaling, acceleration_scaling: 0 < f <= 1. timing: algorithm
     of timing.time_path.
-    start_bounds_error: by how much [rad or m] the start may be beyond a limit; it is brought onto it.
-    jiggle: share of a joint's range within which a start that touches something is moved to one that does not.
-    planner_id: the command, where `industrial` plans.
+    start_bounds_error: by how much [rad or m] the start may be beyond a limit; it is moved onto the limit.
+    jiggle: share of a joint's range within which a start in collision is moved to a free one.
+    planner_id: the command, if `industrial` plans.
     """
 
     scene: Scene
@@ -91,8 +91,8 @@ class PlanQuery:
 
 @dataclass(frozen=True, eq=False)
 class Tools:
-    """What plans are made with: exact: ExactChecker; plan_path, sampler: as planners and constraints have them; clock:
-    function that gives the time [s]; seed: of all that is random; stop(): true ends the planning."""
+    """The tools of planning: exact: ExactChecker; plan_path, sampler: as in planners and constraints; clock: function
+    that returns the time [s]; seed: of the random numbers; stop(): true ends the planning."""
 
     exact: Any
     plan_path: Callable
@@ -114,14 +114,14 @@ class Plan(NamedTuple):
 def plan(query, tools):
     """Return a :class:`Plan` for a :class:`PlanQuery`. Raises PlanningFailure.
 
-    Nothing of the returned trajectory was checked by an approximation alone: its states, as controllers play them,
-    are free of collisions in ``tools.exact``.
+    The returned trajectory is not only checked by an approximation: its states, sampled as in a controller, are free of
+    collisions in ``tools.exact``.
     """
     return _Planning(query, tools).run()
 
 
 class _Planning:
-    """One request on its way."""
+    """One request while it is planned."""
 
     def __init__(self, query, tools):
         self.query, self.tools = query, tools
@@ -171,12 +171,12 @@ class _Planning:
     # -- start --------------------------------------------------------------------------------------------------
 
     def _start(self):
-        """(scene with a start that will do, the states (m, k) that lead there from where the robot is)."""
+        """Return (scene with a valid start, the states (m, k) from the robot's state to it)."""
         scene = self._within_limits(self.query.scene)
         q = self.query.scene.state.q[self.indices]
         lead = np.empty((0, len(q))) if scene is self.query.scene else q[None]
         contacts = self.tools.exact.contacts(scene, scene.state, self.query.group)
-        # The first question about a scene makes its tables; with 10,000 objects that shall not use up the time.
+        # The first question about a scene makes its tables; with 10,000 objects that must not use up the time.
         self.tables_made = self.tools.clock()
         if contacts:
             free = self._free_near(scene)
@@ -204,7 +204,7 @@ class _Planning:
         return scene.with_state(scene.state.with_q(inside, self.indices))
 
     def _free_near(self, scene):
-        """A free posture (k,) near the scene's, or None."""
+        """Return a free posture (k,) near the scene's, or None."""
         random = np.random.default_rng(self.tools.seed)
         low, high = self.model.bounds[self.indices].T
         q = scene.state.q[self.indices]
@@ -219,7 +219,7 @@ class _Planning:
     # -- goals --------------------------------------------------------------------------------------------------
 
     def _goals(self, scene):
-        """Postures (g, k) that meet one of the goals and touch nothing."""
+        """Return postures (g, k) that meet one of the goals and are free of collisions."""
         found, failures = [], []
         for goal in self.query.goals:
             try:
@@ -258,7 +258,7 @@ class _Planning:
         return found
 
     def _brought_back(self, q, goal, scene):
-        """A free posture (k,) near ``q`` that meets a goal and the path constraints, None where none is found."""
+        """Return a free posture (k,) near ``q`` that meets a goal and the path constraints, None if none is found."""
         path = self.query.path_constraints
         near = Manifold(scene, self.group, goal.merged(path), q).project(q)
         if near is None:
@@ -269,7 +269,7 @@ class _Planning:
         return near if self.tools.exact.free(scene, state, self.query.group) else None
 
     def _why_no_goal(self, scene):
-        """The PlanningFailure of the goal that got furthest."""
+        """Return the PlanningFailure of the goal that passed the most stages."""
         unreached = None
         for goal in self.query.goals:
             samples = self._samples(goal, scene, None, 1.0)
@@ -303,7 +303,7 @@ class _Planning:
         return any(not self._violated(goal, state, scene) for goal in self.query.goals)
 
     def _violated(self, constraints, state, scene):
-        """The sentence on the first constraint that ``state`` does not meet, or an empty one."""
+        """Return the sentence on the first constraint that ``state`` violates, or an empty one."""
         if constraints is None:
             return ""
         evaluated = constraints.evaluate(self.model, state, scene, self.tools.exact)
@@ -329,10 +329,10 @@ class _Planning:
         acceleration = self.model.acceleration[self.indices] * self.query.acceleration_scaling
         whole = np.concatenate([lead, path])
         hit = None
-        through = self.query.timing.startswith("iterative")  # its splines keep to the lines by the points being near
+        through = self.query.timing.startswith("iterative")  # the points are dense, so its splines stay near the lines
         ways = [(self.query.timing, tolerance) for tolerance in _CORNERS]
         if self.query.path_constraints is not None and not through:
-            # Constraints that leave next to nothing: through every point of a path that is dense.
+            # For very tight constraints: through every point of a dense path.
             ways.append(("iterative_time_parameterization", _CORNERS[-1]))
         for timing, tolerance in ways:
             self._look_up()
@@ -345,12 +345,12 @@ class _Planning:
                               % hit[0], hit[1])
 
     def _first_hit(self, scene, timed, from_collision):
-        """None, or (sentence, contacts) of the first state of a trajectory that may not be."""
+        """Return None, or (sentence, contacts) of the first invalid state of a trajectory."""
         step = _RESOLUTION if self.query.path_constraints is None else _CONSTRAINED
         states, _, _ = timed.sampled(timed.spaced(step))
         low, high = self.model.bounds[self.indices].T
         turns = self.model.continuous[self.indices]
-        # Who starts a little beyond a limit is led back.
+        # A start slightly beyond a limit is led back.
         low, high = np.where(turns, -np.inf, np.minimum(low, states[0])), np.where(turns, np.inf,
                                                                                   np.maximum(high, states[0]))
         beyond = np.argwhere((states < low - 1e-6) | (states > high + 1e-6))
@@ -370,7 +370,7 @@ class _Planning:
                     contacts = self.tools.exact.contacts(scene, state, self.query.group)
                     return _named(contacts), contacts
             else:
-                left = True  # out of what the start state touched
+                left = True  # out of the start state's collision
                 violated = self._violated(self.query.path_constraints, state, scene)
                 if violated:
                     return violated, []
@@ -394,11 +394,11 @@ class _Planning:
         return self.tools.clock() - self.begin
 
     def _used(self):
-        """How much of the allowed time has been used [s]."""
+        """The used part of the allowed time [s]."""
         return self.tools.clock() - self.tables_made
 
     def _is_over(self, share=1.0):
-        """Whether nothing more is to be tried: stopped, or this share of the time is over."""
+        """Whether to stop: requested, or this share of the time is over."""
         return self.tools.stop() or self._used() > share * self.query.allowed_time
 
     def _look_up(self):

@@ -49,7 +49,7 @@ class Octree:
     """Occupied cubes of an octree. resolution [m]: side of the smallest; boxes (n, 4): centre x y z, and side.
 
     Raises ValueError for a side that is not the resolution times a power of 2, a cube off the grid of its size, and one
-    farther from the origin than the tree has room for, 32768 times the resolution.
+    too far from the origin for the tree, 32768 times the resolution.
     """
 
     resolution: float
@@ -78,7 +78,7 @@ class Octree:
 
 
 def read_only(array, kind=np.float64):
-    """Return a contiguous copy of ``array`` that cannot be written, or ``array`` itself where it is one already."""
+    """Return a contiguous copy of ``array`` that cannot be written, or ``array`` itself if it is one already."""
     if isinstance(array, np.ndarray) and array.dtype == kind and array.flags.c_contiguous and not array.flags.writeable:
         return array
     copy = np.array(array, dtype=kind, order="C")

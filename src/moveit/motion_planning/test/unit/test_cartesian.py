@@ -134,7 +134,7 @@ def test_bad_numbers_are_refused(robot, options, sentence):
 
 
 def test_bad_waypoints_and_links_are_refused(robot):
-    with pytest.raises(CartesianError, match="waypoint 2 is no pose"):
+    with pytest.raises(CartesianError, match="waypoint 2 is not a pose"):
         robot.path([robot.moved(z=-0.05), np.full((4, 4), np.nan)])
     robot.link = robot.model.root
     with pytest.raises(CartesianError, match="moves link"):

@@ -106,9 +106,9 @@ def test_regions(scene, shape, inside, outside):
 
 def test_positions_that_are_none(scene):
     for make, words in ((lambda: PositionTarget("left_gripper", ()), "no region"),
-                        (lambda: PositionTarget("left_gripper", ((Plane(), at()),)), "Plane, which has no inside"),
+                        (lambda: PositionTarget("left_gripper", ((Plane(), at()),)), "a Plane as region"),
                         (lambda: PositionTarget("left_gripper", ((Sphere(1.0), at(math.nan)),)), "not finite"),
-                        (lambda: one(scene, PositionTarget("nose", ((Sphere(1.0), at()),))), "'nose' is no frame"),
+                        (lambda: one(scene, PositionTarget("nose", ((Sphere(1.0), at()),))), "'nose' is not a frame"),
                         (lambda: one(scene, PositionTarget("torso", ((Sphere(1.0), at()),), frame="x")), "'x' is no"),):
         with pytest.raises(ConstraintError, match=words):
             make()
@@ -161,9 +161,9 @@ def test_visibility(scene, exact):
                               max_view_angle=0.3)
     assert "turned away from the sensor by 0.5" in one(scene, turned, exact).sentence
     beside = VisibilityTarget(0.02, facing @ at(0.0, 0.0, 0.2), camera, "left_gripper", max_range_angle=0.05)
-    assert "beside the sensor's axis" in one(scene, beside, exact).sentence
+    assert "off the sensor's axis" in one(scene, beside, exact).sentence
     behind = VisibilityTarget(0.02, at(-0.6, 0.0, 1.2), camera)
-    assert "stands between the sensor and the target" in one(scene, behind, exact).sentence
+    assert "is between the sensor and the target" in one(scene, behind, exact).sentence
     assert one(scene, behind).satisfied  # without a checker nothing stands in the way
     along_x = VisibilityTarget(0.02, facing @ at(0.0, 0.0, 0.2), at(2.0, 0.0, 1.2, rpy_matrix(0, 0, math.pi)),
                                "left_gripper", view_axis=2, max_view_angle=0.3)
@@ -201,7 +201,7 @@ def test_frames_are_looked_up_when_the_goal_is_set(scene):
     moved = goal.resolved(held)
     assert {one.link for one in moved.positions + moved.orientations} == {"left_gripper"}
     assert moved.broken(held.model, held.state, held) is None
-    with pytest.raises(ConstraintError, match="'cup/rim', which the robot has not, nor holds"):
+    with pytest.raises(ConstraintError, match="'cup/rim', which is neither a link nor attached"):
         goal.resolved(scene)
 
 

@@ -125,7 +125,7 @@ def test_nothing_works_and_every_fall_is_named(scene, exact, hand):
     scene = scene.with_object(thing("lamp", SPOT + (0.0, 0.0, 0.62), (0.5, 0.5, 0.02)))
     far = from_above("far")
     far.pose[:3, 3] += (2.0, 0.0, 0.0)
-    with pytest.raises(ManipulationFailure, match="'far' falls at 'reach'.*'top' falls at 'approach'.*lamp") as caught:
+    with pytest.raises(ManipulationFailure, match="'far' fails at 'reach'.*'top' fails at 'approach'.*lamp") as caught:
         pick(scene, exact, hand, [far, from_above(approach=LOWER._replace(desired=0.3, least=0.3))])
     assert caught.value.code == Code.PLANNING_FAILED and len(caught.value.falls) == 2
     with pytest.raises(ManipulationFailure, match="none of 1 candidates") as caught:
@@ -194,7 +194,7 @@ def test_a_path_that_cannot_be_planned_is_told_and_the_next_is_tried(scene, exac
         return straight_plan(scene, q, seconds)
 
     found = pick(scene, exact, hand, [from_above("a"), from_above("b")], seconds=8.0, plan=plan)
-    assert found.candidate.name == "b" and str(found.falls[0]) == "'a' falls at 'plan': no way round"
+    assert found.candidate.name == "b" and str(found.falls[0]) == "'a' fails at 'plan': no way round"
     assert asked[0] < 4.0 < asked[1]
     with pytest.raises(ManipulationFailure) as caught:
         asked.clear()
@@ -235,7 +235,7 @@ def test_no_place_where_something_stands(scene, exact, hand):
     there = SPOT + (0.05, -0.15, 0.001)
     scene = held(scene, exact, hand).with_object(thing("vase", there, (0.05, 0.05, 0.2)))
     task = PlaceTask(scene, ARM, LINK, hand, "block", support="table")
-    with pytest.raises(ManipulationFailure, match="'there' falls at 'grasp pose'.*vase") as caught:
+    with pytest.raises(ManipulationFailure, match="'there' fails at 'grasp pose'.*vase") as caught:
         plan_manipulation(task, [Candidate("there", task.hand_pose(rigid(np.eye(3), there)), LOWER, LIFT)], 60.0,
                           tools(exact))
     assert caught.value.code == Code.GOAL_IN_COLLISION

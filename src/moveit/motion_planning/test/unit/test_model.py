@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The robot that is planned for: variables, limits, groups, frames."""
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from baxter_sim_kinematics import Chain
-from motion_planning.model import ModelError, PlanningModel
+from motion_planning.model import MeshReader, MeshUnreadable, ModelError, PlanningModel
+from motion_planning.model import meshes as mesh_files
 from urdf_model.transforms import axis_rotation, rigid
 
 
@@ -88,7 +91,7 @@ def test_states_never_change(mix):
     assert state.q[2] == 0.0 and other.positions == {"turn": 0.0, "push": 0.2, "grip": 0.5}
     with pytest.raises(ValueError, match="read-only"):
         other.q[0] = 1.0
-    with pytest.raises(ModelError, match="'nose' is no joint variable"):
+    with pytest.raises(ModelError, match="'nose' is not a joint variable"):
         state.with_joints({"nose": 1.0})
     with pytest.raises(ModelError, match="is nan"):
         state.with_joints({"grip": math.nan})
@@ -180,3 +183,38 @@ def test_meshes_are_read_as_they_are(baxter, meshes):
     mesh = meshes(filename)
     assert len(mesh.triangles) > 100 and meshes(filename) is mesh
     assert 0.2 < np.ptp(mesh.vertices, axis=0).max() < 2.0
+
+
+def full_disk(*_):
+    raise OSError(28, "No space left on device")
+
+
+def test_triangles_are_kept_until_the_file_changes(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
+    path = tmp_path / "one.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    first = MeshReader(lambda name: path)("one")
+    made = []
+    monkeypatch.setattr(mesh_files, "_made", lambda path, make=mesh_files._made: made.append(path) or make(path))
+    again = MeshReader(lambda name: path)("one")
+    assert not made and np.array_equal(again.vertices, first.vertices) and again.triangles.shape == (1, 3)
+    kept, = (tmp_path / "kept").glob("*/*.npz")
+    kept.write_bytes(b"half a file")
+    assert MeshReader(lambda name: path)("one").vertices.max() == 1.0 and len(made) == 1
+    path.write_text("v 0 0 0\nv 2 0 0\nv 0 2 0\nf 1 2 3\n")
+    assert MeshReader(lambda name: path)("one").vertices.max() == 2.0 and len(made) == 2
+    monkeypatch.setattr(mesh_files.os, "replace", full_disk)
+    path.write_text("v 0 0 0\nv 3 0 0\nv 0 3 0\nf 1 2 3\n")
+    assert MeshReader(lambda name: path)("one").vertices.max() == 3.0  # read, though not kept
+    assert len(list((tmp_path / "kept").glob("motion_planning_meshes-*/*"))) == 2
+    path.write_text("f 1 2 3\n")
+    for _ in range(2):
+        with pytest.raises(MeshUnreadable, match="mesh one cannot be used"):
+            MeshReader(lambda name: path)("one")
+
+
+def test_planning_loads_no_simulator_and_no_library_for_files():
+    text = "import sys, motion_planning.pipeline, motion_planning.planners; " \
+           "print(sorted({'pybullet', 'trimesh', 'bullet_sim', 'ompl', 'cv2'} & sys.modules.keys()))"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=300, check=True)
+    assert done.stdout.strip() == "[]"

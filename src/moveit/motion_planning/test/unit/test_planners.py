@@ -12,12 +12,15 @@ import pytest
 from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
 from motion_planning.planners import NoPath, Run, Search, plan_path, rrt_connect, shorten
+from motion_planning.planners.parts import _at_once
 from motion_planning.planners.parts import apart as planned_apart
 from motion_planning.planners.planning import sphere_model_of
 from motion_planning.scene import Scene, WorldObject
 from motion_planning.spheres import SphereChecker, SphereModel
 from urdf_model import Box, Cylinder
 from urdf_model.transforms import pose_matrix as pose
+
+pytestmark = pytest.mark.once
 
 # As long as a slow machine may need: what is tested is the answer.
 PATIENCE_S = 60.0
@@ -325,6 +328,15 @@ def test_two_arms_get_past_each_other_each_planned_for_alone(pair):
     assert found >= 20 and waited >= 2
 
 
+def test_two_ways_at_once_begin_and_end_together_and_pieces_of_no_length_do_no_harm():
+    straight, kinked = np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([[0.0], [2.0], [3.0], [3.0]])
+    points = _at_once([(np.array([0, 2]), None), (np.array([1]), None)], [straight, kinked])
+    assert np.allclose(points[[0, -1]], [[0.0, 0.0, 0.0], [1.0, 3.0, 1.0]])
+    assert np.allclose(points[:, 0], points[:, 1] / 3.0) and np.allclose(points[:, 0], points[:, 2])
+    still = _at_once([(np.array([0]), None), (np.array([1]), None)], [np.zeros((2, 1)), np.array([[0.0], [1.0]])])
+    assert np.allclose(still, [[0.0, 0.0], [0.0, 1.0]])
+
+
 def test_an_arm_alone_has_no_parts(snake, exact):
     assert SphereChecker(SphereModel.of(snake, None), snake.groups["arm"], Scene(snake)).parts == []
 
@@ -384,9 +396,9 @@ import runpy, sys
 runpy.run_module("motion_planning", run_name="__main__")
 from motion_planning.planners import kernels as planning
 from motion_planning.spheres import kernel
-for function in (planning.grow, planning.shortcut, kernel.free_states, kernel.edge_is_free):
+for function in (planning.grow, planning.shortcut, kernel.free_states, kernel.free_edges):
     print(function.__name__, len(function.signatures))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["grow", "1", "shortcut", "1", "free_states", "1", "edge_is_free", "1"]
+    assert done.stdout.split() == ["grow", "1", "shortcut", "1", "free_states", "1", "free_edges", "1"]

@@ -163,7 +163,7 @@ def test_frames_of_everything(scene):
     np.testing.assert_allclose(full.frame("camera"), at(7.0))
     assert full.has_frame("slide") and not full.has_frame("box/bottom")
     assert set(full.frame_names()) >= {"base", "slide", "box", "box/top", "camera"}
-    with pytest.raises(SceneError, match="'box/tap' is no frame.*did you mean 'box/top'"):
+    with pytest.raises(SceneError, match="'box/tap' is not a frame.*did you mean 'box/top'"):
         full.frame("box/tap")
 
 

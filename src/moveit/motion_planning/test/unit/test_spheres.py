@@ -15,6 +15,8 @@ from motion_planning.spheres.world_tables import forest, solids_of, tree_of
 from urdf_model import Box, Cylinder, Plane, Sphere
 from urdf_model.transforms import pose_matrix as pose
 
+pytestmark = pytest.mark.tree
+
 TOLERANCE = 0.01
 SOLIDS = [Box((0.3, 0.02, 0.1)), Box((0.01, 0.0135, 0.1127)), Cylinder(0.06, 0.27), Cylinder(0.04, 0.02), Sphere(0.1)]
 
@@ -207,6 +209,11 @@ def test_an_edge_is_what_its_states_are(baxter, cluttered, spheres):
         count = 16 * max(1, int(np.ceil(np.linalg.norm(b - a) / (16.0 * checker.resolution))))
         states = a + (b - a) * np.arange(1, count + 1)[:, None] / count
         assert checker.edge(a, b) == checker.valid(states).all()
+    points = rng.uniform(*baxter.bounds[own.indices].T, (40, len(own)))
+    points[1::2] = points[::2] + rng.uniform(-0.1, 0.1, (20, len(own)))
+    free = checker.edges(points)
+    assert free.tolist() == [checker.edge(a, b) for a, b in itertools.pairwise(points)]
+    assert free.any() and not free.all()
 
 
 def test_no_states_and_one(baxter, cluttered, spheres):
@@ -238,6 +245,19 @@ def test_padding_makes_links_larger(rod):
     assert SphereChecker(model, group, scene).valid(q)[0]
     assert not SphereChecker(model, group, scene.with_padding({"ball": 0.11})).valid(q)[0]
     assert not SphereChecker(model, group, scene.with_padding({}, {"ball": 2.1})).valid(q)[0]
+
+
+def test_tables_are_made_once_for_scenes_that_differ_in_the_groups_joints_alone(baxter, cluttered, spheres):
+    own = baxter.groups["left_arm"]
+    tables = SphereChecker(spheres, own, cluttered).tables
+    moved = cluttered.with_state(cluttered.state.with_q(np.full(len(own), 0.3), own.indices))
+    assert SphereChecker(spheres, own, moved).tables is tables
+    right = baxter.groups["right_arm"]
+    away = cluttered.with_state(cluttered.state.with_q(np.full(len(right), 0.3), right.indices))
+    fewer = cluttered.without_object(next(iter(cluttered.objects)))
+    free = cluttered.with_allowed(cluttered.allowed.with_entries({("left_gripper", "right_gripper"): True}))
+    for other in (away, fewer, free):
+        assert SphereChecker(spheres, own, other).tables is not tables
 
 
 def test_a_tree_leads_past_everything_to_each_of_its_objects():

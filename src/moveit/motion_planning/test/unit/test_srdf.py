@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Every element of an SRDF, and what becomes of entries that cannot be used."""
+"""Every element of an SRDF, and the treatment of entries that cannot be used."""
 import pytest
 
 from motion_planning.srdf import DisabledPair, EndEffector, SrdfError, VirtualJoint, parse_srdf
@@ -62,7 +62,7 @@ def test_every_element_is_read(robot):
     ('<group name="g"><chain base_link="hand" tip_link="hand"/></group>', "holds no joint"),
     ('<group name="g"/>', "group 'g' is empty"),
     ('<group name="g"><group name="h"/></group>', "contains the group 'h'"),
-    ('<group name="arm"><joint name="a"/></group>', "stands twice (first in line 2)"),
+    ('<group name="arm"><joint name="a"/></group>', "appears twice (first in line 2)"),
     ('<group_state name="s" group="nobody"><joint name="a" value="0"/></group_state>', "group 'nobody'"),
     ('<group_state name="s" group="arm"><joint name="a" value="x"/></group_state>', "value='x' is not a number"),
     ('<group_state name="s" group="arm"><joint name="a" value="nan"/></group_state>', "not finite"),

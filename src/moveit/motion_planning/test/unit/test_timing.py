@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from motion_planning.timing import ALGORITHMS, Timed, TimingError, time_path, within_limits
+from motion_planning.timing.kernels import peaks_of_cubics, second_derivatives
+from motion_planning.timing.waypoints import _spline
 
 VELOCITY = np.array([0.75, 0.75, 1.0, 1.0, 2.0])
 ACCELERATION = np.array([2.0, 1.0, 2.0, 4.0, 2.0])
@@ -86,6 +88,27 @@ def test_iterative_ones_pass_through_every_point(algorithm, name):
         assert np.abs(timed.positions - point).max(axis=1).min() < 1e-12
     extra = 2 if algorithm == "iterative_spline_parameterization" else 0
     assert len(timed.times) == len(PATHS[name]) + extra
+
+
+def test_splines_have_one_velocity_on_both_sides_of_a_point_and_none_at_the_ends():
+    rng = np.random.default_rng(5)
+    h, path = rng.uniform(0.05, 1.0, (9, 1)), rng.normal(size=(10, 3))
+    bend, slopes = second_derivatives(h[:, 0].copy(), path), np.diff(path, axis=0) / h
+    leaving = slopes - h * (2.0 * bend[:-1] + bend[1:]) / 6.0
+    arriving = slopes + h * (bend[:-1] + 2.0 * bend[1:]) / 6.0
+    assert np.allclose(leaving[1:], arriving[:-1]) and np.allclose([leaving[0], arriving[-1]], 0.0, atol=1e-9)
+
+
+def test_peaks_of_cubics_are_those_between_the_points():
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        h, path = rng.uniform(0.05, 1.0, 9), rng.normal(size=(10, 3))
+        timed = _spline(h, path, rest_acceleration=False)
+        speeds, accelerations = peaks_of_cubics(h, timed.velocities, timed.accelerations)
+        for k, begin in enumerate(timed.times[:-1]):
+            _, velocities, bends = timed.sampled(np.linspace(begin, timed.times[k + 1], 2001)[1:-1])
+            assert np.allclose(np.abs(velocities).max(axis=0), speeds[k], rtol=0.01, atol=1e-3)
+            assert np.allclose(np.abs(bends).max(axis=0), accelerations[k], rtol=0.01, atol=1e-2)
 
 
 @pytest.mark.parametrize("length", [0.01, 0.5, 3.0])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a goal or a path must keep to: evaluated with a sentence where it is not kept, and sampled."""
+"""Constraints of goals and paths: evaluation, with a sentence for each violated one, and sampling."""
 from motion_planning.constraints.sampling import Sampler, sampler
 from motion_planning.constraints.sets import ConstraintSet
 from motion_planning.constraints.targets import (

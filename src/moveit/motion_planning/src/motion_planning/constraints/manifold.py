@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Postures brought onto constraints by Newton's method."""
+"""Projection of postures onto constraints by Newton's method."""
 import math
 
 import numpy as np
@@ -9,26 +9,26 @@ from motion_planning.kinematics import KinematicsFailure, limbs_of
 from urdf_model import Box, Cylinder, Sphere
 from urdf_model.transforms import inverse
 
-# The share of a tolerance that postures are brought within: what lies between two of them needs the rest.
+# Postures are projected to within this share of a tolerance; the rest is a margin for the motion between two of them.
 _SHARE = 0.8
 _STEPS = 25
-# Newton's steps are damped by this, and no joint moves by more in one of them [rad or m].
+# Damping of Newton's steps, and greatest motion of a joint in one step [rad or m].
 _DAMPING, _LONGEST = 1e-4, 0.5
-# Residuals below are none [rad or m].
+# Smaller residuals count as zero [rad or m].
 _NONE = 1e-10
 _LEAST_COSINE = 0.05
 
 
 class Manifold:
-    """The postures (k,) of a group that keep to joint, position and orientation constraints.
+    """The postures (k,) of a group that satisfy joint, position and orientation constraints.
 
-    bounds (k, 2): of the joints, with the joint constraints in them. Constraints on links that the group does not move
-    alone, and lines of sight, are not looked at here.
+    bounds (k, 2): of the joints, including the joint constraints. Constraints on links that the group does not move
+    alone, and lines of sight, are not checked here.
     """
 
     def __init__(self, scene, group, constraints, near):
-        """group: Group; constraints: ConstraintSet. near (k,): joints that turn without end stay in its turn. Raises
-        ConstraintError for names that nothing has."""
+        """group: Group; constraints: ConstraintSet. near (k,): continuous joints stay within half a turn of it. Raises
+        ConstraintError for unknown names."""
         model, constraints = scene.model, constraints.resolved(scene)
         self.bounds = _bounds(model, group, constraints, near)
         frames = model.frames(scene.state.q, scene.state.base)
@@ -43,13 +43,12 @@ class Manifold:
                 self._parts.append(kind(target, limb.chain, columns, frames[model.link_index[limb.base]]))
 
     def keeps(self, q):
-        """Whether the posture ``q`` (k,) keeps to the constraints, by their whole tolerances."""
+        """Whether the posture ``q`` (k,) satisfies the constraints, with their full tolerances."""
         return bool((q >= self.bounds[:, 0] - _NONE).all() and (q <= self.bounds[:, 1] + _NONE).all()
                     and not any(np.any(part.residual(q, 1.0)[0]) for part in self._parts))
 
     def project(self, q):
-        """Return a posture (k,) near ``q`` that keeps to the constraints with some tolerance left, None if none is
-        found."""
+        """Return a posture (k,) near ``q`` that satisfies the constraints with some margin, None if none is found."""
         q = np.clip(q, self.bounds[:, 0], self.bounds[:, 1])
         if not self._parts:
             return q
@@ -57,7 +56,7 @@ class Manifold:
             residual, jacobian = self._residual(q)
             if np.abs(residual).max() <= _NONE:
                 return q
-            # Joints at a limit that would go beyond it stay out.
+            # Joints at a limit that would move beyond it are left out.
             free = np.ones(len(q), dtype=bool)
             for _ in range(2):
                 part = jacobian[:, free]
@@ -79,7 +78,7 @@ class Manifold:
 
 
 class _Part:
-    """One constraint on a link: what is beyond its tolerance, and how that changes with the joints."""
+    """One constraint on a link: the error beyond its tolerance, and its derivatives with respect to the joints."""
 
     def __init__(self, target, chain, columns, root):
         self._target, self._chain, self._columns, self._root = target, chain, columns, root
@@ -91,7 +90,7 @@ class _Part:
         whole = np.zeros((6, len(q)))
         whole[:3, self._columns], whole[3:, self._columns] = turn @ jacobian[:3], turn @ jacobian[3:]
         residual, derivatives = self._beyond(self._root @ pose, whole, share)
-        # What is within its tolerance asks for nothing.
+        # Errors within the tolerance count as zero.
         derivatives[residual == 0.0] = 0.0
         return residual, derivatives
 
@@ -141,7 +140,8 @@ def _beyond_shape(shape, point, share):
 
 
 def _of_angles(angles):
-    """How angles about x, then the new y, then the new z change with an angular velocity in the fixed frame (3, 3)."""
+    """Return the matrix (3, 3) from an angular velocity in the fixed frame to the rates of angles about x, then the new
+    y, then the new z."""
     sine_x, cosine_x = math.sin(angles[0]), math.cos(angles[0])
     sine_y, cosine_y = math.sin(angles[1]), math.cos(angles[1])
     cosine_y = math.copysign(max(abs(cosine_y), _LEAST_COSINE), cosine_y)
@@ -150,7 +150,7 @@ def _of_angles(angles):
 
 
 def _of_rotation_vector(vector):
-    """How a rotation vector changes with an angular velocity in the fixed frame (3, 3)."""
+    """Return the matrix (3, 3) from an angular velocity in the fixed frame to the rate of a rotation vector."""
     x, y, z = vector
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     angle = float(np.linalg.norm(vector))
@@ -163,7 +163,7 @@ def _of_rotation_vector(vector):
 
 
 def _bounds(model, group, constraints, near):
-    """Bounds (k, 2) of the joints, with those of joint constraints in them; endless joints a turn about ``near``."""
+    """Bounds (k, 2) of the joints, including joint constraints; continuous joints get one turn around ``near``."""
     bounds = np.array(model.bounds[group.indices])
     turns = model.continuous[group.indices]
     bounds[turns] = np.column_stack([near - math.pi, near + math.pi])[turns]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shapes that a point may be in, and turns: whether one lies within, and one within at random."""
+"""Regions of points and rotations: tests whether one is inside, and random samples."""
 import math
 
 import numpy as np
@@ -8,7 +8,7 @@ from motion_planning.shapes import Cone, TriangleMesh
 from urdf_model import Box, Cylinder, Sphere
 from urdf_model.transforms import axis_rotation, rpy_matrix
 
-# Numbers that a comparison with an edge forgives [m]: of rounding alone.
+# Tolerance of comparisons with an edge [m], for rounding errors.
 _EDGE = 1e-9
 
 
@@ -37,7 +37,7 @@ def holds(shape, point):
 
 
 def point_in(shape, generator):
-    """Return a random point (3,) of a shape, in its frame, all of it alike."""
+    """Return a random point (3,) of a shape, in its frame, uniformly distributed."""
     if isinstance(shape, Sphere):
         direction = generator.normal(size=3)
         return direction * (shape.radius * generator.random() ** (1.0 / 3.0) / max(1e-12, np.linalg.norm(direction)))
@@ -59,19 +59,19 @@ def point_in(shape, generator):
 
 
 def size_of(shape):
-    """Return how far a shape reaches [m], about."""
+    """Return the approximate extent of a shape [m]."""
     if isinstance(shape, TriangleMesh):
         return float(np.ptp(shape.vertices, axis=0).max())
     return max(shape.size) if isinstance(shape, Box) else max(shape.radius, getattr(shape, "length", 0.0))
 
 
 def middle_of(shape):
-    """Return the point (3,) of a shape that is tried first, in its frame."""
+    """Return the point (3,) of a shape to try first, in its frame."""
     return shape.vertices.mean(axis=0) if isinstance(shape, TriangleMesh) else np.zeros(3)
 
 
 def turn_within(tolerances, as_vector, generator):
-    """Return a random turn (3, 3) within ``tolerances`` (3,) [rad], as OrientationTarget has them."""
+    """Return a random rotation (3, 3) within ``tolerances`` (3,) [rad], as in OrientationTarget."""
     angles = generator.uniform(-1.0, 1.0, 3) * np.minimum(tolerances, math.pi)
     if as_vector:
         length = float(np.linalg.norm(angles))
@@ -81,7 +81,7 @@ def turn_within(tolerances, as_vector, generator):
 
 
 def rotation_vector(turn):
-    """Return axis times angle (3,) [rad] of a turn (3, 3)."""
+    """Return axis times angle (3,) [rad] of a rotation (3, 3)."""
     sine = 0.5 * np.array((turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]))
     length, cosine = float(np.linalg.norm(sine)), 0.5 * (np.trace(turn) - 1.0)
     angle = math.atan2(length, cosine)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Postures of a group that keep to constraints."""
+"""Postures of a group that satisfy constraints."""
 from __future__ import annotations
 
 import math
@@ -11,30 +11,32 @@ from motion_planning.constraints import regions
 from motion_planning.constraints.targets import ConstraintError
 from motion_planning.kinematics import KinematicsFailure, NoIkSolution, limbs_of
 
-#: Postures that are tried without a single one that will do before a sampler gives up, and that it gives at most.
+#: Number of tried postures after which a sampler without a valid one gives up, and greatest number of postures that it
+#: yields.
 _FRUITLESS, _MOST = 200, 200
-# Poses that inverse kinematics fails at, one after the other, before it gives up: when next to nothing is left to
-# chance, the next pose is the same again.
-_POSES_IN_VAIN, _POSES_IN_VAIN_IF_ONE = 60, 2
-# Where tolerances leave less than this [rad or m], another sample is the same one again.
+# Number of failures of inverse kinematics in a row after which it gives up; fewer if the tolerances are so small that
+# the next pose is the same again.
+_FAILED_POSES, _FAILED_POSES_IF_ONE = 60, 2
+# If tolerances leave less than this [rad or m], another sample is the same one again.
 _ONE = 2e-3
 _SOLUTIONS = 8
-# Postures that differ by less in every joint are the same [rad or m].
+# Postures that differ by less in every joint count as the same [rad or m].
 _SAME = 1e-3
-# A goal may be named at a limit, and rounded beyond it [rad or m].
+# A goal may be given at a limit, and be rounded beyond it [rad or m].
 _AT_LIMIT = 1e-6
 
 
 def sampler(model, group, constraints, scene, exact, seed, stop=None):
-    """Return a :class:`Sampler`. group: name. Raises ConstraintError and ModelError for names that nothing has."""
+    """Return a :class:`Sampler`. group: name. Raises ConstraintError and ModelError for unknown names."""
     return Sampler((model, model.group(group), constraints.resolved(scene)), scene, exact, seed, stop)
 
 
 class Sampler:
-    """Iterator of postures (k,) of a group that keep to constraints, limits and, with ``exact``, touch nothing.
+    """Iterator of postures (k,) of a group that satisfy constraints and limits and, with ``exact``, are free of
+    collisions.
 
-    The first ones are the nearest to the scene's state that are easily had. It ends when there are no more, when none
-    is found, or when ``stop()`` says so. reason: why it ended without one, or early; else None.
+    The first ones are near the scene's state. It ends if there are no more, if none is found, or if ``stop()`` is true.
+    reason: why it ended without one, or early; else None.
     """
 
     def __init__(self, problem, scene, exact, seed, stop=None):
@@ -46,7 +48,7 @@ class Sampler:
         self._low, self._high, empty = self._ranges()
         for one in constraints_with_links(self._constraints):
             if one.link not in self._model.link_index:
-                raise ConstraintError("a constraint is on link '%s', which the robot has not" % one.link)
+                raise ConstraintError("a constraint is on link '%s', which is unknown" % one.link)
         self._postures = iter(()) if empty else self._checked()
         self.reason = empty
 
@@ -62,14 +64,15 @@ class Sampler:
         self._given += 1
         return q
 
-    # -- what is asked for --------------------------------------------------------------------------------------
+    # -- limits and checks --------------------------------------------------------------------------------------
 
     def _ranges(self):
-        """Least and largest value (n,) of each joint that limits and joint constraints leave; a sentence if none."""
+        """Least and greatest value (n,) of each joint within limits and joint constraints; the reason if there is
+        none."""
         (low, high), named = self._model.bounds.T.copy(), set()
         for one in self._constraints.joints:
             if one.joint not in self._model.index:
-                raise ConstraintError("a constraint names joint '%s', which the robot has not or which cannot be moved"
+                raise ConstraintError("a constraint names joint '%s', which is unknown or cannot be moved"
                                       % one.joint)
             index = self._model.index[one.joint]
             turns = self._model.continuous[index]
@@ -88,7 +91,7 @@ class Sampler:
         return low, high, None
 
     def _checked(self):
-        """Those of the candidates that will do."""
+        """Yield the valid candidates."""
         fruitless = 0
         for q in self._candidates():
             if self._stop is not None and self._stop():
@@ -107,7 +110,7 @@ class Sampler:
                 return
 
     def _refusal(self, q):
-        """Why a posture ``q`` (n,) will not do, as a kind and an example; None where it will."""
+        """Return why a posture ``q`` (n,) is not valid, as a kind and an example; None if it is valid."""
         index = self._group.indices
         beyond = self._model.beyond_limits(q, _AT_LIMIT, index)
         if beyond:
@@ -131,13 +134,14 @@ class Sampler:
     # -- candidates ---------------------------------------------------------------------------------------------
 
     def _candidates(self):
-        """Postures q (n,), most of which keep to the constraints."""
+        """Postures q (n,), most of which satisfy the constraints."""
         if self._constraints.positions or self._constraints.orientations:
             return self._by_kinematics()
         return self._by_joints()
 
     def _by_joints(self):
-        """Within the ranges of the joints: the middle where one is named, the present value elsewhere; then any."""
+        """Within the ranges of the joints: first the middle of constrained joints and the present value of the others;
+        then random values."""
         index = self._group.indices
         first = np.clip(self._scene.state.q, self._low, self._high)
         for one in self._constraints.joints:
@@ -162,24 +166,24 @@ class Sampler:
         except KinematicsFailure as error:
             self.reason = str(error)
             return
-        in_vain, patience = 0, _POSES_IN_VAIN if self._is_wide() else _POSES_IN_VAIN_IF_ONE
+        failed, patience = 0, _FAILED_POSES if self._is_wide() else _FAILED_POSES_IF_ONE
         first, known = True, np.empty((0, len(self._group)))
-        while in_vain < patience:
+        while failed < patience:
             if self._stop is not None and self._stop():
                 self.reason = "it was stopped"
                 return
-            in_vain += 1
+            failed += 1
             for q in self._solutions(limbs, first):
                 own = q[self._group.indices]
                 if (np.abs(known - own).max(axis=1, initial=0.0) < _SAME).any():
                     continue
                 known = np.vstack([known, own])
-                in_vain = 0
+                failed = 0
                 yield q
             first = False
 
     def _solutions(self, limbs, first):
-        """Postures [q (n,), ...] that put the links of ``limbs`` at a pose each within their constraints.
+        """Postures [q (n,), ...] that put each link of ``limbs`` at a pose within its constraints.
 
         ``first``: one posture at the middle of them, near the scene's state.
         """
@@ -203,9 +207,9 @@ class Sampler:
         return together
 
     def _goal(self, link, start, first):
-        """A pose (4, 4) of a link, or position (3,) where any orientation will do, within its constraints.
+        """A pose (4, 4) of a link, or position (3,) if the orientation is free, within its constraints.
 
-        ``first``: in the middle of them. What is not constrained comes from the posture ``start`` (n,).
+        ``first``: in the middle of them. Unconstrained parts come from the posture ``start`` (n,).
         """
         generator = self._generator
         position = next((one for one in self._constraints.positions if one.link == link), None)
@@ -226,7 +230,7 @@ class Sampler:
         return pose
 
     def _is_wide(self):
-        """Whether tolerances leave much to chance, so that another pose may do where one did not."""
+        """Whether the tolerances are wide, so that another pose may have a solution if one has none."""
         placed = {one.link for one in self._constraints.positions}
         turned = {one.link for one in self._constraints.orientations}
         return (placed != turned or any(len(one.regions) > 1 for one in self._constraints.positions)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Constraints that hold together."""
+"""Sets of constraints."""
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
@@ -15,7 +15,7 @@ from motion_planning.constraints.targets import (
 
 @dataclass(frozen=True)
 class ConstraintSet:
-    """Constraints all of which are to be kept. Empty: everything keeps to it."""
+    """Constraints that must all hold. An empty set always holds."""
 
     name: str = ""
     joints: tuple[JointTarget, ...] = ()
@@ -32,27 +32,28 @@ class ConstraintSet:
 
     @property
     def all(self):
-        """The constraints in the order of :meth:`evaluate`'s answer: joints, positions, orientations, visibilities."""
+        """The constraints in the order of :meth:`evaluate`'s result: joints, positions, orientations, visibilities."""
         return self.joints + self.positions + self.orientations + self.visibilities
 
     def evaluate(self, model, state, scene, exact=None):
         """Return [Evaluation, ...], one for each of :attr:`all`, of a State.
 
-        ``exact``: ExactChecker that tells whether a link stands in a line of sight; not looked at where None. Raises
+        ``exact``: ExactChecker that tells whether a link blocks a line of sight; None: no such check. Raises
         ConstraintError for names that neither the robot nor the scene has.
         """
         context = Context(model, state, scene, exact)
         return [one.evaluate(context) for one in self.all]
 
     def broken(self, model, state, scene, exact=None):
-        """Return the sentence of the first constraint that is not kept, None where all are. Raises ConstraintError."""
+        """Return the sentence of the first violated constraint, None if all hold. Raises ConstraintError."""
         context = Context(model, state, scene, exact)
         return next((result.sentence for result in (one.evaluate(context) for one in self.all)
                      if not result.satisfied), None)
 
     def resolved(self, scene):
-        """Return the set with its frames looked up in ``scene`` as it is now, and constraints on something that is held
-        put on the link that holds it. What a goal means by a frame that moves is where that is when it is asked for.
+        """Return the set with its frames looked up in ``scene`` as it is now, and constraints on attached objects
+        applied to the link that holds them. A goal in a moving frame refers to the frame's pose at the time of the
+        request.
 
         Raises ConstraintError for names that neither the robot nor the scene has.
         """

@@ -14,17 +14,18 @@ from motion_planning.scene import Scene, TriangleMesh, WorldObject
 from motion_planning.shapes import read_only
 from urdf_model.transforms import inverse, matrix_from_quaternion
 
-#: Rounding errors that a comparison with a tolerance forgives [rad, m].
+#: Margin of comparisons with a tolerance, for rounding errors [rad, m].
 _ROUNDING = 1e-9
-_AXES = ("z", "y", "x")  # of a sensor that looks along it, by number
+_AXES = ("z", "y", "x")  # the sensor's viewing axis, by number
 
 
 class ConstraintError(PlanningError):
-    """A constraint that cannot be understood: unknown names, tolerances or numbers that are none."""
+    """An invalid constraint: unknown names, invalid tolerances or numbers."""
 
 
 class Evaluation(NamedTuple):
-    """Whether a constraint is kept, how far from its middle (weighted, in its unit), and why not, "" where it is."""
+    """Whether a constraint holds, the distance from its middle (weighted, in its unit), and the reason if it does not
+    hold, else ""."""
 
     satisfied: bool
     distance: float
@@ -66,8 +67,8 @@ class JointTarget:
 class PositionTarget:
     """A point of a link inside one of some regions. offset (3,): the point in the link's frame [m].
 
-    regions: ((shape, pose (4, 4) in ``frame``), ...); shapes that have an inside: Box, Sphere, Cylinder, Cone, and
-    TriangleMesh, of which the convex hull counts.
+    regions: ((shape, pose (4, 4) in ``frame``), ...); shapes with a volume: Box, Sphere, Cylinder, Cone, and
+    TriangleMesh, which means its convex hull.
     """
 
     link: str
@@ -81,10 +82,10 @@ class PositionTarget:
         object.__setattr__(self, "regions", tuple((shape, read_only(pose)) for shape, pose in self.regions))
         _finite("the position of link '%s'" % self.link, self.offset, self.weight, *(pose for _, pose in self.regions))
         if not self.regions:
-            raise ConstraintError("the position of link '%s' has no region to be in" % self.link)
+            raise ConstraintError("the position of link '%s' has no region" % self.link)
         for shape, _ in self.regions:
             if not regions.has_inside(shape):
-                raise ConstraintError("the position of link '%s' shall be in a %s, which has no inside"
+                raise ConstraintError("the position of link '%s' has a %s as region, which has no volume"
                                       % (self.link, type(shape).__name__))
 
     def evaluate(self, context):
@@ -110,8 +111,8 @@ class PositionTarget:
 class OrientationTarget:
     """A link turned as ``rotation`` (3, 3), or quaternion (x, y, z, w), in ``frame``, within ``tolerances`` (3,) [rad].
 
-    They are of angles about x, y and z, or of the rotation vector's parts (``rotation_vector``), of the turn from what
-    is wanted to what is. pi or more lets an axis free.
+    They bound the angles about x, y and z, or the rotation vector's parts (``rotation_vector``), of the rotation from
+    the target to the actual orientation. With pi or more an axis is free.
     """
 
     link: str
@@ -120,7 +121,7 @@ class OrientationTarget:
     frame: str = ""
     rotation_vector: bool = False
     weight: float = 1.0
-    # The axes that are meant, in the link (3, 3): others than its own where it holds what the constraint is on.
+    # The constraint's axes, in the link (3, 3): not the link's own if the constraint is on an attached object.
     axes: np.ndarray = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self):
@@ -131,7 +132,7 @@ class OrientationTarget:
         except ValueError as error:
             raise ConstraintError("the orientation of link '%s' is none: %s" % (self.link, error)) from None
         if rotation.shape != (3, 3) or abs(np.linalg.det(rotation) - 1.0) > 1e-3:
-            raise ConstraintError("the orientation of link '%s' is no rotation" % self.link)
+            raise ConstraintError("the orientation of link '%s' is not a rotation" % self.link)
         if len(self.tolerances) != 3 or min(self.tolerances) < 0.0:
             raise ConstraintError("tolerances of the orientation of link '%s' are %s; expected three of 0 or more"
                                   % (self.link, list(self.tolerances)))
@@ -143,11 +144,12 @@ class OrientationTarget:
         angles = self.angles(turn)
         kept = all(abs(angle) <= allowed + _ROUNDING for angle, allowed in zip(angles, self.tolerances, strict=True))
         return Evaluation(kept, self.weight * float(np.abs(angles).sum()), "" if kept else
-                          "link '%s' is turned by %.4f %.4f %.4f rad (x, y, z) from what is wanted; allowed %g %g %g"
+                          "link '%s' is turned by %.4f %.4f %.4f rad (x, y, z) from its target; allowed %g %g %g"
                           % (self.link, *angles, *self.tolerances))
 
     def angles(self, turn):
-        """Return the angles (3,) of a turn (3, 3) that the tolerances are of; of equal ones the best that fit."""
+        """Return the angles (3,) of a rotation (3, 3) that the tolerances bound; of equivalent ones, those that fit
+        best."""
         if self.rotation_vector:
             return regions.rotation_vector(turn)
         y = math.asin(min(1.0, max(-1.0, turn[0, 2])))
@@ -170,7 +172,7 @@ class VisibilityTarget:
     target_pose (4, 4) in ``target_frame``: the disc lies in its x-y plane; target_radius [m]. sensor_pose (4, 4) in
     ``sensor_frame``; view_axis: 0, 1, 2 for a sensor that looks along its z, y, x. max_view_angle [rad]: between the
     sensor's axis and the disc's axis (its z turned round); max_range_angle: between the sensor's axis and the line to
-    the disc; 0: not looked at. cone_sides: corners that the disc is drawn with.
+    the disc; 0: not checked. cone_sides: number of corners of the disc.
     """
 
     target_radius: float
@@ -183,7 +185,7 @@ class VisibilityTarget:
     max_view_angle: float = 0.0
     max_range_angle: float = 0.0
     weight: float = 1.0
-    # Links that may stand in the way: what sees and what is seen.
+    # Links that may be in the line of sight: of the sensor and of the target.
     may_touch: tuple[str, ...] = field(default=())
 
     def __post_init__(self):
@@ -202,9 +204,9 @@ class VisibilityTarget:
         axis, line = sensor[:3, 2 - self.view_axis], target[:3, 3] - sensor[:3, 3]
         reach = float(np.linalg.norm(line))
         if reach < 1e-9:
-            return Evaluation(False, 0.0, "the sensor sits on what it shall see")
+            return Evaluation(False, 0.0, "the sensor is at the target's position")
         for limit, other, what in ((self.max_view_angle, -target[:3, 2], "the target is turned away from the sensor"),
-                                   (self.max_range_angle, line / reach, "the target lies beside the sensor's axis")):
+                                   (self.max_range_angle, line / reach, "the target is off the sensor's axis")):
             angle = math.acos(min(1.0, max(-1.0, float(axis @ other))))
             if limit > 0.0 and angle > limit + _ROUNDING:
                 return Evaluation(False, self.weight * (angle - limit), "%s by %.4f rad; at most %.4f are allowed"
@@ -212,7 +214,7 @@ class VisibilityTarget:
         if self.target_radius > 0.0 and context.exact is not None:
             for contact in self._in_the_way(context, sensor, target):
                 if contact.a not in self.may_touch:
-                    return Evaluation(False, self.weight * contact.depth, "'%s' stands between the sensor and the "
+                    return Evaluation(False, self.weight * contact.depth, "'%s' is between the sensor and the "
                                       "target" % contact.a)
         return Evaluation(True, 0.0, "")
 
@@ -229,7 +231,7 @@ class VisibilityTarget:
         return [one for one in context.exact.contacts(alone) if one.b == "line of sight"]
 
     def resolved(self, scene):
-        return self  # one of the two moves with the robot, else there would be nothing to choose
+        return self  # one of the two moves with the robot, otherwise the constraint could not be influenced
 
 
 class Context:
@@ -242,7 +244,7 @@ class Context:
 
     def variable(self, joint):
         if joint not in self.model.index:
-            raise ConstraintError("a constraint names joint '%s', which the robot has not or which cannot be moved"
+            raise ConstraintError("a constraint names joint '%s', which is unknown or cannot be moved"
                                   % joint)
         return self.model.index[joint]
 
@@ -267,12 +269,12 @@ def _frame(scene, name):
 
 
 def _holder(scene, name):
-    """(link, pose (4, 4) in it) of a link, or of something that a link holds, or a subframe of that."""
+    """(link, pose (4, 4) in it) of a link, of an attached object, or of an object's subframe."""
     if name in scene.model.link_index:
         return name, np.eye(4)
     owner = name if name in scene.state.attached else name.rpartition("/")[0]
     if owner not in scene.state.attached:
-        raise ConstraintError("a constraint is on link '%s', which the robot has not, nor holds" % name)
+        raise ConstraintError("a constraint is on link '%s', which is neither a link nor attached" % name)
     link = scene.state.attached[owner].link
     return link, inverse(scene.frame(link)) @ _frame(scene, name)
 

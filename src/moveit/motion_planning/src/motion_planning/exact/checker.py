@@ -19,7 +19,7 @@ from motion_planning.model import ModelError
 from motion_planning.shapes import Octree, TriangleMesh
 from urdf_model import Mesh, Plane
 
-#: Tables of scenes that are kept: a scene is asked about many times, and so are the few that follow it.
+#: Number of cached tables of scenes: a scene and its few successors are checked many times.
 _KEPT = 12
 _ANY = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
 _ALL = fcl.CollisionRequest(num_max_contacts=50, enable_contact=True)
@@ -28,10 +28,10 @@ _DISTANCE = fcl.DistanceRequest(enable_nearest_points=True)
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Two things that touch. a_kind, b_kind: "robot" (a link), "object" (of the world) or "attached" (held).
+    """Two bodies in contact. a_kind, b_kind: "robot" (a link), "object" (of the world) or "attached" (held).
 
-    point (3,) in the planning frame [m]; normal (3,): unit, from a to b; depth [m]: how far they overlap, where meshes
-    meet an estimate.
+    point (3,) in the planning frame [m]; normal (3,): unit, from a to b; depth [m]: of the overlap, an estimate between
+    meshes.
     """
 
     a: str
@@ -49,7 +49,7 @@ class Contact:
 
 
 class Nearest(NamedTuple):
-    """The least distance [m], 0 where something touches, of which two things, and the nearest point (3,) of each."""
+    """The least distance [m], 0 for contacts, with the two bodies and the nearest point (3,) of each."""
 
     distance: float
     a: str
@@ -59,11 +59,10 @@ class Nearest(NamedTuple):
 
 
 class ExactChecker:
-    """Checks states of one robot in scenes. Any thread may call; one call at a time is worked on.
-
-    Shapes are checked as they are. Meshes and cubes of an octomap are what they are in FCL: a mesh is hollow, a cube
-    solid. A plane is endless and has no thickness, so that it can be a floor, a wall or a ceiling.
-    warnings: sentences about shapes that could not be read and are left out.
+    """Checks states of one robot in scenes. Thread-safe; calls are serialized. Shapes are checked without
+    approximation. As in FCL, a mesh is hollow and a cube of an octomap is solid. A plane is infinite and has no
+    thickness, so it can be a floor, a wall or a ceiling. warnings: sentences about shapes that could not be read and
+    are left out.
     """
 
     def __init__(self, model, meshes):
@@ -80,10 +79,9 @@ class ExactChecker:
             joint.movable for joint in model.robot.chain(model.root, part.name)))
 
     def free(self, scene, state=None, group=None):
-        """Whether nothing touches in ``state``, the scene's where None.
-
-        ``group``: name of a group; then only pairs of which one moves with it count. Raises ModelError for an unknown
-        group, and for joint values that do not fit the model or are not finite.
+        """Whether ``state`` (None: the scene's) is free of collisions. ``group``: name of a group; then only pairs of
+        which one moves with it are checked. Raises ModelError for an unknown group, and for joint values that do not
+        fit the model or are not finite.
         """
         with self._lock:
             query = self._query(scene, state, group)
@@ -93,15 +91,16 @@ class ExactChecker:
         return True
 
     def first_blocked(self, scene, postures, group=None):
-        """Return the number of the first of ``postures`` at which something touches, None where all are free.
+        """Return the index of the first of ``postures`` that is in collision, None if all are free.
 
-        postures: (m, n), or (m, k) values of the joints of ``group``, the rest as in the scene's state; quicker than to
-        ask :meth:`free` about each. Errors are those of :meth:`free`.
+        postures: (m, n), or (m, k) values of the joints of ``group``, the others as in the scene's state; faster than
+        :meth:`free` for each. Errors as in :meth:`free`.
         """
         indices = slice(None) if group is None else self.model.group(group).indices
         whole = np.tile(scene.state.q, (len(postures), 1))
         rows = np.asarray(postures, dtype=np.float64)
-        # Whole postures are told by their length; of a group that has all joints, in its own order, they are the same.
+        # Whole postures are recognized by their length; for a group with all joints, in its own order, both are the
+        # same.
         if len(rows) and rows.shape[1:] == (len(self.model.variables),) != whole[0, indices].shape:
             indices = slice(None)
         if rows.shape != whole[:, indices].shape:
@@ -120,7 +119,7 @@ class ExactChecker:
         return None
 
     def contacts(self, scene, state=None, group=None, most=100):
-        """Return a list of Contact, one for each two things that touch, the deepest of theirs; at most ``most``.
+        """Return a list of Contact, the deepest one of each pair of bodies in contact; at most ``most``.
 
         Arguments and errors are those of :meth:`free`.
         """
@@ -139,7 +138,8 @@ class ExactChecker:
         return list(found.values())
 
     def distance(self, scene, state=None, group=None):
-        """Return the least distance [m] of two things that must not touch: 0 where they do, inf where there are none.
+        """Return the least distance [m] of two bodies that must not touch: 0 for contacts, inf if there are no such
+        bodies.
 
         Arguments and errors are those of :meth:`free`.
         """
@@ -147,7 +147,7 @@ class ExactChecker:
         return math.inf if nearest is None else nearest.distance
 
     def nearest(self, scene, state=None, group=None):
-        """Return the Nearest of two things that must not touch, None where there are none.
+        """Return the Nearest of two bodies that must not touch, None if there are none.
 
         Arguments and errors are those of :meth:`free`.
         """
@@ -187,7 +187,7 @@ class ExactChecker:
                       self._fixed(scene), scene.allowed, memory)
 
     def _near(self, query):
-        """List of [i, j] that may touch, as kernels.near has them, allowed ones left out."""
+        """List of [i, j] that are near each other, as from kernels.near, without allowed pairs."""
         arguments = query.robot, query.movers.arrays, query.pairs, query.active, query.fixed.arrays, query.poses
         count = kernels.near(*arguments, self._pairs)
         if count > len(self._pairs):
@@ -212,13 +212,13 @@ class ExactChecker:
             return Contact(*names, *query.plane_point(i, j), depth)
         result = fcl.CollisionResult()
         if not fcl.collide(a, b, _ALL, result):
-            # Where shapes barely touch, FCL may find that they do, but not where.
+            # If shapes barely touch, FCL may report a contact without its point.
             return _touch(names, query.poses[i], query.pose(j)) if self._touches(query, i, j) else None
         found = result.contacts
-        # Between triangles FCL's depths are those of their planes: the least one is the nearest to the truth.
+        # Between triangles FCL's depths are those of their planes: the least one is the most accurate.
         both = isinstance(part.shape, TriangleMesh) and isinstance(other.shape, TriangleMesh)
         one = (min if both else max)(found, key=lambda contact: abs(contact.penetration_depth))
-        # FCL changes the order for some pairs of shapes, and says so.
+        # FCL changes the order for some pairs of shapes, and reports it.
         turned = one.o1 is query.geometry(j) and query.geometry(i) is not query.geometry(j)
         normal = -one.normal if turned else one.normal
         return Contact(*names, np.array(one.pos), np.array(normal), abs(one.penetration_depth))
@@ -251,7 +251,7 @@ class ExactChecker:
         return parts
 
     def _kept(self, key, held, make):
-        """``make()``, or what it gave for the same key; ``held`` are the things whose identities the key is of."""
+        """``make()``, or its cached result for the same key; ``held``: the objects whose identities form the key."""
         entry = self._tables.get(key)
         if entry is None:
             entry = self._tables[key] = held, make()
@@ -299,7 +299,7 @@ class ExactChecker:
 
 
 class _Query:
-    """One state in one scene: where everything is, filled in as it is needed."""
+    """One state in one scene: poses of all bodies, computed on demand."""
 
     def __init__(self, robot, movers, pairs, active, fixed, allowed, memory):
         self.robot, self.movers, self.pairs, self.active, self.fixed = robot, movers, pairs, active, fixed
@@ -307,12 +307,12 @@ class _Query:
         self._allowed, self._memory, self._placed = allowed, memory, set()
 
     def move(self, q, still):
-        """Go on with the robot at ``q`` (n,); movers in ``still`` stay where they are."""
+        """Move the robot to ``q`` (n,); movers in ``still`` keep their poses."""
         self.robot = self.robot[0], q, self.robot[2]
         self._placed &= still
 
     def may_touch(self, i, j):
-        """Whether mover ``i`` may touch the fixed shape ``j`` < 0; two movers that may are not asked about."""
+        """Whether mover ``i`` may touch the fixed shape ``j`` < 0; allowed pairs of two movers are excluded before."""
         if j >= 0:
             return False
         key = self.movers.parts[i].name, self.fixed.parts[-1 - j].name
@@ -330,7 +330,7 @@ class _Query:
         return self.poses[j] if j >= 0 else self.fixed.poses[-1 - j]
 
     def object(self, j):
-        """The fcl.CollisionObject of a mover or fixed shape where it is, None for a plane."""
+        """The fcl.CollisionObject of a mover or fixed shape at its pose, None for a plane."""
         if j < 0:
             return None if self.fixed.geometries[-1 - j] is None else self.fixed.object(-1 - j)
         one = self.movers.objects[j]
@@ -341,7 +341,7 @@ class _Query:
         return one
 
     def plane_depth(self, i, j):
-        """How deep the two reach into each other, one of them a plane; below 0 how far they are apart."""
+        """The overlap of the two, one of them a plane; below 0 their distance."""
         if isinstance(self.part(i).shape, Plane):
             i, j = j, i
         if isinstance(self.part(i).shape, Plane):
@@ -358,7 +358,7 @@ class _Query:
 
 
 def _touch(names, pose, other):
-    """The Contact of two shapes at ``pose`` and ``other`` (4, 4) of which no more is known than that they touch."""
+    """The Contact of two shapes at ``pose`` and ``other`` (4, 4) for which FCL reports no contact point."""
     way = other[:3, 3] - pose[:3, 3]
     length = float(np.linalg.norm(way))
     normal = way / length if length > 1e-9 else np.array((0.0, 0.0, 1.0))

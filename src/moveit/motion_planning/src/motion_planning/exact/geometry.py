@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Shapes as FCL has them, the boxes around them, and what FCL has not: planes without a thickness."""
+"""FCL geometry of shapes, their bounding boxes, and planes without thickness, which FCL does not have."""
 from typing import NamedTuple
 
 import fcl
@@ -22,7 +22,7 @@ class Bounds(NamedTuple):
 
 
 def bounds_of(shape):
-    """Return the :class:`Bounds` of a shape. Raises TypeError for what is none."""
+    """Return the :class:`Bounds` of a shape. Raises TypeError for other objects."""
     zero = np.zeros(3)
     if isinstance(shape, Box):
         half = 0.5 * np.array(shape.size)
@@ -44,11 +44,11 @@ def bounds_of(shape):
         return Bounds(0.5 * (low + high), half, float(np.linalg.norm(half)))
     if isinstance(shape, Plane):
         return Bounds(zero, np.array((_ENDLESS, _ENDLESS, 0.0)), 2.0 * _ENDLESS)
-    raise TypeError("%r is no shape that can collide" % (shape,))
+    raise TypeError("%r is not a shape that can collide" % (shape,))
 
 
 def fcl_geometry(shape):
-    """Return the FCL geometry of a shape; None for a plane, which :func:`plane_overlap` is for."""
+    """Return the FCL geometry of a shape; None for a plane; use :func:`plane_overlap` for that."""
     if isinstance(shape, Plane):
         return None
     if isinstance(shape, Box):
@@ -87,9 +87,9 @@ def grown(shape, padding, scale):
 
 
 def plane_overlap(plane_pose, shape, pose):
-    """Return how deep a shape reaches through a plane [m], below 0 how far it stays away from it.
+    """Return the overlap of a shape with a plane [m]; below 0, its distance from the plane.
 
-    ``plane_pose`` (4, 4): the plane is the x-y plane of this frame, endless and without a thickness; ``pose`` (4, 4):
+    ``plane_pose`` (4, 4): the plane is the x-y plane of this frame, infinite and without thickness; ``pose`` (4, 4):
     the shape's, in the same frame.
     """
     normal = plane_pose[:3, 2]

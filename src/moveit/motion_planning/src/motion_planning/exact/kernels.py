@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which shapes are near each other: forward kinematics, then balls, then boxes. Compiled.
+"""Compiled search for shapes near each other: forward kinematics, then balls, then boxes.
 
-Shapes that move with the robot ("movers", m) hang on links: links (m,) index, local (m, 4, 4) pose in the link, centres
-(m, 3), halves (m, 3) and radii (m,) of their bounds. Fixed shapes (f) have rotations (f, 3, 3), centres (f, 3), halves
-(f, 3), radii (f,) in the planning frame, sorted so that chunks of them lie together: starts (c + 1,), balls (c, 4)
-centre and radius of each chunk.
+Shapes that move with the robot ("movers", m) belong to links: links (m,) index, local (m, 4, 4) pose in the link,
+centres (m, 3), halves (m, 3) and radii (m,) of their bounds. Fixed shapes (f) have rotations (f, 3, 3), centres (f, 3),
+halves (f, 3), radii (f,) in the planning frame, sorted so that chunks of them lie together: starts (c + 1,), balls (c,
+4) centre and radius of each chunk.
 """
 import math
 from pathlib import Path

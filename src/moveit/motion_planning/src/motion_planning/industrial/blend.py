@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A corner between two commands: the second begins while the first still slows down."""
+"""A rounded corner between two commands: the second begins while the first still slows down."""
 import math
 
 import numpy as np
@@ -9,7 +9,7 @@ from motion_planning.industrial.profile import WINDOW_S
 from motion_planning.timing import Timed
 from urdf_model.transforms import rigid
 
-# Points of a corner: so far apart in time at most [s], and so many at least.
+# Points of a corner: greatest distance in time [s], and least number.
 _SPACING_S, _FEWEST = 0.25 * WINDOW_S, 16
 
 
@@ -17,8 +17,8 @@ class Blend:
     """The sum of two motions, of which the first comes to rest in the corner where the second starts from rest.
 
     overlap [s]; times (m,) from 0 to overlap; motion: positions, velocities, accelerations (m, k) of the joints at
-    these. Where both move a link along lines or arcs, the link's positions are summed and its rotations composed, and
-    the joints follow it; else the joints are summed.
+    these times. If both move a link along lines or arcs, the link's positions are summed and its rotations composed,
+    and the joints follow it; else the joints are summed.
     """
 
     def __init__(self, one, other, overlap):
@@ -35,8 +35,8 @@ class Blend:
             self._follow(one.profile.at(late)[0], other.profile.at(self.times)[0])
 
     def excess(self, limits):
-        """How many times as long the corner has to take to keep the limits of joints, and of the link where it follows
-        lines or arcs: 1 or less where it does. limits: CartesianLimits."""
+        """The factor by which the corner must take longer to respect the limits of joints, and of the link on lines or
+        arcs; 1 or less if it does. limits: CartesianLimits."""
         model, indices = self._ways[0].scene.model, self._ways[0].group.indices
         speeds, accelerations = Timed(self.times, *self.motion).peaks()
         excess = max((speeds / model.velocity[indices]).max(),

@@ -17,26 +17,26 @@ from urdf_model.transforms import rotation_angle
 
 PLANNERS = ("PTP", "LIN", "CIRC")
 
-# Steps in which inverse kinematics follows a way [m], [rad]; and the fewest of a whole one.
+# Steps of inverse kinematics along a path [m], [rad]; and their least number.
 _STEP_M, _STEP_RAD, _FEWEST_STEPS = 0.01, 0.05, 8
 _MOST_STEPS = 3000
-# The link is within this of its way, between the trajectory's points too [m], [rad].
+# Allowed distance of the link from its path, also between the trajectory's points [m], [rad].
 DEVIATION_M, DEVIATION_RAD = 5e-4, 5e-3
-# Where that is looked at, between two points of a trajectory.
+# Where it is checked, between two points of a trajectory.
 _BETWEEN = np.array([0.2, 0.5, 0.8])
-# Points are halved so often at most until it holds; and there are so many at most at first.
+# Greatest number of halvings until it holds, and greatest number of points before.
 _HALVINGS, _MOST_POINTS = 6, 2000
-# Lines and arcs are slowed by so much at most for the joints' sake, and each time by this more than it seems to need.
+# Greatest factor by which lines and arcs are slowed down for the joints' limits, and margin of each slowing.
 _MOST_STRETCH, _MORE = 20.0, 1.002
-# A command that moves no joint by more than this [rad or m] is done already, and so for a link [m or rad].
+# A command with smaller motions of all joints [rad or m], or of its link [m or rad], is already done.
 _NOTHING = 1e-6
-# States are checked so far apart at most [rad or m, in any joint], and so many between two looks at ``stop``.
+# Greatest distance of checked states [rad or m, in any joint], and number of them between two calls of ``stop``.
 _RESOLUTION, _AT_ONCE = 0.02, 200
 
 
 @dataclass(frozen=True, eq=False)
 class Auxiliary:
-    """What an arc needs beside its goal. kind: "center" or "interim"; point (3,) in the planning frame."""
+    """The auxiliary point of an arc. kind: "center" or "interim"; point (3,) in the planning frame."""
 
     kind: str
     point: np.ndarray
@@ -44,9 +44,9 @@ class Auxiliary:
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """query: PlanQuery with planner_id of :data:`PLANNERS` and exactly one goal; of its path constraints none is used
-    to plan, but the trajectory has to keep them. auxiliary: for CIRC. start_velocities: of the group's joints, where
-    they are known."""
+    """query: PlanQuery with planner_id of :data:`PLANNERS` and exactly one goal; its path constraints do not influence
+    the planning, but the trajectory must satisfy them. auxiliary: for CIRC. start_velocities: of the group's joints, if
+    known."""
 
     query: PlanQuery
     auxiliary: Auxiliary | None = None
@@ -55,9 +55,9 @@ class Command:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A command's way. curve: joints (k,) by the fraction of it; path: poses of the link, None for PTP; follower: of
-    the link, None where the group has none; limits (3,): velocity, acceleration and deceleration of the fraction;
-    moves: false where start and goal are the same; scene: Scene at the start."""
+    """A command's path. curve: joints (k,) by the fraction of it; path: poses of the link, None for PTP; follower: of
+    the link, None if the group has none; limits (3,): velocity, acceleration and deceleration of the fraction; moves:
+    false if start and goal are the same; scene: Scene at the start."""
 
     command: Command
     scene: Any
@@ -86,11 +86,10 @@ class Motion:
 def plan(command, tools, limits):
     """Return the pipeline.Plan of a :class:`Command`; tools: pipeline.Tools; limits: CartesianLimits.
 
-    PTP: all joints start and arrive together, each with the same share of its way at each time. LIN, CIRC: the link
-    follows its way within DEVIATION_M and DEVIATION_RAD, its rotation in step. The speed is a trapezoid; limits of
-    joints are kept, and for LIN and CIRC those of the link too: where a joint is too slow, the whole command is slower.
-
-    Raises PlanningFailure. Nothing is planned around: what stands in the way makes the plan invalid.
+    PTP: all joints start and arrive together, each with the same share of its motion at each time. LIN, CIRC: the link
+    follows its path within DEVIATION_M and DEVIATION_RAD, with its rotation in step. The speed is a trapezoid; limits
+    of joints are respected, and for LIN and CIRC those of the link, too: if a joint is too slow, the whole command is
+    slower. Raises PlanningFailure. There is no planning around obstacles: a collision makes the command fail.
     """
     begin = tools.clock()
     way = motion(command, tools, limits)
@@ -123,10 +122,10 @@ def motion(command, tools, limits):
 
 
 def in_time(way, limits=None, stretch=1.0):
-    """Return (Timed, Profile, how many times as long it takes as its limits alone would let it) of a Motion.
+    """Return (Timed, Profile, factor by which it takes longer than by its own limits) of a Motion.
 
-    limits: velocity, acceleration and deceleration of the fraction, the Motion's where None; stretch: how many
-    times as long it takes, or longer where joints need it. Raises PlanningFailure where that is far too long.
+    limits: velocity, acceleration and deceleration of the fraction, None: the Motion's; stretch: least factor by which
+    it takes longer. Raises PlanningFailure if the joints need far longer.
     """
     velocity, acceleration, deceleration = limits or way.limits
     profile = Profile(velocity / stretch, acceleration / stretch**2, deceleration / stretch**2)
@@ -154,12 +153,12 @@ def in_time(way, limits=None, stretch=1.0):
 
 
 def check(scene, query, timed, tools):
-    """Raise PlanningFailure where a Timed of the query's group leaves limits of position, breaks a path constraint, or
-    touches something in ``scene``."""
+    """Raise PlanningFailure if a Timed of the query's group exceeds position limits, violates a path constraint, or
+    collides in ``scene``."""
     model, group = scene.model, scene.model.groups[query.group]
     states = timed.sampled(timed.spaced(_RESOLUTION))[0]
     low, high = model.bounds[group.indices].T
-    low, high = np.minimum(low, states[0]), np.maximum(high, states[0])  # who starts a little beyond is led back
+    low, high = np.minimum(low, states[0]), np.maximum(high, states[0])  # a start slightly beyond is led back
     beyond = np.argwhere(((states < low - 1e-6) | (states > high + 1e-6)) & ~model.continuous[group.indices])
     if len(beyond):
         at, joint = beyond[0]
@@ -186,7 +185,7 @@ def check(scene, query, timed, tools):
 
 
 def _understand(command):
-    """Raise PlanningFailure for a command that says too little, or what cannot be."""
+    """Raise PlanningFailure for an incomplete or impossible command."""
     query, model = command.query, command.query.scene.model
     if query.planner_id not in PLANNERS:
         raise PlanningFailure(Code.PLANNING_FAILED, "there is no planner '%s'; expected %s"
@@ -213,7 +212,7 @@ def _understand(command):
 
 def _follower(query, group, link):
     if link is None:
-        raise PlanningFailure(Code.NO_IK_SOLUTION, "group '%s' is no chain; %s needs a link to move: give a pose as "
+        raise PlanningFailure(Code.NO_IK_SOLUTION, "group '%s' is not a chain; %s needs a link to move: give a pose as "
                               "goal, or another group" % (group.name, query.planner_id))
     try:
         return Follower(query.scene.model, group, query.scene.state, link, None)
@@ -263,7 +262,7 @@ def _points(way, profile, times):
 
 
 def _deviation(way, profile, timed):
-    """How far the link leaves its way between the points of a trajectory, as a multiple of what is allowed."""
+    """The link's distance from its path between the points of a trajectory, as a multiple of the allowed distance."""
     if way.path is None:
         return 0.0
     gaps = np.diff(timed.times)[:, None] * _BETWEEN
@@ -277,14 +276,14 @@ def _deviation(way, profile, timed):
 
 
 def _excess(way, timed):
-    """How many times as long a trajectory has to take to keep the joints' limits, 1 or less where it does."""
+    """The factor by which a trajectory must take longer to respect the joints' limits, 1 or less if it does."""
     model, indices = way.scene.model, way.group.indices
     speeds, accelerations = timed.peaks()
     return max((speeds / model.velocity[indices]).max(), math.sqrt((accelerations / model.acceleration[indices]).max()))
 
 
 def _too_slow(way, timed, slower):
-    """The PlanningFailure of a way that a joint can only follow ``slower`` times as slow."""
+    """The PlanningFailure of a path that a joint can follow only ``slower`` times as slowly."""
     speeds = timed.peaks()[0] / way.scene.model.velocity[way.group.indices]
     at, joint = np.unravel_index(speeds.argmax(), speeds.shape)
     return PlanningFailure(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Arcs of a link, and curves of joints through points. Both are asked by the fraction of the way, 0 to 1."""
+"""Arcs of a link, and curves of joints through points. Their parameter is the fraction of the path, 0 to 1."""
 import math
 
 import numpy as np
@@ -15,12 +15,12 @@ _STRAIGHT = 1e-4
 
 
 class NoCircle(PlanningError):
-    """Points that no arc leads through, with the reason."""
+    """There is no arc through these points; the text gives the reason."""
 
 
 class Arc:
     """Poses (4, 4) on an arc of a circle; the rotation turns about one axis, in step with it. length [m], angle [rad]:
-    of the arc, and of the link's turn."""
+    of the arc, and of the link's rotation."""
 
     def __init__(self, begin, end, centre, axis, sweep):
         """begin, end (4, 4); centre, axis (3,): of the circle; sweep [rad], above 0: about the axis."""
@@ -29,7 +29,7 @@ class Arc:
         self.length, self.angle = sweep * float(np.linalg.norm(self._arm)), self._turn.angle
 
     def at(self, fraction):
-        """Return the pose at ``fraction`` of the way."""
+        """Return the pose at ``fraction`` of the path."""
         position = self._centre + axis_rotation(self._axis, fraction * self._sweep) @ self._arm
         return rigid(self._turn.at(fraction)[:3, :3], position)
 
@@ -46,7 +46,7 @@ def arc_about(begin, end, centre):
     if np.linalg.norm(across) <= _STRAIGHT * max(radii) ** 2 or np.linalg.norm(chord) <= _STRAIGHT * max(radii):
         raise NoCircle("start, centre and goal are on one line, or one point; which arc is meant? Give a point on the "
                        "way ('interim') for half a circle")
-    # The centre moved along the chord, so that the arc ends in the goal to the last digit.
+    # The centre is moved along the chord, so that the arc ends exactly in the goal.
     unit = chord / np.linalg.norm(chord)
     centre = centre + 0.5 * ((a + b) @ unit) * unit
     a, b = begin[:3, 3] - centre, end[:3, 3] - centre

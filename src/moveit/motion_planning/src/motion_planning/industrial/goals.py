@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a command's goal constraints mean: one posture, or one pose of one link."""
+"""Conversion of a command's goal constraints to one posture, or one pose of one link."""
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,13 +9,13 @@ from motion_planning.kinematics import ik
 from motion_planning.pipeline import Code, PlanningFailure
 from urdf_model.transforms import rigid
 
-# How long a posture of a goal that touches nothing is looked for [s].
+# Time limit of the search for a free goal posture [s].
 _IK_TIMEOUT_S = 0.1
 
 
 class Goal(NamedTuple):
-    """q (k,): the group's joints, None for LIN and CIRC, whose joints come of the way; link: that is moved, None where
-    the group is no chain; pose (4, 4): of the link in the planning frame, None for PTP."""
+    """q (k,): the group's joints, None for LIN and CIRC, whose joints follow from the path; link: the moved one, None
+    if the group is not a chain; pose (4, 4): of the link in the planning frame, None for PTP."""
 
     q: Any
     link: Any
@@ -71,7 +71,7 @@ def _pose(query, goal):
         raise _bad("the goal's position is of link '%s', its orientation of link '%s'; both have to be of one link"
                    % (goal.positions[0].link, goal.orientations[0].link))
     try:
-        goal = goal.resolved(query.scene)  # a held object's pose is that of the link that holds it
+        goal = goal.resolved(query.scene)  # the pose of the link that holds the object
     except PlanningError as error:
         raise PlanningFailure(Code.INVALID_LINK_NAME, str(error)) from None
     position, orientation = goal.positions[0], goal.orientations[0]
@@ -80,7 +80,7 @@ def _pose(query, goal):
 
 
 def _reached(query, tools, link, pose):
-    """The group's joints (k,) nearest the start that put the link there and touch nothing."""
+    """The group's joints (k,) nearest to the start that put the link there without collision."""
     scene, group = query.scene, query.scene.model.groups[query.group]
 
     def accept(q):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How fast a link may move along lines and arcs."""
+"""Velocity and acceleration limits of a link on lines and arcs."""
 import math
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 class CartesianLimits:
     """trans_velocity [m/s], trans_acceleration, trans_deceleration [m/s^2], rot_velocity [rad/s]; all above 0.
 
-    The values are those that MoveIt's setup assistant writes.
+    The values are those of MoveIt's setup assistant.
     """
 
     trans_velocity: float = 1.0
@@ -33,12 +33,13 @@ class CartesianLimits:
         return cls(**found), complaints
 
     def along(self, length, angle, scaling):
-        """Return (velocity, acceleration, deceleration) of the fraction of a way of ``length`` [m] and ``angle`` [rad].
+        """Return (velocity, acceleration, deceleration) of the fraction of a path of ``length`` [m] and ``angle``
+        [rad].
 
-        scaling: (of velocity, of acceleration). The acceleration of turns stands to their velocity as that of
-        translations does to theirs.
+        scaling: (of velocity, of acceleration). The ratio of rotational acceleration to velocity is that of the
+        translations.
         """
-        way = max(length / self.trans_velocity, angle / self.rot_velocity)  # the time that it takes at full speed [s]
+        way = max(length / self.trans_velocity, angle / self.rot_velocity)  # its duration at full speed [s]
         full = self.trans_velocity
         return (scaling[0] / way, scaling[1] * self.trans_acceleration / full / way,
                 scaling[1] * self.trans_deceleration / full / way)

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A way from 0 to 1 in time: full acceleration, full speed, full deceleration."""
+"""A motion from 0 to 1 in time: full acceleration, full speed, full deceleration."""
 import math
 
 import numpy as np
 
-# The mean over this time [s] makes the trapezoid's acceleration continuous, as interpolating controllers need it.
+# The mean over this time [s] makes the trapezoid's acceleration continuous, as interpolating controllers need.
 WINDOW_S = 0.1
 
 
 class Profile:
-    """A trapezoid of velocity over a way of length 1, its moving mean taken. The mean keeps the limits.
+    """A velocity trapezoid over a path of length 1, smoothed by a moving mean. The mean respects the limits.
 
-    duration [s]; speeding_up, slowing_down [s]: how long at the begin and at the end the speed changes.
+    duration [s]; speeding_up, slowing_down [s]: durations of acceleration and deceleration.
     """
 
     def __init__(self, velocity, acceleration, deceleration):
@@ -22,7 +22,7 @@ class Profile:
         self.duration = up + cruise + down + WINDOW_S
         self.speeding_up, self.slowing_down = up + WINDOW_S, down + WINDOW_S
         self._begins = np.array([0.0, up, up + cruise, up + cruise + down])
-        # Of each section, at its begin: way, speed, acceleration; the last is rest at the end.
+        # Position, speed and acceleration at the start of each section; the last one is the rest at the end.
         self._ways = np.array([0.0, 0.5 * top * up, 0.5 * top * up + top * cruise, 1.0])
         self._speeds = np.array([0.0, top, top, 0.0])
         self._rates = np.array([acceleration, 0.0, -deceleration, 0.0])
@@ -31,14 +31,14 @@ class Profile:
         self._areas = np.concatenate([[0.0], np.cumsum(areas)])
 
     def at(self, times):
-        """Return the way, its speed and its acceleration (n,) at ``times`` (n,) [s]; at rest before 0 and after the
+        """Return position, speed and acceleration (n,) at ``times`` (n,) [s]; at rest before 0 and after the
         end."""
         area_a, way_a, speed_a = self._plain(times - WINDOW_S)
         area_b, way_b, speed_b = self._plain(times)
         return (area_b - area_a) / WINDOW_S, (way_b - way_a) / WINDOW_S, (speed_b - speed_a) / WINDOW_S
 
     def time_at(self, way):
-        """Return when ``way``, 0 to 1, is reached [s]."""
+        """Return the time at which position ``way``, 0 to 1, is reached [s]."""
         low, high = 0.0, self.duration
         for _ in range(50):
             middle = 0.5 * (low + high)
@@ -46,7 +46,7 @@ class Profile:
         return high
 
     def _plain(self, times):
-        """The trapezoid's way, its integral and its speed (n,)."""
+        """The trapezoid's position, its integral and its speed (n,)."""
         times = np.maximum(times, 0.0)
         i = np.searchsorted(self._begins, times, side="right") - 1
         t, way, speed, rate = times - self._begins[i], self._ways[i], self._speeds[i], self._rates[i]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Commands one after the other, the corners between them rounded where that is asked for."""
+"""Sequences of commands, with rounded corners on request."""
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from typing import Any
@@ -13,9 +13,9 @@ from motion_planning.industrial.commands import check, failing, in_time, motion
 from motion_planning.pipeline import Code, Plan, PlanningFailure
 from motion_planning.timing import Timed
 
-# Rounds in which commands on both sides of a corner are slowed until the corner keeps the limits, and by how much more.
+# Rounds of slowing down the commands on both sides of a corner until it respects the limits, and margin of each round.
 _ROUNDS, _MORE = 8, 1.005
-# Points of a trajectory nearer than this in time [s] are one.
+# Points of a trajectory closer than this in time [s] are merged.
 _SAME_S = 5e-3
 
 
@@ -31,14 +31,13 @@ class _Piece:
 
 
 def plan_sequence(commands, radii, tools, limits):
-    """Return [(group name, pipeline.Plan), ...] of :class:`Command`\\ s that follow each other.
-
-    The first starts where its scene says, each other where the one before ends; start states of the others do not
-    count. radii (n,) [m]: how near its goal the link may leave its way to turn to the next one's; 0: it stops there.
-    Consecutive commands of one group make one trajectory; the groups' trajectories are to be executed in the order
-    given. Between two groups nothing is rounded. In a corner of two LIN or CIRC the rotation passes over in step with
-    the position. Where a corner would break a limit, the commands on both sides of it take longer.
-    tools: pipeline.Tools; limits: CartesianLimits. Raises PlanningFailure.
+    """Return [(group name, pipeline.Plan), ...] of :class:`Command`\\ s that follow each other. The first starts at its
+    scene's state, each other at the end of the previous one; their start states are ignored. radii (n,) [m]: distance
+    from a goal at which the link may leave its path for the next one; 0: it stops at the goal. Consecutive commands of
+    one group make one trajectory; the groups' trajectories are to be executed in the order given. Corners between two
+    groups are not rounded. In a corner of two LIN or CIRC the rotation is blended in step with the position. If a
+    corner would exceed a limit, the commands on both sides of it take longer. tools: pipeline.Tools; limits:
+    CartesianLimits. Raises PlanningFailure.
     """
     begin = tools.clock()
     radii = [float(radius) for radius in radii]
@@ -81,21 +80,21 @@ def _understand(commands, radii):
 
 
 class _Run:
-    """Commands of one group that make one trajectory. first: how many commands of the sequence come before them."""
+    """Commands of one group that make one trajectory. first: number of commands of the sequence before them."""
 
     def __init__(self, ways, radii, first, total, limits):
         self._ways, self._radii, self._first, self._total, self._limits = ways, radii, first, total, limits
         self._stretch = np.ones(len(ways))
         for number, radius in enumerate(radii):
             if radius > 0.0 and (ways[number].follower is None or ways[number + 1].follower is None):
-                raise self._failure(number, "group '%s' is no chain; give a pose of a link as goal, or blend_radius 0"
+                raise self._failure(number, "group '%s' is not a chain; give a link's pose as goal, or blend_radius 0"
                                     % ways[number].command.query.group)
         for number, (one, other) in enumerate(pairwise(radii)):
             apart = np.linalg.norm(self._corner(number) - self._corner(number + 1))
             if one > 0.0 and other > 0.0 and one + other > apart:
                 raise self._failure(number + 1, "the blend radii %g and %g m overlap: the goals of commands %d and %d "
                                     "are %.4f m apart" % (one, other, first + number + 1, first + number + 2, apart))
-        # (fraction of the way into the corner where it is entered, of the way out where it is left), None without.
+        # (fraction of the incoming path at the corner's start, of the outgoing path at its end), None without a corner.
         self._cuts = [self._cut(number, radius) if radius > 0.0 else None for number, radius in enumerate(radii)]
 
     def joined(self):
@@ -129,7 +128,7 @@ class _Run:
         return pieces
 
     def _append(self, number, last, piece):
-        """Place ``piece`` in time after ``last``, with a Blend where there is a corner to be rounded."""
+        """Place ``piece`` in time after ``last``, with a Blend if the corner is rounded."""
         piece.begin = last.begin + last.timed.duration
         cut = self._cuts[number - 1]
         if cut is None:
@@ -159,10 +158,9 @@ class _Run:
 
 
 def _limits(limits, first, last):
-    """Velocity, acceleration and deceleration of the fraction of a way, of which the shares ``first`` and ``last`` are
-    within the spheres around corners, 0 for no corner.
-
-    Speed changes over the whole of these shares, so that the corner is as round as can be.
+    """Velocity, acceleration and deceleration of the fraction of a path, of which the shares ``first`` and ``last`` are
+    within the spheres around corners, 0 for no corner. The speed changes over these whole shares, so that the corner is
+    as round as possible.
     """
     velocity, acceleration, deceleration = limits
     top = min(velocity**2, 2.0 * acceleration * (first or 1.0 - last), 2.0 * deceleration * (last or 1.0 - first))
@@ -198,7 +196,7 @@ def _points(pieces):
         timed = piece.timed
         kept = (timed.times > begin + _SAME_S) & (timed.times < end - _SAME_S)
         if piece.blend is None:
-            kept[0] = True  # where the one before has come to rest
+            kept[0] = True  # where the previous one has come to rest
         if following is None:
             kept[-1] = True
         rows.append((piece.begin + timed.times[kept], timed.positions[kept], timed.velocities[kept],

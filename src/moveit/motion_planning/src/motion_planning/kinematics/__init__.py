@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where links are, and which joint values of a group put its links somewhere, with the reason where none do."""
+"""Forward kinematics of links, and inverse kinematics of groups, with the reason of a failure."""
 from motion_planning.kinematics.inverse import KinematicsFailure, NoIkSolution, fk, ik
 from motion_planning.kinematics.limb import Limb, limbs_of
 

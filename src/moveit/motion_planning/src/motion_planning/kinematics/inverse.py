@@ -8,14 +8,14 @@ import numpy as np
 from motion_planning.kinematics.limb import KinematicsFailure, NoIkSolution, limbs_of
 from motion_planning.model import Group, ModelError, State
 
-#: Solutions of each limb that are tried together before the search begins anew elsewhere.
+#: Number of solutions of each limb to combine before the search restarts from another seed.
 _SEVERAL = 12
 
 
 def fk(model, q, links, base=None):
     """Return {link: pose (4, 4) in the planning frame} of ``links`` at ``q`` (n,).
 
-    ``base`` (4, 4): the root in the planning frame, identity where None. Raises ModelError for an unknown link.
+    ``base`` (4, 4): the root in the planning frame, None: identity. Raises ModelError for an unknown link.
     """
     unknown = [link for link in links if link not in model.link_index]
     if unknown:
@@ -25,14 +25,13 @@ def fk(model, q, links, base=None):
 
 
 def ik(model, group, poses, seed, timeout_s=0.05, accept=None, clock=time.monotonic):
-    """Return ``q`` (n,), the seed's but for the joints of ``group``, that puts links where they shall be.
+    """Return ``q`` (n,) that puts links at the given poses; only the joints of ``group`` differ from the seed.
 
-    group: a Group or its name. poses: {link: pose (4, 4), or position (3,) where any orientation will do}, in the
-    planning frame; several links where each has joints of its own, as the hands of both arms. seed: a State, or q (n,)
-    with the root in the origin; the solution found nearest to it is taken. timeout_s: how long solutions that
-    ``accept`` refuses are followed by others; one is looked for in any case. accept: function of q (n,) that returns
-    None, or a sentence that says why it will not do.
-    Raises NoIkSolution, which says why; KinematicsFailure for links that the group cannot move so; ModelError.
+    group: a Group or its name. poses: {link: pose (4, 4), or position (3,) for any orientation}, in the planning frame;
+    several links if they share no joints, such as both hands. seed: a State, or q (n,) with the root in the origin; the
+    solution nearest to it is returned. timeout_s: time limit for further solutions after ``accept`` has refused one.
+    accept: function of q (n,) that returns None, or the reason why q is not acceptable. Raises NoIkSolution with the
+    reason; KinematicsFailure for links that the group cannot move; ModelError.
     """
     deadline = clock() + timeout_s
     group = group if isinstance(group, Group) else model.group(group)
@@ -53,7 +52,8 @@ def ik(model, group, poses, seed, timeout_s=0.05, accept=None, clock=time.monoto
 
 
 def _search(model, start, problem, accept, progress):
-    """The first other solution that ``accept`` takes, near ones first, then from random postures until the deadline."""
+    """Return the first other solution that ``accept`` accepts: near ones first, then from random postures until the
+    deadline."""
     limbs, targets = problem
     refusal, deadline, clock = progress
     generator, tried, around = np.random.default_rng(0), 1, start
@@ -80,7 +80,7 @@ def _seed_of(limb, q):
 
 
 def _put(model, q, limbs, parts):
-    """``q`` (n,) with each limb's part (k,) in its place; joints that turn without end between -pi and pi."""
+    """Return ``q`` (n,) with each limb's part (k,) inserted; continuous joints are wrapped to -pi to pi."""
     whole = np.array(q)
     for limb, part in zip(limbs, parts, strict=True):
         whole[limb.indices] = part

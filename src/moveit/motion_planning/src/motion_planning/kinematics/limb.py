@@ -14,11 +14,11 @@ from urdf_model.transforms import inverse
 
 
 class KinematicsFailure(PlanningError):
-    """A question that inverse kinematics cannot answer: unknown links, links that the group does not move alone."""
+    """A request that inverse kinematics cannot handle: unknown links, links that the group does not move alone."""
 
 
 class NoIkSolution(KinematicsFailure):
-    """There are no joint values, or none that are acceptable. rejected: True where some were found and all refused."""
+    """There is no solution, or no acceptable one. rejected: True if solutions were found and all refused."""
 
     def __init__(self, text, rejected=False):
         super().__init__(text)
@@ -28,7 +28,7 @@ class NoIkSolution(KinematicsFailure):
 class Limb(NamedTuple):
     """The joints of a group between one link and the nearest link that the group does not move.
 
-    chain: their kinematics, from link ``base`` to ``link``; indices (k,): where its joints stand in the model's q.
+    chain: their kinematics, from link ``base`` to ``link``; indices (k,): of its joints in the model's q.
     """
 
     link: str
@@ -37,8 +37,8 @@ class Limb(NamedTuple):
     indices: np.ndarray
 
     def target(self, goal, root):
-        """Return the Target in the limb's base of ``goal``, a pose (4, 4) or a position (3,) for which any orientation
-        will do, both in the frame that ``root`` (4, 4), the base's pose, is given in. Raises KinematicsFailure."""
+        """Return the Target in the limb's base of ``goal``, a pose (4, 4) or a position (3,) with free orientation,
+        both in the frame of ``root`` (4, 4), the base's pose. Raises KinematicsFailure."""
         goal = np.asarray(goal, dtype=np.float64)
         position_only = goal.shape == (3,)
         pose = np.eye(4)
@@ -59,8 +59,8 @@ class Limb(NamedTuple):
             raise NoIkSolution("link '%s' cannot be put there: %s" % (self.link, error)) from None
 
     def several(self, target, seed, number):
-        """Return up to ``number`` joint values (k,) that differ, those near ``seed`` (k,) first; none where there are
-        none."""
+        """Return up to ``number`` different joint values (k,), those near ``seed`` (k,) first; an empty list if there
+        are none."""
         try:
             return [result.q for result in solve_all(self.chain, target, seed, Several(number, settle=False))]
         except KinematicsError:
@@ -70,7 +70,7 @@ class Limb(NamedTuple):
 def limbs_of(model, group, links):
     """Return a list of Limb, one for each of ``links`` (names), of the Group ``group``.
 
-    Raises KinematicsFailure where a link is unknown, is not moved by the group, hangs on a joint of another group in
+    Raises KinematicsFailure if a link is unknown, is not moved by the group, depends on a joint of another group in
     between, or shares a joint with another one of the links.
     """
     limbs = [_limb(model, group.name, link) for link in links]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Picking objects up and putting them down: which of many grasps or places will do, and how the arm gets there."""
+"""Pick and place: selects a valid grasp or place from many candidates, and plans the arm's motion."""
 from motion_planning.manipulation.places import places_on
 from motion_planning.manipulation.planning import Fall, Manipulation, ManipulationFailure, Tools, plan_manipulation
 from motion_planning.manipulation.tasks import Candidate, PickTask, PlaceTask, Stage, Translation, hand_links

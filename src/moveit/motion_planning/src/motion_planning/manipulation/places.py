@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where on a surface something can stand."""
+"""Poses of an object on a surface."""
 import itertools
 import math
 
@@ -10,18 +10,20 @@ from motion_planning.shapes import TriangleMesh
 from urdf_model import Box
 from urdf_model.transforms import axis_rotation, rigid
 
-# Spots are so far apart [m], and from the surface's edge; turns of the object about the vertical at each.
+# Distance of spots from each other and from the surface's edge [m]; number of rotations of the object about the
+# vertical at each spot.
 _SPACING_M, _TURNS = 0.08, 4
-# An object is put down from a hair's breadth above the surface [m].
+# Height above the surface from which an object is put down [m].
 _CLEARANCE_M = 0.001
 _MOST = 200
 
 
 def places_on(scene, support, thing):
-    """Return poses (4, 4) at which an object stands on a box of the scene, the nearest to where it is first.
+    """Return poses (4, 4) at which an object stands on a box of the scene, sorted by the distance from its present
+    pose.
 
-    support: id of an object whose first shape is a box with a face that looks up. thing: WorldObject where it is now,
-    whose tilt is kept. Raises SceneError.
+    support: id of an object whose first shape is a box with a horizontal upper face. thing: WorldObject at its present
+    pose, whose tilt is kept. Raises SceneError.
     """
     surface, object_pose, height = scene.objects.get(support), thing.pose, thing.pose[2, 3] - lowest(thing)
     if surface is None or not isinstance(surface.shapes[0][0], Box):
@@ -56,7 +58,7 @@ def _lowest(shape, pose):
         return height - 0.5 * float(np.abs(up) @ shape.size)
     if isinstance(shape, TriangleMesh):
         return height + float((shape.vertices @ up).min())
-    # Round about z: a ball, or at most as deep as the cylinder around it.
+    # Bounded by a ball, or by the cylinder around it.
     return height - 0.5 * abs(up[2]) * getattr(shape, "length", 2.0 * shape.radius) - math.hypot(*up[:2]) * shape.radius
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tries candidates until one of them works from beginning to end."""
+"""Tries candidates until one of them passes all stages."""
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -13,18 +13,18 @@ from motion_planning.manipulation.tasks import Stage, by_quality, moved
 from motion_planning.pipeline import Code, PlanningFailure
 from motion_planning.timing import time_path
 
-# Steps of the straight ways [m]; corners are cut by so much at most [rad or m]; states checked so far apart.
+# Steps of straight motions [m]; greatest cut of a corner [rad or m]; distance of checked states.
 _STEP_M, _CORNER, _RESOLUTION = 0.02, 0.001, 0.02
-# The hand goes on for so far at most where it shall come as near as it can [m].
+# Greatest further motion of a hand that must come as close as possible [m].
 _CLOSEST_M = 1.0
-# Postures of the arm that a candidate is given up after: all, and those that touch nothing where the hand closes.
+# Number of the arm's postures after which a candidate is rejected: all, and those without collision at the grasp.
 _MOST_POSTURES, _MOST_FREE_POSTURES = 40, 6
-# Share of the time that is left which planning for one candidate may take while there are others.
+# Greatest share of the remaining time for one candidate while there are others.
 _SHARE = 0.5
-# Candidates whose fall a sentence tells.
+# Number of rejected candidates in a sentence.
 _NAMED = 8
 
-# Stages in which a candidate can fall, in their order.
+# Stages in which a candidate can fail, in their order.
 REACH, CONTACT, APPROACH, RETREAT, PLAN = "reach", "grasp pose", "approach", "retreat", "plan"
 _ORDER = (REACH, CONTACT, APPROACH, RETREAT, PLAN)
 _CODES = {REACH: Code.NO_IK_SOLUTION, CONTACT: Code.GOAL_IN_COLLISION, APPROACH: Code.PLANNING_FAILED,
@@ -32,7 +32,7 @@ _CODES = {REACH: Code.NO_IK_SOLUTION, CONTACT: Code.GOAL_IN_COLLISION, APPROACH:
 
 
 class Fall(NamedTuple):
-    """Why a candidate will not do: its name, the stage that it got to, the reason, and a :class:`pipeline.Code`."""
+    """Why a candidate was rejected: its name, the stage that it reached, the reason, and a :class:`pipeline.Code`."""
 
     candidate: str
     stage: str
@@ -40,11 +40,11 @@ class Fall(NamedTuple):
     code: int
 
     def __str__(self):
-        return "'%s' falls at '%s': %s" % (self.candidate, self.stage, self.reason)
+        return "'%s' fails at '%s': %s" % (self.candidate, self.stage, self.reason)
 
 
 class ManipulationFailure(PlanningFailure):
-    """No candidate works. falls: a :class:`Fall` for each that was tried, in their order."""
+    """No candidate is valid. falls: a :class:`Fall` for each tried one, in their order."""
 
     def __init__(self, code, text, falls=(), contacts=()):
         super().__init__(code, text, contacts)
@@ -53,9 +53,9 @@ class ManipulationFailure(PlanningFailure):
 
 @dataclass(frozen=True, eq=False)
 class Tools:
-    """What is planned with. exact: ExactChecker; plan(scene, q (k,), seconds): returns a pipeline.Plan of the group
-    from the scene's state to ``q`` or raises PlanningError; clock: function that gives the time [s]; stop(): true ends
-    it all; scaling: (velocity, acceleration) 0 < f <= 1 of the straight ways."""
+    """The tools of planning. exact: ExactChecker; plan(scene, q (k,), seconds): returns a pipeline.Plan of the group
+    from the scene's state to ``q`` or raises PlanningError; clock: function that returns the time [s]; stop(): true
+    ends the search; scaling: (velocity, acceleration) 0 < f <= 1 of the straight motions."""
 
     exact: Any
     plan: Callable
@@ -65,7 +65,7 @@ class Tools:
 
 
 class Manipulation(NamedTuple):
-    """candidate: the Candidate that works; stages: [Stage, ...] in their order; falls: of those tried before it."""
+    """candidate: the valid Candidate; stages: [Stage, ...] in their order; falls: of those tried before it."""
 
     candidate: Any
     stages: list
@@ -80,12 +80,12 @@ class _Fallen(Exception):
 
 
 def plan_manipulation(task, candidates, allowed_time, tools):
-    """Return a :class:`Manipulation` of the best Candidate that works.
+    """Return a :class:`Manipulation` of the best valid Candidate.
 
     task: PickTask or PlaceTask; candidates: list; allowed_time [s]. For each candidate, in the order of quality: a
-    posture of the arm that touches nothing it may not, the approach, the retreat with the object in the hand or
-    standing in its place, then a path to where the approach begins. Every state is checked by exact geometry.
-    Raises ManipulationFailure: none works, which tells where each fell; there are none; out of time; stopped.
+    posture of the arm without collision, the approach, the retreat with the object in the hand or in its place, then a
+    path to the start of the approach. Every state is checked by exact geometry. Raises ManipulationFailure if none is
+    valid (with the stage at which each failed), if there are none, out of time, or stopped.
     """
     if not candidates:
         raise ManipulationFailure(Code.PLANNING_FAILED, "'%s' cannot be %s: the list of candidates is empty"
@@ -123,7 +123,7 @@ def _failure(task, count, falls, late):
 
 
 class _Attempt:
-    """One candidate on its way."""
+    """One candidate while it is tried."""
 
     def __init__(self, task, candidate, tools, seconds):
         self.task, self.candidate, self.tools, self.seconds = task, candidate, tools, seconds
@@ -153,7 +153,7 @@ class _Attempt:
         stages.append(Stage("retreat", self._timed(retreat, after, RETREAT), {}, after))
         return stages
 
-    # -- where the hand closes ----------------------------------------------------------------------------------
+    # -- the grasp ----------------------------------------------------------------------------------
 
     def _straight_ways(self, scene):
         """(approach (m, k), retreat (m, k), scene of the retreat) of the first posture that has both."""
@@ -175,7 +175,7 @@ class _Attempt:
         return found
 
     def _note(self, fallen):
-        """Keep the fall that got furthest; give up after enough of them."""
+        """Keep the failure of the latest stage; give up after enough of them."""
         if self.fallen is None or _ORDER.index(fallen.stage) > _ORDER.index(self.fallen.stage):
             self.fallen = fallen
         self.tried += 1
@@ -191,7 +191,7 @@ class _Attempt:
         approach = self.candidate.approach
         back = self._straight(scene, state, -approach.vector(pose), approach, APPROACH)
         after = self.task.retreating(self.candidate, state)
-        # What is touched where the hand has closed is told as such, and not as a retreat of length 0.
+        # A contact at the grasp is reported as such, and not as a retreat of length 0.
         touching = self._contact(after, after.state)
         if touching:
             raise _Fallen(RETREAT, "at its begin %s" % touching)
@@ -200,7 +200,7 @@ class _Attempt:
         return back[::-1], away, after
 
     def _straight(self, scene, state, direction, way, stage):
-        """Joints (m, k) on the straight way from ``state``, as far as it goes."""
+        """Joints (m, k) of the straight motion from ``state``, as far as possible."""
         here = state.q[self.group.indices][None]
         if not way.desired > 0.0:
             return here
@@ -224,13 +224,13 @@ class _Attempt:
                               Steps(step, accept=accept, stop=self.tools.stop))
 
     def _closest(self):
-        """The pose (4, 4) to which the hand can go on from the candidate's before it touches something."""
+        """The pose (4, 4) that the hand can reach from the candidate's pose before it touches something."""
         scene, pose = self.task.closing_in(self.candidate), self.candidate.pose
         try:
             q = ik(self.model, self.group, {self.task.link: pose}, scene.state, max(0.0, 0.2 * self._left()),
                    lambda q: self._contact(scene, scene.state.with_q(q)), self.tools.clock)
         except (NoIkSolution, KinematicsFailure):
-            return pose  # why it will not do is told by what comes next
+            return pose  # the next check reports the reason
         state = scene.state.with_q(q)
         path = self._line(scene, state, self.candidate.approach.vector(pose) * _CLOSEST_M, 0.2 * _STEP_M)
         return self.model.frame_of(state.with_q(path.joints[-1], self.group.indices).q, self.task.link, state.base)
@@ -238,7 +238,7 @@ class _Attempt:
     # -- checks -------------------------------------------------------------------------------------------------
 
     def _contact(self, scene, state):
-        """None, or the sentence on what touches."""
+        """None, or the sentence about the contact."""
         if self.tools.exact.free(scene, state, self.task.group):
             return None
         return "; ".join(map(str, self.tools.exact.contacts(scene, state, self.task.group, 3)))

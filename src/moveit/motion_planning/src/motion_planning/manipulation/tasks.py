@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is to be picked up or put down, and in which scenes that is checked."""
+"""Tasks of picking up and putting down, and the scenes for their checks."""
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -13,8 +13,8 @@ from urdf_model.transforms import inverse
 
 
 class Translation(NamedTuple):
-    """A straight way of the hand. direction (3,): unit vector in the planning frame, or with ``in_hand`` in the frame
-    of the task's link; desired, least: how far [m] it shall and has to go."""
+    """A straight motion of the hand. direction (3,): unit vector in the planning frame, or with ``in_hand`` in the
+    frame of the task's link; desired, least: desired and least length [m]."""
 
     direction: np.ndarray
     in_hand: bool = False
@@ -28,12 +28,11 @@ class Translation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One way to take an object, or one place to put it.
+    """One grasp of an object, or one place for it.
 
     name: for sentences; pose (4, 4): of the task's link in the planning frame where the hand closes or opens; approach,
-    retreat: Translations that lead there and away; quality: the best are tried first. before, after: {joint: value} of
-    the hand on the approach and from the end of it on, empty where it stays as it is. touch: names of objects that the
-    hand may touch.
+    retreat: Translations to and from it; quality: the best are tried first. before, after: {joint: value} of the hand
+    during the approach and after it, empty for no change. touch: names of objects that the hand may touch.
     """
 
     name: str
@@ -48,8 +47,8 @@ class Candidate:
 
 class Stage(NamedTuple):
     """A part of the motion. description: plan, pre_grasp, approach, grasp or retreat. timed: timing.Timed of the
-    group's joints, None where the hand moves; posture: {joint: value} of the hand; scene: in which the motion is free,
-    the robot where the stage begins."""
+    group's joints, None if the hand moves; posture: {joint: value} of the hand; scene: in which the motion is free,
+    with the robot at the start of the stage."""
 
     description: str
     timed: Any
@@ -59,9 +58,9 @@ class Stage(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """scene: Scene with the robot where it is; group: name of the arm's; link: of the arm, which candidates' poses are
-    for; hand: names of the hand's links; target: id of the object. support: id of what the object stands on or shall
-    stand on, or ""; hand_may_touch_support; touch_links: what may touch the held object, the hand where empty."""
+    """scene: Scene with the robot's present state; group: name of the arm's; link: of the arm, for candidates' poses;
+    hand: names of the hand's links; target: id of the object. support: id of the support of the object, before or
+    after, or ""; hand_may_touch_support; touch_links: links that may touch the held object, empty: the hand."""
 
     scene: Scene
     group: str
@@ -73,12 +72,12 @@ class _Task:
     touch_links: frozenset = frozenset()
 
     def on_the_way(self):
-        """The scene while the arm comes near."""
+        """The scene for the path to the approach."""
         entries = {(self.support, self.target): True} if self.support else {}
         return self._allowing(self.scene, entries)
 
     def approaching(self, candidate):
-        """The scene on the approach."""
+        """The scene for the approach."""
         entries = {(link, name): True for link in self.hand for name in (self.target, *candidate.touch)}
         if self.support and self.hand_may_touch_support:
             entries.update({(link, self.support): True for link in self.hand})
@@ -86,7 +85,7 @@ class _Task:
         return _with_hand(scene, candidate.before)
 
     def retreating(self, candidate, state):
-        """The scene from when the hand has closed or opened; ``state``: the robot's there."""
+        """The scene after the hand has closed or opened; ``state``: the robot's at that time."""
         scene = _with_hand(self.approaching(candidate).with_state(state), candidate.after)
         return self._handed_over(scene)
 
@@ -96,8 +95,8 @@ class _Task:
 
 @dataclass(frozen=True, eq=False)
 class PickTask(_Task):
-    """Take ``target`` from the world. minimize_distance: the hand goes on from a candidate's pose along its approach as
-    long as it touches nothing. Raises SceneError where the scene has no such object."""
+    """Take ``target`` from the world. minimize_distance: the hand continues from a candidate's pose along its approach
+    until just before a contact. Raises SceneError if the scene has no such object."""
 
     minimize_distance: bool = False
     verb = "picked up"
@@ -117,7 +116,7 @@ class PickTask(_Task):
 
 @dataclass(frozen=True, eq=False)
 class PlaceTask(_Task):
-    """Put ``target``, which the robot holds, into the world. Raises SceneError where it holds none of that name."""
+    """Put the attached ``target`` into the world. Raises SceneError if the robot does not hold it."""
 
     minimize_distance = False
     verb = "put down"
@@ -137,7 +136,7 @@ class PlaceTask(_Task):
 
 
 def hand_links(model, effector):
-    """Return the names of the links of an srdf.EndEffector: those of its group and all that hangs on them."""
+    """Return the names of the links of an srdf.EndEffector: those of its group and all links below them."""
     found = set(model.groups[effector.group].links)
     grown = True
     while grown:
@@ -148,7 +147,7 @@ def hand_links(model, effector):
 
 
 def _with_hand(scene, posture):
-    """The scene with the hand's joints at ``posture``, brought into their limits; joints that mimic others follow."""
+    """The scene with the hand's joints at ``posture``, clamped to their limits; joints that mimic others follow."""
     model = scene.model
     values = {name: float(np.clip(value, *model.bounds[model.index[name]]))
               for name, value in posture.items() if name in model.index}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The robot that is planned for: joint variables, limits, groups, forward kinematics of all links."""
+"""The model of the robot for planning: joint variables, limits, groups, forward kinematics of all links."""
 from motion_planning.model.errors import ModelError
 from motion_planning.model.group import Group
 from motion_planning.model.meshes import MeshReader, MeshUnreadable

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What can be wrong with a robot, or with a question about it."""
+"""Errors of robot models and of queries about them."""
 from motion_planning.errors import PlanningError
 
 
 class ModelError(PlanningError):
-    """URDF and SRDF make no robot that can be planned for, or a name or value does not fit it."""
+    """URDF and SRDF do not make a valid model, or a name or value does not fit the model."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Groups of joints that are planned for together."""
+"""Groups of joints for planning."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -16,17 +16,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Some joints of a model, as the SRDF names them. It never changes.
+    """Some joints of a model, as named in the SRDF. Immutable.
 
-    joints: names of the k joints that can be moved; indices (k,): where they stand in the model's variables.
-    valued_joints: these and the joints that mimic others, in order: what MoveIt counts as the group's variables.
-    links: the links that hang on the group's joints, fixed ones included; moving_links: all links of the robot that
-    move with the group, whoever they belong to.
-    base, tip: ends of the chain that the group is, None where it is none; chain: its kinematics, None where nothing in
-    it moves or a joint mimics another, too. Limits are the model's.
-    subgroups: names of groups in it. states: name to {joint: value}.
-    end_effector: what the group is as an end effector, else None; end_effectors: names of those mounted on it.
-    all_joints: fixed and mimic joints too.
+    joints: names of the k movable joints; indices (k,): of them in the model's variables.
+    valued_joints: these and the joints that mimic others, in order: the group's variables in MoveIt.
+    links: the child links of the group's joints, including fixed ones; moving_links: all links of the robot that move
+    with the group, also of other groups. base, tip: ends of the group's chain, None if it is not a chain; chain: its
+    kinematics, also None if nothing in it moves or a joint mimics another. Limits are the model's. subgroups: names of
+    groups in it. states: name to {joint: value}. end_effector: the group's entry if it is an end effector, else None;
+    end_effectors: names of those mounted on it. all_joints: including fixed and mimic joints.
     """
 
     name: str
@@ -49,9 +47,10 @@ class Group:
 
 
 def build_groups(robot, srdf, model, warnings):
-    """Return {name: Group} of ``srdf``'s groups, in its order, for ``robot`` (limits as they shall hold).
+    """Return {name: Group} of ``srdf``'s groups, in its order, for ``robot`` (with the limits to use).
 
-    ``model``: has index {joint: where} and mimics. What cannot be used is told to ``warnings`` (list of sentences).
+    ``model``: has index {joint: where} and mimics. ``warnings`` (list of sentences) gets the reasons for unusable
+    entries.
     """
     order = depth_first(robot)
     rank = {joint.name: number for number, joint in enumerate(order)}
@@ -90,9 +89,8 @@ def build_groups(robot, srdf, model, warnings):
 
 
 def depth_first(robot):
-    """Return the joints of ``robot`` (urdf_model.Robot), fixed ones too, each before those that hang on it.
-
-    Those of one link by their names, wherever the URDF has them: MoveIt's order, in which programs send joint values.
+    """Return the joints of ``robot`` (urdf_model.Robot), including fixed ones, parents first. Joints of one parent link
+    are sorted by name, as in MoveIt: programs send joint values in this order.
     """
     below = {}
     for _, joint in sorted(robot.joints.items()):
@@ -106,7 +104,7 @@ def depth_first(robot):
 
 
 def _ends(robot, joints, rank):
-    """Return (base link, tip link) of the chain that ``joints`` are, (None, None) where they are none."""
+    """Return (base link, tip link) of the chain of ``joints``, (None, None) if they are not a chain."""
     joints = sorted(joints, key=lambda joint: rank[joint.name])
     path = {joint.name for joint in robot.chain(joints[0].parent, joints[-1].child)} if _is_below(
         robot, joints[-1].child, joints[0].parent) else set()

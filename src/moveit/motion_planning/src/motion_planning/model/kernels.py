@@ -9,10 +9,10 @@ compiled = compiler("motion_planning_model", [__file__], nogil=True, error_model
 
 @compiled
 def fill_frames(kinematics, q, base, frames):
-    """Fill ``frames`` (l, 4, 4) with the pose of every link in the frame that ``base`` (4, 4) is given in.
+    """Fill ``frames`` (l, 4, 4) with the pose of every link in the frame of ``base`` (4, 4).
 
-    kinematics, one entry per link, parents first: parents (l,) index of the link that it hangs on, -1 for the root;
-    origins (l, 4, 4) and axes (l, 3) of its joint; kinds (l,): 0 fixed, 1 turns, 2 slides; variables (l,): index
+    kinematics, one entry per link, parents first: parents (l,) index of the parent link, -1 for the root;
+    origins (l, 4, 4) and axes (l, 3) of its joint; kinds (l,): 0 fixed, 1 revolute, 2 prismatic; variables (l,): index
     into ``q``, -1 for none; factors (l, 2): multiplier and offset of the value.
     """
     parents, origins, axes, kinds, variables, factors = kinematics

@@ -4,16 +4,17 @@ import math
 
 import numpy as np
 
-#: Where neither file says how fast a joint may move [rad/s, rad/s^2; m for a sliding one]: MoveIt's defaults.
+#: Velocity and acceleration limits if neither file has them [rad/s, rad/s^2; m for a prismatic joint]: MoveIt's
+#: defaults.
 DEFAULT_VELOCITY, DEFAULT_ACCELERATION = 1.0, 1.0
 
 
 def narrow_limits(robot, joint_limits, warnings):
-    """Narrow the positions, and set the velocities, of ``robot``'s joints (in place) to what ``joint_limits`` says.
+    """Narrow the positions, and set the velocities, of ``robot``'s joints (in place) as in ``joint_limits``.
 
     ``joint_limits``: {joint: {min_position, max_position, has_velocity_limits, max_velocity, has_acceleration_limits,
-    max_acceleration}}, or a mapping with that under "joint_limits". Returns {joint: acceleration limit}. What cannot
-    be used is told to ``warnings``.
+    max_acceleration}}, or a mapping with that under "joint_limits". Returns {joint: acceleration limit}. ``warnings``
+    gets the reasons for unusable entries.
     """
     accelerations = {}
     table = joint_limits or {}
@@ -22,7 +23,7 @@ def narrow_limits(robot, joint_limits, warnings):
         joint = robot.joints.get(name)
         if not isinstance(entry, dict) or joint is None:
             if isinstance(entry, dict):
-                warnings.append("joint limits name '%s', which is no joint of the robot; ignored" % name)
+                warnings.append("joint limits name '%s', which is not a joint of the robot; ignored" % name)
             continue
         _narrow_position(joint, entry, warnings)
         velocity = _positive(name, entry, "velocity", warnings)
@@ -61,7 +62,7 @@ def _narrow_position(joint, entry, warnings):
 
 
 def _positive(name, entry, what, warnings):
-    """The limit of ``what``: None where nothing is said, 0 where there shall be none."""
+    """The limit of ``what``: None if there is no entry, 0 if the limit is disabled."""
     if entry.get("has_%s_limits" % what) is False:
         return 0.0
     value = _number(name, entry, "max_" + what, warnings)

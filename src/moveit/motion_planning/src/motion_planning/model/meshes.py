@@ -1,25 +1,30 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mesh files as triangles, read in a process with limits: libraries for formats do what a file tells them to."""
+"""Mesh files as triangles, read in a process with limits: libraries for formats do what a file tells them to.
+
+Triangles are kept on disk. Who finds all of them there starts no process, and loads no libraries: 40 MB and a second.
+"""
+import hashlib
 import os
 import tempfile
 import threading
+import zipfile
+from pathlib import Path
 
 import numpy as np
 
-from bullet_sim.limited import MESHES, LimitError
-from bullet_sim.mesh_loading import MeshError, load_scene
 from motion_planning.errors import PlanningError
 from motion_planning.shapes import TriangleMesh
+from numba_cache import folder
 
 
 class MeshUnreadable(PlanningError):
-    """A mesh file cannot be used; the text names it and says why."""
+    """A mesh file cannot be used; the text names it and the reason."""
 
 
 class MeshReader:
     """Function from a file's name to its TriangleMesh, in the file's own scale, in m, z up. Each is read once.
 
-    find: function from a name as descriptions have it (package://, file://, path) to a path, or None.
+    find: function from a name in a description (package://, file://, path) to a path, or None.
     """
 
     def __init__(self, find):
@@ -38,23 +43,69 @@ class MeshReader:
         path = self._find(filename)
         if path is None:
             raise MeshUnreadable("mesh %s is not there" % filename)
-        handle, target = tempfile.mkstemp(prefix="motion_planning_", suffix=".npz")
-        os.close(handle)
         try:
-            MESHES.call(write_triangles, str(path), target)
-            with np.load(target) as arrays:
-                return TriangleMesh(arrays["vertices"], arrays["triangles"])
-        except (LimitError, ValueError) as error:
+            kept = _file(Path(path))
+            try:
+                return _triangles(kept)
+            except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+                mesh = _made(path)
+                _keep(mesh, kept)
+                return mesh
+        except (OSError, ValueError) as error:
             raise MeshUnreadable("mesh %s cannot be used: %s" % (filename, error)) from None
-        finally:
-            os.unlink(target)
+
+
+def _file(path):
+    """The file that the triangles of the mesh at ``path`` are kept in: another one for other content."""
+    digest = hashlib.sha256(path.suffix.lower().encode())
+    # The corners of a glTF file may stand in others beside it.
+    for part in [path, *(sorted(path.parent.glob("*.bin")) if path.suffix.lower() == ".gltf" else ())]:
+        with part.open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    return Path(folder("motion_planning_meshes", [__file__])) / (digest.hexdigest()[:32] + ".npz")
+
+
+def _triangles(file):
+    with np.load(file) as arrays:
+        return TriangleMesh(arrays["vertices"], arrays["triangles"])
+
+
+def _made(path):
+    """The TriangleMesh of a file, read now. Raises ValueError, OSError."""
+    from bullet_sim.limited import MESHES, LimitError  # loads PyBullet
+
+    handle, target = tempfile.mkstemp(prefix="motion_planning_", suffix=".npz")
+    os.close(handle)
+    try:
+        MESHES.call(write_triangles, str(path), target)
+        return _triangles(target)
+    except LimitError as error:
+        raise ValueError(error) from None
+    finally:
+        os.unlink(target)
+
+
+def _keep(mesh, kept):
+    """Write a TriangleMesh into the file ``kept``, unless there is no room."""
+    unfinished = None
+    try:
+        # Two processes may make it at once: the file is whole or not there.
+        handle, unfinished = tempfile.mkstemp(dir=kept.parent)
+        with os.fdopen(handle, "wb") as file:
+            np.savez(file, vertices=mesh.vertices, triangles=mesh.triangles)
+        os.replace(unfinished, kept)
+    except OSError:
+        if unfinished is not None:
+            Path(unfinished).unlink(missing_ok=True)
 
 
 def write_triangles(path, target):
     """Write the triangles of the mesh at ``path`` to the npz file ``target``: vertices (n, 3), triangles (m, 3).
 
-    Raises MeshError, OSError, and what libraries raise.
+    Raises MeshError, OSError, and the libraries' exceptions.
     """
+    from bullet_sim.mesh_loading import MeshError, load_scene
+
     scene = load_scene(path)
     mesh = scene.to_geometry() if hasattr(scene, "to_geometry") else scene.dump(concatenate=True)
     triangles = np.asarray(getattr(mesh, "faces", ()))

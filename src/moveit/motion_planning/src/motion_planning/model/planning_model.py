@@ -17,18 +17,18 @@ _KINDS = {"revolute": 1, "continuous": 1, "prismatic": 2}
 
 
 class PlanningModel:
-    """The robot that is planned for. It never changes and may be used from any number of threads.
+    """The model of the robot for planning. It is immutable, so threads can share it.
 
-    name: the URDF's. robot: urdf_model.Robot, its limits narrowed. srdf: srdf.Srdf. warnings: what was ignored.
+    name: the URDF's. robot: urdf_model.Robot, its limits narrowed. srdf: srdf.Srdf. warnings: on ignored entries.
     root: root link. frame: the planning frame: the parent frame of a virtual joint that moves, or else the root.
     virtual_joint: srdf.VirtualJoint or None.
-    variables: names of the n joints that can be moved (not fixed, not mimic), depth-first; index: {name: where}.
-    mimics: {joint that mimics another: (variable, multiplier, offset)}: it stands at multiplier * variable + offset.
-    bounds (n, 2) [rad or m], -pi to pi for a joint that turns without end; velocity (n,), acceleration (n,) [per s,
-    per s^2]; continuous (n,) bool: turns without end.
-    links: names, depth-first, parents first; link_index: {name: where}.
-    groups: {name: Group}. end_effectors: {name: srdf.EndEffector}. passive: joints that nothing drives.
-    disabled: frozenset of sorted pairs of links that need not be checked against each other.
+    variables: names of the n movable joints (not fixed, not mimic), depth-first; index: {name: index}.
+    mimics: {joint that mimics another: (variable, multiplier, offset)}: its value is multiplier * variable + offset.
+    bounds (n, 2) [rad or m], -pi to pi for a continuous joint; velocity (n,), acceleration (n,) [per s,
+    per s^2]; continuous (n,) bool: without limits.
+    links: names, depth-first, parents first; link_index: {name: index}.
+    groups: {name: Group}. end_effectors: {name: srdf.EndEffector}. passive: joints without a drive. disabled: frozenset
+    of sorted pairs of links without collision check.
     """
 
     def __init__(self, robot, srdf, joint_limits=None):
@@ -62,7 +62,7 @@ class PlanningModel:
     def from_xml(cls, urdf_xml, srdf_xml, joint_limits=None):
         """Return the model of two texts (str or bytes) and the mapping of a joint_limits.yaml.
 
-        ``srdf_xml`` may be empty: no groups then. Raises ModelError for texts that are no URDF or no SRDF.
+        ``srdf_xml`` may be empty: no groups then. Raises ModelError for texts that are not URDF or SRDF.
         """
         try:
             robot = parse_urdf(urdf_xml)
@@ -92,7 +92,7 @@ class PlanningModel:
             parents, origins, axes, kinds, variables, factors))
 
     def _driver(self, joint):
-        """(name of the joint whose value counts, (multiplier, offset)) of ``joint``, through all that it mimics."""
+        """Return (name of the driving joint, (multiplier, offset)) of ``joint``, through a chain of mimic joints."""
         multiplier, offset, seen = 1.0, 0.0, {joint.name}
         while joint.mimic is not None:
             offset += multiplier * joint.mimic.offset
@@ -108,7 +108,7 @@ class PlanningModel:
     def frames(self, q, base=None):
         """Return the poses (l, 4, 4) of all ``links`` in the planning frame at ``q`` (n,).
 
-        ``base`` (4, 4): the root in the planning frame, identity where None. Mimic joints follow. Raises ModelError
+        ``base`` (4, 4): the root in the planning frame, None: identity. Mimic joints follow. Raises ModelError
         for a wrong count.
         """
         frames = np.empty((len(self.links), 4, 4))
@@ -124,7 +124,7 @@ class PlanningModel:
 
     def checked(self, q):
         """Return ``q`` as an array (n,) of floats. Raises ModelError for a wrong count."""
-        values = np.array(q, dtype=np.float64)  # of one memory layout, writable: numba compiles for each kind
+        values = np.array(q, dtype=np.float64)  # one memory layout, writable: numba compiles for each layout
         if values.shape != (len(self.variables),):
             raise ModelError("expected %d joint values (%s), got an array of shape %s"
                              % (len(self.variables), ", ".join(self.variables), values.shape))
@@ -146,7 +146,7 @@ class PlanningModel:
         return state.with_joints(values) if isinstance(values, dict) else state
 
     def default_state(self):
-        """Return the State with every joint at 0, or in the middle of its limits where 0 is beyond them."""
+        """Return the State with every joint at 0, or in the middle of its limits if 0 is beyond them."""
         return self.state()
 
     def _defaults(self):
@@ -154,21 +154,22 @@ class PlanningModel:
         return np.where((low <= 0.0) & (high >= 0.0), 0.0, 0.5 * (low + high))
 
     def group(self, name):
-        """Return the Group ``name``. Raises ModelError, which names those that there are."""
+        """Return the Group ``name``. Raises ModelError with the existing names."""
         if name not in self.groups:
             raise ModelError("robot '%s' has no group '%s'; its groups are %s"
                              % (self.name, name, ", ".join(self.groups) or "none"))
         return self.groups[name]
 
     def wrapped(self, q):
-        """Return ``q`` (n,) with joints that turn without end brought between -pi and pi."""
+        """Return ``q`` (n,) with continuous joints wrapped to -pi to pi."""
         q = self.checked(q).copy()
         turns = self.continuous
         q[turns] = np.remainder(q[turns] + math.pi, 2.0 * math.pi) - math.pi
         return q
 
     def beyond_limits(self, q, margin=0.0, indices=None):
-        """Return [(joint, value, lower, upper)] of those of ``q`` (n,) beyond their limits by more than ``margin``.
+        """Return [(joint, value, lower, upper)] of the values of ``q`` (n,) that exceed their limits by more than
+        ``margin``.
 
         ``indices``: only these variables count.
         """
@@ -181,7 +182,7 @@ class PlanningModel:
     # -- collisions ---------------------------------------------------------------------------------------------
 
     def default_collision(self, link_a, link_b):
-        """Whether two links of the robot are checked against each other, as the SRDF says."""
+        """Whether the SRDF has a collision check between two links of the robot."""
         pair = pair_of(link_a, link_b)
         if link_a == link_b or pair in self.disabled:
             return False
@@ -189,5 +190,5 @@ class PlanningModel:
 
 
 def pair_of(a, b):
-    """Return two names as a sorted pair, as sets of pairs have them."""
+    """Return two names as a sorted pair, as used in sets of pairs."""
     return (a, b) if a <= b else (b, a)

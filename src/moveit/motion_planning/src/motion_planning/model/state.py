@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where the robot is and what it holds."""
+"""The robot's state: posture, base and attached objects."""
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from motion_planning.shapes import read_only
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A state of a robot; it never changes.
+    """A state of a robot; immutable.
 
     q (n,): a value for each of ``variables`` [rad or m]. base (4, 4): the root link in the planning frame.
     attached: id to the ``scene.AttachedBody`` that the robot holds. variables: names of the model's variables.
@@ -37,12 +37,12 @@ class State:
         return dict(zip(self.variables, self.q.tolist(), strict=True))
 
     def with_joints(self, values):
-        """Return the state with ``values``, {joint: value}, in place. Raises ModelError for a joint that is not a
+        """Return the state with ``values``, {joint: value}, replaced. Raises ModelError for a joint that is not a
         variable, and for a value that is not finite."""
         q = self.q.copy()
         for name, value in values.items():
             if name not in self.variables:
-                raise ModelError("'%s' is no joint variable of the robot; expected one of %s"
+                raise ModelError("'%s' is not a joint variable of the robot; expected one of %s"
                                  % (name, ", ".join(self.variables)))
             if not np.isfinite(value):
                 raise ModelError("the value of joint '%s' is %s; expected a finite number" % (name, value))
@@ -50,7 +50,7 @@ class State:
         return replace(self, q=q)
 
     def with_q(self, q, indices=None):
-        """Return the state at ``q`` (n,), or with ``q`` (k,) at the ``indices`` (k,), as groups have them."""
+        """Return the state at ``q`` (n,), or with ``q`` (k,) at the ``indices`` (k,) of a group."""
         if indices is not None:
             whole = self.q.copy()
             whole[indices] = q
@@ -62,5 +62,5 @@ class State:
         return replace(self, base=base)
 
     def with_attached(self, attached):
-        """Return the state with ``attached``, {id: AttachedBody}, and nothing else, in the robot's hands."""
+        """Return the state with ``attached``, {id: AttachedBody}, as its only attached objects."""
         return replace(self, attached=attached)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a depth camera sees, as occupied cubes."""
+"""Occupied cells from the points of a depth camera."""
 from motion_planning.occupancy.mask import Mask
 from motion_planning.occupancy.occupancy_map import OccupancyMap, View
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Clouds of points and cells of a map, one after the other. Compiled.
+"""Compiled loops over the points of clouds and the cells of a map.
 
 A transform is (rotation (3, 3), translation (3,)). A mask is (balls (g, 4) centre and radius of each group, starts (g
 + 1,) of its solids, solids (s, 16): centre 3, rotation 9 (rows: the solid's axes), half sizes 3, kind). A cell's code
@@ -18,11 +18,11 @@ BOX, CYLINDER, BALL = 0, 1, 2
 BIN_RAD = 0.005
 #: Bins of the angle from the y axis, and of the one about it.
 HIGH, AROUND = int(math.pi / BIN_RAD) + 1, int(2.0 * math.pi / BIN_RAD) + 1
-#: The corner of the tree is so many cells from its origin.
+#: Distance of the tree's corner from its origin [cells].
 MIDDLE = 1 << 15
 # A ray passes through a cell if it comes nearer to its middle than this share of its side.
 _INNER = 0.4
-# Nearer than this [m] a point is the camera's own noise.
+# Nearer points [m] are the camera's noise.
 _NEAREST = 1e-3
 
 compiled = compiler("motion_planning_occupancy", [Path(__file__)], nogil=True, error_model="numpy")
@@ -34,8 +34,8 @@ def sees(points, transforms, mask, sizes, bins, codes, outside):
 
     transforms: (sensor to the mask's frame, sensor to the map's); sizes: (side of a cell, greatest range) [m].
     Fills bins (HIGH, AROUND) with the nearest range in each direction, codes (n,) with the cells of points that are
-    near enough and not in the mask, and outside (n,) with whether a point is not in the mask. Returns how many codes
-    there are.
+    near enough and not in the mask, and outside (n,) with whether a point is not in the mask. Returns the number of
+    codes.
     """
     to_mask, to_map = transforms
     side, most = sizes
@@ -63,7 +63,7 @@ def sees(points, transforms, mask, sizes, bins, codes, outside):
 
 @compiled
 def misses(codes, transforms, mask, side, bins, missed, masked):
-    """Fill ``missed`` (n,): a ray passed through the cell and went on, and ``masked`` (n,): its middle is in the mask.
+    """Fill ``missed`` (n,): a ray passed through the cell, and ``masked`` (n,): its middle is in the mask.
 
     transforms: (map to the mask's frame, map to the sensor's).
     """
@@ -113,7 +113,7 @@ def inside(mask, x, y, z):
 
 @compiled
 def _passed(bins, middle, reach, distance):
-    """Whether a ray less than ``reach`` bins from the middle one goes on beyond ``distance`` [m]."""
+    """Whether a ray less than ``reach`` bins from the middle one is longer than ``distance`` [m]."""
     high, around = middle
     wide = int(reach / max(0.05, math.sin((high + 0.5) * BIN_RAD)))
     tall = int(reach)

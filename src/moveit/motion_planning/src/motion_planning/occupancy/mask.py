@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is known already and shall not be seen again: the robot, what it holds, objects of the scene."""
+"""Bodies that are known already and must not enter the map: the robot, attached objects, objects of the scene."""
 import numpy as np
 
 from motion_planning.exact.geometry import bounds_of
@@ -13,14 +13,14 @@ from urdf_model import Cylinder, Plane, Sphere
 class Mask:
     """Points of a cloud that belong to a scene's robot or to its objects.
 
-    arrays: what ``kernels`` takes; in the planning frame.
+    arrays: the input of ``kernels``; in the planning frame.
     """
 
     def __init__(self, scene, spheres, padding=0.0, scale=1.0):
-        """scene: Scene with the robot where it was when the cloud was taken; spheres: SphereModel of the robot.
+        """scene: Scene with the robot's state at the time of the cloud; spheres: SphereModel of the robot.
 
-        padding [m], scale: solids are so much larger all round than what they stand for, the robot's by the centimetre
-        of its spheres besides. Meshes of objects count as boxes around them; planes and octrees do not count.
+        padding [m], scale: by how much solids are larger than their bodies; the robot's are another centimetre larger
+        because of its spheres. Meshes of objects count as boxes around them; planes and octrees are ignored.
         """
         model, state = scene.model, scene.state
         frames = model.frames(state.q, state.base)

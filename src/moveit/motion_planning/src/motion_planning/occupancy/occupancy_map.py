@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cells that something was seen in."""
+"""A map of occupied cells."""
 from typing import NamedTuple
 
 import numpy as np
@@ -9,13 +9,15 @@ from motion_planning.shapes import Octree
 from urdf_model.transforms import inverse
 
 # Log odds of octomap's sensor model (A. Hornung et al., OctoMap, 2013): of a point in a cell, of a ray that passes
-# through it, and the most that a cell can have. At 0 a cell is forgotten.
+# through it, and the greatest value of a cell. A cell at 0 is removed.
 _HIT, _MISS, _MOST = 0.85, -0.4, 3.5
+# Cells that can be taken from elsewhere: a tenth of a gigabyte.
+_MOST_CELLS = 5e6
 
 
 class View(NamedTuple):
     """points (n, 3) in the sensor's frame, NaN for none; sensor, map (4, 4): both frames in the planning frame when the
-    points were measured; max_range [m]: what is farther away is not entered, but rays up to there clear cells."""
+    points were measured; max_range [m]: farther points are not entered, but their rays clear cells up to this range."""
 
     points: np.ndarray
     sensor: np.ndarray
@@ -24,10 +26,9 @@ class View(NamedTuple):
 
 
 class OccupancyMap:
-    """Occupied cubes of an octree that is filled by views and emptied by rays that pass through. Not for two threads at
-    once.
+    """Occupied cubes of an octree that views fill and passing rays clear. Not thread-safe.
 
-    A ray passes through a cell where a point is seen behind it.
+    A ray passes through a cell if a point behind the cell is seen.
     """
 
     def __init__(self, resolution):
@@ -41,11 +42,11 @@ class OccupancyMap:
         return len(self._codes)
 
     def clear(self):
-        """Forget everything."""
+        """Remove all cells."""
         self._codes, self._odds = np.empty(0, np.int64), np.empty(0)
 
     def see(self, view, mask):
-        """Enter a :class:`View`; points in the :class:`Mask` are rays, but no obstacles.
+        """Enter a :class:`View`; points in the :class:`Mask` clear cells as rays, but are not obstacles.
 
         Returns (whether the cells have changed, (n,) bool: points outside of the mask).
         """
@@ -62,13 +63,34 @@ class OccupancyMap:
         return self._enter(hit, missed, masked), outside
 
     def octree(self):
-        """Return the cells as shapes.Octree in the map's frame, None where there are none."""
+        """Return the cells as shapes.Octree in the map's frame, None if there are none."""
         if not len(self._codes):
             return None
         cells = np.stack([self._codes >> shift & 0xFFFF for shift in (0, 16, 32)], axis=1) - kernels.MIDDLE
         boxes = np.empty((len(cells), 4))
         boxes[:, :3], boxes[:, 3] = (cells + 0.5) * self.resolution, self.resolution
         return Octree(self.resolution, boxes)
+
+    def take(self, octree):
+        """Forget everything but the cubes of a shapes.Octree in the map's frame, or None; larger ones fill all cells in
+        them. What a camera sees empties them again.
+
+        Raises ValueError for another resolution, and for cubes that fill too many cells.
+        """
+        cells = np.empty((0, 3), np.int64)
+        if octree is not None:
+            if not np.isclose(octree.resolution, self.resolution, rtol=1e-6):
+                raise ValueError("its cells are %g m wide, and those of the map %g m"
+                                 % (octree.resolution, self.resolution))
+            wide = np.rint(octree.boxes[:, 3] / self.resolution).astype(np.int64)
+            count = float((wide.astype(float) ** 3).sum())
+            if count > _MOST_CELLS:
+                raise ValueError("it fills %.3g cells; at most %.3g can be kept" % (count, _MOST_CELLS))
+            lowest = np.rint(octree.boxes[:, :3] / self.resolution - 0.5 * wide[:, None]).astype(np.int64)
+            parts = [low + np.indices((n, n, n)).reshape(3, -1).T for low, n in zip(lowest, wide, strict=True)]
+            cells = np.concatenate(parts) + kernels.MIDDLE
+        self._codes = np.unique(cells[:, 0] | cells[:, 1] << 16 | cells[:, 2] << 32)
+        self._odds = np.full(len(self._codes), _MOST)
 
     def _enter(self, hit, missed, masked):
         where = np.searchsorted(self._codes, hit)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Paths that collide with nothing: found by spheres, shortened, and checked by exact geometry."""
+"""Collision-free paths: found with spheres, shortened, and checked by exact geometry."""
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.planning import Search, first_touching, plan_path, prepare
 from motion_planning.planners.trees import Path, Run, rrt_connect, shorten

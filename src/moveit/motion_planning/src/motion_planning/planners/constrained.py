@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Paths all of whose states keep to constraints: RRT-Connect whose steps are brought back onto them
+"""Paths whose states all satisfy constraints: RRT-Connect whose steps are projected onto them
 (CBiRRT; Berenson, Srinivasa, Ferguson and Kuffner 2009)."""
 import itertools
 import math
@@ -10,35 +10,34 @@ from motion_planning.constraints.manifold import Manifold
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import Path, Run
 
-# A step of a tree [rad, Euclidean]; one that was brought back may be longer by this factor.
+# A step of a tree [rad, Euclidean]; a projected one may be longer by this factor.
 _STEP, _STRETCH = 0.12, 2.0
-# A step that gains less than this on its target leads nowhere [rad].
+# A step that comes less than this closer to its target ends the extension [rad].
 _GAIN = 1e-3
-# Straight lines between two states are halved until points on them keep to the constraints, at most so often.
+# Straight lines between two states are halved until their points satisfy the constraints, at most this many times.
 _HALVINGS = 6
 _LOOKS = (0.25, 0.5, 0.75)
-# Shortcuts: tries in all, tries in vain one after the other, and the share of the time that is left for them.
+# Shortcuts: total tries, failed tries in a row, and the share of the remaining time for them.
 _TRIES, _MISSES, _SHARE_OF_REST = 100, 30, 0.3
-# A shortcut has to be worth this much of the path.
+# A shortcut must save at least this share of the path.
 _WORTH = 1e-3
 
 
 class ConstrainedPlanning:
-    """One search. checker: SphereChecker; where spheres touch, exact geometry is asked."""
+    """One search. checker: SphereChecker; if spheres touch, exact geometry decides."""
 
     def __init__(self, scene, group, checker, search):
         """group: Group; search: planning.Search with constraints."""
         self._scene, self._group, self._checker, self._search = scene, group, checker, search
         self._random = np.random.default_rng(search.seed & (1 << 63) - 1)
         self._run = Run(search.seed, search.clock() + search.allowed_time, search.clock, search.stop)
-        # Set once exact geometry has refused a path that spheres had found free.
+        # Set after exact geometry has refused a path that is free by spheres.
         self._doubts_spheres = False
         self._manifold = None
 
     def path(self, start, goals):
-        """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), which keep to the constraints and are free.
-
-        Its points are so dense that the lines between them keep to the constraints too. Raises NoPath.
+        """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), which satisfy the constraints and are free. Its
+        points are so dense that the lines between them satisfy the constraints, too. Raises NoPath.
         """
         self._manifold = Manifold(self._scene, self._group, self._search.constraints, start)
         kept = [goal for goal in goals if self._manifold.keeps(goal)]
@@ -78,15 +77,15 @@ class ConstrainedPlanning:
                             "%d and %d postures" % (trees[0].size, trees[1].size))
 
     def _grow(self, tree, node, target):
-        """Add nodes from ``node`` towards ``target`` (k,) as far as it goes; return the last one."""
+        """Add nodes from ``node`` towards ``target`` (k,) as far as possible; return the last one."""
         for step in self._steps(tree.points[node], target):
             for q in step:
                 node = tree.add(q, node)
         return node
 
     def _steps(self, q, target):
-        """Towards a target, step by step: each a list of points (k,) whose lines keep to the constraints and are free;
-        the last point is the target itself where it is reached."""
+        """Towards a target, step by step: each a list of points (k,) whose lines satisfy the constraints and are free;
+        the last point is the target itself if it is reached."""
         while True:
             self._run.check("a path that keeps to the constraints was looked for")
             rest = target - q
@@ -104,7 +103,7 @@ class ConstrainedPlanning:
             q = new
 
     def _line(self, a, b, halvings):
-        """Points after ``a`` up to ``b`` whose lines keep to the constraints; None where that cannot be had."""
+        """Points after ``a`` up to ``b`` whose lines satisfy the constraints; None if there are none."""
         if all(self._manifold.keeps(a + share * (b - a)) for share in _LOOKS):
             return [b]
         middle = self._manifold.project(0.5 * (a + b)) if halvings else None
@@ -146,8 +145,7 @@ class ConstrainedPlanning:
         return True
 
     def _first_blocked(self, points):
-        """The first of the states along ``points``, but the first point, that touches something; None if all are
-        free."""
+        """The first state along ``points``, except the first point, that is in collision; None if all are free."""
         states = []
         for a, b in itertools.pairwise(points):
             count = max(1, math.ceil(np.linalg.norm(b - a) / (0.5 * self._checker.resolution)))
@@ -161,7 +159,7 @@ class ConstrainedPlanning:
 
 
 class _Tree:
-    """Postures and where each came from."""
+    """Postures and the parent of each."""
 
     def __init__(self, roots):
         self._room = np.array(roots, dtype=float)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Why there is no path."""
+"""Errors of planners."""
 from motion_planning.errors import PlanningError
 
 
 class NoPath(PlanningError):
-    """No path was found. The text says why; ``late``: time was over, ``stopped``: the caller asked to end."""
+    """No path was found. The text gives the reason; ``late``: the time limit was reached, ``stopped``: the caller
+    stopped it."""
 
     def __init__(self, reason, late=False, stopped=False):
         super().__init__(reason)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The inner loops of planning, compiled: two trees that grow towards each other, and shortcuts.
+"""The compiled inner loops of planning: two trees that grow towards each other, and shortcuts.
 
 Trees are kept variable by variable, so that distances to 16 nodes are computed at once: ``nodes`` (2, k, room)
-float32, room a multiple of 16; ``parents`` (2, room) int32, -1 for a root. ``numbers`` (7) int64 holds what is to last
-between calls: 0, 1 the trees' sizes; 2 the tree that grows; 3 the random state; 4, 5 the two nodes at which they met;
-6 how many samples were drawn.
+float32, room a multiple of 16; ``parents`` (2, room) int32, -1 for a root. ``numbers`` (7) int64 is the state between
+calls: 0, 1 the trees' sizes; 2 the tree that grows; 3 the random state; 4, 5 the two nodes at which they met; 6 the
+number of drawn samples.
 """
 import numpy as np
 
@@ -68,7 +68,7 @@ def grow(tables, trees, bounds, reach, step, samples):
     """Draw up to ``samples`` samples. Return MET, FULL (no room for more nodes) or GOING_ON.
 
     tables: of the checker. trees: (nodes, parents, numbers). bounds: (low, high), (k,) float32 each. ``reach``: the
-    longest edge; ``step``: how far apart states on an edge are looked at.
+    longest edge; ``step``: distance of checked states on an edge.
     """
     nodes, parents, numbers = trees
     low, high = bounds
@@ -97,7 +97,7 @@ def grow(tables, trees, bounds, reach, step, samples):
         if not free_edge(tables, work, at, new, step):
             continue
         added = _add(trees, tree, new, parent)
-        # The other tree comes towards what is new as far as it can.
+        # The other tree grows towards the new node as far as possible.
         other = 1 - tree
         parent, square = nearest(nodes, other, numbers[other], new, distances)
         length = np.sqrt(square)
@@ -132,7 +132,7 @@ def _point(path, lengths, along, out):
 
 @compiled
 def shortcut(tables, path, count, numbers, step, tries, misses):
-    """Shorten a path in place: straight lines between two random points of it, where they are free and worth it.
+    """Shorten a path in place: straight lines between two random points of it, if they are free and save enough.
 
     path (room, k), of which the first ``count`` rows count; each success adds at most 2 rows. Ends after ``tries`` or
     after ``misses`` in a row. Returns the new count.
@@ -143,7 +143,7 @@ def shortcut(tables, path, count, numbers, step, tries, misses):
     lengths = np.empty(room, np.float32)
     missed = 0
     lengths[0] = np.float32(0.0)
-    known = 1  # so many of lengths hold
+    known = 1  # number of valid entries in lengths
     for _ in range(tries):
         for i in range(known, count):
             total = np.float32(0.0)
@@ -184,11 +184,54 @@ def shortcut(tables, path, count, numbers, step, tries, misses):
 
 
 @compiled
-def way_through(free, closed):
-    """Return cells (m, 2) of a way of fewest steps from the first to the last cell of ``free`` (a, b) bool; (0, 2)
-    where there is none.
+def _shares(way):
+    """The share of the length of ``way`` (n, j) before each of its points; of their number if it has no length."""
+    shares = np.zeros(len(way))
+    for i in range(1, len(way)):
+        shares[i] = shares[i - 1] + np.sqrt(np.square(way[i] - way[i - 1]).sum())
+    return shares / shares[-1] if shares[-1] > 0.0 else np.arange(len(way)) / max(1, len(way) - 1)
 
-    A step leads to one of the eight cells around; ``closed`` (a, b, 9): steps by (di, dj) that it may not take, at
+
+@compiled
+def _write_point(way, shares, i, share, out):
+    """Write the point at a share of the length into ``out``; i: of the last corner before it. Returns i."""
+    while i < len(shares) - 2 and shares[i + 1] <= share:
+        i += 1
+    # A piece of no length has nothing to divide by, and nowhere to go.
+    along = min(1.0, (share - shares[i]) / max(shares[i + 1] - shares[i], 1e-12))
+    for j in range(way.shape[1]):
+        out[j] = way[i, j] + along * (way[i + 1, j] - way[i, j])
+    return i
+
+
+@compiled
+def at_once(one, other):
+    """Return (m, j + k): the points of two paths (n, j) and (l, k), n, l > 1, that begin and end at the same time, with
+    the corners of both."""
+    first, second = _shares(one), _shares(other)
+    points = np.empty((len(one) + len(other), one.shape[1] + other.shape[1]))
+    count, a, b, i, o = 0, 0, 0, 0, 0
+    while a < len(one) or b < len(other):
+        if b == len(other) or a < len(one) and first[a] <= second[b]:
+            share = first[a]
+        else:
+            share = second[b]
+        while a < len(one) and first[a] <= share:
+            a += 1
+        while b < len(other) and second[b] <= share:
+            b += 1
+        i = _write_point(one, first, i, share, points[count, : one.shape[1]])
+        o = _write_point(other, second, o, share, points[count, one.shape[1] :])
+        count += 1
+    return points[:count]
+
+
+@compiled
+def way_through(free, closed):
+    """Return cells (m, 2) of a shortest path from the first to the last cell of ``free`` (a, b) bool; (0, 2) if there
+    is none.
+
+    A step leads to one of the eight cells around; ``closed`` (a, b, 9): steps by (di, dj) that are forbidden, at
     3 di + dj + 4.
     """
     rows, columns = free.shape

@@ -6,25 +6,25 @@ import math
 from motion_planning.planners import ompl_wheel
 from motion_planning.planners.trees import rrt_connect
 
-#: The planner that is built in.
+#: The built-in planner.
 OWN = "RRTConnect"
-# Which planner is nearest to those that neither this package nor the wheel has. The rest look for any path; for these
-# RRTConnect is by far the quickest.
+# The closest counterpart of planners that neither this package nor the wheel has. All others search for any path, and
+# RRTConnect is by far the fastest at that.
 _ANYTIME = dict.fromkeys(("PRMstar", "LazyPRMstar", "LBTRRT", "AnytimePathShortening"), "RRTstar") \
     | dict.fromkeys(("ABITstar", "AITstar"), "BITstar")
 _ANY_PATH = frozenset(("BiEST", "BiTRRT", "EST", "LazyPRM", "LazyRRT", "PDST", "PRM", "ProjEST", "SBL", "SPARS",
                        "SPARStwo", "STRIDE", "TRRT"))
 INSTALL = "python3 -m pip install ompl==2.0.1"
 
-#: All names that are known.
+#: All known names.
 NAMES = (OWN, *ompl_wheel.CLASSES, *_ANYTIME, *sorted(_ANY_PATH))
 
 
 def kind_of(name, planners):
-    """Return the planner's type, as "RRTstar", of a name that a client asked for: ``Name`` or ``group[Name]``.
+    """Return the planner's type, such as "RRTstar", of a requested name: ``Name`` or ``group[Name]``.
 
     planners: {name: {key: text}}, the planner_configs. A name that is not in it may be a type itself; the old ending
-    kConfigDefault counts as nothing.
+    kConfigDefault is ignored.
     """
     name = config_name(name)
     kind = str(planners.get(name, {}).get("type", name)).rpartition("::")[2]
@@ -37,7 +37,7 @@ def config_name(name):
 
 
 def planner_of(kind, settings):
-    """Return (planner, sentences to tell the user) for a type of planner, as "RRTstar".
+    """Return (planner, sentences for the user) for a type of planner, such as "RRTstar".
 
     planner: a function with the signature of ``rrt_connect``, which finds a path. settings: {key: text}.
     """

@@ -7,18 +7,18 @@ import numpy as np
 from motion_planning.planners.errors import NoPath
 from motion_planning.planners.trees import Path
 
-#: Planners that go on to make the path shorter until their time is over.
+#: Planners that improve the path until their time is over.
 ANYTIME = frozenset({"RRTstar", "InformedRRTstar", "BITstar"})
 #: {name in an ompl_planning.yaml: class of ompl.geometric}. PRM and PRMstar are not among them: they call the checker
-#: from threads of their own, and wait for Python's lock for ever.
+#: from their own threads, and wait for Python's lock forever.
 CLASSES = {"RRT": "RRT", "FMT": "FMT", "BFMT": "BFMT", "KPIECE": "KPIECE1", "BKPIECE": "BKPIECE1",
            "LBKPIECE": "LBKPIECE1", **{name: name for name in ANYTIME}}
 
-# The share of the time to the deadline that an anytime planner takes: shortcuts and exact geometry need the rest.
+# The share of the time until the deadline for an anytime planner: shortcuts and exact geometry need the rest.
 _SHARE = 0.8
-# So far beyond the bounds [rad or m] a start or goal may be by rounding.
+# By rounding, a start or goal may be this far beyond the bounds [rad or m].
 _ROUNDING = 1e-5
-# Settings of a configuration whose setter has another name than theirs.
+# Settings whose setter has another name.
 _SETTERS = {"delay_collision_checking": "DelayCC", "cache_cc": "CacheCC"}
 # Settings that are not the planner's own.
 _FOREIGN = {"type", "projection_evaluator", "longest_valid_segment_fraction", "optimization_objective",
@@ -36,10 +36,10 @@ def is_there():
 
 
 class OmplPlanner:
-    """A planner by its name in :data:`CLASSES`, to be called as ``trees.rrt_connect``. Not repeatable: the library's
-    random numbers take no seed.
+    """A planner by its name in :data:`CLASSES`, called like ``trees.rrt_connect``. Not repeatable: the library's random
+    numbers have no seed.
 
-    name: that; remarks: sentences on settings that it does not have or take.
+    name: the planner's; remarks: sentences on unknown and invalid settings.
     """
 
     def __init__(self, name, settings=None):
@@ -63,7 +63,7 @@ class OmplPlanner:
         return Path(points, space.asked.edges)
 
     def _made(self, space):
-        """(the library's planner, sentences on settings that it does not take)"""
+        """Return (the library's planner, sentences on settings that it refuses)."""
         planner, remarks = getattr(_library()[1], CLASSES[self.name])(space.information), []
         for key, text in self._settings.items():
             method = _SETTERS.get(key, "".join(word.capitalize() for word in key.split("_")))
@@ -96,7 +96,7 @@ class OmplPlanner:
 
 
 class _Space:
-    """The library's view of one search: k joints with a checker."""
+    """The search space for the library: k joints with a checker."""
 
     def __init__(self, checker, values):
         """values (k, any): the joints' bounds are around them."""
@@ -108,7 +108,8 @@ class _Space:
             bounds.setHigh(i, float(row.max()) + _ROUNDING)
         self._space.setBounds(bounds)
         self.information = base.SpaceInformation(self._space)
-        # The library keeps what asks; that must not lead back to the library, or neither is ever freed.
+        # The library keeps a reference to the callback, which must not refer to the library; otherwise neither is ever
+        # freed.
         self.asked = _Asked(checker, len(values))
         self.information.setStateValidityChecker(self.asked.is_free)
         self.information.setMotionValidator(_validator_class()(self.information, self.asked.edge_is_free))
@@ -132,7 +133,7 @@ class _Space:
 
 
 class _Asked:
-    """What the library asks. edges: how many."""
+    """Callbacks of the library. edges: number of checked edges."""
 
     def __init__(self, checker, k):
         self._checker, self._k, self.edges = checker, k, 0
@@ -149,7 +150,7 @@ class _Asked:
 
 
 def _library():
-    from ompl import base, geometric, util  # it is heavy, and most never need it
+    from ompl import base, geometric, util  # its import is slow, and most programs do not need it
 
     util.setLogLevel(util.LogLevel.LOG_NONE)
     return base, geometric
@@ -169,7 +170,7 @@ def _validator_class():
 
 
 def _value(text, usual):
-    """The value of a text, of the kind that ``usual`` has. Raises ValueError."""
+    """The value of a text, with the type of ``usual``. Raises ValueError."""
     if isinstance(usual, bool):
         return {"1": True, "true": True, "0": False, "false": False}.get(str(text).lower(), bool(float(text)))
     return type(usual)(float(text)) if isinstance(usual, int | float) else str(text)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Two arms of one group planned for one by one, and their paths brought together.
+"""Plans two arms of one group one by one, and combines their paths.
 
-Two arms get into each other's way at few of their postures. An arm alone has half the joints, and a path of both needs
-a path of each alone: what is found so is found much sooner, and what is not there need not be looked for in the space
-of all joints.
+Two arms collide with each other in few of their postures. One arm has half the joints, so its path is found much
+faster. A path of both needs a path of each alone: if one arm has none, the search in the space of all joints is not
+needed.
 """
 import itertools
 
@@ -12,62 +12,65 @@ import numpy as np
 from motion_planning.planners import kernels
 from motion_planning.planners.trees import Path, rrt_connect, shorten
 
-# How far apart [rad] postures on the path of one arm are that are looked at together with those of the other.
+# Distance [rad] of postures on the path of one arm that are combined with those of the other.
 _SPACING = 0.15
-# So often a way through these postures is looked for that avoids steps that turned out to touch something.
+# Number of searches for a path through these postures that avoids steps found to be in collision.
 _TURNS = 4
-# So many pairs of paths are tried: others may leave room for each other.
+# Tries and misses of shortcuts, see ``shorten``: of the path of one arm, and afterwards of the path of both.
+_ALONE, TOGETHER = (80, 10), (50, 8)
+# Number of pairs of paths to try: another pair may leave more room.
 _PAIRS = 3
 
 
 def apart(checker, bounds, start, goal, run, reach):
-    """Return a Path from ``start`` (k,) to ``goal`` (k,) on which the two parts of ``checker`` were planned for one by
-    one; None where they cannot get past each other. Arguments and errors are those of ``rrt_connect``."""
-    samples = 0
+    """Return a Path from ``start`` (k,) to ``goal`` (k,) with the two parts of ``checker`` planned one by one; None if
+    they cannot pass each other. Its times are of "shorten". Arguments and errors as in ``rrt_connect``."""
+    samples, shortening = 0, 0.0
     for turn in range(_PAIRS):
         run, ways = run._replace(seed=run.seed + turn), []
         for indices, alone in checker.parts:
             found = rrt_connect(alone, bounds[indices], start[indices], goal[indices], run, reach)
             samples += found.samples
-            ways.append(shorten(found, alone, run).points)
+            begin = run.clock()
+            ways.append(shorten(found, alone, run, *_ALONE).points)
+            shortening += run.clock() - begin
         points = _at_once(checker.parts, ways)
-        if all(checker.edge(a, b) for a, b in itertools.pairwise(points)):
-            return Path(points, samples)
+        if checker.between_parts.edges(points).all():
+            return Path(points, samples, {"shorten": shortening})
         points = _past_each_other(checker, ways)
         if points is not None:
-            return Path(points, samples)
+            return Path(points, samples, {"shorten": shortening})
     return None
 
 
 def _at_once(parts, ways):
     """The points (m, k) of both parts beginning and ending at the same time."""
-    lengths = [np.append(0.0, np.linalg.norm(np.diff(way, axis=0), axis=1).cumsum()) for way in ways]
-    shares = [along / along[-1] if along[-1] > 0.0 else np.linspace(0.0, 1.0, len(along)) for along in lengths]
-    when = np.unique(np.concatenate(shares))
-    points = np.empty((len(when), sum(way.shape[1] for way in ways)))
-    for (indices, _), way, share in zip(parts, ways, shares, strict=True):
-        for column, values in zip(indices, way.T, strict=True):
-            points[:, column] = np.interp(when, share, values)
+    (one, _), (other, _) = parts
+    found = kernels.at_once(*ways)
+    points = np.empty_like(found)
+    points[:, one], points[:, other] = found[:, : len(one)], found[:, len(one) :]
     return points
 
 
 def _past_each_other(checker, ways):
-    """The points (m, k) of the two parts moving along their ways, one waiting or going back for the other where it has
-    to; None where that does not help."""
+    """The points (m, k) of the two parts moving along their paths; one waits or moves back for the other if needed.
+    None if that does not help."""
     (one, _), (other, _) = checker.parts
     first, second = map(_dense, ways)
     grid = np.empty((len(first), len(second), len(one) + len(other)))
     grid[:, :, one], grid[:, :, other] = first[:, None], second
-    free = checker.valid(grid.reshape(-1, grid.shape[2])).reshape(grid.shape[:2])
-    # Whoever asks knows that both ends are free.
+    free = checker.between_parts.valid(grid.reshape(-1, grid.shape[2])).reshape(grid.shape[:2])
+    # The caller has checked that both ends are free.
     free[0, 0] = free[-1, -1] = True
     closed = np.zeros((*free.shape, 9), dtype=np.bool_)
     for _ in range(_TURNS):
         cells = kernels.way_through(free, closed)
         points = grid[cells[:, 0], cells[:, 1]]
-        bad = [k for k in range(len(cells) - 1) if not checker.edge(points[k], points[k + 1])]
-        if not bad:
-            return points if len(points) else None
+        if not len(cells):
+            return None
+        bad = np.flatnonzero(~checker.between_parts.edges(points))
+        if not len(bad):
+            return points
         for k in bad:
             (i, j), (di, dj) = cells[k], cells[k + 1] - cells[k]
             closed[i, j, 3 * di + dj + 4] = closed[i + di, j + dj, 4 - 3 * di - dj] = True
@@ -75,7 +78,7 @@ def _past_each_other(checker, ways):
 
 
 def _dense(way):
-    """The way (m, j) with points added between its corners."""
+    """The path (m, j) with points added between its corners."""
     pieces = []
     for a, b in itertools.pairwise(way):
         count = max(1, int(np.ceil(np.linalg.norm(b - a) / _SPACING)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A path from a start to one of some goals: by spheres, and nothing goes out that exact geometry has not seen."""
+"""A path from a start to one of some goals: found with spheres, and always checked by exact geometry."""
 import math
 import threading
 import weakref
@@ -10,22 +10,24 @@ import numpy as np
 
 from motion_planning.planners.constrained import ConstrainedPlanning
 from motion_planning.planners.errors import NoPath
-from motion_planning.planners.parts import apart
+from motion_planning.planners.parts import TOGETHER, apart
 from motion_planning.planners.trees import REACH, Path, Run, rrt_connect, shorten
 from motion_planning.planners.warming import warm_up
+from motion_planning.scene import Scene
 from motion_planning.spheres import SphereChecker, SphereModel
 
-# The share of the time that spheres get before a search by exact geometry alone begins.
+# The share of the time for spheres; after that, a search by exact geometry alone begins.
 _SHARE_OF_SPHERES = 0.7
-# A path that exact geometry refuses is looked for again, with states on its edges closer by this factor each time.
+# After exact geometry has refused a path, the search is repeated with states on its edges closer by this factor each
+# time.
 _FINER = 0.5
 _FINEST = 1.0 / 512.0
-# How far a step leads out of where spheres say that the robot touches [rad], and how many are looked at together.
+# Size of a step out of a contact of spheres [rad], and number of steps that are checked together.
 _STEPS_OUT = (0.03, 0.4)
 _CANDIDATES = 48
 # Edges that are checked by exact geometry alone are shorter: most of them fail.
 _EXACT_REACH = 0.25
-# Of the states of a path exact geometry sees one in so many even where spheres prove them free; so many at once.
+# Exact geometry checks one in this many states of a path even if spheres prove them free; number of states per call.
 _SEEN, _AT_ONCE = 8, 64
 
 _sphere_models, _checkers = weakref.WeakKeyDictionary(), weakref.WeakKeyDictionary()
@@ -33,10 +35,10 @@ _sphere_models_lock, _checkers_lock = threading.Lock(), threading.Lock()
 
 
 class Search(NamedTuple):
-    """How to look for a path. exact: ExactChecker. seed: the same one gives the same path where time suffices.
-    allowed_time [s] on ``clock``, a function that returns seconds. stop: asked every few ms whether to end.
-    constraints: ConstraintSet that every state on the path keeps to, or None. planner: what looks for paths by spheres,
-    a function as ``rrt_connect`` (``names.planner_of``); constraints have one of their own."""
+    """Options of a search. exact: ExactChecker. seed: the same one gives the same path if the time suffices.
+    allowed_time [s] on ``clock``, a function that returns seconds. stop: called every few ms; true ends the search.
+    constraints: ConstraintSet for every state on the path, or None. planner: a function like ``rrt_connect`` that
+    searches with spheres (``names.planner_of``); with constraints, another one is used."""
 
     exact: Any
     seed: int
@@ -66,19 +68,22 @@ def checker_of(exact, scene, group):
 
 
 def first_touching(exact, scene, group, states):
-    """Return the number of the first of ``states`` (m, k) of the Group at which something touches, None if there is
-    none. Spheres tell most of those that are free, exact geometry decides on the others: dense states cost little."""
+    """Return the index of the first of ``states`` (m, k) of the Group that is in collision, None if there is none.
+    Spheres prove most states free and exact geometry decides on the others, so dense states cost little."""
     doubtful = np.flatnonzero(~checker_of(exact, scene, group).valid(states))
     first = exact.first_blocked(scene, np.asarray(states)[doubtful], group.name) if len(doubtful) else None
     return None if first is None else int(doubtful[first])
 
 
 def prepare(exact):
-    """Make all that does not depend on a scene, so that the first plan need not: spheres of links, compiled code."""
+    """Make all data that do not depend on a scene, so that the first plan is not delayed: spheres of links, maps of
+    pairs of them, compiled code."""
     spheres = sphere_model_of(exact)
     for link in exact.model.links:
         spheres.spheres(link)
         spheres.fixed(link)
+    for group in exact.model.groups.values():
+        SphereChecker(spheres, group, Scene(exact.model))
     warm_up()
 
 
@@ -87,11 +92,11 @@ def plan_path(scene, group, start, goals, search):
 
     Its times are of "tables", "ends" (the exact check of start and goals), "way out", "search", "shorten" and "exact".
 
-    It is looked for and shortened by spheres that contain the robot. Then its states, as close as those that the
-    spheres were asked about and between them, are checked by ``search.exact``: each corner, every eighth, and all that
-    lie not within what spheres prove free. Where exact geometry is free and the spheres are not, it leads out of there
-    by exact geometry. With ``search.constraints``, start and goals have to keep to them, and the points of the path are
-    as dense as it takes. Raises NoPath.
+    It is found and shortened with spheres that contain the robot. Then ``search.exact`` checks states between those of
+    the search, at the same distance: each corner, every eighth, and all states that spheres do not prove free. If the
+    start is free by exact geometry but not by spheres, the path leads out of there by exact geometry. With
+    ``search.constraints``, start and goals must satisfy them, and the points of the path are as dense as needed. Raises
+    NoPath.
     """
     return _Planning(scene, group, search).path(start, goals)
 
@@ -104,7 +109,7 @@ class _Planning:
         self.random = np.random.default_rng(search.seed & (1 << 63) - 1)
         self.checker = checker_of(search.exact, scene, self.group)
         self._note("tables")
-        # The first plan of a robot may have to make its spheres: that shall not use up its time.
+        # The first plan of a robot may have to make its spheres: that must not use up its time.
         self.begin = self.last
         self.bounds = np.array(self.model.bounds[self.group.indices])
 
@@ -129,7 +134,7 @@ class _Planning:
     # -- ends ---------------------------------------------------------------------------------------------------
 
     def _postures(self, start, goals):
-        """The arrays, joints that turn without end brought to the turn that is nearest to the start."""
+        """The arrays, with continuous joints moved to the turn that is nearest to the start."""
         start, goals = np.array(start, dtype=float), np.atleast_2d(np.array(goals, dtype=float))
         count = len(self.group)
         if start.shape != (count,) or goals.shape[1:] != (count,) or not len(goals):
@@ -140,7 +145,7 @@ class _Planning:
         turns = self.model.continuous[self.group.indices]
         goals[:, turns] -= 2.0 * math.pi * np.round((goals[:, turns] - start[turns]) / (2.0 * math.pi))
         ends = np.concatenate([start[None], goals])
-        # Whoever stands a little beyond a limit may come back.
+        # A start slightly beyond a limit may move back.
         self.bounds[:, 0] = np.minimum(self.bounds[:, 0], ends.min(axis=0))
         self.bounds[:, 1] = np.maximum(self.bounds[:, 1], ends.max(axis=0))
         self.bounds[turns] = np.column_stack([ends.min(axis=0) - math.pi, ends.max(axis=0) + math.pi])[turns]
@@ -154,7 +159,7 @@ class _Planning:
             raise NoPath("%s is in collision%s" % (what, ": %s" % contacts[0] if contacts else ""))
         return np.array(free)
 
-    # -- ways of looking ----------------------------------------------------------------------------------------
+    # -- searches ----------------------------------------------------------------------------------------
 
     def _by_spheres(self, start, goals):
         run = self._run(_SHARE_OF_SPHERES)
@@ -172,8 +177,12 @@ class _Planning:
         while True:
             found = self._found(checker, outwards[-1], entries, run._replace(seed=seed))
             self._note("search")
-            short = shorten(found, checker, run._replace(seed=seed))
+            within = found.times.get("shorten")
+            short = shorten(found, checker, run._replace(seed=seed), *(() if within is None else TOGETHER))
             self._note("shorten")
+            within = within or 0.0
+            self.times["shorten"] += within
+            self.times["search"] -= within
             inward = inwards[int(np.abs(entries - short.points[-1]).max(axis=1).argmin())]
             path = short._replace(points=np.concatenate([outwards[:-1], short.points, inward[1:]]))
             path.points[0], path.points[-1] = start, inward[-1]
@@ -205,7 +214,7 @@ class _Planning:
             away *= self.random.uniform(*_STEPS_OUT, (_CANDIDATES, 1)) / np.linalg.norm(away, axis=1, keepdims=True)
             some = np.clip(nodes[parent] + away, self.bounds[:, 0], self.bounds[:, 1])
             free = self.checker.valid(some)
-            # The shortest of those that lead out, then one that only leads on.
+            # The shortest step that leads out, else one that leads further.
             order = np.argsort(np.linalg.norm(some - nodes[parent], axis=1))
             for number in [*[k for k in order if free[k]][:8], *[k for k in order if not free[k]][:1]]:
                 if self._edge_is_free(nodes[parent], some[number]):
@@ -215,7 +224,7 @@ class _Planning:
                         return self._traced(nodes, parents, len(nodes) - 1)[::-1]
 
     def _by_exact(self, start, goals):
-        """RRT-Connect with nothing but exact geometry: slow, for what spheres cannot get through."""
+        """RRT-Connect with exact geometry only: slow, for gaps that are too narrow for spheres."""
         run = self._run(1.0)
         trees = [([start], [-1]), (list(goals), [-1] * len(goals))]
         grown = 0
@@ -247,7 +256,7 @@ class _Planning:
         return len(nodes) - 1
 
     def _shortened(self, points, run):
-        """The path with corners left out while exact geometry and time allow."""
+        """The path without the corners that exact geometry does not need, within the time limit."""
         k = 0
         while k + 2 < len(points):
             try:
@@ -282,10 +291,9 @@ class _Planning:
         return self.search.exact.first_blocked(self.scene, states, self.group.name) is None
 
     def _path_is_free(self, points, run):
-        """Whether exact geometry agrees, at states between those that spheres were asked about.
-
-        Spheres contain the robot: where they are free, so is what is in them. Exact geometry is asked about all other
-        states, and whatever spheres say about every eighth and each corner.
+        """Whether the path is free by exact geometry, at states between those that spheres have checked. Spheres
+        contain the robot: if they are free, so is the robot. Exact geometry checks all other states, and in any case
+        every eighth state and each corner.
         """
         states, corners = [points[:1]], [0]
         for a, b in zip(points[:-1], points[1:], strict=True):
@@ -296,7 +304,7 @@ class _Planning:
         doubtful = ~self.checker.valid(states)
         some = np.zeros(len(states), dtype=bool)
         some[::_SEEN], some[corners] = True, True
-        # What spheres doubt is what may turn out to touch.
+        # States that spheres do not prove free are the most likely collisions.
         order = np.concatenate([np.flatnonzero(doubtful), np.flatnonzero(some & ~doubtful)])
         for begin in range(0, len(order), _AT_ONCE):
             run.check("a path was checked by exact geometry")

@@ -9,19 +9,19 @@ import numpy as np
 from motion_planning.planners import kernels
 from motion_planning.planners.errors import NoPath
 
-#: The longest edge of a tree [rad, Euclidean distance of joint values]. Longer ones find fewer narrow ways.
+#: The longest edge of a tree [rad, Euclidean distance of joint values]. Longer ones find fewer narrow passages.
 REACH = 0.5
-# So many samples are drawn between two looks at the clock: about 2 ms.
+# Number of samples between two checks of the clock: about 2 ms.
 _SAMPLES = 1000
 _LEAST_ROOM, _MOST_ROOM = 4096, 1 << 20
-# Shortcuts: so many tries in all, so many in vain one after the other; nodes that a path may have meanwhile.
+_ALL = (1 << 64) - 1
+# Shortcuts: total tries, failed tries in a row.
 _TRIES, _MISSES = 200, 30
-_ROOM_MORE = 2 * _TRIES + 2
 
 
 class Path(NamedTuple):
-    """points (m, k): corners of a path of straight lines, the first is the start. samples: how many were drawn.
-    times: {part of the work: s}, where it was measured."""
+    """points (m, k): corners of a path of straight lines, the first is the start. samples: number of drawn ones. times:
+    {part of the work: s}, if measured."""
 
     points: np.ndarray
     samples: int = 0
@@ -34,8 +34,8 @@ class Path(NamedTuple):
 
 
 class Run(NamedTuple):
-    """seed: the same one gives the same path. deadline: when to give up, on ``clock``, a function that returns seconds.
-    stop: a function asked every few ms whether to end."""
+    """seed: the same one gives the same path. deadline: on ``clock``, a function that returns seconds. stop: a function
+    called every few ms; true ends the search."""
 
     seed: int
     deadline: float
@@ -43,7 +43,7 @@ class Run(NamedTuple):
     stop: Callable[[], bool] = lambda: False
 
     def check(self, what):
-        """Raise NoPath when time is over or the caller wants no more."""
+        """Raise NoPath if the deadline has passed or the caller stops the search."""
         if self.stop():
             raise NoPath("stopped while %s" % what, stopped=True)
         if self.clock() >= self.deadline:
@@ -53,8 +53,8 @@ class Run(NamedTuple):
 def rrt_connect(checker, bounds, start, goals, run, reach=REACH):
     """Return a Path from ``start`` (k,) to one of ``goals`` (g, k), free by ``checker`` (SphereChecker).
 
-    Two trees grow towards each other, the smaller one first. bounds (k, 2): where samples are drawn; start and goals
-    have to be free themselves. Raises NoPath when time is over or ``run.stop`` says so.
+    Two trees grow towards each other, the smaller one first. bounds (k, 2): of the samples; start and goals must be
+    free. Raises NoPath if the deadline has passed or ``run.stop`` is true.
     """
     start, goals = np.asarray(start, dtype=np.float32), np.atleast_2d(np.asarray(goals, dtype=np.float32))
     for goal in goals[np.argsort(np.linalg.norm(goals - start, axis=1), kind="stable")]:
@@ -73,26 +73,29 @@ def rrt_connect(checker, bounds, start, goals, run, reach=REACH):
             trees = _roomier(trees)
 
 
-def shorten(path, checker, run):
-    """Return the Path without detours that ``checker`` knows a straight way past; never longer than it was."""
+def shorten(path, checker, run, tries=_TRIES, misses=_MISSES):
+    """Return the Path without detours for which ``checker`` finds a straight line; it is never longer than before. Ends
+    after so many ``tries``, or so many ``misses`` in a row."""
     count = len(path.points)
-    points = np.empty((count + _ROOM_MORE, path.points.shape[1]), np.float32)
+    points = np.empty((count + 2 * tries + 2, path.points.shape[1]), np.float32)
     points[:count] = path.points
-    count = kernels.shortcut(checker.tables, points, count, _numbers(run.seed), np.float32(checker.resolution), _TRIES,
-                             _MISSES)
+    count = kernels.shortcut(checker.tables, points, count, _numbers(run.seed), np.float32(checker.resolution), tries,
+                             misses)
     return path._replace(points=points[:count].astype(float))
 
 
 def _numbers(seed):
     numbers = np.zeros(7, np.int64)
-    # Seeds that are near each other shall not give sequences that are; 0 would give nothing but zeros.
-    bits = np.random.SeedSequence(seed & (1 << 63) - 1).generate_state(1, np.uint64)[0]
-    numbers[3] = bits >> np.uint64(1) | np.uint64(1)
+    # Similar seeds must not give similar sequences, and 0 would give only zeros: splitmix64 (Steele, Lea, Flood 2014).
+    bits = (seed + 1) * 0x9E3779B97F4A7C15 & _ALL
+    bits = (bits ^ bits >> 30) * 0xBF58476D1CE4E5B9 & _ALL
+    bits = (bits ^ bits >> 27) * 0x94D049BB133111EB & _ALL
+    numbers[3] = (bits ^ bits >> 31) >> 1 | 1
     return numbers
 
 
 def _seeds(start, goals, seed):
-    """Trees of nothing but their roots."""
+    """Trees that consist of their roots."""
     room = max(_LEAST_ROOM, 2 * len(goals) + 16)
     room += -room % 16
     nodes, parents = np.empty((2, len(start), room), np.float32), np.full((2, room), -1, np.int32)
@@ -115,7 +118,8 @@ def _roomier(trees):
 
 
 def _traced(trees):
-    """The points from the first tree's root over where the trees met to a root of the second; the place counts once."""
+    """The points from the first tree's root through the meeting point to a root of the second; the meeting point
+    appears once."""
     nodes, parents, numbers = trees
     ways = []
     for tree in (0, 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compile the planner into the cache, so that no start and no first plan has to wait for it."""
+"""Compile the planner into the cache, so that neither the start nor the first plan has to wait for it."""
 import time
 
 import numpy as np
@@ -14,7 +14,7 @@ from motion_planning.planners.trees import Path, Run, rrt_connect, shorten
 from motion_planning.scene import Scene
 from motion_planning.spheres import SphereChecker, SphereModel
 
-# Compiled code does not depend on the robot: any will do. This one cannot pass its base.
+# Compiled code does not depend on the robot, so any robot is suitable. This one cannot pass its base.
 _URDF = """<robot name="two">
 <link name="base"><collision><geometry><box size="0.1 0.1 4"/></geometry></collision></link>
 <link name="arm"><collision><origin xyz="1 0 0"/><geometry><sphere radius="0.1"/></geometry></collision></link>
@@ -24,7 +24,7 @@ _SRDF = "<robot name='two'><group name='arm'><joint name='turn'/></group></robot
 
 
 def warm_up():
-    """Compile all that planning needs, or load it from the cache."""
+    """Compile all code of planning, or load it from the cache."""
     model = PlanningModel.from_xml(_URDF, _SRDF)
     checker = SphereChecker(SphereModel.of(model, None), model.groups["arm"], Scene(model))
     run = Run(seed=1, deadline=0.0, clock=time.monotonic)
@@ -32,9 +32,10 @@ def warm_up():
     try:
         rrt_connect(checker, model.bounds, ends[0], ends[1:], run)
     except NoPath:
-        pass  # as it has to be: what counts is that everything is compiled now
+        pass  # as expected; everything is compiled now
     shorten(Path(ends), checker, run)
     checker.valid(ends)
+    kernels.at_once(ends, ends)
     kernels.way_through(np.ones((2, 2), dtype=bool), np.zeros((2, 2, 9), dtype=bool))
     arm, level = model.groups["arm"], ConstraintSet(orientations=[OrientationTarget("arm", np.eye(3))])
     Manifold(Scene(model), arm, level, ends[0]).project(ends[0])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What stands around the robot, what it holds, and which of all that may touch. A snapshot: changes make new scenes."""
+"""The objects around the robot, attached objects, and allowed collisions. A snapshot: changes return new scenes."""
 from motion_planning.scene.allowed import AllowedCollisions
 from motion_planning.scene.objects import OCTOMAP, AttachedBody, SceneError, WorldObject
 from motion_planning.scene.scene import Scene, check_object

@@ -13,10 +13,10 @@ from motion_planning.model.planning_model import pair_of
 
 @dataclass(frozen=True, eq=False)
 class AllowedCollisions:
-    """What is said of pairs of names, and of one name with all others. It never changes.
+    """Entries for pairs of names, and defaults for one name with all others. Immutable.
 
-    entries: {sorted pair: may touch}; defaults: {name: may touch whatever it has no entry with}. A pair's entry comes
-    first; then defaults, of which a "must not" wins; what nothing is said of must not touch.
+    entries: {sorted pair: may touch}; defaults: {name: may touch all bodies that it has no entry with}. A pair's entry
+    has priority; then defaults, of which a "must not" wins; pairs without either must not touch.
     """
 
     entries: Mapping = field(default_factory=dict)
@@ -28,14 +28,14 @@ class AllowedCollisions:
 
     @classmethod
     def of(cls, model):
-        """Return what the SRDF of ``model`` says."""
+        """Return the matrix of ``model``'s SRDF."""
         entries = {pair_of(*pair): False for pair in model.srdf.enabled}
         entries.update(dict.fromkeys(model.disabled, True))
         return cls(entries, dict.fromkeys(model.srdf.no_default, True))
 
     @classmethod
     def from_matrix(cls, names, matrix, default_names=(), default_values=()):
-        """Return what a message says: ``matrix`` (n, n) bool for ``names`` (n), values for default names.
+        """Return the entries of a message: ``matrix`` (n, n) bool for ``names`` (n), values for default names.
 
         Raises ValueError for lists that do not fit each other.
         """
@@ -44,15 +44,14 @@ class AllowedCollisions:
                              % (len(names), len(names), len(names), sorted({len(row) for row in matrix}) or "nothing"))
         if len(default_names) != len(default_values):
             raise ValueError("%d default names but %d default values" % (len(default_names), len(default_values)))
-        # The upper half counts: a sender fills both.
+        # Only the upper half is read: senders fill both.
         entries = {pair_of(a, b): bool(matrix[i][j]) for i, a in enumerate(names) for j, b in enumerate(names[i:], i)
                    if i != j}
         return cls(entries, dict(zip(default_names, map(bool, default_values), strict=True)))
 
     def as_matrix(self):
-        """Return (names, matrix (n, n) bool, default names, default values), as a message has them.
-
-        A pair that nothing is said of stands there as its defaults have it.
+        """Return (names, matrix (n, n) bool, default names, default values), as in a message. A pair without an entry
+        gets the value of its defaults.
         """
         names = sorted({name for pair in self.entries for name in pair})
         matrix = np.array([[i != j and self.allowed(a, b) for j, b in enumerate(names)] for i, a in enumerate(names)],
@@ -68,16 +67,16 @@ class AllowedCollisions:
         return bool(said) and all(said)
 
     def with_entries(self, pairs):
-        """Return what there is with ``pairs``, {(name, name): may touch}, in place."""
+        """Return a copy with the entries ``pairs``, {(name, name): may touch}."""
         return AllowedCollisions({**self.entries, **{pair_of(*pair): bool(value) for pair, value in pairs.items()}},
                                  self.defaults)
 
     def with_default(self, name, allow):
-        """Return what there is with ``name`` allowed to touch everything, or nothing; its entries stay."""
+        """Return a copy with ``name`` allowed to touch everything, or nothing; its entries stay."""
         return AllowedCollisions(self.entries, {**self.defaults, name: bool(allow)})
 
     def without(self, names):
-        """Return what there is without all that is said of ``names``."""
+        """Return a copy without the entries of ``names``."""
         names = set(names)
         if not names & {*self.defaults, *(name for pair in self.entries for name in pair)}:
             return self

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Things in a scene: standing in the world, or held by the robot."""
+"""Objects of a scene: in the world, or attached to the robot."""
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -11,24 +11,24 @@ import numpy as np
 from motion_planning.errors import PlanningError
 from motion_planning.shapes import TriangleMesh, read_only
 
-#: The name that the octomap has in an AllowedCollisions and in contacts.
+#: The octomap's name in an AllowedCollisions and in contacts.
 OCTOMAP = "<octomap>"
-#: What is farther away or larger is a mistake [m]; collision checks would lose millimetres there.
+#: Larger distances and sizes are refused as errors [m]; collision checks would lose millimetres there.
 FARTHEST = 1e5
 
 
 class SceneError(PlanningError):
-    """A change or a question that does not fit the scene."""
+    """A change or query that does not fit the scene."""
 
 
 @dataclass(frozen=True, eq=False)
 class WorldObject:
-    """Something with shapes; it never changes.
+    """An object with shapes; immutable.
 
     pose (4, 4): of the object in the planning frame, or in the link that holds it. shapes: ((shape, pose (4, 4) in the
     object), ...), shapes of urdf_model (Box, Cylinder, Sphere, Plane) or of motion_planning.shapes.
-    subframes: {name: pose (4, 4) in the object}. type: (key, database), as ObjectType has them.
-    Raises SceneError for a pose that is none, and for a size below 0, not finite, or beyond any scene.
+    subframes: {name: pose (4, 4) in the object}. type: (key, database), as in ObjectType. Raises SceneError for an
+    invalid pose, and for a size below 0, not finite, or too large.
     """
 
     id: str
@@ -51,9 +51,8 @@ class WorldObject:
         return replace(self, pose=pose)
 
     def with_shapes_of(self, other):
-        """Return the object with the shapes and subframes of ``other``, given in the same frame, added where they are.
-
-        Raises SceneError for a pose that is none.
+        """Return the object with the shapes and subframes of ``other``, given in the same frame, added. Raises
+        SceneError for an invalid pose.
         """
         into = np.linalg.inv(self.pose) @ other.pose
         shapes = (*self.shapes, *((shape, into @ pose) for shape, pose in other.shapes))
@@ -63,10 +62,10 @@ class WorldObject:
 
 @dataclass(frozen=True, eq=False)
 class AttachedBody:
-    """An object that a link holds; the object's pose is in that link.
+    """An attached object; its pose is in the link that holds it.
 
-    touch_links: the links that it may touch; the one that holds it always is among them.
-    detach_posture: what the caller wants to know when it is let go; nothing here looks at it.
+    touch_links: the links that it may touch; the holding link is always included.
+    detach_posture: the caller's data for the release; not used here.
     """
 
     object: WorldObject

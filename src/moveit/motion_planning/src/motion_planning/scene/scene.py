@@ -16,18 +16,18 @@ from motion_planning.scene.allowed import AllowedCollisions
 from motion_planning.scene.objects import OCTOMAP, AttachedBody, SceneError, WorldObject
 from urdf_model.transforms import inverse
 
-# So many known names are compared with an unknown one.
+# Number of known names that are compared with an unknown one.
 _COMPARED = 300
 _MAPPINGS = ("objects", "colours", "transforms", "link_padding", "link_scale")
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A snapshot: every change returns a new scene and leaves this one as it is, so any thread may keep one.
+    """A snapshot: every change returns a new scene and does not modify this one, so threads can share it.
 
-    objects: {id: WorldObject}, in the order in which they came. state: State, what the robot holds included.
+    objects: {id: WorldObject}, in the order of insertion. state: State, including attached objects.
     allowed: AllowedCollisions, the SRDF's at first. colours: {id: (r, g, b, a)}. octomap: WorldObject of one Octree, id
-    OCTOMAP, or None. transforms: {frame: pose (4, 4) in the planning frame}, fixed frames that nobody else has.
+    OCTOMAP, or None. transforms: {frame: pose (4, 4) in the planning frame}, additional fixed frames.
     link_padding: {link: m} added to its collision shapes all around; link_scale: {link: factor}.
     """
 
@@ -66,15 +66,14 @@ class Scene:
         return replace(self, objects=objects)
 
     def appended(self, more):
-        """Return the scene with the shapes of ``more`` (WorldObject) added to the object of its id, new where there is
-        none. Raises SceneError."""
+        """Return the scene with the shapes of ``more`` (WorldObject) added to the object of its id, or to a new one.
+        Raises SceneError."""
         there = self.objects.get(more.id)
         return self.with_object(more if there is None else there.with_shapes_of(more))
 
     def without_object(self, name):
-        """Return the scene without an object, and without what the scene knows of it; an empty ``name``: without any.
-
-        Raises SceneError where there is none of that name.
+        """Return the scene without an object, and its data; an empty ``name``: without all objects. Raises SceneError
+        for an unknown name.
         """
         if not name:
             return self._without(list(self.objects))
@@ -82,12 +81,12 @@ class Scene:
         return self._without([name])
 
     def without_objects(self, names):
-        """Return the scene without many objects; names that there are none of do not count."""
+        """Return the scene without many objects; unknown names are ignored."""
         return self._without(names)
 
     def moved(self, name, pose, shape_poses=None):
-        """Return the scene with an object at ``pose`` (4, 4), and its shapes at ``shape_poses`` [(4, 4), ...] in it
-        where given. Raises SceneError for an unknown object, and where the number of shapes is another."""
+        """Return the scene with an object at ``pose`` (4, 4), and its shapes at ``shape_poses`` [(4, 4), ...] in it if
+        given. Raises SceneError for an unknown object, and for another number of shapes."""
         there = self._object(name)
         if shape_poses is not None:
             if len(shape_poses) != len(there.shapes):
@@ -103,14 +102,14 @@ class Scene:
             OCTOMAP, np.eye(4) if pose is None else pose, ((octree, np.eye(4)),))
         return replace(self, octomap=octomap)
 
-    # -- what the robot holds -----------------------------------------------------------------------------------
+    # -- attached objects -----------------------------------------------------------------------------------
 
     def attach(self, what, link, touch_links=(), detach_posture=None):
-        """Return the scene with ``what`` in the hands of ``link``.
+        """Return the scene with ``what`` attached to ``link``.
 
-        ``what``: id of an object of the world, which leaves the world and stays where it is seen; or a WorldObject
-        with its pose in the link, which replaces what has its id there and in the world.
-        Raises SceneError for an unknown link or object, and for an object without shapes.
+        ``what``: id of an object of the world, which is removed from the world and keeps its pose; or a WorldObject
+        with its pose in the link, which replaces any object of its id there and in the world. Raises SceneError for an
+        unknown link or object, and for an object without shapes.
         """
         if link not in self.model.link_index:
             raise SceneError("object cannot be attached to '%s': the robot has no such link%s"
@@ -128,8 +127,8 @@ class Scene:
         return replace(self, objects=objects, state=self.state.with_attached({**self.state.attached, new.id: body}))
 
     def attach_more(self, more, link):
-        """Return the scene with the shapes of ``more`` (WorldObject, pose in ``link``) added to what is held there
-        under its id. Raises SceneError where nothing is, or another link holds it."""
+        """Return the scene with the shapes of ``more`` (WorldObject, pose in ``link``) added to the attached object of
+        its id. Raises SceneError if there is none, or another link holds it."""
         there = self._attached(more.id)
         if there.link != link:
             raise SceneError("object '%s' is held by '%s', not by '%s'" % (more.id, there.link, link))
@@ -137,10 +136,10 @@ class Scene:
         return replace(self, state=self.state.with_attached({**self.state.attached, more.id: body}))
 
     def detach(self, name="", link=""):
-        """Return the scene with what the robot holds back in the world, where it is now.
+        """Return the scene with attached objects back in the world, at their present poses.
 
-        Empty ``name``: all that ``link`` holds; both empty: all. Where the world has an object of that name already
-        this one is dropped. Raises SceneError where the robot does not hold it.
+        Empty ``name``: all objects of ``link``; both empty: all. If the world already has an object of that name, this
+        one is dropped. Raises SceneError if the robot does not hold it.
         """
         names = [name] if name else [one for one, body in self.state.attached.items() if link in ("", body.link)]
         held, objects = dict(self.state.attached), dict(self.objects)
@@ -155,7 +154,7 @@ class Scene:
     def attached_pose(self, body, frames=None):
         """Return the pose (4, 4) of an AttachedBody's object in the planning frame.
 
-        ``frames`` (l, 4, 4): the links', those of the scene's state where None.
+        ``frames`` (l, 4, 4): the links', None: those of the scene's state.
         """
         frames = self.link_frames if frames is None else frames
         return frames[self.model.link_index[body.link]] @ body.object.pose
@@ -163,7 +162,7 @@ class Scene:
     # -- the rest -----------------------------------------------------------------------------------------------
 
     def with_state(self, state):
-        """Return the scene with the robot in another State, which also says what it holds."""
+        """Return the scene with the robot in another State, including its attached objects."""
         return replace(self, state=state)
 
     def with_allowed(self, allowed):
@@ -179,7 +178,7 @@ class Scene:
         return replace(self, transforms=transforms)
 
     def with_padding(self, padding=None, scale=None):
-        """Return the scene with {link: m} and {link: factor} put over what there is. Raises SceneError."""
+        """Return the scene with {link: m} and {link: factor} merged into the present ones. Raises SceneError."""
         for what, table, least in (("padding", padding or {}, 0.0), ("scale", scale or {}, 1e-6)):
             for link, value in table.items():
                 if link not in self.model.link_index:
@@ -197,21 +196,21 @@ class Scene:
         return self.model.frames(self.state.q, self.state.base)
 
     def frame(self, name):
-        """Return the pose (4, 4) in the planning frame of a link, of something the robot holds, of an object, of
+        """Return the pose (4, 4) in the planning frame of a link, of an attached object, of an object, of
         "object/subframe", or of a fixed frame; in this order. Raises SceneError for an unknown name."""
         name = name.lstrip("/")
         pose = self._known_pose(name)
         if pose is None:
-            raise SceneError("'%s' is no frame: neither a link, nor an object of the scene or a subframe of one%s"
+            raise SceneError("'%s' is not a frame: neither a link, nor an object of the scene or a subframe of one%s"
                              % (name, _like(name, self.frame_names())))
         return np.array(pose)
 
     def has_frame(self, name):
-        """Whether :meth:`frame` knows ``name``."""
+        """Whether :meth:`frame` accepts ``name``."""
         return self._known_pose(name.lstrip("/")) is not None
 
     def frame_names(self):
-        """A new list of all names that :meth:`frame` knows."""
+        """A new list of all names that :meth:`frame` accepts."""
         held = {name: body.object for name, body in self.state.attached.items()}
         return [self.model.frame, *self.model.links,
                 *(name for things in (held, self.objects) for name in things),
@@ -264,7 +263,7 @@ class Scene:
 
 
 def check_object(new):
-    """Raise SceneError for a WorldObject that a scene would not take."""
+    """Raise SceneError for a WorldObject that a scene does not accept."""
     _check_name(new.id)
     if not new.shapes:
         raise SceneError("object '%s' has no shapes; give it a primitive, a mesh or a plane" % new.id)
@@ -278,7 +277,7 @@ def _check_name(name):
 
 
 def _like(name, known):
-    """The rest of a sentence: which of the ``known`` names is most like ``name``, if any; of the first ones, for a
-    message may hold thousands of wrong names."""
+    """The end of a sentence: the most similar of the ``known`` names, if any. Only the first ones are compared, because
+    a message may have thousands of wrong names."""
     near = difflib.get_close_matches(name, list(itertools.islice(known, _COMPARED)), 1)
     return "; did you mean '%s'?" % near[0] if near else ""

@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether configurations and edges of a group are free, by spheres; many at once."""
+"""Collision checks of configurations and edges of a group by spheres, many at once."""
 import copy
 import functools
 
 import numpy as np
 
 from motion_planning.spheres import kernel
-from motion_planning.spheres.tables import bake, split
+from motion_planning.spheres.tables import bake, between, split
 
 #: States on an edge are at most this far apart [rad, the Euclidean distance of joint values].
 RESOLUTION = 1.0 / 64.0
 
 
 class SphereChecker:
-    """A scene as one group sees it. It never changes, and may be used from any number of threads.
+    """A scene prepared for one group. It is immutable, so threads can share it.
 
-    tables: (robot, world), see ``kernel``. resolution [rad]: how far apart the states are that an edge is looked at in.
+    tables: (robot, world), see ``kernel``. resolution [rad]: distance of the checked states on an edge.
     """
 
     def __init__(self, sphere_model, group, scene, state=None, resolution=RESOLUTION):
-        """``state``: where the joints are that the group does not move, and what is attached; the scene's where None.
+        """``state``: for the joints that the group does not move and for attached objects; None: the scene's.
         """
         self.group, self.resolution = group, resolution
         self.tables = bake(sphere_model, group, scene, scene.state if state is None else state)
@@ -33,26 +33,37 @@ class SphereChecker:
         return free
 
     def at(self, resolution):
-        """Return this checker with edges looked at in steps of another ``resolution`` [rad]."""
-        other = copy.copy(self)
-        other.__dict__.pop("parts", None)
-        other.resolution = resolution
-        return other
+        """Return this checker with another ``resolution`` [rad] of edges."""
+        return self._but(resolution=resolution)
 
     @functools.cached_property
     def parts(self):
-        """[(indices (j,) of the group's joints, SphereChecker of these alone)] of parts that move independently of
-        each other, each on joints of its own; what is between parts is not looked at. Empty where there are not two.
+        """[(indices (j,) of the group's joints, SphereChecker of these alone)] of parts that move independently of each
+        other, each by its own joints. Collisions between parts are not checked. Empty if there are fewer than two.
         """
-        found = []
-        for indices, tables in split(self.tables):
-            alone = copy.copy(self)
-            alone.__dict__.pop("parts", None)
-            alone.tables = tables
-            found.append((indices, alone))
-        return found
+        return [(indices, self._but(tables=tables)) for indices, tables in split(self.tables)]
+
+    @functools.cached_property
+    def between_parts(self):
+        """The SphereChecker of collisions of parts with each other alone: the rest of what may happen on a path that is
+        free for each of ``parts``."""
+        return self._but(tables=between(self.tables))
+
+    def _but(self, **changes):
+        other = copy.copy(self)
+        for name in ("parts", "between_parts"):
+            other.__dict__.pop(name, None)
+        other.__dict__.update(changes)
+        return other
 
     def edge(self, a, b):
-        """Whether the straight line from ``a`` to ``b`` (k,) is free; ``a`` itself is not looked at."""
-        return bool(kernel.edge_is_free(self.tables, np.ascontiguousarray(a, dtype=np.float32),
-                                        np.ascontiguousarray(b, dtype=np.float32), np.float32(self.resolution)))
+        """Whether the straight line from ``a`` to ``b`` (k,) is free; ``a`` itself is not checked."""
+        return bool(self.edges((a, b))[0])
+
+    def edges(self, points):
+        """Return (m - 1,) bool: whether each straight line between ``points`` (m, k) is free; the first point is not
+        checked."""
+        points = np.ascontiguousarray(points, dtype=np.float32)
+        free = np.empty(len(points) - 1, dtype=bool)
+        kernel.free_edges(self.tables, points, np.float32(self.resolution), free)
+        return free

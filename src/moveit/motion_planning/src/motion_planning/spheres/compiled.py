@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How the inner loops of this package are compiled, and where what was compiled is kept."""
+"""Compilation of the inner loops of this package, and the cache of compiled code."""
 from pathlib import Path
 
 from numba_cache import compiler
 
 _PACKAGE = Path(__file__).parents[1]
 
-#: Decorates a function: compiled when it is first called, or loaded if the files of spheres and planners are as then.
+#: Decorates a function: compiled at its first call, or loaded from the cache if the files of spheres and planners have
+#: not changed.
 compiled = compiler("motion_planning", [*_PACKAGE.glob("spheres/*.py"), *_PACKAGE.glob("planners/*.py")],
                     nogil=True, error_model="numpy")

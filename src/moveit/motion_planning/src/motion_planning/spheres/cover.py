@@ -1,35 +1,42 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Few spheres that together contain a solid, and reach little beyond it; boxes that contain a mesh.
+"""Covers a solid by few spheres that exceed it only a little, and a mesh by boxes.
 
-A sphere whose centre lies d deep in the solid and whose radius is d + tolerance reaches at most ``tolerance`` beyond
-it. Of such spheres those are taken, most first, that contain what no other has contained yet. Contained have to be
-samples of surface and inside; each by so much more than itself that what lies between the samples is contained too.
+A sphere whose centre is at depth d in the solid and whose radius is d + tolerance exceeds it by at most ``tolerance``.
+A greedy choice takes the sphere that contains the most samples not yet contained. Samples are on the surface and
+inside; each must be contained with a margin, so that the points between the samples are contained, too.
 """
 import numpy as np
 
+from motion_planning.spheres import covering
 from urdf_model import Box, Cylinder, Sphere
 
-# Samples are this far apart [tolerances]; what lies between is at most half a diagonal of their squares away.
+# Distance of samples [tolerances]; points between them are at most half a diagonal of their squares away.
 _SPACING = 0.5
 _BETWEEN = 0.75 * _SPACING
-# No more samples times centres than this, which is about as many bytes: larger solids get a larger tolerance.
-_MOST = 40_000_000
+# Greatest number of samples times centres, of boxes and cylinders and of meshes: larger ones get a larger tolerance.
+# The links of most arms are meshes of half a metre, covered in a second or two and then kept on disk.
+_MOST, _MOST_OF_MESH = 40_000_000, 1_000_000_000
+# Samples of a mesh are at most this far from each of its points, and voxels have this size [tolerances].
+_MESH_SPACING, _MESH_CELL = 0.3, 0.6
 # Half of the largest side [m].
 _LARGEST = 1e4
-#: Added to each radius [m]: what single floats lose.
+# Sides of the small triangles at whose corners a mesh is sampled, and of cubes with one sample each [distances of
+# samples]: 0.8 / sqrt(3) + 0.3 sqrt(3) < 1.
+_SIDES, _CUBES = 0.8, 0.3
+#: Added to each radius [m]: rounding error of single floats.
 ROUNDING = 2e-5
 
 
 class CoverError(ValueError):
-    """Geometry that cannot be covered; the text says which."""
+    """Geometry that cannot be covered; the text names it."""
 
 
 def cover(parts, tolerance):
     """Return spheres (n, 4), centre and radius, that contain all ``parts`` and reach ``tolerance`` [m] beyond them.
 
-    parts: [(geometry, pose (4, 4))]; geometry: Box, Cylinder or Sphere of urdf_model, or what has ``vertices`` (n, 3)
-    and ``triangles`` (m, 3). A mesh counts as solid where its surface is closed up to gaps of ``tolerance``. What is
-    large is contained with a larger tolerance. Raises CoverError.
+    parts: [(geometry, pose (4, 4))]; geometry: Box, Cylinder or Sphere of urdf_model, or an object with ``vertices``
+    (n, 3) and ``triangles`` (m, 3). A mesh counts as solid if its surface is closed up to gaps of ``tolerance``. Large
+    geometry gets a larger tolerance. Raises CoverError.
     """
     alone = [(geometry, pose) for geometry, pose in parts if isinstance(geometry, Sphere)]
     found = [np.append(pose[:3, 3], geometry.radius + ROUNDING) for geometry, pose in alone]
@@ -49,7 +56,7 @@ def cover(parts, tolerance):
 
 
 def ball(spheres, steps=100):
-    """Return (4,): a ball around all ``spheres`` (n, 4), made smaller by ``steps`` towards what is furthest."""
+    """Return (4,): a ball around all ``spheres`` (n, 4), made smaller by ``steps`` towards the farthest sphere."""
     centre = 0.5 * ((spheres[:, :3] - spheres[:, 3:]).min(0) + (spheres[:, :3] + spheres[:, 3:]).max(0))
     best = np.append(centre, np.inf)
     for turn in range(steps):
@@ -63,56 +70,41 @@ def ball(spheres, steps=100):
 
 def _greedy(wanted, centres, reach):
     """Indices of centres whose balls with radius ``reach`` contain all points ``wanted``, most points first."""
-    # A row for each point: what a step of the choice reads is one piece of memory.
-    contains = np.empty((len(wanted), len(centres)), dtype=bool)
-    squares, limits = np.sum(centres * centres, axis=1), np.square(np.maximum(reach, 0.0))
-    for begin in range(0, len(wanted), 256):
-        some = wanted[begin : begin + 256]
-        distance = squares + np.sum(some * some, axis=1)[:, None] - 2.0 * some @ centres.T
-        contains[begin : begin + 256] = distance <= limits
-    left = np.ones(len(wanted), dtype=bool)
-    gain = contains.sum(axis=0)
-    chosen = []
-    while left.any():
-        best = int(gain.argmax())
-        if gain[best] <= 0:
-            raise CoverError("%d of %d samples of a solid are in no sphere; its parts may be too different in size"
-                             % (left.sum(), len(left)))
-        chosen.append(best)
-        new = np.flatnonzero(left & contains[:, best])
-        left[new] = False
-        gain -= contains[new].sum(axis=0)
-    # What later spheres contain as well is not needed.
-    contained = np.ascontiguousarray(contains[:, chosen].T)
-    times = contained.sum(axis=0)
-    kept = []
-    for k, inside in zip(chosen, contained, strict=True):
-        if (times[inside] > 1).all():
-            times = times - inside
-        else:
-            kept.append(k)
-    return np.array(kept, dtype=int)
+    balls = np.column_stack([centres, np.square(np.maximum(reach, 0.0))]).astype(np.float32)
+    chosen = np.empty(len(balls), dtype=np.int64)
+    number, left = covering.choose(covering.by_axes(wanted), len(wanted), balls, chosen)
+    if left:
+        raise CoverError("%d of %d samples of a solid are in no sphere; its parts may be too different in size"
+                         % (left, len(wanted)))
+    return chosen[:number]
 
 
 def _shrunk(spheres, wanted, between):
-    """Make each sphere as small as what it alone contains allows."""
-    spheres = spheres.copy()
-    distance = np.array([np.sqrt(np.sum(np.square(wanted - centre), axis=1)) for centre in spheres[:, :3]])
-    distance += between + ROUNDING
-    inside = distance <= spheres[:, 3:] + 1e-9
-    times = inside.sum(axis=0)
-    for k in np.argsort(-spheres[:, 3]):
-        alone = inside[k] & (times == 1)
-        spheres[k, 3] = min(spheres[k, 3], max(distance[k, alone].max(initial=0.0), 1e-4))
-        now = distance[k] <= spheres[k, 3] + 1e-9
-        times += now
-        times -= inside[k]
-        inside[k] = now
-    return spheres
+    """Without the spheres whose points others contain as well, each as small as the points that only it contains
+    allow."""
+    spheres, members, apart = spheres.copy(), [], []
+    for sphere in spheres:
+        distance = np.linalg.norm(wanted - sphere[:3], axis=1) + between + ROUNDING
+        # They were chosen in single precision.
+        inside = np.flatnonzero(distance <= sphere[3] + 0.1 * ROUNDING)
+        members.append(inside)
+        apart.append(distance[inside])
+    times = np.bincount(np.concatenate([*members, np.empty(0, dtype=int)]), minlength=len(wanted))
+    kept = []
+    for k, inside in enumerate(members):
+        if (times[inside] > 1).all():
+            times[inside] -= 1
+        else:
+            kept.append(k)
+    for k in sorted(kept, key=lambda k: -spheres[k, 3]):
+        alone = times[members[k]] == 1
+        spheres[k, 3] = min(spheres[k, 3], max(apart[k][alone].max(initial=0.0), 1e-4))
+        times[members[k][apart[k] > spheres[k, 3] + 0.1 * ROUNDING]] -= 1
+    return spheres[kept]
 
 
 class _solid_box:
-    """A box or a cylinder: samples of it, points inside, and how deep points are in it."""
+    """A box or a cylinder: samples of it, points inside, and the depth of points."""
 
     def __init__(self, geometry, pose, tolerance):
         self._geometry, self._pose = geometry, pose
@@ -120,13 +112,13 @@ class _solid_box:
         half = 0.5 * np.array(geometry.size if box else [2 * geometry.radius, 2 * geometry.radius, geometry.length])
         if not ((half >= 0.0) & (half <= _LARGEST)).all():
             raise CoverError("a solid has sizes %s m; expected from 0 to %g" % (2.0 * half, 2.0 * _LARGEST))
-        # About as many samples and centres as there will be; a large solid is seen with coarser eyes.
+        # Estimated number of samples and centres; a large solid is sampled more coarsely.
         area, volume = 8.0 * (half * np.roll(half, 1)).sum(), 8.0 * half.prod()
         while (area / (tolerance * _SPACING) ** 2) * (volume / tolerance**3 + area / tolerance**2) > _MOST:
             tolerance *= 1.25
         spacing, self.tolerance = tolerance * _SPACING, tolerance
         self.between = spacing * _BETWEEN / _SPACING
-        # Along an edge the spheres are small: centres are to be no further apart than the tolerance.
+        # Along an edge the spheres are small: the distance of centres must not exceed the tolerance.
         if box:
             samples, inside = _box_surface(half, spacing), _grid(half, tolerance)
         else:
@@ -144,7 +136,7 @@ class _solid_box:
 
 
 class _solid_mesh:
-    """A mesh, seen as the voxels that its surface runs through and those that it encloses."""
+    """A mesh as voxels: those of its surface and those that it encloses."""
 
     def __init__(self, mesh, pose, tolerance):
         vertices = np.asarray(mesh.vertices, dtype=float).reshape(-1, 3)
@@ -152,16 +144,16 @@ class _solid_mesh:
         if not len(triangles) or not np.isfinite(vertices).all():
             raise CoverError("a mesh has %d triangles and %s corners; expected at least one, and finite corners"
                              % (len(triangles), "finite" if np.isfinite(vertices).all() else "infinite"))
-        # Surface voxels are not deep at all: the tolerance alone has to take a sphere to their corners.
+        # Surface voxels have no depth: the tolerance alone must extend a sphere to their corners.
         while True:
-            cell, spacing = 0.6 * tolerance, 0.3 * tolerance
+            cell, spacing = _MESH_CELL * tolerance, _MESH_SPACING * tolerance
             samples = mesh_samples(vertices, triangles, spacing)
             full, lowest = voxels(samples, cell)
             cells = np.argwhere(full)
-            if len(samples) * len(cells) <= _MOST:
+            if len(samples) * len(cells) <= _MOST_OF_MESH:
                 break
             tolerance *= 1.25
-        self.tolerance, self.between = tolerance, 0.6 * spacing
+        self.tolerance, self.between = tolerance, spacing
         self._surface = _moved(pose, samples)
         self.samples = self._surface
         self.inside = _moved(pose, lowest + (cells + 0.5) * cell)
@@ -170,7 +162,7 @@ class _solid_mesh:
         self._inside_depth[surface[tuple(cells.T)]] = 0.0
 
     def depth(self, points):
-        """Of points of ``inside``; 0 elsewhere, which is never too deep."""
+        """The depth of points of ``inside``; 0 elsewhere, which is a lower bound."""
         depth = np.zeros(len(points))
         own = {tuple(p): d for p, d in zip(self.inside.tolist(), self._inside_depth, strict=True)}
         for i, point in enumerate(points.tolist()):
@@ -178,12 +170,9 @@ class _solid_mesh:
         return depth
 
     def _distance(self, points):
-        nearest = np.empty(len(points))
-        square = np.sum(self._surface**2, axis=1)
-        for begin in range(0, len(points), 256):
-            some = points[begin : begin + 256]
-            nearest[begin : begin + 256] = (square - 2.0 * some @ self._surface.T).min(axis=1) + np.sum(some**2, axis=1)
-        return np.sqrt(np.maximum(nearest, 0.0))
+        nearest = np.empty(len(points), dtype=np.float32)
+        covering.nearest(covering.by_axes(self._surface), len(self._surface), points.astype(np.float32), nearest)
+        return nearest.astype(float)
 
 
 def _solid(geometry, pose, tolerance):
@@ -236,7 +225,7 @@ def _around(radius, spacing):
 
 
 def _cylinder_surface(cylinder, spacing):
-    # A round reaches beyond the line between two samples: hence a little closer.
+    # A circle bulges beyond the line between two samples, so they are a little closer.
     angle, z = _around(cylinder.radius, 0.9 * spacing), _line(0.5 * cylinder.length, spacing)
     angle, z = (grid.ravel() for grid in np.meshgrid(angle, z))
     return np.concatenate([np.column_stack([cylinder.radius * np.cos(angle), cylinder.radius * np.sin(angle), z]),
@@ -254,10 +243,11 @@ def _stacked(disc, heights):
 
 
 def mesh_samples(vertices, triangles, spacing):
-    """Return points (n, 3) on the triangles, none of whose points is further than 0.6 ``spacing`` from one of them."""
+    """Return points (n, 3) on the triangles, none of whose points is further than ``spacing`` from one of them."""
     corners = vertices[triangles]
     longest = np.max([np.linalg.norm(corners[:, i] - corners[:, i - 1], axis=1) for i in range(3)], axis=0)
-    parts = np.maximum(1, np.ceil(longest / spacing)).astype(int)
+    # A point of a triangle with no longer side than 1 is at most 1 / sqrt(3) from a corner.
+    parts = np.maximum(1, np.ceil(longest / (_SIDES * spacing))).astype(int)
     points = [vertices]
     for count in np.unique(parts):
         some = corners[parts == count]
@@ -265,8 +255,8 @@ def mesh_samples(vertices, triangles, spacing):
         points.append((some[:, None, 0] * (1.0 - i - j)[:, None] + some[:, None, 1] * i[:, None]
                        + some[:, None, 2] * j[:, None]).reshape(-1, 3))
     points = np.concatenate(points)
-    # Corners that triangles share, and crowds in small ones, count once.
-    _, first = np.unique(np.round(points / (0.15 * spacing)).astype(np.int64), axis=0, return_index=True)
+    # One sample is enough for a cube with such sides; small triangles have many in one.
+    _, first = np.unique(np.floor(points / (_CUBES * spacing)).astype(np.int64), axis=0, return_index=True)
     return points[first]
 
 
@@ -284,7 +274,7 @@ def voxels(samples, pitch, fill=True):
     count = -1
     while count != outside.sum():
         count = outside.sum()
-        # Sweeps carry the outside as far as it goes along each axis, both ways.
+        # Sweeps extend the outside as far as possible along each axis, both ways.
         for axis in range(3):
             for way in (slice(None), slice(None, None, -1)):
                 sweep, wall = np.moveaxis(outside, axis, 0)[way], np.moveaxis(full, axis, 0)[way]

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sixteen configurations at once: where the robot's spheres are, and whether they meet the world or each other.
+"""Checks sixteen configurations at once: the positions of the robot's spheres, and their collisions with the world or
+each other.
 
 A checker is two tuples of flat arrays, made by ``tables``:
 
-    robot = (joints, joint_numbers, clusters, cluster_numbers, spheres, pairs, tests, branches, skips)
+    robot = (joints, joint_numbers, clusters, cluster_numbers, spheres, pairs, tests, branches, skips, maps, cells)
     world = (node_links, nodes, kinds, objects)
 
 ``joints`` (3 int32 each): parent joint or -1, 1 if prismatic, variable; parents come first.
@@ -11,13 +12,13 @@ A checker is two tuples of flat arrays, made by ``tables``:
 multiplier and offset of the variable.
 ``clusters`` (3 int32): joint, first and last + 1 sphere. ``cluster_numbers`` (4 float32): a ball around all spheres of
 the cluster, centre in the joint's frame and radius. ``spheres``: the same, a tree: ``skips`` (1 int32) is 0 for a
-sphere, and for a ball around those that follow the number of the first that it does not contain. ``pairs`` (2 int32):
-clusters that must not meet.
-``tests`` (3 int32): cluster, first and last + 1 node that it must not meet; what hits most should come first.
-``branches`` (6 int32): first and last + 1 joint, cluster and test of what hangs on one joint of those without a parent.
-``nodes`` (6 float32): least and greatest corner. ``node_links`` (2 int32): the node to go on with where this one is not
-met, the object or -1. ``kinds`` and ``objects`` (16 float32): SPHERE ... below; centre (3), rotation from the planning
-frame's axes into the object's (3, 3), sizes (3).
+sphere, and for a ball around the following spheres the index of the first one outside of it. ``pairs`` (2 int32):
+clusters that must not collide. ``tests`` (3 int32): cluster, first and last + 1 node that it must not hit; the most
+frequent hits should come first. ``branches`` (6 int32): first and last + 1 joint, cluster and test of the branch below
+one root joint. ``maps`` (3 int32): two variables that turn, and the first of their CELLS x CELLS ``cells`` (uint8); 1
+where the robot may touch itself, see ``pair_maps``. ``nodes`` (6 float32): least and greatest corner.
+``node_links`` (2 int32): the node to continue with if this one is not hit, the object or -1. ``kinds`` and ``objects``
+(16 float32): SPHERE ... below; centre (3), rotation from the planning frame's axes into the object's (3, 3), sizes (3).
 """
 import numpy as np
 
@@ -25,44 +26,40 @@ from motion_planning.spheres.compiled import compiled
 from motion_planning.spheres.lanes import below, fill, greatest, load, magnitude, ramp, root, store, whole
 
 SPHERE, AXIS_BOX, BOX, UPRIGHT_CYLINDER, CYLINDER, PLANE = range(6)
-JOINT, JOINT_NUMBERS, CLUSTER, OBJECT, BRANCH = 3, 14, 3, 16, 6
+JOINT, JOINT_NUMBERS, CLUSTER, OBJECT, BRANCH, MAP = 3, 14, 3, 16, 6, 3
+#: Cells of a map along a full turn, a power of two.
+CELLS = 64
 ALL = 0xFFFF
 
 _PI_HIGH, _PI_LOW = np.float32(3.140625), np.float32(np.pi - 3.140625)
-_ONE_OVER_PI, _HALF, _TWO, _ONE = np.float32(1.0 / np.pi), np.float32(0.5), np.float32(2.0), np.float32(1.0)
+_ONE_OVER_PI, _HALF, _FOUR, _ONE = np.float32(1.0 / np.pi), np.float32(0.5), np.float32(4.0), np.float32(1.0)
 _ZERO = np.float32(0.0)
-# Taylor's series of the sine as far as single floats on [-pi/2, pi/2] tell the difference.
+_CELLS_PER_RADIAN = np.float32(CELLS / (2.0 * np.pi))
+# Taylor's series of sine and cosine, to the precision of single floats on [-pi/2, pi/2].
 _S3, _S5, _S7 = np.float32(-1.0 / 6.0), np.float32(1.0 / 120.0), np.float32(-1.0 / 5040.0)
 _S9, _S11 = np.float32(1.0 / 362880.0), np.float32(-1.0 / 39916800.0)
+_C2, _C4, _C6 = np.float32(-0.5), np.float32(1.0 / 24.0), np.float32(-1.0 / 720.0)
+_C8, _C10, _C12 = np.float32(1.0 / 40320.0), np.float32(-1.0 / 3628800.0), np.float32(1.0 / 479001600.0)
 
 
 @compiled
-def _sine_near(x, turns):
-    """The sine of x + turns pi, |x| <= pi / 2."""
-    square = x * x
-    series = fill(_S9) + square * fill(_S11)
-    series = fill(_S7) + square * series
-    series = fill(_S5) + square * series
-    series = fill(_S3) + square * series
-    value = x + x * square * series
-    # -1 for odd turns
-    halves = turns * fill(_HALF)
-    odd = magnitude(halves - whole(halves)) * fill(_TWO)
-    return value * (fill(_ONE) - fill(_TWO) * odd)
-
-
-@compiled
-def sine(x):
+def sine_and_cosine(x):
+    """Both share the turns that are taken off: x = turns pi + rest, |rest| <= pi / 2; odd turns change the signs."""
     turns = whole(x * fill(_ONE_OVER_PI))
-    return _sine_near((x - turns * fill(_PI_HIGH)) - turns * fill(_PI_LOW), turns)
-
-
-@compiled
-def cosine(x):
-    """cos x = sin(x + pi / 2), with the half turn taken off before it costs digits."""
-    turns = whole(x * fill(_ONE_OVER_PI) + fill(_HALF))
-    before = turns - fill(_HALF)
-    return _sine_near((x - before * fill(_PI_HIGH)) - before * fill(_PI_LOW), turns)
+    rest = (x - turns * fill(_PI_HIGH)) - turns * fill(_PI_LOW)
+    square = rest * rest
+    s = fill(_S9) + square * fill(_S11)
+    s = fill(_S7) + square * s
+    s = fill(_S5) + square * s
+    s = fill(_S3) + square * s
+    c = fill(_C10) + square * fill(_C12)
+    c = fill(_C8) + square * c
+    c = fill(_C6) + square * c
+    c = fill(_C4) + square * c
+    c = fill(_C2) + square * c
+    halves = turns * fill(_HALF)
+    sign = fill(_ONE) - magnitude(halves - whole(halves)) * fill(_FOUR)
+    return (rest + rest * square * s) * sign, (fill(_ONE) + square * c) * sign
 
 
 @compiled
@@ -76,40 +73,48 @@ def place_joints(robot, q, begin, end, frames):
         parent, prismatic, variable = joints[JOINT * j], joints[JOINT * j + 1], joints[JOINT * j + 2]
         n = JOINT_NUMBERS * j
         value = load(q, 16 * variable) * fill(numbers[n + 12]) + fill(numbers[n + 13])
-        at = 192 * j
-        for axis in range(3):  # of the frame outside
-            if parent < 0:
-                x, y, z = fill(numbers[n + 3 * axis]), fill(numbers[n + 3 * axis + 1]), fill(numbers[n + 3 * axis + 2])
-                p = fill(numbers[n + 9 + axis])
-            else:
-                up = 192 * parent + 16 * axis
-                a, b, c = load(frames, up), load(frames, up + 48), load(frames, up + 96)
-                x = a * fill(numbers[n]) + b * fill(numbers[n + 3]) + c * fill(numbers[n + 6])
-                y = a * fill(numbers[n + 1]) + b * fill(numbers[n + 4]) + c * fill(numbers[n + 7])
-                z = a * fill(numbers[n + 2]) + b * fill(numbers[n + 5]) + c * fill(numbers[n + 8])
-                p = load(frames, up + 144) + a * fill(numbers[n + 9]) + b * fill(numbers[n + 10]) \
-                    + c * fill(numbers[n + 11])
-            place = at + 16 * axis
-            store(frames, place, x)
-            store(frames, place + 48, y)
-            store(frames, place + 96, z)
-            store(frames, place + 144, p)
+        # Read before anything is written: the compiler does not know that these are other arrays.
+        r0, r1, r2 = fill(numbers[n]), fill(numbers[n + 1]), fill(numbers[n + 2])
+        r3, r4, r5 = fill(numbers[n + 3]), fill(numbers[n + 4]), fill(numbers[n + 5])
+        r6, r7, r8 = fill(numbers[n + 6]), fill(numbers[n + 7]), fill(numbers[n + 8])
+        p0, p1, p2 = fill(numbers[n + 9]), fill(numbers[n + 10]), fill(numbers[n + 11])
         if prismatic:
-            for axis in range(3):
-                place = at + 16 * axis
-                store(frames, place + 144, load(frames, place + 144) + value * load(frames, place + 96))
+            s, c = fill(_ZERO), fill(_ONE)
+            p0, p1, p2 = p0 + value * r2, p1 + value * r5, p2 + value * r8
         else:
-            s, c = sine(value), cosine(value)
-            for axis in range(3):
-                place = at + 16 * axis
-                x, y = load(frames, place), load(frames, place + 48)
-                store(frames, place, x * c + y * s)
-                store(frames, place + 48, y * c - x * s)
+            s, c = sine_and_cosine(value)
+        # The joint's own motion turns x and y about z.
+        r0, r1 = r0 * c + r1 * s, r1 * c - r0 * s
+        r3, r4 = r3 * c + r4 * s, r4 * c - r3 * s
+        r6, r7 = r6 * c + r7 * s, r7 * c - r6 * s
+        at = 192 * j
+        if parent < 0:
+            _store_column(frames, at, r0, r3, r6)
+            _store_column(frames, at + 48, r1, r4, r7)
+            _store_column(frames, at + 96, r2, r5, r8)
+            _store_column(frames, at + 144, p0, p1, p2)
+            continue
+        up = 192 * parent
+        for axis in range(3):  # of the frame outside
+            a, b, d = load(frames, up + 16 * axis), load(frames, up + 16 * axis + 48), load(frames, up + 16 * axis + 96)
+            p = load(frames, up + 16 * axis + 144)
+            place = at + 16 * axis
+            store(frames, place, a * r0 + b * r3 + d * r6)
+            store(frames, place + 48, a * r1 + b * r4 + d * r7)
+            store(frames, place + 96, a * r2 + b * r5 + d * r8)
+            store(frames, place + 144, p + a * p0 + b * p1 + d * p2)
+
+
+@compiled
+def _store_column(frames, at, x, y, z):
+    store(frames, at, x)
+    store(frames, at + 16, y)
+    store(frames, at + 32, z)
 
 
 @compiled
 def _place(frames, joint, numbers, i):
-    """Where the centre of ball i is."""
+    """The centre of ball i."""
     at = 192 * joint
     x, y, z = fill(numbers[4 * i]), fill(numbers[4 * i + 1]), fill(numbers[4 * i + 2])
     return (load(frames, at) * x + load(frames, at + 48) * y + load(frames, at + 96) * z + load(frames, at + 144),
@@ -119,7 +124,7 @@ def _place(frames, joint, numbers, i):
 
 @compiled
 def _beyond(x, half):
-    """How far |x| is beyond half, or 0."""
+    """The excess of |x| over half, or 0."""
     return greatest(magnitude(x) - half, fill(_ZERO))
 
 
@@ -214,11 +219,25 @@ def _balls_meet(x, y, z, reach):
 
 
 @compiled
+def _in_closed_cells(robot, q, found):
+    """``found`` with the lanes in which two joints are in a closed cell of their map."""
+    maps, cells = robot[9], robot[10]
+    for m in range(0, len(maps), MAP):
+        u, v, begin = 16 * maps[m], 16 * maps[m + 1], maps[m + 2]
+        for lane in range(16):
+            row = int(np.floor(q[u + lane] * _CELLS_PER_RADIAN)) & CELLS - 1
+            column = int(np.floor(q[v + lane] * _CELLS_PER_RADIAN)) & CELLS - 1
+            if cells[begin + CELLS * row + column]:
+                found |= 1 << lane
+    return found
+
+
+@compiled
 def hits(tables, work, every):
     """Return the mask of those of 16 configurations that are in collision.
 
     tables: (robot, world). work: ``work_arrays``, the configurations in the first of them, 16 values of each variable.
-    ``every`` false: it is enough to know that one is; the mask may lack others.
+    ``every`` false: the caller only needs to know whether any is in collision; the mask may be incomplete.
     """
     robot, world = tables
     q, frames, centres, last_hit = work
@@ -227,7 +246,7 @@ def hits(tables, work, every):
     found = 0
     count = len(branches) // BRANCH
     for turn in range(count):
-        # The arm that was hit last is likely to be hit again, and then the others need not be placed at all.
+        # The arm that was hit last is likely to be hit again; then the others need not be computed.
         b = (turn + last_hit[0]) % count
         row = BRANCH * b
         place_joints(robot, q, branches[row], branches[row + 1], frames)
@@ -253,6 +272,10 @@ def hits(tables, work, every):
                 if found != 0 and (not every or found == ALL):
                     last_hit[0] = b
                     return found
+    if len(robot[9]):
+        found = _in_closed_cells(robot, q, found)
+        if found != 0 and (not every or found == ALL):
+            return found
     for i in range(len(pairs) // 2):
         a, b = pairs[2 * i], pairs[2 * i + 1]
         x, y, z = load(centres, 48 * a), load(centres, 48 * a + 16), load(centres, 48 * a + 32)
@@ -293,10 +316,9 @@ def free_states(tables, states, free):
 
 @compiled
 def free_edge(tables, work, a, b, step):
-    """Whether the straight line from ``a`` to ``b`` (k,) float32 is free, looked at in steps of at most ``step``.
-
-    ``a`` itself is left out. The steps are fewer than sixteen nowhere: lanes that would lie idle make them finer. They
-    are looked at from coarse to fine, the end first.
+    """Whether the straight line from ``a`` to ``b`` (k,) float32 is free, checked in steps of at most ``step``. ``a``
+    itself is left out. There are at least sixteen steps, so that no lane is idle. They are checked from coarse to fine,
+    the end first.
     """
     q = work[0]
     length = np.float32(0.0)
@@ -308,7 +330,7 @@ def free_edge(tables, work, a, b, step):
     while bits < rows:
         bits *= 2
     for turn in range(bits):
-        # The bits of the turn in reverse: 0, 1/2, 1/4, 3/4 ... of the way between two lanes.
+        # The bits of the turn in reverse: 0, 1/2, 1/4, 3/4 ... of the distance between two lanes.
         back, one, rest = 0, bits >> 1, turn
         while rest:
             if rest & 1:
@@ -326,6 +348,8 @@ def free_edge(tables, work, a, b, step):
 
 
 @compiled
-def edge_is_free(tables, a, b, step):
-    """``free_edge`` for a caller without work arrays."""
-    return free_edge(tables, work_arrays(tables[0]), a, b, step)
+def free_edges(tables, points, step, free):
+    """Write into ``free`` (m - 1,) whether each line between ``points`` (m, k) float32 is, see ``free_edge``."""
+    work = work_arrays(tables[0])
+    for i in range(len(free)):
+        free[i] = free_edge(tables, work, points[i], points[i + 1], step)

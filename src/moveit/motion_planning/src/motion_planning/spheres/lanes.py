@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sixteen floats at once, for numba: the type ``lanes`` with its arithmetic.
 
-LLVM does not turn loops over short arrays into vector instructions by itself here; a vector type leaves it no choice.
-Sixteen single floats are one register of AVX-512, two of AVX, four of SSE or NEON: LLVM splits what is too wide.
-Inside compiled functions alone:
+LLVM does not vectorize loops over short arrays here; an explicit vector type makes it do so.
+Sixteen single floats are one register of AVX-512, two of AVX, four of SSE or NEON: LLVM splits wider vectors. Only
+inside compiled functions:
 
-    v = load(array, i)      # array[i : i + 16], float32, one axis; nothing looks whether it is that long
+    v = load(array, i)      # array[i : i + 16], float32, one axis; without a bounds check
     store(array, i, v)
     fill(x)                 # x in every lane; x is a float32
     ramp()                  # 0, 1, ... 15
@@ -27,7 +27,7 @@ WIDTH = 16
 
 _VECTOR = ir.VectorType(ir.FloatType(), WIDTH)
 _MASK = ir.VectorType(ir.IntType(1), WIDTH)
-# A product and a sum may become one instruction. No more than that: what is not a number has to stay it.
+# A product and a sum may become one instruction. No other fast-math option: NaN must stay NaN.
 _FLAGS = ("contract",)
 
 

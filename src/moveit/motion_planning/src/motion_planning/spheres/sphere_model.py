@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The spheres of all links of a robot, made once from its collision geometry and kept between runs."""
+"""The spheres of all links of a robot, made once from its collision geometry and cached on disk."""
 import hashlib
 import os
 import tempfile
@@ -11,42 +11,43 @@ import numpy as np
 
 from motion_planning.errors import PlanningError
 from motion_planning.shapes import TriangleMesh
-from motion_planning.spheres import cover as covers
 from motion_planning.spheres.cover import boxes_of_cells, cover, mesh_samples, voxels
 from numba_cache import folder
 from urdf_model import Box, Cylinder, Mesh
 
-#: How far a sphere may reach beyond the geometry [m]; for what is thin, this share of its thinnest half side, ...
+#: How far a sphere may reach beyond the geometry [m]; for thin geometry, this share of its thinnest half side, ...
 TOLERANCE_M = 0.01
 _THIN_SHARE = 0.35
 # ... but not less than this share of the tolerance.
 _LEAST_SHARE = 0.4
-#: Boxes that stand for a mesh have sides of this size and its multiples [m]...
+#: Boxes that replace a mesh have sides of this size and its multiples [m]...
 MESH_CELL_M = 0.006
-# ... or larger ones, so that the longest side of the mesh has at most so many.
+# ... or larger ones, so that the longest side of the mesh has at most this many.
 _MOST_CELLS = 150
-# Tables of robots and of links that stand still.
-_MOST_KEPT = 200
+# Tables of robots and of links that stand still; maps of pairs of links; tables of whole scenes, which are large.
+_MOST_KEPT, _MOST_MAPS, _MOST_SCENES = 400, 10_000, 4
+# What is kept on disk is made by these.
+_SOURCES = [Path(__file__).with_name(name) for name in ("cover.py", "covering.py", "pair_maps.py")]
 
 
 class SphereModel:
-    """Spheres and boxes that contain the collision geometry of each link, made when they are first asked for.
-
-    May be used from any number of threads. What is made is kept on disk beside compiled code, for the same geometry and
-    tolerance [m].
+    """Spheres and boxes that contain the collision geometry of each link, made on first use. Thread-safe. They are
+    cached on disk beside compiled code, by geometry and tolerance [m].
     """
 
     def __init__(self, model, parts, tolerance):
         self.model, self.tolerance = model, tolerance
         self._parts, self._spheres, self._fixed = parts, {}, {}
-        self._kept, self._lock = OrderedDict(), threading.Lock()
+        #: What was made for a key: ``kept(key, make)`` returns ``make()``, made again only when many others have been
+        #: asked for since; ``maps`` and ``scenes`` the same for maps of pairs of links, and for tables of whole scenes.
+        self.kept, self.maps, self.scenes = _Kept(_MOST_KEPT), _Kept(_MOST_MAPS), _Kept(_MOST_SCENES)
 
     @classmethod
     def of(cls, model, meshes, tolerance=TOLERANCE_M):
         """Return the SphereModel of a PlanningModel.
 
-        ``meshes``: function from a mesh's filename to its TriangleMesh in the file's own scale. What it raises
-        PlanningError for is left out, as ExactChecker leaves it out and says so.
+        ``meshes``: function from a mesh's filename to its TriangleMesh in the file's own scale. Meshes for which it
+        raises PlanningError are left out, as in ExactChecker, which reports them.
         """
         parts = {name: [] for name in model.links}
         for name in model.links:
@@ -58,7 +59,7 @@ class SphereModel:
         return cls(model, parts, tolerance)
 
     def spheres(self, link):
-        """Return (n, 4), centre in the link's frame and radius [m], what the link is while it moves; n may be 0.
+        """Return (n, 4), centre in the link's frame and radius [m], for a moving link; n may be 0.
 
         Raises CoverError.
         """
@@ -68,63 +69,72 @@ class SphereModel:
         return self._spheres[link]
 
     def fixed(self, link):
-        """Return [(geometry, pose (4, 4) in the link's frame)], what the link is while it does not move: meshes as
-        Boxes."""
+        """Return [(geometry, pose (4, 4) in the link's frame)], for a link that does not move: meshes as Boxes."""
         if link not in self._fixed:
             self._fixed[link] = [(boxes_of(geometry), pose) for geometry, pose in self._parts[link]]
         return self._fixed[link]
+
+    def parts(self, link):
+        """Return [(geometry, pose (4, 4) in the link's frame)]: its collision geometry, meshes as TriangleMesh."""
+        return self._parts[link]
 
     def not_kept(self):
         """Return names of the links whose spheres are not on disk."""
         return [name for name, parts in self._parts.items()
                 if parts and not _file(cover, parts, fitting(parts, self.tolerance)).exists()]
 
-    def kept(self, key, make):
-        """Return what ``make()`` returned for this key, made again only when many others have been asked for since."""
+
+class _Kept:
+    """The last ``most`` things that were made. Any thread may call."""
+
+    def __init__(self, most):
+        self._most, self._things, self._lock = most, OrderedDict(), threading.Lock()
+
+    def __call__(self, key, make):
         with self._lock:
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                return self._kept[key]
+            if key in self._things:
+                self._things.move_to_end(key)
+                return self._things[key]
         made = make()
         with self._lock:
-            self._kept[key] = made
-            while len(self._kept) > _MOST_KEPT:
-                self._kept.popitem(last=False)
+            self._things[key] = made
+            while len(self._things) > self._most:
+                self._things.popitem(last=False)
         return made
 
 
 def fitting(parts, tolerance):
-    """Return the tolerance [m] for parts of these sizes: what is thin gets a closer fit."""
+    """Return the tolerance [m] for parts of these sizes: thin parts get a closer fit."""
     half = [0.5 * min(geometry.size) for geometry, _ in parts if isinstance(geometry, Box)]
     half += [min(geometry.radius, 0.5 * geometry.length) for geometry, _ in parts if isinstance(geometry, Cylinder)]
     return tolerance * float(np.clip(_THIN_SHARE * min(half, default=np.inf) / tolerance, _LEAST_SHARE, 1.0))
 
 
 class Boxes:
-    """Boxes that stand for a mesh or an octree. corners (n, 2, 3): least and greatest, in the frame of the shape."""
+    """Boxes that replace a mesh or an octree. corners (n, 2, 3): least and greatest, in the frame of the shape."""
 
     def __init__(self, corners):
         self.corners = corners
 
 
 def boxes_of(geometry):
-    """Return ``geometry`` as it is, or the Boxes that contain it where it is a mesh; made once for the same mesh."""
+    """Return ``geometry`` unchanged, or Boxes that contain it if it is a mesh; made once per mesh."""
     return Boxes(cached(mesh_boxes, [(geometry, np.eye(4))], MESH_CELL_M)) if _is_mesh(geometry) else geometry
 
 
 def mesh_boxes(parts, cell):
-    """Return boxes (n, 2, 3) that contain a mesh and what it encloses, and reach at most two cells beyond it."""
+    """Return boxes (n, 2, 3) that contain a mesh and its inside, and exceed it by at most two cells."""
     (mesh, _), = parts
     size = np.ptp(mesh.vertices, axis=0).max()
     cell = max(cell, size / _MOST_CELLS)
-    spacing = 0.5 * cell
+    spacing = 0.3 * cell
     samples = mesh_samples(mesh.vertices, mesh.triangles, spacing)
     full, lowest = voxels(samples, cell)
-    return boxes_of_cells(full, lowest, cell, beyond=0.6 * spacing)
+    return boxes_of_cells(full, lowest, cell, beyond=spacing)
 
 
 def cached(function, parts, size):
-    """Return ``function(parts, size)``, an array, from disk where it has been made before."""
+    """Return ``function(parts, size)``, an array, from disk if it has been made before."""
     path = _file(function, parts, size)
     try:
         return np.load(path)
@@ -133,20 +143,20 @@ def cached(function, parts, size):
     made = function(parts, size)
     unfinished = None
     try:
-        # Two processes may make it at once: the file is whole or not there.
+        # Two processes may make it at the same time: the file is written atomically.
         handle, unfinished = tempfile.mkstemp(dir=path.parent)
         with os.fdopen(handle, "wb") as file:
             np.save(file, made)
         os.replace(unfinished, path)
     except OSError:
-        # A cache that cannot be written is as good as none; who has to know asks ``not_kept``.
+        # A cache that cannot be written is ignored; callers can check with ``not_kept``.
         if unfinished is not None:
             Path(unfinished).unlink(missing_ok=True)
     return made
 
 
 def _file(function, parts, size):
-    """The path of the file that what ``function`` makes of ``parts`` is kept in."""
+    """The path of the cache file for ``function`` and ``parts``."""
     digest = hashlib.sha256(repr((function.__name__, size)).encode())
     for geometry, pose in parts:
         digest.update(np.ascontiguousarray(pose).tobytes())
@@ -154,7 +164,7 @@ def _file(function, parts, size):
             digest.update(geometry.vertices.tobytes() + geometry.triangles.tobytes())
         else:
             digest.update(repr(geometry).encode())
-    return Path(folder("motion_planning_spheres", [covers.__file__])) / (digest.hexdigest()[:32] + ".npy")
+    return Path(folder("motion_planning_spheres", _SOURCES)) / (digest.hexdigest()[:32] + ".npy")
 
 
 def _is_mesh(geometry):

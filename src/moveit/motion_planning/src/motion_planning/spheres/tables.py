@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A scene, seen by one group, as the flat arrays that ``kernel`` works on.
+"""A scene for one group, as flat arrays for ``kernel``.
 
-What moves with the group becomes spheres on joints; all else, other links of the robot included, becomes the world.
-What is the same from scene to scene, the robot, is kept in the SphereModel.
+Bodies that move with the group become spheres on joints; all others, including other links of the robot, become the
+world. The robot's part does not depend on the scene and is cached in the SphereModel.
 """
+import hashlib
+import itertools
 import math
 from typing import NamedTuple
 
@@ -12,18 +14,19 @@ import numpy as np
 from motion_planning.shapes import Cone, Octree
 from motion_planning.spheres import kernel
 from motion_planning.spheres.cover import ball
+from motion_planning.spheres.pair_maps import pair_map
 from motion_planning.spheres.sphere_model import cached, cover, fitting
 from motion_planning.spheres.world_tables import Tree, forest, joined, pyramid, solids_of, tree_of
 from urdf_model import Plane
 
 # Clusters on the same joint become one if the ball around both is at most this much larger than the larger one's.
 _MERGED = 1.25
-# So many spheres are looked at one by one.
+# Number of spheres that are checked one by one.
 _FEW_SPHERES = 4
 
 
 class _Mover(NamedTuple):
-    """A link, or what one holds: spheres (n, 4) in the frame of the joint that it moves with."""
+    """A link or an attached object: spheres (n, 4) in the frame of the joint that it moves with."""
 
     name: str
     touch: frozenset
@@ -32,7 +35,7 @@ class _Mover(NamedTuple):
 
 
 class _Cluster(NamedTuple):
-    """Movers on one joint that may touch the same things."""
+    """Movers on one joint that may touch the same bodies."""
 
     joint: int
     movers: tuple
@@ -41,50 +44,60 @@ class _Cluster(NamedTuple):
 
 
 class _Still(NamedTuple):
-    """A link, or what one holds, that the group does not move; may: for each cluster, whether they may touch."""
+    """A link or an attached object that the group does not move; may: for each cluster, whether they may touch."""
 
     tree: Tree
     may: tuple
 
 
 class _Robot(NamedTuple):
-    """What a robot is for a group, whatever objects there are."""
+    """The robot's part of the tables for a group, independent of objects."""
 
     clusters: tuple
     branch: tuple  # of each cluster
     depth: tuple
-    arrays: tuple  # of the kernel's robot table, tests and what follows left out
+    arrays: tuple  # of the kernel's robot table, without tests and the rest
     pairs: np.ndarray
     still: tuple
+    maps: tuple  # (maps, cells) of the kernel's robot table
+    world: tuple  # the table of ``still``, and their places in it
 
 
 def bake(sphere_model, group, scene, state):
     """Return (robot, world), see ``kernel``: what of ``scene`` the joints of ``group`` can run into, elsewhere as in
-    ``state``."""
+    ``state``. Scenes that differ in the values of these joints alone have the same tables, made once."""
+    others = np.delete(state.q, group.indices)
+    key = (group.name, id(scene.allowed), others.tobytes(), state.base.tobytes(), tuple(scene.link_padding.items()),
+           tuple(scene.link_scale.items()), tuple(map(id, state.attached.values())))
+    # What a key names by identity is kept with what is found: no other object gets the same.
+    named = scene.allowed, scene.objects, scene.octomap, tuple(state.attached.values())
+    tables, _ = sphere_model.scenes((*key, id(scene.objects), id(scene.octomap)),
+                                    lambda: (_baked(sphere_model, group, scene, state, key), named))
+    return tables
+
+
+def _baked(sphere_model, group, scene, state, key):
     things = [*scene.objects.values(), *([scene.octomap] if scene.octomap is not None else [])]
     movers = _mover_names(sphere_model.model, group, state)
-    # For each object those that may touch it, mostly nobody.
+    # For each object the bodies that may touch it, mostly none.
     special = [(thing.id, frozenset(name for name, touch in movers
                                     if thing.id in touch or scene.allowed.allowed(name, thing.id))) for thing in things]
     special = {name: may for name, may in special if may}
-    others = np.delete(state.q, group.indices)
-    key = (group.name, id(scene.allowed), others.tobytes(), state.base.tobytes(), tuple(scene.link_padding.items()),
-           tuple(scene.link_scale.items()), tuple(map(id, state.attached.values())), tuple(special.values()))
-    # What the key names by identity is kept with what is found: no other object gets the same.
-    robot, _ = sphere_model.kept(key, lambda: (_robot(sphere_model, group, scene, state, special),
-                                               (scene.allowed, *state.attached.values())))
+    robot, _ = sphere_model.kept((*key, tuple(special.values())),
+                                 lambda: (_robot(sphere_model, group, scene, state, special),
+                                          (scene.allowed, *state.attached.values())))
     groups = {}
     for thing in things:
         may = special.get(thing.id, frozenset())
         allowed = tuple(bool(may) and all(mover.name in may for mover in cluster.movers) for cluster in robot.clusters)
         groups.setdefault(allowed, []).append(solids_of([(shape, thing.pose @ pose) for shape, pose in thing.shapes]))
-    stills = [_Still(tree_of(joined(solids)), may) for may, solids in groups.items()] + list(robot.still)
-    world, places = forest([still.tree for still in stills])
-    return _with_tests(robot, stills, places), world
+    stills = [_Still(tree_of(joined(solids)), may) for may, solids in groups.items()]
+    world, places = forest([still.tree for still in stills], robot.world)
+    return _with_tests(robot, [*stills, *robot.still], [*places[len(robot.still):], *places[: len(robot.still)]]), world
 
 
 def _with_tests(robot, stills, places):
-    """The robot's table, complete: what each cluster has to be tested against, objects before the robot itself."""
+    """The complete robot table: the tests of each cluster, objects before the robot itself."""
     tests = [(robot.branch[c], rank, -robot.depth[c], c, *place)
              for rank, (still, place) in enumerate(zip(stills, places, strict=True)) if place[1] > place[0]
              for c in range(len(robot.clusters)) if not still.may[c]]
@@ -95,13 +108,13 @@ def _with_tests(robot, stills, places):
         for keys in (joint_branch, robot.branch, [test[0] for test in tests]):
             branches += [sum(key < number for key in keys), sum(key <= number for key in keys)]
     return (joints, *rest, robot.pairs, np.array([test[3:] for test in tests], np.int32).ravel(),
-            np.array(branches, np.int32), skips)
+            np.array(branches, np.int32), skips, *robot.maps)
 
 
 def split(tables):
     """Return [(indices of variables, tables of these alone)] of the branches of a robot, see ``kernel``.
 
-    Empty where there are not at least two, each with variables of its own, that together have them all.
+    Empty unless there are at least two, each with its own variables, that together have all of them.
     """
     robot, world = tables
     joints, pairs, rows = robot[0].reshape(-1, kernel.JOINT), robot[5].reshape(-1, 2), robot[7].reshape(
@@ -118,15 +131,29 @@ def split(tables):
         alone[row[0] : row[1], 2] = np.searchsorted(indices, alone[row[0] : row[1], 2])
         alone[: row[0], 2] = alone[row[1] :, 2] = 0
         inside = ((pairs >= row[2]) & (pairs < row[3])).all(axis=1)
+        maps = robot[9].reshape(-1, kernel.MAP)
+        maps = maps[np.isin(maps[:, :2], indices).all(axis=1)]
+        maps[:, :2] = np.searchsorted(indices, maps[:, :2])
         found.append((indices, ((alone.ravel(), *robot[1:5], pairs[inside].ravel(), robot[6],
-                                 np.ascontiguousarray(row), robot[8]), world)))
+                                 np.ascontiguousarray(row), robot[8], maps.ravel(), robot[10]), world)))
     return found
+
+
+def between(tables):
+    """Return tables of the same robot that know collisions of its branches with each other only."""
+    robot, world = tables
+    rows = robot[7].reshape(-1, kernel.BRANCH).copy()
+    branch = np.searchsorted(rows[:, 3], robot[5], side="right").reshape(-1, 2)
+    pairs = robot[5].reshape(-1, 2)[branch[:, 0] != branch[:, 1]]
+    rows[:, 4:] = 0  # no tests
+    return (*robot[:5], pairs.ravel(), robot[6][:0], rows.ravel(), robot[8], robot[9][:0], robot[10][:0]), world
 
 
 # -- the robot ----------------------------------------------------------------------------------------------------
 
 def _mover_names(model, group, state):
-    """[(name, names of what it may touch whatever is allowed)] of the links that the group moves and what they hold."""
+    """[(name, names of bodies that it may always touch)] of the links that the group moves and their attached
+    objects."""
     moving = frozenset(group.moving_links)
     return ([(name, frozenset()) for name in model.links if name in moving]
             + [(name, body.touch_links) for name, body in state.attached.items() if body.link in moving])
@@ -149,6 +176,8 @@ def _robot(sphere_model, group, scene, state, special):
                 ("still", name, frames[link].tobytes(), pad),
                 lambda name=name, link=link, pad=pad: tree_of(solids_of(_placed(sphere_model.fixed(name), frames[link]),
                                                                        pad)))))
+    moving = [mover.name for mover in movers if not scene.link_padding.get(mover.name)
+              and scene.link_scale.get(mover.name, 1.0) == 1.0]
     for body in state.attached.values():
         joint, pose = seats[model.link_index[body.link]]
         if joint >= 0:
@@ -162,17 +191,21 @@ def _robot(sphere_model, group, scene, state, special):
     def may(a, b):
         return a[0] in b[1] or b[0] in a[1] or scene.allowed.allowed(a[0], b[0])
 
-    rows = [tuple([may(mover, other) for other in [*movers, *still]]
+    mapped, maps = _maps(sphere_model, group, scene.allowed, moving)
+    rows = [tuple([may(mover, other) or frozenset((mover.name, other[0])) in mapped for other in [*movers, *still]]
                   + [mover.name in names for names in special.values()]) for mover in movers]
     depth, branch = _branches(joints)
-    clusters = sorted(_clusters(movers, rows), key=lambda cluster: (branch[cluster.joint], -depth[cluster.joint]))
+    clusters = sorted(_clusters(sphere_model, movers, rows),
+                      key=lambda cluster: (branch[cluster.joint], -depth[cluster.joint]))
     first = [movers.index(cluster.movers[0]) for cluster in clusters]
     pairs = [(a, b) for a in range(len(clusters)) for b in range(a + 1, len(clusters))
              if clusters[a].joint != clusters[b].joint and not rows[first[a]][first[b]]]
     table, spheres, skips = [], [], []
     for cluster in clusters:
         begin = len(spheres)
-        _sphere_tree(cluster.spheres, spheres, skips)
+        balls, jumps = _made_once(sphere_model, _balls_and_jumps, cluster.spheres)
+        spheres += balls
+        skips += [begin + jump if jump else 0 for jump in jumps]
         table += [cluster.joint, begin, len(spheres)]
     arrays = (np.array([joint[:3] for joint in joints], np.int32).ravel(),
               np.array([joint[3] for joint in joints], np.float32).ravel(), np.array(table, np.int32),
@@ -181,7 +214,23 @@ def _robot(sphere_model, group, scene, state, special):
     return _Robot(tuple(clusters), tuple(branch[cluster.joint] for cluster in clusters),
                   tuple(depth[cluster.joint] for cluster in clusters), arrays, np.array(pairs, np.int32).ravel(),
                   tuple(_Still(tree, tuple(rows[k][len(movers) + n] for k in first))
-                        for n, (_, _, tree) in enumerate(still)))
+                        for n, (_, _, tree) in enumerate(still)), maps, forest([tree for _, _, tree in still]))
+
+
+def _maps(sphere_model, group, allowed, links):
+    """Return (pairs of ``links`` as frozensets, (maps, cells)): those that maps check in place of spheres, see
+    ``kernel``."""
+    own = {int(index): number for number, index in enumerate(group.indices)}
+    mapped, rows, cells = set(), [], [np.empty(0, np.uint8)]
+    for a, b in itertools.combinations(links, 2):
+        if allowed.allowed(a, b):
+            continue
+        found = sphere_model.maps((a, b), lambda a=a, b=b: pair_map(sphere_model, a, b))
+        if found is not None and own.keys() >= set(found.variables):
+            rows.append([*(own[variable] for variable in found.variables), sum(map(len, cells))])
+            cells.append(found.closed.ravel())
+            mapped.add(frozenset((a, b)))
+    return mapped, (np.array(rows, np.int32).ravel(), np.concatenate(cells))
 
 
 def _joints(model, group, state):
@@ -210,7 +259,7 @@ def _joints(model, group, state):
 
 
 def _branches(joints):
-    """Return for each joint how many are above it, and which of those without a parent it hangs on."""
+    """Return for each joint its depth, and its root joint."""
     depth, branch = [], []
     for parent, *_ in joints:
         depth.append(0 if parent < 0 else depth[parent] + 1)
@@ -240,27 +289,41 @@ def _moved(spheres, pose, larger):
 
 
 def _padding(scene, link, spheres):
-    """How much larger [m] a link is to be: its padding, and its scale as what that adds at the furthest point."""
+    """How much larger [m] a link becomes: its padding, and the effect of its scale at the farthest point."""
     larger, scale = scene.link_padding.get(link, 0.0), scene.link_scale.get(link, 1.0)
     if scale != 1.0:
         larger += (scale - 1.0) * float((np.linalg.norm(spheres[:, :3], axis=1) + spheres[:, 3]).max(initial=0.0))
     return larger
 
 
-def _clusters(movers, rows):
+def _made_once(sphere_model, function, spheres):
+    """``function(spheres)``: many tables of a robot have the same links in them."""
+    key = function.__name__, hashlib.sha256(spheres.tobytes()).digest()
+    return sphere_model.kept(key, lambda: function(spheres))
+
+
+def _balls_and_jumps(spheres):
+    """(balls [(4,)], jumps): ``_sphere_tree`` of ``spheres`` (n, 4) that begins at 0."""
+    balls, jumps = [], []
+    _sphere_tree(spheres, balls, jumps)
+    return balls, jumps
+
+
+def _clusters(sphere_model, movers, rows):
     """Return the _Clusters of ``movers``, whose ``rows`` say what each may touch."""
     found = []
     for number, mover in enumerate(movers):
-        alone = _Cluster(mover.joint, (mover,), mover.spheres, ball(mover.spheres))
+        alone = _Cluster(mover.joint, (mover,), mover.spheres, _made_once(sphere_model, ball, mover.spheres))
         for place, cluster in enumerate(found):
-            # Two on one joint never meet; all the rest has to be the same for them.
+            # Two on one joint never collide; everything else must be equal for them.
             other = rows[movers.index(cluster.movers[0])]
             if cluster.joint != mover.joint or any(
                     a != b for k, (a, b) in enumerate(zip(rows[number], other, strict=True))
                     if k >= len(movers) or movers[k].joint != mover.joint):
                 continue
             spheres = np.concatenate([cluster.spheres, mover.spheres])
-            together = cluster._replace(movers=(*cluster.movers, mover), spheres=spheres, ball=ball(spheres))
+            together = cluster._replace(movers=(*cluster.movers, mover), spheres=spheres,
+                                        ball=_made_once(sphere_model, ball, spheres))
             if together.ball[3] <= _MERGED * max(cluster.ball[3], alone.ball[3]):
                 found[place] = together
                 break
@@ -270,7 +333,7 @@ def _clusters(movers, rows):
 
 
 def _sphere_tree(some, spheres, skips):
-    """Append ``some`` (n, 4) to ``spheres`` and ``skips`` as a tree of balls, see ``kernel``; what is larger first."""
+    """Append ``some`` (n, 4) to ``spheres`` and ``skips`` as a tree of balls, see ``kernel``; larger ones first."""
     if len(some) <= _FEW_SPHERES:
         spheres += some[np.argsort(-some[:, 3], kind="stable")].tolist()
         skips += [0] * len(some)
@@ -286,11 +349,11 @@ def _sphere_tree(some, spheres, skips):
 
 
 def _spheres_of(item, tolerance):
-    """The spheres (n, 4) of an object that is held, in its own frame."""
+    """The spheres (n, 4) of an attached object, in its own frame."""
     found = []
     for geometry, pose in item.shapes:
         if isinstance(geometry, Plane):
-            continue  # nobody holds a plane without end
+            continue  # an infinite plane cannot be attached
         if isinstance(geometry, Octree):
             found += [np.array([[*(pose[:3, :3] @ box[:3] + pose[:3, 3]), 0.5 * math.sqrt(3.0) * box[3]]])
                       for box in geometry.boxes]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What stands still as the flat arrays that ``kernel`` works on: objects, and trees of boxes around them."""
+"""Fixed bodies as flat arrays for ``kernel``: objects, and trees of boxes around them."""
 import math
 from typing import NamedTuple
 
@@ -10,11 +10,11 @@ from motion_planning.spheres import kernel
 from motion_planning.spheres.sphere_model import Boxes, boxes_of
 from urdf_model import Box, Cylinder, Plane, Sphere
 
-# What is infinite has corners this far away [m].
+# Corners of infinite shapes are this far away [m].
 _FAR = 1e6
-# A cone is the pyramid around it with so many sides.
+# A cone becomes the pyramid around it with this many sides.
 _CONE_SIDES = 24
-# By how much a tree's boxes are larger than what is in them [m], for single floats.
+# Margin of a tree's boxes around their content [m], for single floats.
 _ROUNDING = 1e-5
 
 
@@ -78,7 +78,7 @@ def _one(kind, centre, rotation, sizes, reach):
 
 
 def _corners(geometry):
-    """(n, 2, 3) of what is made of boxes."""
+    """(n, 2, 3) of shapes made of boxes."""
     if isinstance(geometry, Boxes):
         return geometry.corners
     if isinstance(geometry, Box):
@@ -141,18 +141,24 @@ def _along_curve(points):
     return np.argsort(code, kind="stable")
 
 
-def forest(trees):
-    """Return (world, [(first node, last + 1)]): many Trees as one table, see ``kernel``."""
-    places, links, objects_before, nodes_before = [], [], 0, 0
-    for tree in trees:
-        shifted = tree.links.copy()
-        shifted[:, 0] += nodes_before
-        shifted[shifted[:, 1] >= 0, 1] += objects_before
-        links.append(shifted)
-        places.append((nodes_before, nodes_before + len(shifted)))
-        nodes_before, objects_before = nodes_before + len(shifted), objects_before + len(tree.kinds)
+def forest(trees, before=None):
+    """Return (world, [(first node, last + 1)]): many Trees as one table, see ``kernel``.
+
+    before: what this function returned for Trees that come before them.
+    """
     empty = tree_of(joined([]))
-    trees = [empty, *trees]
-    world = (np.concatenate([empty.links, *links]).ravel(), np.concatenate([tree.nodes for tree in trees]).ravel(),
-             np.concatenate([tree.kinds for tree in trees]), np.concatenate([tree.objects for tree in trees]).ravel())
-    return world, places
+    world, places = before or (_flat([empty]), [])
+    nodes_before, objects_before, places, moved = len(world[0]) // 2, len(world[2]), list(places), []
+    for tree in trees:
+        links = tree.links.copy()
+        links[:, 0] += nodes_before
+        links[links[:, 1] >= 0, 1] += objects_before
+        moved.append(tree._replace(links=links))
+        places.append((nodes_before, nodes_before + len(links)))
+        nodes_before, objects_before = nodes_before + len(links), objects_before + len(tree.kinds)
+    return tuple(map(np.concatenate, zip(world, _flat([empty, *moved]), strict=True))), places
+
+
+def _flat(trees):
+    links, nodes, kinds, objects = (np.concatenate(arrays) for arrays in zip(*trees, strict=True))
+    return links.ravel(), nodes.ravel(), kinds, objects.ravel()

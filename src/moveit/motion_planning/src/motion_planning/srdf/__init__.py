@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""SRDF: what planning needs to know of a robot beyond its URDF, as plain data."""
+"""SRDF: a robot's data for planning in addition to its URDF, as plain data."""
 from motion_planning.srdf.data import DisabledPair, EndEffector, GroupEntry, GroupState, Srdf, VirtualJoint
 from motion_planning.srdf.reader import SrdfError, parse_srdf
 from motion_planning.srdf.writer import element_of, with_disabled_pairs

@@ -9,7 +9,8 @@ VIRTUAL_JOINT_TYPES = ("fixed", "floating", "planar")
 
 @dataclass(frozen=True)
 class VirtualJoint:
-    """How the robot's root hangs in the world. type: fixed, floating (any pose) or planar (x, y, turn about z)."""
+    """The connection of the robot's root to the world. type: fixed, floating (any pose) or planar (x, y, turn about
+    z)."""
 
     name: str
     type: str
@@ -38,7 +39,7 @@ class GroupState:
 
 @dataclass(frozen=True)
 class EndEffector:
-    """A group at the end of another. parent_link: the link it is mounted on; parent_group: "" where it is not said."""
+    """A group at the end of another. parent_link: the link it is mounted on; parent_group: "" if not given."""
 
     name: str
     group: str
@@ -48,7 +49,7 @@ class EndEffector:
 
 @dataclass(frozen=True)
 class DisabledPair:
-    """Two links that need not be checked against each other. reason: Adjacent, Always, Default, Never, User, ..."""
+    """Two links that need no collision check. reason: Adjacent, Always, Default, Never, User, ..."""
 
     link1: str
     link2: str
@@ -65,7 +66,7 @@ class Srdf:
     passive_joints: list[str] = field(default_factory=list)
     disabled: list[DisabledPair] = field(default_factory=list)
     enabled: list[tuple[str, str]] = field(default_factory=list)
-    no_default: list[str] = field(default_factory=list)  # links that by default collide with nothing of the robot
+    no_default: list[str] = field(default_factory=list)  # links without collision checks against the robot by default
     joint_properties: dict[str, dict[str, str]] = field(default_factory=dict)
     # link to ((centre x y z in the link's frame, radius), ...) [m]
     spheres: dict[str, tuple] = field(default_factory=dict)

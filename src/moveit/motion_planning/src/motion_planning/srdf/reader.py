@@ -16,7 +16,7 @@ from urdf_model import UrdfError, XmlRefused, parse_xml
 
 
 class SrdfError(PlanningError):
-    """The text is no SRDF at all."""
+    """The text is not SRDF."""
 
 
 class _Skip(Exception):
@@ -24,11 +24,11 @@ class _Skip(Exception):
 
 
 def parse_srdf(xml, robot, source="robot_description_semantic"):
-    """Return the :class:`~motion_planning.srdf.Srdf` that ``xml`` (str or bytes) says of ``robot`` (urdf_model.Robot).
+    """Return the :class:`~motion_planning.srdf.Srdf` in ``xml`` (str or bytes), for ``robot`` (urdf_model.Robot).
 
-    ``source`` names the text in messages. Unknown elements are ignored. An entry that names a link, joint or group
-    that is not there, or lacks an attribute, is skipped and stands in ``Srdf.warnings``. Raises SrdfError for malformed
-    XML and another root element.
+    ``source`` names the text in messages. Unknown elements are ignored. An entry with an unknown link, joint or group,
+    or without a required attribute, is skipped and listed in ``Srdf.warnings``. Raises SrdfError for malformed XML and
+    another root element.
     """
     try:
         root = parse_xml(xml)
@@ -49,7 +49,7 @@ class _Reader:
         if self.srdf.name != self.robot.name:
             self.warn(self.root, "it describes robot '%s', but the URDF's name is '%s'; it is used nevertheless"
                       % (self.srdf.name, self.robot.name))
-        # Later entries refer to earlier kinds, wherever they stand in the document.
+        # Later kinds of entries refer to earlier kinds, in any order in the document.
         for tag, read in (("virtual_joint", self.virtual_joint), ("group", self.group)):
             self.each(tag, read)
         self.drop_unresolved_groups()
@@ -90,7 +90,7 @@ class _Reader:
     def group(self, element):
         name = _attribute(element, "name")
         if name in self.srdf.groups:
-            raise _Skip("group '%s' stands twice (first in line %d)" % (name, self.srdf.groups[name].line))
+            raise _Skip("group '%s' appears twice (first in line %d)" % (name, self.srdf.groups[name].line))
         found = {"link": [], "joint": [], "chain": [], "group": []}
         readers = {"link": lambda part: self.link(part, "name"), "joint": self.member_joint, "chain": self.chain,
                    "group": lambda part: _attribute(part, "name")}
@@ -124,7 +124,7 @@ class _Reader:
         return base, tip
 
     def drop_unresolved_groups(self):
-        """Skip groups whose subgroups are not there, and groups that contain themselves."""
+        """Skip groups with unknown subgroups, and groups that contain themselves."""
         groups, known = self.srdf.groups, set()
         while True:
             new = {name for name, group in groups.items() if name not in known and known.issuperset(group.subgroups)}
@@ -196,7 +196,7 @@ class _Reader:
                 raise _Skip("a sphere of link '%s' needs three numbers as center and a radius of 0 or more" % link)
             spheres.append((centre, radius))
         if link in self.srdf.spheres:
-            raise _Skip("the spheres of link '%s' stand twice" % link)
+            raise _Skip("the spheres of link '%s' appear twice" % link)
         self.srdf.spheres[link] = tuple(spheres)
 
     # -- pieces -------------------------------------------------------------------------------------------------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compiled inner loop of the time-optimal profile."""
+"""Compiled inner loops: the time-optimal profile, and splines through given points."""
 import numpy as np
 
 from numba_cache import compiler
@@ -82,3 +82,47 @@ def greatest_speeds(widths, derivatives, velocity, acceleration, stop):
         squared[i + 1] = min(limit[i + 1], max(0.0, squared[i] + 2.0 * widths[i] * upper))
         rates[i] = 0.5 * (squared[i + 1] - squared[i]) / widths[i]
     return squared, rates
+
+
+@_compiled
+def second_derivatives(h, path):
+    """Those (m, k) of the spline through ``path`` (m, k) with durations ``h`` (m - 1,), at rest at both ends.
+
+    Thomas's algorithm; the system is diagonally dominant.
+    """
+    m, k = path.shape
+    diagonal, result = np.empty(m), np.empty((m, k))
+    for i in range(m):
+        before, after = (h[i - 1] if i > 0 else 0.0), (h[i] if i < m - 1 else 0.0)
+        diagonal[i] = 2.0 * (before + after)
+        for j in range(k):
+            left = (path[i, j] - path[i - 1, j]) / before if i > 0 else 0.0
+            right = (path[i + 1, j] - path[i, j]) / after if i < m - 1 else 0.0
+            result[i, j] = 6.0 * (right - left)
+    for i in range(1, m):
+        factor = h[i - 1] / diagonal[i - 1]
+        diagonal[i] -= factor * h[i - 1]
+        for j in range(k):
+            result[i, j] -= factor * result[i - 1, j]
+    for j in range(k):
+        result[m - 1, j] /= diagonal[m - 1]
+    for i in range(m - 2, -1, -1):
+        for j in range(k):
+            result[i, j] = (result[i, j] - h[i] * result[i + 1, j]) / diagonal[i]
+    return result
+
+
+@_compiled
+def peaks_of_cubics(h, velocities, accelerations):
+    """The greatest speeds and accelerations (m - 1, k) of cubics that last ``h`` (m - 1,), from what they have at their
+    ends (m, k)."""
+    m, k = velocities.shape
+    speeds, greatest = np.empty((m - 1, k)), np.empty((m - 1, k))
+    for i in range(m - 1):
+        for j in range(k):
+            a, b = accelerations[i, j], accelerations[i + 1, j]
+            speed = max(abs(velocities[i, j]), abs(velocities[i + 1, j]))
+            if a * b < 0.0:
+                speed = max(speed, abs(velocities[i, j] + 0.5 * a * h[i] * a / (a - b)))
+            speeds[i, j], greatest[i, j] = speed, max(abs(a), abs(b))
+    return speeds, greatest

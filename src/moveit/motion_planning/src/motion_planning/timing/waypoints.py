@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from motion_planning.timing.kernels import peaks_of_cubics, second_derivatives
 from motion_planning.timing.timed import Timed
 
 _ROUNDS = 60
@@ -24,7 +25,7 @@ def through_points(path, velocity, acceleration, rest_acceleration):
     best, best_length = None, math.inf
     for _ in range(_ROUNDS):
         timed = _spline(durations, path, rest_acceleration)
-        speeds, accelerations = timed.peaks()
+        speeds, accelerations = peaks_of_cubics(durations, timed.velocities, timed.accelerations)
         excess = np.maximum((speeds / velocity).max(axis=1), np.sqrt((accelerations / acceleration).max(axis=1)))
         worst = float(excess.max())
         if timed.duration * max(1.0, worst) < best_length:
@@ -59,7 +60,7 @@ def _spline(durations, path, rest_acceleration):
     times = np.concatenate([[0.0], np.cumsum(durations)])
     if rest_acceleration:
         path = _moved_for_rest(durations, path)
-    accelerations = _second_derivatives(durations, path)
+    accelerations = second_derivatives(durations, path)
     h = durations[:, None]
     slopes = np.diff(path, axis=0) / h
     velocities = np.empty_like(path)
@@ -67,24 +68,6 @@ def _spline(durations, path, rest_acceleration):
     velocities[-1] = slopes[-1] + h[-1] * (accelerations[-2] + 2.0 * accelerations[-1]) / 6.0
     velocities[0] = velocities[-1] = 0.0
     return Timed(times, path, velocities, accelerations)
-
-
-def _second_derivatives(h, path):
-    """(m, k) for clamped ends."""
-    m = len(path)
-    slopes = np.diff(path, axis=0) / h[:, None]
-    diagonal = np.concatenate([[2.0 * h[0]], 2.0 * (h[:-1] + h[1:]), [2.0 * h[-1]]])
-    right = 6.0 * np.concatenate([[slopes[0]], np.diff(slopes, axis=0), [-slopes[-1]]])
-    # Thomas's algorithm; the system is diagonally dominant.
-    for i in range(1, m):
-        factor = h[i - 1] / diagonal[i - 1]
-        diagonal[i] -= factor * h[i - 1]
-        right[i] -= factor * right[i - 1]
-    result = np.empty_like(right)
-    result[-1] = right[-1] / diagonal[-1]
-    for i in range(m - 2, -1, -1):
-        result[i] = (right[i] - h[i] * result[i + 1]) / diagonal[i]
-    return result
 
 
 def _moved_for_rest(h, path):
@@ -96,7 +79,7 @@ def _moved_for_rest(h, path):
         moved = path.copy()
         moved[1] += moved_by_first
         moved[-2] += moved_by_last
-        bends = _second_derivatives(h, moved)
+        bends = second_derivatives(h, moved)
         return np.array([bends[0], bends[-1]])
 
     rest = ends(0.0, 0.0)

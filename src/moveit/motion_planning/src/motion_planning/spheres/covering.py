@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The compiled inner loops of covers: distances between many points, and the greedy choice of balls.
+
+Points (3 * room,) float32 are stored axis by axis; room is a multiple of 16, and what is not used is infinite.
+"""
+import numpy as np
+
+from motion_planning.spheres.compiled import compiled
+from motion_planning.spheres.lanes import below, fill, least, load, store
+
+_FAR = np.float32(np.inf)
+
+
+def by_axes(points):
+    """Return ``points`` (n, 3) as these functions take them; n must be passed with them."""
+    room = max(16, len(points) + -len(points) % 16)
+    flat = np.full((3, room), _FAR, dtype=np.float32)
+    flat[:, : len(points)] = np.transpose(points)
+    return flat.ravel()
+
+
+@compiled
+def _squares(points, begin, x, y, z):
+    """The squared distances of 16 points from a point."""
+    room = len(points) // 3
+    dx = load(points, begin) - fill(x)
+    dy = load(points, room + begin) - fill(y)
+    dz = load(points, 2 * room + begin) - fill(z)
+    return dx * dx + dy * dy + dz * dz
+
+
+@compiled
+def _count(points, count, ball):
+    """How many of the first ``count`` points lie in ``ball`` (4,): its centre and squared radius."""
+    x, y, z, limit = ball[0], ball[1], ball[2], fill(ball[3])
+    total = 0
+    for begin in range(0, count, 16):
+        bits = below(_squares(points, begin, x, y, z), limit)
+        while bits:
+            bits &= bits - 1
+            total += 1
+    return total
+
+
+@compiled
+def _part(points, count, ball, inside):
+    """Move those of the first ``count`` points that lie in ``ball`` into ``inside``; return how many, how many stay."""
+    x, y, z, limit = ball[0], ball[1], ball[2], fill(ball[3])
+    room = len(points) // 3
+    taken, left = 0, 0
+    for begin in range(0, count, 16):
+        bits = below(_squares(points, begin, x, y, z), limit)
+        for lane in range(min(16, count - begin)):
+            for axis in range(0, 3 * room, room):
+                value = points[axis + begin + lane]
+                if bits >> lane & 1:
+                    inside[axis + taken] = value
+                else:
+                    points[axis + left] = value
+            if bits >> lane & 1:
+                taken += 1
+            else:
+                left += 1
+    for axis in range(0, 3 * room, room):
+        for k in range(taken, min(room, taken + 16)):
+            inside[axis + k] = _FAR
+        for k in range(left, min(room, left + 16)):
+            points[axis + k] = _FAR
+    return taken, left
+
+
+@compiled
+def choose(points, count, balls, chosen):
+    """Write into ``chosen`` (m,) int64 the indices of ``balls`` (m, 4) float32, centre and squared radius, that
+    together contain the first ``count`` points; each is the one that contains most of those that are left.
+
+    ``points`` is overwritten. Returns the number of chosen ones and that of the points that are in no ball.
+    """
+    gains = np.empty(len(balls), np.int64)
+    for c in range(len(balls)):
+        gains[c] = _count(points, count, balls[c])
+    inside = np.empty_like(points)
+    number = 0
+    while count:
+        best = np.argmax(gains)
+        if gains[best] <= 0:
+            break
+        chosen[number] = best
+        number += 1
+        taken, count = _part(points, count, balls[best], inside)
+        gains[best] = 0
+        reach = np.sqrt(balls[best, 3])
+        for c in range(len(balls)):
+            if gains[c] == 0:
+                continue
+            apart = np.float32(0.0)
+            for axis in range(3):
+                apart += (balls[c, axis] - balls[best, axis]) ** 2
+            if apart < (reach + np.sqrt(balls[c, 3])) ** 2:
+                gains[c] -= _count(inside, taken, balls[c])
+    return number, count
+
+
+@compiled
+def nearest(points, count, places, found):
+    """Write into ``found`` (m,) float32 the distance of each of ``places`` (m, 3) float32 from the nearest of the first
+    ``count`` points."""
+    lane = np.empty(16, np.float32)
+    for m in range(len(places)):
+        best = fill(_FAR)
+        for begin in range(0, count, 16):
+            best = least(best, _squares(points, begin, places[m, 0], places[m, 1], places[m, 2]))
+        store(lane, 0, best)
+        found[m] = np.sqrt(lane.min())
