@@ -71,7 +71,7 @@ def flaws_of(case, code, sentences):
     """What is wrong with the answer to a Case. code: None where the answer has none; sentences: the failures' texts."""
     flaws = []
     if code is not None and code not in KNOWN_CODES:
-        flaws.append("%s is no error code" % code)
+        flaws.append("%s is not an error code" % code)
     if case.codes and code not in case.codes:
         flaws.append("the code is none of %s" % sorted(case.codes))
     if code not in (None, CODES.SUCCESS) and len(sentences) != 1:
@@ -342,7 +342,7 @@ def spoiled(message, choose):
 
 
 def _fields(message, path):
-    """(owner, field's name, its type, its path) of all fields of a message that are no message themselves."""
+    """(owner, field's name, its type, its path) of all fields of a message that are not messages themselves."""
     for name, kind in zip(message.__slots__, message._slot_types, strict=True):
         value, here = getattr(message, name), "%s.%s" % (path, name)
         if isinstance(value, genpy.Message):

@@ -20,12 +20,12 @@ SERVICES = {"apply_planning_scene": srv.ApplyPlanningScene, "check_state_validit
             "compute_ik": srv.GetPositionIK, "get_planning_scene": srv.GetPlanningScene,
             "query_planner_interface": srv.QueryPlannerInterfaces}
 ACTIONS = {"move_group": msg.MoveGroupAction, "execute_trajectory": msg.ExecuteTrajectoryAction}
-#: How long a service is waited for that nobody offers yet [s].
+#: Time limit for a service that does not exist yet [s].
 SERVICE_WAIT_S = 2.0
 
 
 class NoAnswer(PlanningError):
-    """move_group is not there, or refuses."""
+    """move_group does not answer, or refuses."""
 
 
 class NoPosture(PlanningError):
@@ -60,7 +60,7 @@ class Snapshot(NamedTuple):
 
 class Outcome(NamedTuple):
     """How an action ended. text: of its server, or the error code's name; trajectory: the RobotTrajectory of a plan;
-    seconds: that planning took."""
+    seconds: planning time."""
 
     success: bool
     text: str
@@ -82,7 +82,7 @@ class MoveGroupClient:
     # -- questions ----------------------------------------------------------------------------------------------
 
     def snapshot(self):
-        """Return the Snapshot of now. Raises NoAnswer."""
+        """Return a Snapshot of the present scene. Raises NoAnswer."""
         parts = PlanningSceneComponents
         scene = self._call("get_planning_scene", parts(
             parts.ROBOT_STATE | parts.ROBOT_STATE_ATTACHED_OBJECTS | parts.WORLD_OBJECT_NAMES
@@ -124,7 +124,7 @@ class MoveGroupClient:
         return tuple(dict.fromkeys(found))
 
     def _call(self, name, *values):
-        """The answer of a service. Connections are kept: a marker that is dragged asks often."""
+        """Return a service's response. Connections stay open: a marker that is dragged calls often."""
         for attempt in (1, 2):
             try:
                 if name not in self._proxies:
@@ -193,7 +193,7 @@ class MoveGroupClient:
         self._send("execute_trajectory", msg.ExecuteTrajectoryGoal(trajectory), done)
 
     def stop(self):
-        """End what is planned and executed, whoever began it."""
+        """Stop all planning and execution, also that of other clients."""
         with self._lock:
             handles = tuple(self._handles)
         for handle in handles:
@@ -202,7 +202,7 @@ class MoveGroupClient:
 
     def _send(self, name, goal, done):
         client = self._clients[name]
-        # A duration below 0 looks once: the client's own wait has no end while simulated time stands still.
+        # A duration below 0 checks once: the client's own wait never ends while simulation time is paused.
         if not client.wait_for_server(rospy.Duration(0, -1)):
             raise NoAnswer("move_group is not there: nobody serves the action %s" % rospy.resolve_name(name))
 
@@ -215,10 +215,10 @@ class MoveGroupClient:
                     self._handles.discard(handle)
                 done(_outcome(handle))
 
-        # Sent without our lock: actionlib holds a lock of its own while it calls transition, which wants ours.
+        # Sent without our lock: actionlib holds its own lock while it calls transition, which needs ours.
         handle = client.send_goal(goal, transition_cb=transition)
         with self._lock:
-            # A handle that nobody holds is forgotten by actionlib.
+            # actionlib forgets a handle without a reference.
             if not ended.is_set():
                 self._handles.add(handle)
 

@@ -12,14 +12,14 @@ from urdf_model import Box, Cylinder, Mesh, Plane, Sphere
 GOAL, START, PATH = (1.0, 0.55, 0.1, 0.65), (0.2, 0.75, 0.3, 0.65), (0.45, 0.65, 1.0, 0.5)
 COLLIDING = (0.95, 0.1, 0.1, 0.85)
 THING, HELD = (0.35, 0.7, 0.35, 1.0), (0.7, 0.35, 0.7, 1.0)
-#: Side and thickness that an endless plane is drawn with [m].
+#: Side and thickness of an infinite plane's marker [m].
 _PLANE_M, _THIN_M = 4.0, 0.002
 _CONE_SIDES = 24
 
 
 class Solid(NamedTuple):
     """A shape as a marker shows it. kind: box, sphere, cylinder, mesh or triangles; pose (4, 4) in its link or
-    object; size: what the marker's shape of size 1 is scaled by, x y z; mesh: its file; points (3 k, 3): corners of
+    object; size: scale of the marker's unit shape, x y z; mesh: its file; points (3 k, 3): corners of
     triangles."""
 
     kind: str

@@ -14,9 +14,10 @@ FILM_HZ = 15.0
 
 
 class Picture:
-    """A topic with one set of markers. Only what has gone is deleted: rviz would load meshes anew, and flicker.
+    """A topic with one set of markers. Only markers that are no longer needed are deleted: otherwise rviz would load
+    meshes again, and flicker.
 
-    frame: one that tf knows.
+    frame: a frame of tf.
     """
 
     def __init__(self, name, frame):
@@ -25,13 +26,13 @@ class Picture:
         self._shown = None
 
     def show(self, markers):
-        """Publish ``markers``, and that those of the last time which are not among them are gone."""
+        """Publish ``markers``, and delete the previous ones that are not among them."""
         keys = {(marker.ns, marker.id) for marker in markers}
         # An earlier process of this node may have left some.
         gone = [Marker(action=Marker.DELETEALL)] if self._shown is None else [
             Marker(ns=ns, id=number, action=Marker.DELETE) for ns, number in sorted(self._shown - keys)]
         for marker in gone:
-            # rviz deletes what has no frame at once, before it has drawn what came earlier.
+            # rviz deletes a marker without a frame immediately, before it has drawn earlier ones.
             marker.header.frame_id = self._frame
         self._shown = keys
         if gone or markers:
@@ -42,7 +43,7 @@ class Picture:
 
 
 class Film:
-    """Shows a playback.Playback on a topic again and again, in a thread of its own. width: of the line [m]."""
+    """Shows a playback.Playback on a topic again and again, in a separate thread. width: of the line [m]."""
 
     def __init__(self, name, model, width):
         self._picture, self._model, self._width = Picture(name, model.root), model, width
@@ -53,7 +54,7 @@ class Film:
         threading.Thread(target=self._run, name="film", daemon=True).start()
 
     def show(self, playback, links):
-        """Show a path from now on; ``links``: those whose way is drawn as a line."""
+        """Show a path from now on; ``links``: those whose path is drawn as a line."""
         with self._lock:
             self._playback, self._begin = playback, time.monotonic()
             self._solids = drawing.link_solids(self._model.robot, playback.moving)
@@ -80,7 +81,7 @@ class Film:
                 markers = self._markers() if playing and self._picture.is_looked_at() else []
                 if markers or not playing:
                     self._picture.show(markers)
-            # Real time: a film goes on while simulated time stands still.
+            # Real time: a film continues while simulation time is paused.
             self._wake.wait(1.0 / FILM_HZ if playing else None)
             self._wake.clear()
 

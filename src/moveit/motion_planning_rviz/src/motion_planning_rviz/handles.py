@@ -10,7 +10,7 @@ from visualization_msgs.msg import InteractiveMarker, InteractiveMarkerControl, 
 from motion_planning_rviz.drawing import GOAL, START
 from motion_planning_rviz.messages import pose_message
 
-#: Where MoveIt's panel has its markers; programs look for them there.
+#: The topic of MoveIt's panel for its markers; programs expect them there.
 TOPIC = "/rviz_moveit_motion_planning_display/robot_interaction_interactive_marker_topic"
 # A control's axis is the x axis of its orientation.
 _HALF = 0.5 ** 0.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is going to be planned: group, start, goal, settings; and which links of a group can be dragged."""
+"""The planning query: group, start, goal, settings; and the links of a group that can be dragged."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ WHICH = ("goal", "start")
 
 
 class InteractionError(PlanningError):
-    """Something that was asked for and cannot be had."""
+    """A request that cannot be fulfilled."""
 
 
 class Handle(NamedTuple):
@@ -28,9 +28,9 @@ class Handle(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Query:
-    """What would be planned now. It never changes.
+    """The present planning query. Immutable.
 
-    group: name. goal: State. start: State, None for where the robot is. speed: share of the joints' limits, for
+    group: name. goal: State. start: State, None for the robot's present state. speed: share of the joints' limits, for
     velocity and acceleration. pipeline, planner: names, empty for move_group's own choice. avoid: whether inverse
     kinematics keeps clear of collisions.
     """
@@ -44,7 +44,7 @@ class Query:
     avoid: bool = False
 
     def state(self, which):
-        """The State of "goal" or "start"; None for a start where the robot is."""
+        """The State of "goal" or "start"; None for a start at the robot's present state."""
         return self.goal if which == "goal" else self.start
 
     def with_state(self, which, state):
@@ -75,8 +75,8 @@ def pose_of(model, state, link):
 
 
 def outwards(model, state, link):
-    """Return which way is out of the arm at ``link``, a unit vector (3,) in the root link: that axis of the link which
-    leads most directly away from the link before it. Frames of tools point either way."""
+    """Return the outward direction of the arm at ``link``, a unit vector (3,) in the root link: the link's axis that
+    points most directly away from the previous link. Tool frames point either way."""
     frames = model.frames(state.q)
     here, joint = frames[model.link_index[link]], model.robot.parent_joint(link)
     way = here[:3, 2]
@@ -92,7 +92,7 @@ def outwards(model, state, link):
 
 
 def is_at(pose, other, position_m=1e-3, angle_rad=1e-2):
-    """Whether two poses (4, 4) are the same for the eye."""
+    """Whether two poses (4, 4) look the same."""
     return bool(np.linalg.norm(pose[:3, 3] - other[:3, 3]) < position_m
                 and rotation_angle(pose[:3, :3].T @ other[:3, :3]) < angle_rad)
 
@@ -126,7 +126,7 @@ def group_values(model, state, group_name):
 
 
 def why_unreachable(model, handle, pose, state):
-    """Return the sentence why no joint values put a handle's link to ``pose`` (4, 4) in the root link; None where some
+    """Return the reason why no joint values put a handle's link to ``pose`` (4, 4) in the root link; None if some
     do."""
     try:
         ik(model, handle.group, {handle.link: pose}, state.with_base(None), timeout_s=0.0)

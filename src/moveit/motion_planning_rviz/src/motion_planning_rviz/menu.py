@@ -19,7 +19,7 @@ class Entry(NamedTuple):
 
 
 class MenuState(NamedTuple):
-    """What the menu depends on. groups, states, objects, attached: names; planners: ((pipeline, planner), ...)."""
+    """The state that the menu shows. groups, states, objects, attached: names; planners: ((pipeline, planner), ...)."""
 
     groups: tuple = ()
     group: str = ""

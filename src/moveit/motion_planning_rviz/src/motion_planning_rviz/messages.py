@@ -15,7 +15,7 @@ from motion_planning_rviz.playback import Playback
 from urdf_model import Box, Cylinder, Plane, Sphere
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, quaternion_from_matrix, rigid
 
-#: How far off its value a joint of a goal may be [rad or m], as MoveIt's programs have it.
+#: Tolerance of a joint goal [rad or m], as in MoveIt's programs.
 JOINT_TOLERANCE = 1e-4
 _KINDS = {"box": Marker.CUBE, "sphere": Marker.SPHERE, "cylinder": Marker.CYLINDER, "mesh": Marker.MESH_RESOURCE,
           "triangles": Marker.TRIANGLE_LIST}
@@ -28,7 +28,7 @@ def code_name(code):
 
 
 def matrix_of(pose):
-    """Return the (4, 4) of a Pose; a quaternion of zeros is the identity. Raises ValueError for what is no pose."""
+    """Return the (4, 4) of a Pose; a quaternion of zeros is the identity. Raises ValueError for what is not a pose."""
     point, turn = pose.position, pose.orientation
     position, quaternion = (point.x, point.y, point.z), (turn.x, turn.y, turn.z, turn.w)
     if not all(math.isfinite(value) for value in (*position, *quaternion)):
@@ -87,7 +87,7 @@ def _laid_over(q, model, values):
 def object_solids(message):
     """Return the Solids of a CollisionObject; their poses are in its header's frame. Shapes that are none are left out.
 
-    Objects of MoveIt's newer form have a pose of their own, which those of their shapes are relative to.
+    Objects of MoveIt's newer form have a pose; the poses of their shapes are relative to it.
     """
     base, found = matrix_of(message.pose), []
     for primitive, pose in zip(message.primitives, message.primitive_poses, strict=False):

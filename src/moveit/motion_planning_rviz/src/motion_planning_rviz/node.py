@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The node: what rviz and other programs say, to the panel."""
+"""The node: passes messages from rviz and other programs to the panel."""
 import logging
 import sys
 import time
@@ -25,13 +25,13 @@ from motion_planning_rviz.worker import Worker
 from rospy_limits.node import limit_ports
 from rospy_start import MissingParameter, end_on_signals, wait_for_param
 
-# Wall time to wait for the robot's model, and after which to say again that move_group is waited for [s].
+# Wall time to wait for the robot's model, and between two log lines about waiting for move_group [s].
 _DESCRIPTION_TIMEOUT_S, _TOLD_EVERY_S = 60.0, 10.0
 _TF_TIMEOUT_S = 1.0
-#: MoveIt's defaults, where robot_description_planning says nothing.
+#: MoveIt's defaults, if robot_description_planning has no value.
 _SPEED = "default_velocity_scaling_factor"
 _USUAL_SPEED = 0.1
-# Commands that are about the marker that was clicked.
+# Commands for the marker that was clicked.
 _OF_A_HANDLE = ("add_box", "attach")
 
 
@@ -143,7 +143,7 @@ class PanelNode:
         for handle in self._panel.handles:
             if handle.link == link:
                 return handle
-        raise InteractionError("link '%s' is no end of group '%s'" % (link, self._panel.query.group))
+        raise InteractionError("link '%s' is not an end of group '%s'" % (link, self._panel.query.group))
 
     def _in_root(self, frame):
         """The pose (4, 4) of a frame in the root link, by tf where it is another."""

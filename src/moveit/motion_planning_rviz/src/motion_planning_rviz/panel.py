@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a panel of MoveIt's does, without buttons: goal and start, plan, execute, the scene."""
+"""The functions of MoveIt's panel, without buttons: goal and start, plan, execute, the scene."""
 from __future__ import annotations
 
 import functools
@@ -11,18 +11,18 @@ from motion_planning_rviz import interaction, menu
 from motion_planning_rviz.client import NoPosture
 from motion_planning_rviz.interaction import WHICH, InteractionError
 
-#: Postures that are tried for a random valid state.
+#: Number of postures to try for a random valid state.
 _TRIES = 200
 _NAMED_CONTACTS = 3
-#: Between a link and a box that is put in front of it [m].
+#: Distance between a link and a box that is put in front of it [m].
 _GAP_M = 0.001
 
 
 class Panel:
-    """The state of the panel; everything but :meth:`stop` belongs into one thread.
+    """The state of the panel; all methods except :meth:`stop` must be called from one thread.
 
     model: PlanningModel. client: as MoveGroupClient. view: draws; its methods are called with what has changed. worker:
-    has ``put(function)``, for what is to be done when an action has ended. generator: numpy.random.Generator.
+    has ``put(function)``, for work after the end of an action. generator: numpy.random.Generator.
     """
 
     def __init__(self, model, client, view, worker, generator):
@@ -43,7 +43,7 @@ class Panel:
     # -- what is shown ------------------------------------------------------------------------------------------
 
     def begin(self, group, speed):
-        """Put the goal to where the robot is. Raises PlanningError where move_group does not answer."""
+        """Set the goal to the robot's present state. Raises PlanningError if move_group does not answer."""
         self._look()
         goal = interaction.with_known(self.query.goal, self._snapshot.values)
         self.query = replace(self.query, goal=goal, speed=speed)
@@ -64,7 +64,7 @@ class Panel:
         self._show_menu()
 
     def refresh(self):
-        """Look at the scene anew, and whether the goal touches something in it now."""
+        """Read the scene again, and check whether the goal is in collision now."""
         self._look()
         self.view.scene(self._snapshot)
         for which in WHICH:
@@ -75,8 +75,8 @@ class Panel:
         self._snapshot = self.client.snapshot()
 
     def _show(self, which, moved=True, unreached=None, reason=""):
-        """Draw "goal" or "start". moved: handles follow; unreached: (handle, pose (4, 4)) that was asked for in vain,
-        for a ``reason``."""
+        """Draw "goal" or "start". moved: handles follow; unreached: (handle, pose (4, 4)) that could not be reached,
+        and the ``reason``."""
         state = self.query.state(which)
         if state is None:
             self._lines[which] = ""
@@ -105,7 +105,7 @@ class Panel:
         return ", ".join(beyond + pairs[:_NAMED_CONTACTS] + more) or "not valid, for move_group"
 
     def complain(self, text):
-        """Say that something was not done, and why."""
+        """Report that something was not done, and why."""
         self._say(motion=text)
 
     def _say(self, **lines):
@@ -134,8 +134,8 @@ class Panel:
     def drag(self, which, handle, pose, released=True):
         """Let the joints follow a handle's link to ``pose`` (4, 4) in the root link.
 
-        released: the handle may be put to where the link is. Where no posture does it, the ghost stays and the reason
-        is shown.
+        released: the handle may move to the link. If no posture reaches the pose, the ghost stays and the reason is
+        shown.
         """
         state = self.query.state(which)
         if state is None:
@@ -174,11 +174,11 @@ class Panel:
         return interaction.with_known(self.query.goal, self._snapshot.values)
 
     def current(self, which):
-        """The goal comes to where the robot is; the start follows it from now on."""
+        """Set the goal to the robot's present state; from now on the start follows the robot."""
         self._set(which, None if which == "start" else self._robot())
 
     def copy(self, which):
-        """The goal becomes the start, or the start gets a marker of its own, at the goal."""
+        """The goal becomes the start, or the start gets its own marker, at the goal."""
         other = self.query.state("start" if which == "goal" else "goal")
         self._set(which, other if other is not None else self._robot())
 
@@ -188,7 +188,7 @@ class Panel:
         self._set(which, interaction.named_state(self.model, state, self.query.group, name))
 
     def random(self, which):
-        """A random state that move_group takes. Raises InteractionError where none is found."""
+        """Set a random state that move_group accepts. Raises InteractionError if none is found."""
         state = self.query.state(which) or self._robot()
         for _ in range(_TRIES):
             drawn = interaction.random_state(self.model, state, self.query.group, self._generator)
@@ -254,7 +254,7 @@ class Panel:
         self._begin("executing", functools.partial(self.client.execute, self.trajectory), self._executed)
 
     def stop(self):
-        """End what is being done. May be called from any thread."""
+        """Stop the present action. May be called from any thread."""
         self.client.stop()
         self.worker.put(self._stopped)
 
@@ -276,7 +276,7 @@ class Panel:
             raise
 
     def _ended(self, generation, outcome, ended):
-        # What ended after a stop is no news.
+        # A result after a stop is ignored.
         if generation == self._generation:
             self._busy = ""
             ended(outcome)

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A planned path as a film that begins anew after each end."""
+"""A planned path as a film that is repeated."""
 import numpy as np
 
-#: How long the end stays before the film begins anew [s].
+#: Pause at the end before the film is repeated [s].
 PAUSE_S = 1.0
 
 
 class Playback:
     """A path of states.
 
-    times (m,): ascending, from 0 [s]; postures (m, n): values of all the model's variables. moving: the links that are
-    elsewhere at some time than at the first. duration [s].
+    times (m,): ascending, from 0 [s]; postures (m, n): values of all the model's variables. moving: the links whose
+    pose changes. duration [s].
     """
 
     def __init__(self, model, times, postures):
@@ -35,5 +35,5 @@ class Playback:
         return np.array([np.interp(now, self.times, column) for column in self.postures.T])
 
     def trail(self, link):
-        """Return where ``link`` goes, (m, 3) in the root link."""
+        """Return the path of ``link``, (m, 3) in the root link."""
         return self._frames[:, self._model.link_index[link], :3, 3]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the panel shows: markers on topics that rviz's own displays read."""
+"""The panel's output: markers on topics for rviz's own displays."""
 import textwrap
 
 import numpy as np
@@ -17,9 +17,9 @@ _COLOURS = {"goal": drawing.GOAL, "start": drawing.START}
 #: Topics with pictures, below the node's name.
 PICTURES = ("goal_state", "start_state", "contacts", "planning_scene", "text")
 FILM = "planned_path"
-# Of each line of text; rviz leaves a text out whose middle is out of sight.
+# Of each line of text; rviz hides a text whose middle is out of view.
 _COLUMNS, _ROWS = 60, 2
-# Sizes of what is drawn, as shares of the markers' size.
+# Sizes of drawn things, as shares of the markers' size.
 _TEXT, _ABOVE, _LINE, _CONTACT = 0.16, 1.0, 0.04, 0.15
 
 
@@ -49,17 +49,17 @@ class View:
         self._film.forget()
 
     def ghost(self, which, state, touches, attached, unreached):
-        """Draw the group's links at ``state`` and what they hold; what touches something is red.
+        """Draw the group's links at ``state`` and their attached objects; bodies in contact are red.
 
         touches: client.Touches. attached: AttachedCollisionObjects. unreached: None, or (handle, pose (4, 4)) that the
-        handle's link does not get to.
+        handle's link cannot reach.
         """
         frames = self._model.frames(state.q)
         poses = {link: frames[number] for link, number in self._model.link_index.items()}
         special = {name: drawing.COLLIDING for touch in touches for name in (*touch.links, *touch.held)}
         found = drawing.drawn(self._solids, poses, _COLOURS[which], special)
         for body in attached:
-            # What is held stands in the frame of its link, or in that of another link.
+            # Attached objects are in the frame of their link, or of another link.
             frame = body.object.header.frame_id or body.link_name
             if body.link_name in self._moving and frame in poses:
                 name = body.object.id
@@ -73,7 +73,8 @@ class View:
         self._touches[which] = touches
         self._show_contacts()
         if which == "goal" and self._links:
-            self._anchor = poses[self._links[0]][:3, 3]
+            # Above the whole robot: an arm in front of the text would hide it.
+            self._anchor = np.append(poses[self._links[0]][:2, 3], frames[:, 2, 3].max())
 
     def clear(self, which):
         """No ghost and no markers of "goal" or "start"."""
@@ -92,7 +93,7 @@ class View:
         self._entries = {entry.number: entry.command for entry in entries}
 
     def command(self, number):
-        """The command of a menu entry, empty for one that there is not."""
+        """The command of a menu entry, empty for an unknown one."""
         return self._entries.get(number, ())
 
     def _show_contacts(self):
@@ -108,9 +109,9 @@ class View:
     # -- text, scene, path --------------------------------------------------------------------------------------
 
     def say(self, motion, notes):
-        """Write lines above the goal, the ends of long ones left out, and all of them onto ``~status``.
+        """Write lines above the robot at its goal, the ends of long ones left out, and all of them onto ``~status``.
 
-        motion: what is being done, into the log, too.
+        motion: the present action; it is also logged.
         """
         lines = [line for line in (motion, *notes) if line]
         rows = [row for line in lines for row in textwrap.wrap(line, _COLUMNS, max_lines=_ROWS,
@@ -126,7 +127,7 @@ class View:
         self._logged = motion
 
     def scene(self, snapshot):
-        """Draw the objects of the world, and what the robot holds, where it is now: of a client.Snapshot."""
+        """Draw the objects of the world and attached objects at their present poses, from a client.Snapshot."""
         markers = []
         for one in snapshot.objects:
             markers += _object(one, one.header.frame_id, snapshot.colours.get(one.id, drawing.THING))
@@ -144,7 +145,7 @@ class View:
         self._film.enable(shown)
 
     def forget_path(self):
-        """The planned path is of no interest any more."""
+        """Remove the planned path."""
         self._film.forget()
 
 
@@ -152,5 +153,5 @@ def _object(message, frame, colour):
     poses = {message.id: np.eye(4)}
     markers = [marker_of(one, frame) for one in drawing.drawn({message.id: object_solids(message)}, poses, colour)]
     for marker in markers:
-        marker.frame_locked = True  # what is held goes with its link
+        marker.frame_locked = True  # attached objects move with their link
     return markers

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One thread that does things in turn, so that what they change needs no locks."""
+"""One thread that runs functions in turn, so that their data needs no locks."""
 import threading
 from collections import deque
 
 
 class Worker:
-    """Calls functions in the order in which they came. ``on_error``: function of an exception that one raised."""
+    """Calls functions in the order of their arrival. ``on_error``: function of an exception that one raised."""
 
     def __init__(self, on_error):
         self._on_error = on_error
@@ -16,8 +16,8 @@ class Worker:
         self._thread.start()
 
     def put(self, function, key=None):
-        """Call ``function()`` later. With a ``key`` it takes the place of the last waiting one of the same key: of a
-        marker that is dragged only the newest pose counts."""
+        """Call ``function()`` later. With a ``key`` it replaces the waiting one of the same key: only the newest pose
+        of a dragged marker matters."""
         with self._wake:
             if key is not None and self._waiting and self._waiting[-1][0] == key:
                 self._waiting.pop()
@@ -25,7 +25,7 @@ class Worker:
             self._wake.notify()
 
     def end(self):
-        """Do nothing any more, and wait for what is being done."""
+        """Stop, and wait for the function that is running."""
         with self._wake:
             self._ended = True
             self._waiting.clear()
@@ -42,5 +42,5 @@ class Worker:
                 _, function = self._waiting.popleft()
             try:
                 function()
-            except Exception as error:  # the thread outlives whatever a request does to it
+            except Exception as error:  # the thread must survive any error of a request
                 self._on_error(error)

@@ -12,14 +12,9 @@ from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningSc
 from moveit_msgs.srv import ApplyPlanningScene
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty, String
-from visualization_msgs.msg import (
-    InteractiveMarkerFeedback,
-    InteractiveMarkerInit,
-    InteractiveMarkerUpdate,
-    Marker,
-    MarkerArray,
-)
+from visualization_msgs.msg import Marker, MarkerArray
 
+from lab_testing.marker_client import MarkerClient
 from lab_testing.waiting import stretched, wait_for_message, wait_until
 from motion_planning_rviz.drawing import COLLIDING, GOAL
 from motion_planning_rviz.handles import TOPIC
@@ -28,37 +23,22 @@ JOINTS = ["joint_%d" % number for number in range(1, 7)]
 HOME, UPWARD = (0.0,) * 6, (0.0, 0.0, 1.5708, 0.0, 1.5708, 0.0)
 TIMEOUT_S = stretched(60.0)
 GOAL_MARKER = "EE:goal_tool0"
-FEEDBACK = InteractiveMarkerFeedback
 
 
-class Rviz:
-    """What rviz knows of markers: full at first, then changes."""
+class Rviz(MarkerClient):
+    """What rviz knows: the markers to drag, and those that are drawn."""
 
     def __init__(self):
-        self._lock = threading.Lock()
-        self.markers, self._pictures = {}, {}
-        self._feedback = rospy.Publisher(TOPIC + "/feedback", FEEDBACK, queue_size=20)
-        self._subscribers = [rospy.Subscriber(TOPIC + "/update_full", InteractiveMarkerInit, self._on_full),
-                             rospy.Subscriber(TOPIC + "/update", InteractiveMarkerUpdate, self._on_update)]
+        self._drawing = threading.Lock()
+        self._pictures = {}
+        self._drawn = []
         for name in ("goal_state", "start_state", "contacts", "planning_scene", "planned_path"):
             self._pictures[name] = {}
-            self._subscribers.append(rospy.Subscriber("/planning_panel/" + name, MarkerArray, self._on_picture, name))
-        wait_until(lambda: self._feedback.get_num_connections(), "the panel's markers", TIMEOUT_S)
-
-    def _on_full(self, message):
-        with self._lock:
-            self.markers.update({marker.name: marker for marker in message.markers})
-
-    def _on_update(self, message):
-        with self._lock:
-            self.markers.update({marker.name: marker for marker in message.markers})
-            for one in message.poses:
-                self.markers[one.name].pose = one.pose
-            for name in message.erases:
-                self.markers.pop(name, None)
+            self._drawn.append(rospy.Subscriber("/planning_panel/" + name, MarkerArray, self._on_picture, name))
+        super().__init__(TOPIC, TIMEOUT_S)
 
     def _on_picture(self, message, name):
-        with self._lock:
+        with self._drawing:
             picture = self._pictures[name]
             for marker in message.markers:
                 if marker.action == Marker.DELETEALL:
@@ -69,7 +49,7 @@ class Rviz:
                     picture[(marker.ns, marker.id)] = marker
 
     def picture(self, name):
-        with self._lock:
+        with self._drawing:
             return list(self._pictures[name].values())
 
     def colours(self, name):
@@ -77,33 +57,14 @@ class Rviz:
         return {marker.ns: np.round((marker.color.r, marker.color.g, marker.color.b, marker.color.a), 3).tolist()
                 for marker in self.picture(name)}
 
-    def drag(self, pose, name=GOAL_MARKER, steps=3):
-        """Drag a marker to a pose, and release it."""
-        marker = self.markers[name]
-        for step in range(steps + 1):
-            message = FEEDBACK(client_id="/rviz/Goals", marker_name=name, control_name="ball", pose=pose,
-                               event_type=FEEDBACK.POSE_UPDATE if step < steps else FEEDBACK.MOUSE_UP)
-            message.header.frame_id = marker.header.frame_id
-            self._feedback.publish(message)
+    def drag(self, pose, name=GOAL_MARKER):
+        super().drag(pose, name)
 
     def titles(self, name=GOAL_MARKER):
-        return [entry.title for entry in self.markers[name].menu_entries]
+        return super().titles(name)
 
     def choose(self, *titles, name=GOAL_MARKER):
-        """Click an entry of a marker's menu, by the titles on the way there."""
-        def find():
-            parent = 0
-            for title in titles:
-                found = [entry for entry in self.markers[name].menu_entries if entry.parent_id == parent
-                         and entry.title.replace("[x] ", "").replace("[  ] ", "") == title]
-                if not found:
-                    return None
-                parent = found[0].id
-            return parent
-
-        number = wait_until(find, "the menu's entry %s" % " / ".join(titles), TIMEOUT_S)
-        self._feedback.publish(FEEDBACK(client_id="/rviz/Goals", marker_name=name, menu_entry_id=number,
-                                        event_type=FEEDBACK.MENU_SELECT))
+        super().choose(*titles, name=name)
 
 
 class PlanningPanelTest(unittest.TestCase):

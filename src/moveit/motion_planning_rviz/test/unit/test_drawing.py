@@ -55,7 +55,7 @@ def film(twins):
 
 @pytest.mark.parametrize("elapsed, reach", [(0.0, 0.0), (0.5, 0.25), (2.0, 0.75), (3.0 + 0.5 * PAUSE_S, 1.0),
                                             (3.0 + PAUSE_S + 1.0, 0.5)])
-def test_a_film_stands_at_its_end_and_begins_anew(twins, elapsed, reach):
+def test_a_film_stands_at_its_end_and_restarts(twins, elapsed, reach):
     assert film(twins).at(elapsed)[twins.index["left_reach"]] == pytest.approx(reach)
 
 

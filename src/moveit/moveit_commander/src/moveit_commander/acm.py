@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Methods for moveit_msgs/AllowedCollisionMatrix: who may touch whom."""
+"""Methods for moveit_msgs/AllowedCollisionMatrix: the bodies that may touch each other."""
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix
 
 
@@ -33,7 +33,7 @@ def _names(value):
 
 
 def _add_entry(matrix, name):
-    """A row and a column for ``name``; with the others it does what the defaults say."""
+    """A row and a column for ``name``; with the others it gets the values of the defaults."""
     if name in matrix.entry_names:
         return
     defaults = dict(zip(matrix.default_entry_names, matrix.default_entry_values, strict=True))

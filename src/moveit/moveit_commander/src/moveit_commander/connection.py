@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The way to a running move_group: its actions, services and topics."""
+"""The connection to a running move_group: its actions, services and topics."""
 import threading
 import time
 from functools import cache
@@ -23,7 +23,7 @@ SERVICES = {"apply_planning_scene": srv.ApplyPlanningScene, "compute_cartesian_p
 TOPICS = {"attached_collision_object": msg.AttachedCollisionObject, "collision_object": msg.CollisionObject,
           "planning_scene": msg.PlanningScene, "trajectory_execution_event": String}
 
-#: How long a service is waited for that move_group has not advertised yet [s].
+#: Time limit for a service that move_group has not advertised yet [s].
 SERVICE_WAIT_S = 5.0
 _POLL_S = 0.05
 
@@ -42,11 +42,11 @@ class Connection:
         return rospy.resolve_name("/".join(filter(None, [self._namespace, name])))
 
     def wait_for_actions(self, names, seconds):
-        """Wait until the action servers answer. Raises RuntimeError after so many seconds of real time."""
+        """Wait until the action servers answer. Raises RuntimeError after the time limit, in seconds of real time."""
         deadline = time.monotonic() + seconds
         for name in names:
             client = self._client(name)
-            # A duration below 0 looks once: the client's own wait has no end while simulated time stands still.
+            # A duration below 0 checks once: the client's own wait never ends while simulation time is paused.
             while not client.wait_for_server(rospy.Duration(0, -1)):
                 if rospy.is_shutdown() or time.monotonic() > deadline:
                     raise RuntimeError("Unable to connect to move_group action server '%s' within allotted time (%gs); "
@@ -56,10 +56,10 @@ class Connection:
     def start(self, name, goal):
         """Send a goal and return at once; :meth:`cancel` ends it."""
         done = threading.Event()
-        # Sent without our lock: actionlib holds a lock of its own while it calls _transition, which wants ours.
+        # Sent without our lock: actionlib holds its own lock while it calls _transition, which needs ours.
         handle = self._client(name).send_goal(goal, transition_cb=lambda handle: self._transition(handle, done))
         with self._lock:
-            # A handle that nobody holds is forgotten by actionlib.
+            # actionlib forgets a handle without a reference.
             if not done.is_set():
                 self._running.add(handle)
         return handle, done
@@ -71,9 +71,9 @@ class Connection:
                 self._running.discard(handle)
 
     def run(self, name, goal):
-        """Send a goal, wait until it has ended, however long that takes, and return (result, text of its server).
+        """Send a goal, wait until it has ended, without a time limit, and return (result, text of its server).
 
-        The result says FAILURE where the server refused the goal, or is gone.
+        The result is FAILURE if the server refused the goal or has ended.
         """
         handle, done = self.start(name, goal)
         client = self._client(name)

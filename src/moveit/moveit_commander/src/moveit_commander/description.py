@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the parameter server says about a robot: its planning model, and what is set for its groups."""
+"""A robot's data from the parameter server: its planning model, and the settings of its groups."""
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -14,7 +14,7 @@ from .node import ensure_node
 @dataclass(frozen=True)
 class Description:
     """model: a :class:`motion_planning.model.PlanningModel`; kinematics: group to its mapping of settings;
-    velocity_scaling, acceleration_scaling: what is sent unless told otherwise."""
+    velocity_scaling, acceleration_scaling: defaults."""
 
     model: object
     kinematics: dict = field(default_factory=dict)
@@ -29,7 +29,8 @@ def _model(urdf, srdf, limits):
 
 
 def _parameter_name(name, namespace):
-    """The full name of the robot's description: as the program's own names go, else in the namespace of move_group."""
+    """The full name of the robot's description: resolved like the program's own names, else in the namespace of
+    move_group."""
     if name.startswith("/"):
         return name
     return rospy.search_param(name) or rospy.resolve_name("/".join(filter(None, [namespace, name])))
@@ -38,7 +39,7 @@ def _parameter_name(name, namespace):
 def load(robot_description, namespace):
     """Return the :class:`Description` under the parameter ``robot_description`` and those named after it.
 
-    Raises RuntimeError when the URDF or the SRDF is not there or makes no model; the text says which.
+    Raises RuntimeError if the URDF or the SRDF is missing or invalid; the text says which.
     """
     ensure_node()
     name = _parameter_name(robot_description, namespace)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The error that this package raises for what cannot be done."""
+"""The error that this package raises."""
 
 
 class MoveItCommanderException(Exception):
-    """Something asked of a commander cannot be done; the text says what, with which value, and what would be right."""
+    """A request to a commander failed; the text says what, with which value, and what would be correct."""

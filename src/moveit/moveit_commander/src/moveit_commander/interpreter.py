@@ -15,7 +15,7 @@ from .states import named_positions
 
 __all__ = ["MoveGroupCommandInterpreter", "MoveGroupInfoLevel"]
 
-#: What `ground` puts under the robot: a slab of this size [m], its top a little below zero: nothing stands in it.
+#: The slab that `ground` puts under the robot: size [m]; its top is a little below zero, so that nothing is inside it.
 _GROUND_SIZE, _GROUND_TOP = (3.0, 3.0, 0.1), -0.01
 _FILE = "move_group.cfg"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

@@ -95,7 +95,7 @@ class MoveGroupCommander(Targeting):
         return self._end_effector_link
 
     def set_end_effector_link(self, link_name):
-        """Make poses be for this link. Raises MoveItCommanderException for a link that the robot has not."""
+        """Make poses be for this link. Raises MoveItCommanderException for an unknown link."""
         self._end_effector_link = self._known_link(link_name)
 
     def get_interface_description(self):
@@ -157,7 +157,7 @@ class MoveGroupCommander(Targeting):
         message = self.get_current_state()
         unknown = [name for name in self._group.joints if name not in message.joint_state.name]
         if unknown:
-            raise MoveItCommanderException("move_group does not know where %s stand; does somebody publish them on "
+            raise MoveItCommanderException("move_group does not know where %s stand; does a node publish them on "
                                            "the joint states that it listens to?" % ", ".join(unknown))
         return states.state_of(self._model, message)
 
@@ -185,11 +185,11 @@ class MoveGroupCommander(Targeting):
     # -- start ------------------------------------------------------------------------------------------------------
 
     def set_start_state_to_current_state(self):
-        """Plan from where the robot stands when it plans."""
+        """Plan from the robot's state at the time of planning."""
         self._settings.start_state = None
 
     def set_start_state(self, msg):
-        """Plan from this RobotState. Joints that it does not name stand where they are when it plans."""
+        """Plan from this RobotState. Joints without a value in it keep their state at the time of planning."""
         names = msg.joint_state.name
         partial = any(name not in names for name in self._model.variables)
         self._settings.start_state = RobotState(
@@ -253,7 +253,7 @@ class MoveGroupCommander(Targeting):
         """Return (RobotTrajectory, fraction) along straight lines through ``waypoints`` (Poses in the reference frame).
 
         eef_step: largest distance between two points. jump_threshold: largest step of the joints, as a multiple of
-        the mean one; 0 for no check; it may be left out. fraction: how much of the way was possible, -1 for an error.
+        the mean one; 0 for no check; it may be left out. fraction: of the path that is possible, -1 for an error.
         """
         if isinstance(jump_threshold, bool):
             shifted = avoid_collisions if isinstance(avoid_collisions, Constraints) else path_constraints
@@ -285,7 +285,7 @@ class MoveGroupCommander(Targeting):
         return self._ended("execute_trajectory", goal).error_code.val == MoveItErrorCodes.SUCCESS
 
     def stop(self):
-        """Stop moving: whatever move_group executes, and what this program has asked for."""
+        """Stop moving: the present execution of move_group, and the requests of this program."""
         self._connection.publish("trajectory_execution_event", String("stop"))
         self._connection.cancel()
 
@@ -329,7 +329,7 @@ class MoveGroupCommander(Targeting):
         return self._ended(action, goal).error_code.val
 
     def set_support_surface_name(self, value):
-        """Name the object that things stand on which are picked up and placed."""
+        """Name the support surface of objects to pick up and place."""
         self._settings.support_surface = value
 
     # -- computations -----------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ class Plan(tuple):
         return self[1]
 
     def __getattr__(self, name):
-        # Only names that a tuple has not; those of the interpreter's own are asked while a plan is copied.
+        # Only names that a tuple does not have; Python's special names are looked up while a plan is copied.
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self[1], name)

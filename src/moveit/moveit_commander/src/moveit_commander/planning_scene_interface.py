@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The world that move_group plans in, and what the robot holds."""
+"""The world of move_group's planning scene, and attached objects."""
 import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningSceneComponents
@@ -30,8 +30,8 @@ class PlanningSceneInterface:
 
     def __init__(self, ns="", synchronous=True):
         self._connection, self._synchronous = connect(ns), synchronous
-        # Programs reach for these three by the names of MoveIt's class, which has not always had a method to add or
-        # move any object. They are there from the start, so that no message is lost.
+        # Programs use these three by the names in MoveIt's class, which has not always had a method to add or move any
+        # object. They are created at the start, so that no message is lost.
         self._pub_co = self._connection.advertise("collision_object")
         self._pub_aco = self._connection.advertise("attached_collision_object")
         self._apply_planning_scene_diff = self._connection.service("apply_planning_scene")

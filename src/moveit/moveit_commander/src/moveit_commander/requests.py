@@ -27,7 +27,7 @@ from .exception import MoveItCommanderException
 JOINTS = "joints"
 POSE, POSITION, ORIENTATION = "pose", "position", "orientation"
 _CODES = {value: name for name, value in vars(MoveItErrorCodes).items() if name.isupper() and isinstance(value, int)}
-#: How far a hand comes and goes where only a pose to place at is known: wished for, and at least [m].
+#: Length of approach and retreat for a place that is given as a pose only: desired and least [m].
 _PLACE_DISTANCE_M, _PLACE_MIN_DISTANCE_M = 0.2, 0.1
 
 
@@ -169,7 +169,8 @@ def grasps_of(grasp):
 def place_locations(location, frame, root, tip):
     """Return a list of PlaceLocations from what :meth:`MoveGroupCommander.place` takes; None makes an empty list.
 
-    ``frame``: of a Pose. A pose alone is come to from above (down in ``root``) and left along the hand (-x of ``tip``).
+    ``frame``: of a Pose. A pose alone is approached from above (down in ``root``); the hand retreats along its axis (-x
+    of ``tip``).
     """
     if location is None:
         return []

@@ -12,7 +12,7 @@ def retimed(model, trajectory, scaling, algorithm):
     """Return a RobotTrajectory along the same points, as fast as limits allow; empty for an unknown ``algorithm``.
 
     scaling: shares of the limits of velocity and acceleration; one that is not above 0 and at most 1 counts as 1.
-    Raises MoveItCommanderException for a joint that the model has not, and for points that are no path.
+    Raises MoveItCommanderException for an unknown joint, and for points that are not a path.
     """
     # Compiled code, which few programs need.
     from motion_planning.timing import ALGORITHMS, TimingError, time_path

@@ -33,19 +33,19 @@ class Joint:
         return self._robot.variables_of(self._name)
 
     def bounds(self):
-        """Return [lower, upper], [] for a joint without a value of its own."""
+        """Return [lower, upper], [] for a joint without its own value."""
         return self._robot.bounds_of(self._name)
 
     def min_bound(self):
-        """Return the lower limit, [] for a joint without a value of its own."""
+        """Return the lower limit, [] for a joint without its own value."""
         return (self.bounds() or [[]])[0]
 
     def max_bound(self):
-        """Return the upper limit, [] for a joint without a value of its own."""
+        """Return the upper limit, [] for a joint without its own value."""
         return (self.bounds() or [[]])[-1]
 
     def value(self):
-        """Return where it stands now; a list for a base that floats, [] for a fixed joint."""
+        """Return its present value; a list for a floating base, [] for a fixed joint."""
         return self._robot.value_of(self._name)
 
     def move(self, position, wait=True):
@@ -99,7 +99,7 @@ class RobotCommander:
         return self._model.frame
 
     def get_root_link(self):
-        """Return the link that all others hang on."""
+        """Return the root link."""
         return self._model.root
 
     def get_group_names(self):
@@ -191,14 +191,14 @@ class RobotCommander:
         return int(joint in self._model.index or joint in self._model.mimics)
 
     def bounds_of(self, joint):
-        """Return [lower, upper] of a joint, [] where it has no value of its own or no single one."""
+        """Return [lower, upper] of a joint, [] if it has no own value or several."""
         if joint in self._model.mimics:
             limit = self._model.robot.joints[joint].limit
             return [limit.lower, limit.upper]
         return self._model.bounds[self._model.index[joint]].tolist() if joint in self._model.index else []
 
     def value_of(self, joint):
-        """Return where a joint stands now; a list for a floating base, [] for a fixed joint."""
+        """Return a joint's present value; a list for a floating base, [] for a fixed joint."""
         values = self.get_current_variable_values()
         if self._is_floating(joint):
             return [value for name, value in values.items() if name.startswith(joint + "/")]

@@ -20,7 +20,7 @@ def named_positions(joints):
 def state_of(model, message):
     """Return the core's State of a RobotState: joints that it does not name stand at their default, nothing attached.
 
-    Names that are no joint variable of the model are ignored. Raises MoveItCommanderException for a value that is not
+    Names that are not joint variables of the model are ignored. Raises MoveItCommanderException for a value that is not
     finite and for lists of unequal length.
     """
     positions = named_positions(message.joint_state)

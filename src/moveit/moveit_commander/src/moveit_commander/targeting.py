@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Where a group of joints shall go: joints, poses, names."""
+"""Targets of a group of joints: joint values, poses, names."""
 import numpy as np
 from geometry_msgs.msg import Pose, PoseStamped
 from moveit_msgs.msg import (

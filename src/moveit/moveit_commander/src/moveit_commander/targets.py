@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Joint values that a group is to reach. Knows neither ROS nor messages; angles in rad, lengths in m."""
+"""Target joint values of a group. No ROS needed; angles in rad, lengths in m."""
 import numpy as np
 
 from motion_planning.model import ModelError
@@ -10,7 +10,7 @@ from .exception import MoveItCommanderException
 class JointTarget:
     """Values for every variable of a model, of which those of one group are the target.
 
-    It starts at the model's default state: every joint at 0, or in the middle of its limits where 0 is beyond them.
+    It starts at the model's default state: every joint at 0, or in the middle of its limits if 0 is beyond them.
     Every setter raises MoveItCommanderException, and changes nothing, for values that are beyond the limits by more
     than ``tolerance``, and for names and numbers of values that do not fit.
     """
@@ -103,7 +103,7 @@ def random_values(model, group, generator):
 
 
 def within_limits(model, q):
-    """Return ``q`` (n,) with every joint inside its limits; joints that turn without end come to -pi to pi."""
+    """Return ``q`` (n,) with every joint inside its limits; continuous joints are wrapped to -pi to pi."""
     q = model.wrapped(q)
     return np.where(model.continuous, q, np.clip(q, model.bounds[:, 0], model.bounds[:, 1]))
 
@@ -112,10 +112,10 @@ def jacobian(group, values, reference_point):
     """Return the Jacobian (6, k) of a point of the group's tip, velocity [m/s] above angular velocity [rad/s].
 
     Both in the frame of the link that the group's chain begins at. ``reference_point`` (3,): in the tip's frame [m].
-    Raises MoveItCommanderException for a group that is no chain.
+    Raises MoveItCommanderException for a group that is not a chain.
     """
     if group.chain is None:
-        raise MoveItCommanderException("group '%s' is no chain of joints; it has no Jacobian" % group.name)
+        raise MoveItCommanderException("group '%s' is not a chain of joints; it has no Jacobian" % group.name)
     pose, matrix = group.chain.fk_and_jacobian(values)
     shift = pose[:3, :3] @ np.asarray(reference_point, dtype=float)
     matrix = np.array(matrix)

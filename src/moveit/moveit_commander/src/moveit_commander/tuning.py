@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What can be set for planning, and asked for: tolerances, constraints, planners, speed."""
+"""Settings of planning: tolerances, constraints, planners, speed."""
 import rospy
 from moveit_msgs.msg import Constraints, TrajectoryConstraints
 
@@ -49,11 +49,11 @@ class Tunable:
         self._settings.orientation_tolerance = float(value)
 
     def allow_looking(self, value):
-        """Let move_group look around for what it does not know, or not."""
+        """Allow or forbid move_group to look around for unknown parts of the scene."""
         self._settings.looking = bool(value)
 
     def allow_replanning(self, value):
-        """Let move_group plan again when something comes into the way, or not."""
+        """Allow or forbid move_group to plan again if an obstacle blocks the path."""
         self._settings.replanning = bool(value)
 
     def get_known_constraints(self):

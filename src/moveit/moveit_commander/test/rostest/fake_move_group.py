@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Serves what moveit_commander asks of move_group: a robot that is at once where it is sent.
 
-The planner asked for says what becomes of a goal: "wait" waits until it is cancelled, "refuse" rejects it, "die" ends
+The requested planner decides the result of a goal: "wait" waits until it is cancelled, "refuse" rejects it, "die" ends
 this process.
 """
 import os

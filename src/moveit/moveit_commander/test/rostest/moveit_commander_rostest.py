@@ -33,14 +33,14 @@ moveit_commander.roscpp_shutdown()
 
 
 def run(*command, **options):
-    return subprocess.run(command, text=True, capture_output=True, timeout=stretched(40.0), **options)
+    return subprocess.run(command, text=True, capture_output=True, timeout=stretched(90.0), **options)
 
 
 class CommanderTest(unittest.TestCase):
     def test_planning_and_moving_in_both_namespaces(self):
         for ns in ("", "robot1"):
             with self.subTest(ns=ns):
-                group = MoveGroupCommander(GROUP, ns=ns, wait_for_servers=stretched(10.0))
+                group = MoveGroupCommander(GROUP, ns=ns, wait_for_servers=stretched(60.0))
                 group.set_named_target("home")
                 self.assertTrue(group.go(wait=True))
                 success, plan, _, code = group.plan(UPWARD)
@@ -104,10 +104,10 @@ class CommanderTest(unittest.TestCase):
         fake = subprocess.Popen(["rosrun", "moveit_commander", "fake_move_group.py", "__ns:=mortal"])
         self.addCleanup(fake.kill)
         group = MoveGroupCommander(GROUP, robot_description="/robot_description", ns="mortal",
-                                   wait_for_servers=stretched(20.0))
+                                   wait_for_servers=stretched(60.0))
         group.set_planner_id("die")
         self.assertFalse(group.plan(UPWARD)[0])
-        fake.wait(stretched(10.0))
+        fake.wait(stretched(60.0))
         with self.assertRaises(MoveItCommanderException):
             group.get_current_joint_values()
 

@@ -23,7 +23,7 @@ class RequestError(PlanningError):
 @dataclass
 class Context:
     """model: PlanningModel; monitor: SceneMonitor; exact: ExactChecker; failures: Failures; pipelines: {name:
-    Pipeline}, default_pipeline: name; executor: Executor, None where nothing may be moved."""
+    Pipeline}, default_pipeline: name; executor: Executor, None if the node only plans."""
 
     model: Any
     monitor: Any
@@ -46,8 +46,8 @@ class Context:
     def scene_from(self, state, request):
         """Return the scene with the robot in the RobotState of a request, over where it is now.
 
-        Raises RequestError for one that cannot be understood. A state without joints that is no diff is taken for the
-        current one with a warning: half of all clients forget the flag.
+        Raises RequestError for one that cannot be understood. A state without joints that is not a diff is taken for
+        the current one with a warning: many clients forget the flag.
         """
         scene, errors = self.monitor.scene(), []
         empty = not (state.joint_state.name or state.multi_dof_joint_state.joint_names)
@@ -76,8 +76,8 @@ class Context:
 def answered(name, response_type):
     """A decorator for methods ``f(self, request, response)`` that serve ``name``: failures become error codes.
 
-    The response's ``error_code``, if it has one, is SUCCESS unless the method raises RequestError, which is told to
-    the context's failures, or anything else, which becomes FAILURE.
+    The response's ``error_code``, if it has one, is SUCCESS unless the method raises RequestError, which is passed to
+    the context's failures, or any other exception, which becomes FAILURE.
     """
     def decorate(method):
         @functools.wraps(method)
@@ -88,7 +88,7 @@ def answered(name, response_type):
                 method(self, request, response)
             except PlanningError as error:
                 code = tell(self.context, name, error, _group_of(request))
-            except Exception as error:  # the node outlives whatever a request does to it
+            except Exception as error:  # the node must survive any error of a request
                 code = tell(self.context, name, RequestError(MoveItErrorCodes.FAILURE, "%s: %s" % (
                     type(error).__name__, error)), _group_of(request))
             if hasattr(response, "error_code"):

@@ -8,7 +8,7 @@ from motion_planning.errors import PlanningError
 
 FOLLOW, GRIPPER, FAKE = "FollowJointTrajectory", "GripperCommand", "fake"
 _FAKE_TYPES = ("interpolate", "via points", "last point")
-# Sets of controllers that are tried one by one; a longer list is searched greedily.
+# Greatest number of sets of controllers to try one by one; above it, the search is greedy.
 _MOST_TO_COMBINE = 12
 
 
@@ -21,7 +21,7 @@ class Controller:
     """One entry of a controller_list.
 
     name: its namespace, may be empty; kind: FOLLOW, GRIPPER or FAKE; joints: those that it moves; action: name of its
-    action, empty for a fake one; default: to be preferred; options: the entry's other keys.
+    action, empty for a fake one; default: whether it is preferred; options: the entry's other keys.
     """
 
     name: str
@@ -72,7 +72,7 @@ def read_list(entries, fake=False):
 def choose(controllers, joints, alive=lambda controller: True):
     """Return the fewest Controllers that together move all ``joints``; those that answer and defaults are preferred.
 
-    alive(controller): whether its action answers. Raises ControllerError, which names the joints that nobody moves.
+    alive(controller): whether its action answers. Raises ControllerError, which names the joints without a controller.
     """
     joints = set(joints)
     useful = [controller for controller in controllers if joints & set(controller.joints)]
@@ -118,8 +118,8 @@ def _known(controllers):
 def start_deviation(names, positions, current, tolerance, continuous=()):
     """Return (joint, by how much) of the joint that is furthest from where a trajectory starts; None if all are near.
 
-    names, positions: of the first point; current: {joint: value}; tolerance: [rad or m] or {joint: value}, of which 0
-    is not looked at; continuous: joints that turn without end. A joint without a value deviates by infinity.
+    names, positions: of the first point; current: {joint: value}; tolerance: [rad or m] or {joint: value}, where 0
+    disables the check; continuous: joints that turn without end. A joint without a value deviates by infinity.
     """
     worst = None
     for name, position in zip(names, positions, strict=True):

@@ -12,16 +12,19 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from moveit_ros_move_group.controllers import ControllerError, allowed_duration, choose, start_deviation
 from moveit_ros_move_group.handles import TICK_S
 
-# How long [s] a cancelled controller may take to say so, and the joints to come to rest.
+# Time limits [s] for a cancelled controller to report it, for the joints to come to rest, and for the first joint state
+# (MoveIt waits as long).
 _CANCEL_S = 0.2
 _REST_S = 1.0
+_FIRST_STATE_S = 1.0
 _RESTING_STATES = 3
 
 
 @dataclass
 class ExecutionSettings:
     """``~trajectory_execution``: monitored: a limit on time is kept; scaling and margin [s] make it. start_tolerance:
-    [rad or m], or by joint. wait_for_rest: the end is waited for until the joints rest. connection_timeout [s]."""
+    [rad or m], or by joint. wait_for_rest: whether execution ends only when the joints are at rest. connection_timeout
+    [s]."""
 
     monitored: bool = True
     scaling: float = 1.1
@@ -44,7 +47,7 @@ class ExecutionSettings:
 
 @dataclass
 class Outcome:
-    """How an execution ended: a value of MoveItErrorCodes, and the sentence why where it is no success."""
+    """How an execution ended: a value of MoveItErrorCodes, and the reason if it failed."""
 
     code: int
     text: str = ""
@@ -69,9 +72,9 @@ class Executor:
     def execute(self, message, preempted=lambda: False, invalidated=lambda: None, from_anywhere=False):
         """Follow a RobotTrajectory to its end; return an Outcome.
 
-        preempted(): whether the caller wants it to end; invalidated(): None, or the sentence why the rest of the way is
-        no longer free. Both are asked every few milliseconds. from_anywhere: its first point need not be near where the
-        joints are, as with a hand that has something between its fingers.
+        preempted(): whether the caller wants to stop it; invalidated(): None, or the reason why the rest of the path is
+        no longer free. Both are called every few milliseconds. from_anywhere: the first point need not be near the
+        joints' positions, as for a hand with an object between its fingers.
         """
         trajectory = message.joint_trajectory
         if not trajectory.points:
@@ -102,17 +105,13 @@ class Executor:
         return None
 
     def _follow(self, trajectory, preempted, invalidated, from_anywhere):
-        chosen = choose(self._controllers, trajectory.joint_names, self._is_alive)
-        off = None if from_anywhere else start_deviation(
-            trajectory.joint_names, trajectory.points[0].positions, self._monitor.joint_values(),
-            self.settings.start_tolerance, self._monitor.continuous)
-        if off:
-            return Outcome(MoveItErrorCodes.CONTROL_FAILED,
-                           "Invalid Trajectory: start point deviates from current robot state more than the allowed "
-                           "start tolerance: joint '%s' by %.4g; plan again from the current state" % off, dict([off]))
         def given_up():
             return self._stop.is_set() or preempted()
 
+        chosen = choose(self._controllers, trajectory.joint_names, self._is_alive)
+        flaw = None if from_anywhere else self._flaw_of_start(trajectory, given_up)
+        if flaw is not None:
+            return flaw
         handles = [self._handle_of(controller) for controller in chosen]
         for controller, handle in zip(chosen, handles, strict=True):
             if not handle.connected(self.settings.connection_timeout, given_up):
@@ -124,16 +123,32 @@ class Executor:
             for controller, handle in zip(chosen, handles, strict=True):
                 handle.send(part_of(trajectory, controller.joints))
             return self._watch(trajectory, chosen, handles, preempted, invalidated)
-        except Exception:  # nothing may go on moving that nobody watches
+        except Exception:  # no motion may continue unsupervised
             for handle in handles:
                 handle.cancel()
             raise
+
+    def _flaw_of_start(self, trajectory, given_up):
+        """An Outcome where the joints are not where the trajectory starts, or do not say where they are; else None."""
+        tolerance, names = self.settings.start_tolerance, trajectory.joint_names
+        checked = [name for name, limit in zip(names, self._limits(names), strict=True) if limit > 0.0]
+        # The first execution may be asked for before the first joint state has come.
+        silent = self._monitor.wait_for_state(rospy.Time(), _FIRST_STATE_S, checked, given_up)
+        if silent:
+            return Outcome(MoveItErrorCodes.CONTROL_FAILED, "Failed to validate trajectory: %s" % silent)
+        off = start_deviation(names, trajectory.points[0].positions, self._monitor.joint_values(), tolerance,
+                              self._monitor.continuous)
+        if off is None:
+            return None
+        return Outcome(MoveItErrorCodes.CONTROL_FAILED,
+                       "Invalid Trajectory: start point deviates from current robot state more than the allowed start "
+                       "tolerance: joint '%s' by %.4g; plan again from the current state" % off, dict([off]))
 
     def _watch(self, trajectory, chosen, handles, preempted, invalidated):
         duration = trajectory.points[-1].time_from_start.to_sec()
         allowed = allowed_duration(duration, chosen, self.settings.scaling, self.settings.margin)
         begin = rospy.get_time()
-        # Time that has been set back, as by a reset of the simulation, ends nothing; the limit starts anew.
+        # If time is set back, as by a reset of the simulation, nothing ends; the limit starts again.
         while True:
             running = [handle for handle in handles if not handle.done.is_set()]
             if not running:
@@ -169,8 +184,7 @@ class Executor:
 
     def _wait_for_rest(self, names, preempted):
         """Until three joint states in a row agree within the start tolerance."""
-        tolerance = self.settings.start_tolerance
-        limits = [tolerance.get(name, 0.0) if isinstance(tolerance, dict) else tolerance for name in names]
+        limits = self._limits(names)
         deadline, before, same, number = time.monotonic() + _REST_S, None, 0, -1
         while time.monotonic() < deadline and not rospy.is_shutdown() and not self._stop.is_set() and not preempted():
             count, values = self._monitor.joint_update()
@@ -185,6 +199,11 @@ class Executor:
                 if same >= _RESTING_STATES - 1:
                     return
             before = now
+
+    def _limits(self, names):
+        """The start tolerance of each joint [rad or m]; 0 where it is not checked."""
+        tolerance = self.settings.start_tolerance
+        return [tolerance.get(name, 0.0) if isinstance(tolerance, dict) else tolerance for name in names]
 
     def _is_alive(self, controller):
         return self._handle_of(controller).connected(0.0)

@@ -18,7 +18,7 @@ from sensor_msgs.msg import JointState
 
 from moveit_ros_move_group.controllers import FAKE, FOLLOW
 
-# How often [s] something that gives no sign is looked at.
+# Polling period [s].
 TICK_S = 0.01
 # Between two joint states of a fake controller that interpolates, where its ``rate`` does not say [s].
 _FAKE_STEP_S = 0.1
@@ -33,11 +33,11 @@ class Handles:
 
     def __init__(self, controllers, initial=None, limits=None):
         """controllers: list of controllers.Controller. initial: {joint: value}, where fake controllers begin. limits:
-        {joint: (lowest, highest)}, for grippers that are told percents."""
+        {joint: (lowest, highest)}, for grippers that are commanded in percent."""
         self._limits = limits or {}
         self._made, self._fake_states = {}, None
         if any(controller.kind == FAKE for controller in controllers):
-            # Latched: who shows the joints may come later than they are said to be somewhere.
+            # Latched: a subscriber may connect later than the joints are published.
             self._fake_states = rospy.Publisher("~fake_controller_joint_states", JointState, queue_size=100, latch=True)
             if initial:
                 self._fake_states.publish(_joint_state(initial.keys(), initial.values()))
@@ -73,7 +73,7 @@ class _ActionHandle:
 
     def __init__(self, controller, action_type):
         self.controller = controller
-        # Resolved: actionlib remaps a name as it is written, where roscpp's remaps what it stands for.
+        # Resolved: actionlib remaps the name as written, roscpp's version remaps the resolved name.
         self._client = actionlib.ActionClient(rospy.resolve_name(controller.action), action_type)
         self._sent, self._goal = None, _Goal()
 
@@ -83,10 +83,10 @@ class _ActionHandle:
         return self._goal.over
 
     def connected(self, timeout_s, given_up=lambda: False):
-        """Whether the action's server is there; waited for so long in wall time, or until ``given_up()``."""
+        """Whether the action's server exists; waits this long in wall time, or until ``given_up()``."""
         deadline = time.monotonic() + timeout_s
         client = self._client
-        # actionlib's own waiting sleeps in ROS time, which may stand still.
+        # actionlib's own waiting sleeps in ROS time, which may be paused.
         while not all(end.get_num_connections() for end in (client.pub_goal, client.pub_cancel, client.status_sub,
                                                             client.result_sub)):
             if time.monotonic() >= deadline or rospy.is_shutdown() or given_up():
@@ -192,7 +192,7 @@ class FakeHandle:
         return True
 
     def send(self, trajectory):
-        # New events: what played before may still sleep, and must neither go on nor end this one.
+        # New events: the previous playback may still sleep, and must neither continue nor end this one.
         self.done, self._cancelled = threading.Event(), threading.Event()
         threading.Thread(target=self._play, args=(trajectory, self.done, self._cancelled), daemon=True).start()
 

@@ -10,7 +10,7 @@ from moveit_ros_move_group.context import RequestError
 from moveit_ros_move_group.convert.constraints import constraint_set_of
 from moveit_ros_move_group.convert.geometry import matrix_of
 
-# Of a position that was given without a region around it [m].
+# Radius of a position that was given without a region [m].
 _POINT_M = 1e-4
 
 

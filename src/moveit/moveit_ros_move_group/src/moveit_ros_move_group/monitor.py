@@ -18,14 +18,14 @@ from moveit_ros_move_group.convert.octomap import octomap_message
 from moveit_ros_move_group.convert.scene_in import SceneReader
 from moveit_ros_move_group.convert.scene_out import scene_diff, scene_message
 
-# How long [s] a frame that tf does not know yet is waited for, in wall time.
+# Time limit [s] for a frame that tf does not know yet, in wall time.
 _NEWEST = rospy.Time()
 _FRAME_TIMEOUT_S = 0.5
-# For so long [s] after one that did not come no other is waited for: a scene may name thousands.
+# After a frame that did not come, no other is waited for during this time [s]: a scene may name thousands.
 _IMPATIENT_S = 1.0
-# How often in a second the scene is published, where no parameter says so.
+# Default rate of publishing the scene [Hz].
 _USUAL_HZ = 4.0
-# Errors of one message that are told one by one.
+# Number of errors of one message that are logged one by one.
 _TOLD = 10
 _NAMES = {"joint_state_topic": "joint_states", "attached_collision_object_topic": "attached_collision_object",
           "planning_scene_topic": "planning_scene"}
@@ -35,7 +35,7 @@ class SceneMonitor:
     """The scene as it is now: what messages said, with the robot where its joint states say it is.
 
     continuous: names of the joints that turn without end. publishes, publishes_states: whether changes of the scene,
-    and of the robot alone, are published, ``hz`` times a second at most. Calls may come from any thread.
+    and of the robot alone, are published, at most ``hz`` times per second. All methods may be called from any thread.
     """
 
     def __init__(self, model, say_failure):
@@ -43,7 +43,7 @@ class SceneMonitor:
         self.model = model
         self.continuous = {name for name, turns in zip(model.variables, model.continuous, strict=True) if turns}
         self._say_failure = say_failure
-        # Changes of the scene wait for each other, and may wait for tf; nobody else waits for them.
+        # Changes of the scene wait for each other, and may wait for tf; no other call waits for them.
         self._changing, self._lock, self._news = threading.RLock(), threading.RLock(), threading.Condition()
         self._scene, self._octomap = Scene(model), None
         self._values, self._stamps, self._updates = {}, {}, 0
@@ -93,7 +93,7 @@ class SceneMonitor:
 
     def apply(self, message, request):
         """Apply a PlanningScene; return the list of sentences on what could not be. ``request`` names who asked."""
-        # Where attached things hang depends on where the robot is.
+        # The poses of attached objects depend on the robot's posture.
         return self._change(lambda _: self.reader.with_planning_scene(self.scene(), message), request,
                             message.world.octomap)
 
@@ -131,7 +131,7 @@ class SceneMonitor:
                 self._replace(scene, octomap)
             except PlanningError as error:
                 errors = [str(error)]
-            except Exception as error:  # the node outlives whatever a message holds
+            except Exception as error:  # the node must survive any message
                 errors = ["%s: %s" % (type(error).__name__, error)]
         for error in errors[:_TOLD]:
             self._say_failure(request, error)
@@ -188,7 +188,7 @@ class SceneMonitor:
     def wait_for_state(self, after, timeout_s, joints=(), given_up=lambda: False):
         """Wait in wall time until each of ``joints`` has a value no older than ``after`` (rospy.Time).
 
-        Returns None, as where it is given up, or the sentence why that did not come to be.
+        Returns None if it came or the caller gave up, or the reason why it did not come.
         """
         deadline = time.monotonic() + timeout_s
         with self._news:
@@ -273,8 +273,8 @@ class SceneMonitor:
                 self._patient_from = now + _IMPATIENT_S
             if now < self._patient_from or rospy.is_shutdown() or given_up is not None and given_up():
                 if self.model.virtual_joint is not None and name == self.model.virtual_joint.parent_frame:
-                    return np.eye(4)  # what the robot stands on, as its description says
-                raise MessageError("'%s' is no frame: neither of the robot, nor an object or subframe of the scene, "
+                    return np.eye(4)  # the robot's base, as its description says
+                raise MessageError("'%s' is not a frame: neither of the robot, nor an object or subframe of the scene, "
                                    "nor does tf lead from it to '%s' (%s)" % (name, self.model.frame, reason))
             time.sleep(0.02)
 
@@ -294,7 +294,7 @@ class SceneMonitor:
                 continue
             try:
                 published = self._publish_change(published)
-            except Exception as error:  # the next scene may be one that can be published
+            except Exception as error:  # the next scene may be publishable
                 if not rospy.is_shutdown():
                     rospy.logerr_throttle(30.0, "the scene could not be published: %s: %s"
                                           % (type(error).__name__, error))

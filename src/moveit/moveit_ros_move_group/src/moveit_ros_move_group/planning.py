@@ -19,9 +19,9 @@ from moveit_ros_move_group.capabilities.cartesian import slowed
 from moveit_ros_move_group.context import RequestError, wall_clock
 from moveit_ros_move_group.convert.constraints import constraint_set_of
 
-# [s], where a request has none.
+# [s], if a request has none.
 _USUAL_TIME_S = 5.0
-# Remarks on planners that are kept, so that none is made twice.
+# Remarks on planners that were logged already; each is logged once.
 _MOST_REMARKS = 1000
 
 
@@ -81,7 +81,7 @@ class Planner:
             try:
                 plan_path(scene, name, q, near[None], Search(context.exact, 0, 1.0, wall_clock))
             except PlanningError:
-                pass  # as where the robot touches itself in its zero position
+                pass  # for example if the robot touches itself in its zero position
             time_path(np.array([q, near]), context.model.velocity[group.indices],
                       context.model.acceleration[group.indices])
 

@@ -2,9 +2,9 @@
 """Whether what is left of a running trajectory is still free."""
 import rospy
 
-# States that are looked at are at most so far apart [rad or m, in any joint].
+# Greatest distance between two checked states [rad or m, in any joint].
 _APART = 0.05
-# A controller may be behind the trajectory by so much [s].
+# Greatest delay of a controller behind the trajectory [s].
 _BEHIND_S = 0.2
 
 

@@ -5,23 +5,28 @@ import math
 import threading
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import rospy
+from moveit_msgs.srv import LoadMap, LoadMapResponse, SaveMap, SaveMapResponse
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 
 from motion_planning.errors import PlanningError
 from motion_planning.occupancy import Mask, OccupancyMap, View
 from moveit_ros_move_group.convert.clouds import cloud_of, points_of, points_of_depth
+from moveit_ros_move_group.convert.octomap_file import file_of, octree_of_file
 
-# Where no parameter says otherwise [m]: cells, and how far a sensor sees.
+# Defaults [m]: size of cells, and range of a sensor.
 _RESOLUTION_M, _MAX_RANGE_M = 0.1, 5.0
 # A cloud may be as large as this [bytes], or rospy would keep old ones in its buffer.
 _BUFFER = 1 << 25
-# So many joint states are remembered: some seconds.
+# Number of stored joint states: some seconds.
 _STATES = 300
-# A worker that waits for a cloud looks up so often [s].
+# Greatest size of an octomap file to read [bytes].
+_LONGEST_FILE = 1 << 26
+# Polling period of a worker that waits for a cloud [s].
 _LOOK_UP_S = 0.2
 
 
@@ -98,8 +103,8 @@ class _Past:
 class Sensors:
     """Keeps the scene's octomap as the sensors of ``~sensors`` see it; nothing where there are none.
 
-    What ``~octomap_frame`` moves, moves with it. The cells are published as a cloud of their centres on
-    ``~display_octomap``, for rviz to draw as boxes.
+    The map moves with ``~octomap_frame``. The cells are published as a cloud of their centres on
+    ``~display_octomap``, for rviz to draw as boxes. ``~save_map`` and ``~load_map`` write and read files of octomap.
     """
 
     def __init__(self, monitor, spheres):
@@ -122,24 +127,58 @@ class Sensors:
         self._past = _Past(monitor)
         monitor.on_clear_octomap(self._clear)
         self._sources = [_Source(one, self._see) for one in settings]
+        self._services = [rospy.Service("~save_map", SaveMap, self._save),
+                          rospy.Service("~load_map", LoadMap, self._load)]
         rospy.loginfo("octomap: cells of %g m in '%s' from %s", self._map.resolution, self._frame,
                       ", ".join(one.topic for one in settings))
 
     def _see(self, points, header, settings):
         """Enter points (n, 3) of a sensor; return (n,) bool: those that are not the robot. Raises PlanningError."""
         scene = self._past.scene(header.stamp)
-        sensor, frame = (scene.frame(name) if scene.has_frame(name) else self._monitor.tf_frame(name, header.stamp)
-                         for name in (header.frame_id.lstrip("/"), self._frame))
+        sensor, frame = (self._pose(name, scene, header.stamp) for name in (header.frame_id.lstrip("/"), self._frame))
         mask = Mask(scene, self._spheres, settings.padding, settings.scale)
         with self._lock:
             view = View(points, sensor, frame, min(settings.max_range, self._max_range))
             changed, outside = self._map.see(view, mask)
-            # Somebody's planning scene may have come without an octomap.
+            # A client's planning scene may have removed the octomap.
             if changed or self._octree is not _shape_of(self._monitor.scene().octomap):
                 self._octree = self._map.octree()
                 self._monitor.set_octomap(self._octree, frame)
                 self._show(header.stamp)
         return outside
+
+    def _pose(self, name, scene, stamp):
+        """The pose (4, 4) of a frame in the planning frame. Raises PlanningError."""
+        return scene.frame(name) if scene.has_frame(name) else self._monitor.tf_frame(name, stamp)
+
+    def _save(self, request):
+        with self._lock:
+            content = file_of(self._map.octree(), self._map.resolution)
+        try:
+            Path(request.filename).write_bytes(content)
+        except (OSError, ValueError) as error:
+            rospy.logerr("save_map: the octomap cannot be written to '%s': %s", request.filename, error)
+            return SaveMapResponse(False)
+        return SaveMapResponse(True)
+
+    def _load(self, request):
+        """The cubes of the file take the place of those of the map, in ``~octomap_frame``."""
+        try:
+            with open(request.filename, "rb") as file:
+                content = file.read(_LONGEST_FILE + 1)
+            if len(content) > _LONGEST_FILE:
+                raise ValueError("it is longer than %d bytes" % _LONGEST_FILE)
+            octree = octree_of_file(content)
+            frame = self._pose(self._frame, self._monitor.scene(), rospy.Time())
+            with self._lock:
+                self._map.take(octree)
+                self._octree = self._map.octree()
+                self._monitor.set_octomap(self._octree, frame)
+                self._show(rospy.Time.now())
+        except (OSError, ValueError) as error:
+            rospy.logerr("load_map: no octomap is read from '%s': %s", request.filename, error)
+            return LoadMapResponse(False)
+        return LoadMapResponse(True)
 
     def _clear(self):
         with self._lock:
@@ -157,7 +196,7 @@ def _shape_of(octomap):
 
 
 class _Source:
-    """A sensor's topic. The newest message counts; a thread of its own hands its points on."""
+    """A sensor's topic. The newest message counts; a separate thread hands its points on."""
 
     def __init__(self, settings, see):
         """see(points, header, settings) -> (n,) bool: points that are not the robot."""
@@ -198,7 +237,7 @@ class _Source:
                 return
             except PlanningError as error:
                 rospy.logwarn_throttle(10.0, "what %s sees is not entered: %s" % (self._settings.topic, error))
-            except Exception as error:  # the next cloud may be a better one
+            except Exception as error:  # the next cloud may be valid
                 rospy.logerr_throttle(10.0, "%s: %s: %s" % (self._settings.topic, type(error).__name__, error))
             if self._settings.rate > 0.0:
                 time.sleep(max(0.0, 1.0 / self._settings.rate - (time.monotonic() - begin)))

@@ -18,16 +18,16 @@ DEFAULT_CAPABILITIES = (
     "move_group/MoveGroupQueryPlannersService", "move_group/MoveGroupStateValidationService",
     "move_group/MoveGroupGetPlanningSceneService", "move_group/ApplyPlanningSceneService",
     "move_group/ClearOctomapService")
-# Known by name; of these the node has the service for known trajectories and those for sequences.
+# Known names; of these the node serves the one for known trajectories and those for sequences.
 OTHER_CAPABILITIES = ("move_group/MoveGroupExecuteService", "move_group/TfPublisher",
                       "pilz_industrial_motion_planner/MoveGroupSequenceAction",
                       "pilz_industrial_motion_planner/MoveGroupSequenceService")
-# Adapters that decide how a path is timed; the last in the list that is there counts.
+# Adapters that select the time parameterization; the last one in the list counts.
 _TIMINGS = {"AddTimeParameterization": "time_optimal_trajectory_generation",
             "AddTimeOptimalParameterization": "time_optimal_trajectory_generation",
             "AddIterativeSplineParameterization": "iterative_spline_parameterization",
             "AddRuckigTrajectorySmoothing": "ruckig"}
-# Planning plugins that stand for motions of industrial robots, and those that nothing here stands for.
+# Planning plugins for motions of industrial robots, and those that have no counterpart here.
 _INDUSTRIAL, _NOT_BUILT_IN = "pilz_industrial_motion_planner", "chomp|stomp"
 _FAKE = "moveit_fake_controller_manager/MoveItFakeControllerManager"
 
@@ -36,7 +36,7 @@ _FAKE = "moveit_fake_controller_manager/MoveItFakeControllerManager"
 class Pipeline:
     """A planning pipeline: name; planners: {name: {key: text}}; groups: {group: {key: value}}; timing: algorithm;
     start_bounds_error [rad or m]; jiggle: share of a joint's range; industrial: plans PTP, LIN and CIRC; usual: planner
-    where neither request nor group names one."""
+    if neither request nor group names one."""
 
     name: str
     planners: dict = field(default_factory=dict)

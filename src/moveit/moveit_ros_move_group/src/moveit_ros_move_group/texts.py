@@ -4,7 +4,7 @@ from moveit_msgs.msg import MoveItErrorCodes
 
 # Field and class share names; only the constants are of interest.
 _NAMES = {value: name for name, value in vars(MoveItErrorCodes).items() if isinstance(value, int) and name.isupper()}
-# A sentence that names what a request holds could be as long as the request.
+# A sentence with names from a request could be as long as the request.
 _LONGEST = 1000
 
 
@@ -17,7 +17,7 @@ def one_line(text):
 def result_text(code, reason="", *, empty=False, plan_only=False):
     """Return the text of an action's result; ``empty``: nothing had to be moved, or no plan was found.
 
-    Where MoveIt has a bare code the ``reason`` stands beside it.
+    If MoveIt returns only a code, the ``reason`` is added to it.
     """
     codes = MoveItErrorCodes
     if code == codes.SUCCESS:

@@ -26,7 +26,7 @@ def servers(executor, monitor, move_action):
     if move_action is not None:
         made.append(SettingsServer(topics, "~plan_execution", [Setting(
             "max_replan_attempts", int(move_action.replan_attempts), 0, 10000,
-            "how often a goal that may be planned again is planned again")],
+            "number of replanning attempts of a goal that allows it")],
             lambda values: setattr(move_action, "replan_attempts", values["max_replan_attempts"])))
     return made
 
@@ -41,13 +41,13 @@ def _of_execution(topics, settings):
             settings.allow_at_start(values["allowed_start_tolerance"])
 
     server = SettingsServer(topics, "~trajectory_execution", [
-        Setting("execution_duration_monitoring", settings.monitored, meaning="end what takes too long"),
+        Setting("execution_duration_monitoring", settings.monitored, meaning="stop motions that take too long"),
         Setting("allowed_execution_duration_scaling", float(settings.scaling), 1.0, 10.0,
-                "how much longer than planned a trajectory may take"),
-        Setting("allowed_goal_duration_margin", float(settings.margin), 0.1, 60.0, "and so much more [s]"),
+                "factor by which a trajectory may take longer than planned"),
+        Setting("allowed_goal_duration_margin", float(settings.margin), 0.1, 60.0, "additional time [s]"),
         Setting("allowed_start_tolerance", float(settings.usual_start_tolerance), 0.0, 1e9,
-                "how far [rad or m] joints may be from a trajectory's start; 0: as far as they like"),
-        Setting("wait_for_trajectory_completion", settings.wait_for_rest, meaning="wait until the joints rest"),
+                "allowed distance [rad or m] of joints from a trajectory's start; 0: any"),
+        Setting("wait_for_trajectory_completion", settings.wait_for_rest, meaning="wait until the joints are at rest"),
     ], apply)
     return server
 
@@ -59,6 +59,6 @@ def _of_monitor(topics, monitor):
 
     return SettingsServer(topics, "~planning_scene_monitor", [
         Setting("publish_planning_scene", monitor.publishes, meaning="publish changes of the scene"),
-        Setting("publish_planning_scene_hz", float(monitor.hz), 0.1, 100.0, "so often at most [Hz]"),
-        Setting("publish_state_updates", monitor.publishes_states, meaning="publish where the robot goes, too"),
+        Setting("publish_planning_scene_hz", float(monitor.hz), 0.1, 100.0, "greatest rate [Hz]"),
+        Setting("publish_state_updates", monitor.publishes_states, meaning="publish the robot's motion, too"),
     ], apply)

@@ -168,7 +168,7 @@ class BadRequestsTest(unittest.TestCase):
         request.motion_plan_request.allowed_planning_time = TIMEOUT_S
         code, _ = outcome(self.ask("plan_kinematic_path", request))
         self.assertEqual(code, MoveItErrorCodes.SUCCESS, self.failures[-1:])
-        self.assertEqual(self.process(), self.pid, "move_group was started anew")
+        self.assertEqual(self.process(), self.pid, "move_group was restarted")
 
 
 if __name__ == "__main__":

@@ -73,7 +73,7 @@ class FailuresTest(unittest.TestCase):
     def refused(self, request, answer, code):
         """The Failure that says the same as an answer (code, text)."""
         self.assertEqual(answer[0], code, answer[1])
-        wait_until(lambda: [one for one in self.told if one.request == request], "a failure of %s" % request, 20.0)
+        wait_until(lambda: [one for one in self.told if one.request == request], "a failure of %s" % request, TIMEOUT_S)
         failure = next(one for one in self.told if one.request == request)
         if code != CODES.SUCCESS:
             self.assertEqual(failure.error_code, code)

@@ -111,7 +111,7 @@ def test_poses_are_seen_from_links_and_objects(scene):
 
 
 @pytest.mark.parametrize("message, sentence", [
-    (box("box", "nowhere"), "ADD of collision object 'box' refused: 'nowhere' is no frame"),
+    (box("box", "nowhere"), "ADD of collision object 'box' refused: 'nowhere' is not a frame"),
     (box("none", operation=CollisionObject.REMOVE), "REMOVE of collision object 'none' refused"),
     (box("none", operation=CollisionObject.MOVE), "MOVE of collision object 'none' refused"),
     (box("<octomap>"), "octomap's name"),
@@ -297,7 +297,7 @@ def test_trajectories_have_every_field():
 
 
 def tree(*path_of_kinds):
-    """Data of a binary tree along one path: (child, kind) a level; the last one is no inner node."""
+    """Data of a binary tree along one path: (child, kind) a level; the last one is not an inner node."""
     return b"".join((kind << 2 * child).to_bytes(2, "little") for child, kind in path_of_kinds)
 
 

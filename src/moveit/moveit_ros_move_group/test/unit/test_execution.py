@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Trajectories are followed to their end, or everything that moves is stopped."""
+import contextlib
 import threading
-import time
 
 import actionlib
 import pytest
@@ -17,7 +17,7 @@ from moveit_ros_move_group.controllers import read_list
 from moveit_ros_move_group.execution import ExecutionSettings, Executor
 
 # As long as a slow machine may need: what is tested is the answer.
-PATIENCE_S = 30.0
+PATIENCE_S = 90.0
 JOINTS = ["turn", "reach"]
 LONG_S = 1000.0
 
@@ -31,15 +31,20 @@ def trajectory(seconds, **changes):
 
 
 class Joints:
-    """The monitor's part: joints that rest at 0."""
+    """The monitor's part: joints that rest at 0. silent: why they say nothing; late: they are heard of when somebody
+    waits for them."""
 
     continuous = ()
 
-    def __init__(self):
-        self._updates = 0
+    def __init__(self, silent=None, late=False):
+        self._updates, self._silent, self._is_known = 0, silent, not (silent or late)
+
+    def wait_for_state(self, after, timeout_s, joints=(), given_up=lambda: False):
+        self._is_known = not self._silent
+        return self._silent if joints else None
 
     def joint_values(self):
-        return dict.fromkeys(JOINTS, 0.0)
+        return dict.fromkeys(JOINTS, 0.0) if self._is_known else {}
 
     def joint_update(self):
         self._updates += 1
@@ -54,9 +59,8 @@ class Handle:
         self.text, self.preempted = "", False
 
     def connected(self, timeout_s, given_up=lambda: False):
-        end = time.monotonic() + timeout_s
-        while not self.there and time.monotonic() < end and not given_up():
-            time.sleep(0.001)
+        with contextlib.suppress(AssertionError):
+            wait_until(lambda: self.there or given_up(), "the controller", timeout_s, 0.001)
         return self.there
 
     def send(self, part):
@@ -81,12 +85,12 @@ class Handle:
 class Lab:
     """Two controllers, a joint each, and who executes on them. run(...) returns the Outcome that comes in the end."""
 
-    def __init__(self, **settings):
+    def __init__(self, joints=None, **settings):
         entries = [{"name": joint, "action_ns": "follow", "type": "FollowJointTrajectory", "joints": [joint]}
                    for joint in JOINTS]
         controllers, _ = read_list(entries)
         self.handles = {joint: Handle() for joint in JOINTS}
-        self.executor = Executor(controllers, ExecutionSettings(**settings), Joints(),
+        self.executor = Executor(controllers, ExecutionSettings(**settings), joints or Joints(),
                                  lambda controller: self.handles[controller.name])
 
     def start(self, seconds=LONG_S, **hooks):
@@ -120,6 +124,28 @@ def test_each_controller_gets_its_joints():
     for joint in JOINTS:
         assert lab.handles[joint].sent[0].joint_names == [joint]
         assert len(lab.handles[joint].sent[0].points[1].positions) == 1
+        lab.handles[joint].end()
+    assert lab.outcome().code == MoveItErrorCodes.SUCCESS
+
+
+def test_the_first_execution_waits_for_the_first_joint_state():
+    lab = Lab(Joints(late=True)).start()
+    lab.wait_until_sent()
+    for joint in JOINTS:
+        lab.handles[joint].end()
+    assert lab.outcome().code == MoveItErrorCodes.SUCCESS
+
+
+def test_joints_that_are_never_heard_of_are_named():
+    outcome = Lab(Joints(silent="no joint state has come for turn")).start().outcome()
+    assert outcome.code == MoveItErrorCodes.CONTROL_FAILED
+    assert "no joint state has come for turn" in outcome.text
+
+
+def test_joints_that_are_never_heard_of_matter_only_where_the_start_is_checked():
+    lab = Lab(Joints(silent="no joint state has come for turn"), start_tolerance=0.0, wait_for_rest=False).start()
+    lab.wait_until_sent()
+    for joint in JOINTS:
         lab.handles[joint].end()
     assert lab.outcome().code == MoveItErrorCodes.SUCCESS
 

@@ -73,7 +73,7 @@ def test_a_direction_turns_with_the_hand_in_a_frame_that_does(scene):
     (lambda g: setattr(g.pre_grasp_approach.direction.vector, "x", 0.0), "approach: 0.2 m along a direction of"),
     (lambda g: setattr(g.pre_grasp_approach.direction.vector, "x", math.nan), "finite"),
     (lambda g: setattr(g, "grasp_quality", math.inf), "quality is inf"),
-    (lambda g: setattr(g, "grasp_posture", posture(0.1, names=("tail",))), "joint 'tail', which robot 'crane' has not"),
+    (lambda g: setattr(g, "grasp_posture", posture(0.1, names=("tail",))), "joint 'tail', unknown to robot 'crane'"),
     (lambda g: setattr(g, "grasp_posture", posture(0.1, 0.2)), "2 positions for 1 joints"),
     (lambda g: setattr(g, "grasp_posture", posture(math.nan)), "not finite")])
 def test_what_cannot_be_understood(scene, change, match):
@@ -90,7 +90,7 @@ def holding(scene):
     return scene.with_object(cup).attach("cup", LINK, detach_posture=posture(0.4))
 
 
-def test_a_place_is_where_the_object_shall_be(holding):
+def test_a_place_is_where_the_object_should_be(holding):
     task = PlaceTask(holding, "arm", LINK, frozenset([LINK]), "cup")
     place = PlaceLocation()
     place.place_pose.header.frame_id = "world"

@@ -18,7 +18,7 @@ from moveit_ros_move_group import monitor as module
 from moveit_ros_move_group.monitor import SceneMonitor
 
 # As long as a slow machine may need: what is tested is the answer.
-PATIENCE_S = 30.0
+PATIENCE_S = 90.0
 
 
 class Topic:
@@ -133,7 +133,7 @@ def test_frames_that_do_not_come_are_not_waited_for_one_by_one(make, monkeypatch
     now = iter(range(1000000))
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: 0.01 * next(now), sleep=sleep))
     errors = monitor.apply(scene(*[box("crate%d" % k, "nowhere%d" % k) for k in range(90)]), "test")
-    assert len(errors) == 90 and all("is no frame" in error for error in errors)
+    assert len(errors) == 90 and all("is not a frame" in error for error in errors)
     assert len(waits) < 200
 
 

@@ -60,7 +60,7 @@ def test_what_is_left_behind_does_not_matter(model, scene, clock):
     assert watch.hit() is None
 
 
-def test_time_that_goes_back_begins_anew(model, scene, clock):
+def test_time_that_goes_back_restarts(model, scene, clock):
     timed = time_path(np.array([[0.9, 0.2], [-0.8, 0.2]]), np.ones(2), np.ones(2))
     watch = look(model, scene, timed, [None, with_needle(scene, np.pi / 4)])
     watch.hit()

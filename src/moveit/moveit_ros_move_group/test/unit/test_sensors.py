@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A camera's clouds become the scene's octomap, in messages that octomap itself can read."""
+import errno
 import functools
+import os
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,14 +11,17 @@ import fcl
 import numpy as np
 import pytest
 import rospy
+from moveit_msgs.srv import LoadMapRequest, SaveMapRequest
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from lab_testing.waiting import wait_until
+from motion_planning.occupancy import OccupancyMap
 from motion_planning.shapes import Octree
 from moveit_ros_move_group.convert.clouds import cloud_of, points_of, points_of_depth
 from moveit_ros_move_group.convert.geometry import MessageError
 from moveit_ros_move_group.convert.octomap import octomap_message, octree_of
+from moveit_ros_move_group.convert.octomap_file import file_of, octree_of_file
 from moveit_ros_move_group.sensors import read_settings
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -91,6 +96,34 @@ def test_octomap_messages_are_what_octomap_reads():
             assert (fcl.collide(tree, probe) > 0) == hit
 
 
+BOXES = np.array([(0.05, 0.05, 0.05, 0.1), (-0.95, 0.45, 2.05, 0.1), (0.2, -0.2, 0.2, 0.4)])
+
+
+def test_octomaps_files_are_written_and_read():
+    content = file_of(Octree(0.1, BOXES), 0.1)
+    head, _, data = content.partition(b"\ndata\n")
+    lines = head.decode().splitlines()
+    assert lines[0] == "# Octomap OcTree binary file" and {"id OcTree", "res 0.1"} <= set(lines)
+    assert data == np.array(octomap_message(Octree(0.1, BOXES), np.eye(4), "world", rospy.Time(5)).octomap.data,
+                            dtype=np.int8).tobytes()
+    # Three leaves, and the inner nodes above them, of two bytes each.
+    assert "size %d" % (3 + len(data) // 2) in lines
+    back = octree_of_file(content).boxes
+    assert sorted(map(tuple, back.round(6).tolist())) == sorted(map(tuple, BOXES.round(6).tolist()))
+    assert octree_of_file(file_of(None, 0.1)) is None
+
+
+@pytest.mark.parametrize(("content", "reason"), [
+    (b"", "does not begin"), (b"# Octomap OcTree binary file\nid OcTree\nres 0.1\n", "no line 'data'"),
+    (b"# Octomap OcTree binary file\nid OcTree\nres far\ndata\n00", "no resolution: 'res far'"),
+    (b"# Octomap OcTree binary file\nid OcTree\nres 0.1\ndata\n\xff", "end too early"),
+    (b"# Octomap OcTree binary file\nid Quadtree\nres 0.1\ndata\n00", "expected an OcTree"),
+])
+def test_files_that_are_none_are_refused(content, reason):
+    with pytest.raises(MessageError, match=reason):
+        octree_of_file(content)
+
+
 def test_settings_are_understood_and_nonsense_is_told():
     found, complaints = read_settings([CLOUD, {"sensor_plugin": "a/LaserUpdater"}, 7,
                                        {**CLOUD, "point_subsample": 3, "max_range": "far"}])
@@ -118,7 +151,7 @@ def octomap_of(node):
 def test_a_cloud_becomes_an_obstacle_and_goes_again(node):
     node.ask("/eye/points", cloud([(1.0, 0.0, 0.5), (1.0, 0.3, 0.5), (2.5, 0.0, 0.5), (0.0, 0.0, 0.6)]))
     wait_for(lambda: len(octomap_of(node)), "octomap")
-    # The point beyond the range and that on the robot's arm are no obstacles.
+    # The point beyond the range and that on the robot's arm are not obstacles.
     assert sorted(map(tuple, octomap_of(node).round(3).tolist())) == [(1.025, 0.025, 0.525), (1.025, 0.325, 0.525)]
     shown = points_of(node.told("~display_octomap")[-1])
     assert len(shown) == 2
@@ -150,3 +183,47 @@ def test_clouds_that_cannot_be_used_are_told_once_in_the_log(node):
     wait_for(lambda: any("no field" in line for line in node.logged), "word of the cloud's fields")
     node.ask("/eye/points", cloud([(1.0, 0.3, 0.5)]))
     wait_for(lambda: len(octomap_of(node)), "octomap")
+
+
+def test_an_octomap_is_saved_and_loaded(node, tmp_path):
+    file = tmp_path / "seen.bt"
+    node.ask("/eye/points", cloud([(1.0, 0.0, 0.5), (1.0, 0.3, 0.5)]))
+    wait_for(lambda: len(octomap_of(node)) == 2, "octomap")
+    seen = octomap_of(node)
+    assert node.ask("~save_map", SaveMapRequest(str(file))).success
+    node.ask("clear_octomap", None)
+    assert node.ask("~load_map", LoadMapRequest(str(file))).success
+    assert octomap_of(node).tolist() == seen.tolist()
+    assert len(points_of(node.told("~display_octomap")[-1])) == 2
+    # What is loaded is in the map of the sensors, too: the next cloud adds to it.
+    node.ask("/eye/points", cloud([(1.0, 0.6, 0.5)]))
+    wait_for(lambda: len(octomap_of(node)) == 3, "a third cell")
+
+
+@pytest.mark.parametrize(("content", "reason"), [
+    (None, os.strerror(errno.ENOENT)), (b"solid cube", "does not begin"),
+    (file_of(Octree(0.1, BOXES), 0.1), "0.1 m wide")])
+def test_a_map_that_cannot_be_loaded_changes_nothing(node, tmp_path, content, reason):
+    file = tmp_path / "seen.bt"
+    if content is not None:
+        file.write_bytes(content)
+    node.ask("/eye/points", cloud([(1.0, 0.3, 0.5)]))
+    wait_for(lambda: len(octomap_of(node)) == 1, "octomap")
+    assert not node.ask("~load_map", LoadMapRequest(str(file))).success
+    assert len(octomap_of(node)) == 1
+    assert any("load_map" in line and reason in line for line in node.logged), node.logged
+    assert not node.ask("~save_map", SaveMapRequest(str(tmp_path / "nowhere" / "seen.bt"))).success
+
+
+def test_large_cubes_fill_their_cells():
+    cells = OccupancyMap(0.1)
+    cells.take(Octree(0.1, BOXES))
+    assert len(cells) == 2 + 4 ** 3
+    found = cells.octree().boxes
+    assert (found[:, 3] == 0.1).all()
+    inside = np.abs(found[:, :3] - BOXES[2, :3]).max(axis=1) < 0.2
+    assert inside.sum() == 4 ** 3
+    cells.take(None)
+    assert not len(cells)
+    with pytest.raises(ValueError, match="cells"):
+        cells.take(Octree(0.1, np.array([(204.8, 204.8, 204.8, 409.6)])))

@@ -14,7 +14,7 @@ from moveit_ros_move_group.convert.scene_out import state_message, trajectory_me
 
 
 class CartesianPath:
-    """A fraction below 1 is no error; why the path ends there is told to the failures."""
+    """A fraction below 1 is not an error; the reason why the path ends there is published as a failure."""
 
     def __init__(self, context):
         self.context = context
@@ -42,7 +42,8 @@ class CartesianPath:
             limited = request.cartesian_speed_limited_link or link
             timed = slowed(model, scene.state, group, limited, timed, speed)
         response.fraction = path.fraction
-        # Without a stamp: a controller takes one for the time to begin at, and would leave out what is due already.
+        # Without a stamp: a controller takes one for the time to begin at, and would leave out points that are due
+        # already.
         response.solution = trajectory_message(group.joints, timed, model.frame)
         context.show_path(scene.state, response.solution)
         if path.reason is not None:
@@ -86,7 +87,7 @@ class CartesianPath:
 def slowed(model, state, group, link, timed, speed):
     """Return ``timed``, stretched so that the origin of ``link`` is nowhere faster than ``speed`` [m/s].
 
-    Raises RequestError where that would take longer than a motion may.
+    Raises RequestError if that would exceed the longest duration of a motion.
     """
     times = np.linspace(0.0, timed.duration, max(2, 4 * len(timed.times)))
     points = np.array([model.frame_of(state.with_q(q, group.indices).q, link, state.base)[:3, 3]

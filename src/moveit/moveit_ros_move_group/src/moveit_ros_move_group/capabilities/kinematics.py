@@ -14,7 +14,7 @@ from urdf_model.transforms import inverse
 
 # [s], for a request without a time-out.
 _TIMEOUT_S = 0.05
-# [s], however long a request would wait for another solution where all are refused: a service cannot be cancelled.
+# [s], upper bound of a request's time limit if all solutions are refused: a service cannot be cancelled.
 _LONGEST_S = 5.0
 
 
@@ -60,7 +60,7 @@ class Kinematics:
         else:
             links, poses = [request.ik_link_name or group.tip], [request.pose_stamped]
             if links == [None]:
-                raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "group '%s' is no chain; name the link for the "
+                raise RequestError(MoveItErrorCodes.INVALID_LINK_NAME, "group '%s' is not a chain; name a link for the "
                                    "pose" % group.name)
         twice = next((link for k, link in enumerate(links) if link in links[:k]), None)
         if twice is not None:

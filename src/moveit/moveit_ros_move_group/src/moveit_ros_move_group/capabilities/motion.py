@@ -25,9 +25,9 @@ from moveit_ros_move_group.planning import scene_with_diff
 from moveit_ros_move_group.rest_of_the_way import RestOfTheWay
 from moveit_ros_move_group.texts import result_text
 
-# How long [s] a joint state newer than the goal is waited for.
+# Time limit [s] for a joint state newer than the goal.
 _STATE_TIMEOUT_S = 1.0
-# Replanning, where neither the goal nor a parameter says how often.
+# Number of replanning attempts if neither the goal nor a parameter sets it.
 _REPLAN_ATTEMPTS = 5
 
 
@@ -50,7 +50,7 @@ class PlanService:
             response.trajectory = show(self.context, request.group_name, plan)
             response.planning_time = plan.planning_time
             response.error_code.val = MoveItErrorCodes.SUCCESS
-        except Exception as error:  # the node outlives whatever a request does to it
+        except Exception as error:  # the node must survive any error of a request
             response.error_code.val = failed(self.context, "plan_kinematic_path", error, request.group_name)[0]
             response.planning_time = time.monotonic() - begin
         return GetMotionPlanResponse(response)
@@ -78,7 +78,7 @@ class MoveAction:
             self._wait_for_state(group)
             with self.context.monitor.asking_for(self._server.is_preempt_requested):
                 reason = self._plan_only(goal, result) if plan_only else self._plan_and_execute(goal, result)
-        except Exception as error:  # the node outlives whatever a request does to it
+        except Exception as error:  # the node must survive any error of a request
             if self._server.is_preempt_requested():
                 error = RequestError(MoveItErrorCodes.PREEMPTED, "stopped on request (%s)" % error)
             result.error_code.val, reason = failed(self.context, "move_group", error, group)
@@ -114,7 +114,7 @@ class MoveAction:
         return plan
 
     def _plan_and_execute(self, goal, result):
-        """Fill the result; return the reason where it is no success."""
+        """Fill the result; return the reason if it fails."""
         context, options, request = self.context, goal.planning_options, goal.request
         if request.start_state.joint_state.name and not request.start_state.is_diff:
             rospy.logwarn("move_group: the start state is for planning alone; the robot starts where it is")
@@ -188,7 +188,7 @@ class ExecuteAction:
             result.error_code.val, reason = outcome.code, outcome.text
             if outcome.code != MoveItErrorCodes.SUCCESS:
                 self.context.failures.tell("execute_trajectory", outcome.code, outcome.text, joints=outcome.joints)
-        except Exception as error:  # the node outlives whatever a request does to it
+        except Exception as error:  # the node must survive any error of a request
             result.error_code.val, reason = failed(self.context, "execute_trajectory", error)
         self._server.publish_feedback(ExecuteTrajectoryFeedback("IDLE"))
         finish(self._server, result, result_text(result.error_code.val, reason))
@@ -213,7 +213,7 @@ class ExecuteService:
     def _execute(self, trajectory):
         try:
             outcome = self.context.executor.execute(trajectory)
-        except Exception as error:  # the caller may be gone: nobody else would say so
+        except Exception as error:  # the caller may have ended, so the node logs it
             return failed(self.context, "execute_kinematic_path", error)[0]
         if outcome.code != MoveItErrorCodes.SUCCESS:
             self.context.failures.tell("execute_kinematic_path", outcome.code, outcome.text, joints=outcome.joints)

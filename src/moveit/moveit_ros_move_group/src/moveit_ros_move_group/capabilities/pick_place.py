@@ -20,26 +20,36 @@ from moveit_msgs.msg import (
     PlaceLocation,
     PlaceResult,
 )
+from visualization_msgs.msg import MarkerArray
 
 from motion_planning.errors import PlanningError
-from motion_planning.manipulation import PickTask, PlaceTask, Tools, hand_links, places_on, plan_manipulation
+from motion_planning.manipulation import (
+    ManipulationFailure,
+    PickTask,
+    PlaceTask,
+    Tools,
+    hand_links,
+    places_on,
+    plan_manipulation,
+)
 from motion_planning.scene import SceneError
 from moveit_ros_move_group.capabilities.motion import failed, finish, require_state
 from moveit_ros_move_group.context import RequestError, wall_clock
 from moveit_ros_move_group.convert.geometry import stamped
 from moveit_ros_move_group.convert.grasps import grasp_candidate, hand_trajectory, place_candidate, usual_grasp
 from moveit_ros_move_group.convert.scene_out import state_message, trajectory_message
+from moveit_ros_move_group.grasp_markers import hands
 from moveit_ros_move_group.planning import scene_with_diff
 from moveit_ros_move_group.rest_of_the_way import RestOfTheWay
 from moveit_ros_move_group.texts import result_text
 
-# [s], where a goal has none.
+# [s], if a goal has none.
 _USUAL_TIME_S = 5.0
-# How long [s] a joint state newer than the goal is waited for.
+# Time limit [s] for a joint state newer than the goal.
 _STATE_TIMEOUT_S = 1.0
-# How near [rad or m] the path ends to where the approach begins.
+# Tolerance [rad or m] between the path's end and the start of the approach.
 _JOINED = 1e-4
-# Where a place is looked for by move_group itself, the hand comes and goes so far along the vertical [m].
+# If move_group itself chooses the place: length of the vertical approach and retreat, desired and least [m].
 _WAY_M, _LEAST_WAY_M = 0.1, 0.03
 
 
@@ -52,6 +62,7 @@ class PickPlace:
         self.may_execute = may_execute and context.executor is not None
         self.scaling = tuple(_share("~pick_place/max_%s_scaling_factor" % what)
                              for what in ("velocity", "acceleration"))
+        self.hands = rospy.Publisher("~display_grasp_markers", MarkerArray, queue_size=1, latch=True)
         self._actions = [_Action(self, _Pick), _Action(self, _Place)]
 
 
@@ -80,7 +91,7 @@ class _Action:
             if not plan_only:
                 self._feedback("MONITOR")
                 result.error_code.val, reason = self._execute(job, found)
-        except Exception as error:  # the node outlives whatever a request does to it
+        except Exception as error:  # the node must survive any error of a request
             result.error_code.val, reason = failed(self._context, name, error, goal.group_name)
             result.planning_time = result.planning_time or wall_clock() - begin
         finally:
@@ -107,7 +118,12 @@ class _Action:
 
         tools = Tools(self._context.exact, plan, wall_clock, lambda: stop() or rospy.is_shutdown(),
                       self._shared.scaling)
-        found = plan_manipulation(job.task, job.candidates, seconds, tools)
+        try:
+            found = plan_manipulation(job.task, job.candidates, seconds, tools)
+        except ManipulationFailure as failure:
+            self._shared.hands.publish(hands(job, None, failure.falls))
+            raise
+        self._shared.hands.publish(hands(job, found.candidate, found.falls))
         for fall in found.falls:
             rospy.loginfo("%s: %s", self._kind.name, fall)
         return found

@@ -21,7 +21,7 @@ from moveit_ros_move_group.planning import scene_with_diff
 from moveit_ros_move_group.rest_of_the_way import RestOfTheWay
 from moveit_ros_move_group.texts import result_text
 
-# How long [s] a joint state newer than the goal is waited for.
+# Time limit [s] for a joint state newer than the goal.
 _STATE_TIMEOUT_S = 1.0
 
 
@@ -39,7 +39,7 @@ class SequenceService:
             scene = self.context.scene_from(items[0].req.start_state, "plan_sequence_path") if items else None
             _planned(self.context, self._planner, items, scene, response)
             response.error_code.val = MoveItErrorCodes.SUCCESS
-        except Exception as error:  # the node outlives whatever a request does to it
+        except Exception as error:  # the node must survive any error of a request
             response.error_code.val = failed(self.context, "plan_sequence_path", error)[0]
         response.planning_time = time.monotonic() - begin
         return GetMotionSequenceResponse(response)
@@ -63,7 +63,7 @@ class SequenceAction:
         try:
             self._server.publish_feedback(MoveGroupSequenceFeedback("PLANNING"))
             reason = self._done(goal, plan_only, response)
-        except Exception as error:  # the node outlives whatever a request does to it
+        except Exception as error:  # the node must survive any error of a request
             response.error_code.val, reason = failed(self.context, "sequence_move_group", error)
         response.planning_time = response.planning_time or time.monotonic() - begin
         self._server.publish_feedback(MoveGroupSequenceFeedback("IDLE"))
@@ -73,7 +73,7 @@ class SequenceAction:
             plan_only and code == MoveItErrorCodes.SUCCESS), plan_only=plan_only), code)
 
     def _done(self, goal, plan_only, response):
-        """Fill the response; return the reason where it is no success."""
+        """Fill the response; return the reason if it fails."""
         context, options, items = self.context, goal.planning_options, goal.request.items
         begin = time.monotonic()
         joints = [joint for item in items for joint in context.group(item.req.group_name).joints]

@@ -12,19 +12,19 @@ from motion_planning.constraints import (
 )
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of, mesh_shape_of, shape_of
 
-# A cone of sight is drawn with so many corners at most.
+# Greatest number of corners of a cone of sight.
 _MOST_SIDES = 100
 
 
 def constraint_set_of(message, scene, reader):
     """Return the ConstraintSet of a Constraints message, None for one without any constraint.
 
-    Frames are looked up in ``scene`` as it is now, by ``reader`` (SceneReader). Raises PlanningError, for names of
-    joints and links that nothing has too.
+    Frames are looked up in ``scene`` as it is now, by ``reader`` (SceneReader). Raises PlanningError, also for unknown
+    joints and links.
     """
     for one in (*message.position_constraints, *message.orientation_constraints):
         if not (one.link_name in scene.model.link_index or scene.has_frame(one.link_name)):
-            raise MessageError("a constraint is on link '%s', which the robot has not, nor holds" % one.link_name)
+            raise MessageError("a constraint is on link '%s', which is neither a link nor attached" % one.link_name)
     found = ConstraintSet(
         message.name, [_joint(one, scene.model) for one in message.joint_constraints],
         [_position(one, scene, reader) for one in message.position_constraints],
@@ -42,7 +42,7 @@ def _joint(message, model):
     """Of a joint that mimics another: what it means for that one. MoveIt's clients name both."""
     joint, multiplier, offset = model.mimics.get(message.joint_name, (message.joint_name, 1.0, 0.0))
     if joint not in model.index:
-        raise MessageError("a constraint names joint '%s', which the robot has not or which cannot be moved"
+        raise MessageError("a constraint names joint '%s', which is unknown or cannot be moved"
                            % message.joint_name)
     if multiplier == 0.0:
         raise MessageError("joint '%s' always stands at %g, whatever a constraint says" % (message.joint_name, offset))

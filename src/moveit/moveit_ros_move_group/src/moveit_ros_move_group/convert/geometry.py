@@ -23,7 +23,7 @@ class MessageError(PlanningError):
 def matrix_of(pose, what="pose"):
     """Return the (4, 4) of a Pose or a Transform. A quaternion of zeros is taken for the identity, as MoveIt does.
 
-    Raises MessageError for numbers that are not finite and for a quaternion that is no rotation; ``what`` names it.
+    Raises MessageError for numbers that are not finite and for a quaternion that is not a rotation; ``what`` names it.
     """
     if isinstance(pose, Transform):
         point, turn = pose.translation, pose.rotation
@@ -96,7 +96,7 @@ def plane_shape_of(plane):
     if not (math.isfinite(length) and math.isfinite(offset) and length > 1e-9):
         raise MessageError("a plane needs finite coefficients and a normal, got %s" % list(plane.coef))
     normal = normal / length
-    # The shortest turn that takes z to the normal, so that a plane comes back as it was sent.
+    # The shortest turn that takes z to the normal, so that a plane is returned as it was sent.
     axis, cosine = np.cross((0.0, 0.0, 1.0), normal), normal[2]
     sine = float(np.linalg.norm(axis))
     if sine > 1e-9:
@@ -109,7 +109,7 @@ def plane_shape_of(plane):
 def add_shapes(message, shapes):
     """Append shapes ((shape, pose (4, 4)), ...) to a message with primitives, meshes, planes and their poses.
 
-    An octree, which has no message of its own there, is left out.
+    An octree is left out: it has no message type there.
     """
     for shape, pose in shapes:
         if isinstance(shape, TriangleMesh):

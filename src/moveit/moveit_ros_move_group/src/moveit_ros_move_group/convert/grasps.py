@@ -10,10 +10,10 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from motion_planning.manipulation import Candidate, Translation
 from moveit_ros_move_group.convert.geometry import MessageError, matrix_of
 
-# A hand takes at least so long for a posture that says nothing of time [s].
+# Least duration of a hand's posture without a time [s].
 _POSTURE_S = 0.5
-# The grasp that is tried where a goal has none: from so far in front of the object's origin along x [m], and how the
-# hand comes and goes: wished for, and at least [m].
+# The grasp for a goal without grasps: distance in front of the object's origin along x [m], and the length of approach
+# and retreat, desired and least [m].
 _IN_FRONT_M, _WAY_M, _LEAST_WAY_M = 0.2, 0.2, 0.1
 
 
@@ -31,7 +31,7 @@ def grasp_candidate(grasp, name, scene, reader, link):
 def place_candidate(place, name, reader, task, of_hand=False):
     """Return the Candidate of a PlaceLocation for a PlaceTask; its pose is the object's, or the hand's (``of_hand``).
 
-    Where it says nothing of the hand, this opens as it was open before the object was grasped. Raises PlanningError.
+    Without a posture of the hand, it opens as before the object was grasped. Raises PlanningError.
     """
     what, scene = "place '%s'" % name, task.scene
     pose = reader.frame(scene, place.place_pose.header.frame_id) @ matrix_of(place.place_pose.pose, what)
@@ -69,7 +69,7 @@ def usual_grasp(target, frame, hand):
 def posture_of(trajectory, model, what):
     """Return {joint: value} at the end of a hand's JointTrajectory, joints that mimic others left out.
 
-    Raises MessageError for joints that the robot has not, and values that are missing or no numbers.
+    Raises MessageError for unknown joints, and values that are missing or not numbers.
     """
     if not trajectory.points:
         return {}
@@ -79,7 +79,7 @@ def posture_of(trajectory, model, what):
                            % (what, len(end), len(trajectory.joint_names)))
     unknown = [name for name in trajectory.joint_names if name not in model.robot.joints]
     if unknown:
-        raise MessageError("%s: a posture names joint '%s', which robot '%s' has not" % (what, unknown[0], model.name))
+        raise MessageError("%s: a posture names joint '%s', unknown to robot '%s'" % (what, unknown[0], model.name))
     if not all(map(math.isfinite, end)):
         raise MessageError("%s: a posture is not finite: %s" % (what, list(end)))
     return {name: value for name, value in zip(trajectory.joint_names, end, strict=True) if name in model.index}
@@ -88,7 +88,7 @@ def posture_of(trajectory, model, what):
 def hand_trajectory(posture, values, model, force=0.0):
     """Return the RobotTrajectory that brings a hand from ``values`` {joint: value} to a posture (JointTrajectory).
 
-    What is beyond a joint's limits is brought onto them. A posture without times takes as long as its joints need.
+    Values beyond a joint's limits are clamped. A posture without times lasts as long as its joints need.
     force: effort of the last point where that has none, if above 0.
     """
     names = list(posture.joint_names)

@@ -23,7 +23,7 @@ def octree_of(message):
 
     Raises MessageError for a tree of another kind than OcTree and for data that end too early.
     """
-    if not message.data:
+    if not len(message.data):
         return None
     if message.id not in ("OcTree", "ColorOcTree") or message.id == "ColorOcTree" and not message.binary:
         raise MessageError("expected an OcTree, got '%s'" % message.id)
@@ -43,7 +43,7 @@ def octree_of(message):
 def octomap_message(octree, pose, frame, stamp):
     """Return the OctomapWithPose, binary, of an Octree at ``pose`` (4, 4) in ``frame``.
 
-    What is not occupied is unknown in it.
+    Cells that are not occupied are unknown in it.
     """
     message = OctomapWithPose(origin=pose_of(pose))
     message.header.frame_id, message.header.stamp = frame, stamp

@@ -23,14 +23,14 @@ _OPERATIONS = {CollisionObject.ADD: "ADD", CollisionObject.REMOVE: "REMOVE", Col
                CollisionObject.MOVE: "MOVE"}
 
 
-# So many parts of one message may be refused before the rest of it is left out.
+# Number of refused parts of a message after which its rest is left out.
 _MOST_ERRORS = 1000
 
 
 class SceneReader:
     """Applies messages to scenes; frames that a scene does not know are looked up by ``find_frame``.
 
-    find_frame(name): pose (4, 4) in the planning frame; raises PlanningError where there is none.
+    find_frame(name): pose (4, 4) in the planning frame; raises PlanningError if there is none.
     """
 
     def __init__(self, find_frame=None):
@@ -75,7 +75,7 @@ class SceneReader:
             if not (what.primitives or what.meshes or what.planes):
                 return scene.attach(what.id, message.link_name, message.touch_links, message.detach_posture)
             if message.link_name not in scene.model.link_index:
-                return scene.attach(what.id, message.link_name)  # says that there is no such link
+                return scene.attach(what.id, message.link_name)  # raises the error for an unknown link
             link = scene.frame(message.link_name)
             frame = self.frame(scene, what.header.frame_id) if what.header.frame_id else link
             new = _object_of(what, inverse(link) @ frame)
@@ -90,7 +90,7 @@ class SceneReader:
     def with_robot_state(self, scene, message, errors):
         """Return the scene after a RobotState: over what is there if it is a diff, else without what the robot held.
 
-        Joints that the model does not have are ignored. What cannot be understood is told to ``errors`` (list).
+        Joints that the model does not have are ignored. ``errors`` (list) gets the reasons for refused parts.
         """
         try:
             scene = scene.with_state(state_over(scene, message, self))
@@ -136,7 +136,8 @@ class SceneReader:
         return self._with_world(scene.without_object("").with_octomap(None), message, set(), errors), errors
 
     def _with_world(self, scene, message, held_before, errors):
-        # One who attaches an object often removes it from the world in the same message; it has left it by then.
+        # Clients that attach an object often remove it from the world in the same message; by then it is no longer
+        # there.
         taken = {name for name in scene.state.attached if name not in held_before and name not in scene.objects}
         objects = [one for one in message.collision_objects
                    if not (one.id in taken and one.operation == CollisionObject.REMOVE)]
@@ -202,7 +203,7 @@ class SceneReader:
         return scene
 
     def _made(self, messages, make, errors):
-        """[make(message), ...] of those that can be done; why others cannot is told to ``errors``."""
+        """[make(message), ...] of the valid ones; ``errors`` gets the reasons for the others."""
         made = []
         for message in messages:
             if len(errors) >= _MOST_ERRORS:
@@ -243,7 +244,7 @@ def state_over(scene, message, reader):
 
 def _operation(message):
     value = message.operation
-    # rospy reads a byte as a number, but clients in Python set what they like.
+    # rospy reads a byte as a number, but clients in Python may set any type.
     value = value[0] if isinstance(value, bytes) and value else value
     if value not in _OPERATIONS:
         raise MessageError("operation %r of object '%s' is none of ADD 0, REMOVE 1, APPEND 2, MOVE 3"
@@ -261,7 +262,8 @@ def _is_unset(pose):
 
 
 def _object_of(message, frame):
-    """The WorldObject of a CollisionObject's shapes; ``frame`` (4, 4): its header's, where the poses shall be given."""
+    """The WorldObject of a CollisionObject's shapes; ``frame`` (4, 4): its header's, in which the poses are
+    returned."""
     shapes = []
     for kind, items, poses, convert in (("primitives", message.primitives, message.primitive_poses, shape_of),
                                         ("meshes", message.meshes, message.mesh_poses, mesh_shape_of),

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The hand at each grasp or place that was offered, as markers."""
+import numpy as np
+from geometry_msgs.msg import Vector3
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from moveit_ros_move_group.convert.geometry import pose_of
+from urdf_model import Box, Cylinder, Mesh, Sphere
+
+#: Of the one that works, of those that fell, and of those that were not tried.
+WORKS, FELL, UNTRIED = (0.2, 0.8, 0.3, 0.9), (0.9, 0.15, 0.1, 0.3), (0.6, 0.6, 0.6, 0.3)
+
+
+def hands(job, chosen, falls):
+    """Return the MarkerArray of a pick or place: each Candidate's hand where it closes or opens, its posture before.
+
+    job: has task, candidates and hand (names of links); chosen: the Candidate that works, or None; falls: Falls.
+    """
+    model, fallen = job.task.scene.model, {fall.candidate for fall in falls}
+    markers = [Marker(action=Marker.DELETEALL)]
+    markers[0].header.frame_id = model.frame
+    for candidate in job.candidates:
+        colour = WORKS if candidate is chosen else FELL if candidate.name in fallen else UNTRIED
+        markers += _hand(job, candidate, colour)
+    return MarkerArray(markers)
+
+
+def _hand(job, candidate, colour):
+    model, state = job.task.scene.model, job.task.scene.state
+    opened = {name: float(np.clip(value, *model.bounds[model.index[name]]))
+              for name, value in candidate.before.items() if name in model.index}
+    frames = model.frames(state.with_joints(opened).q, state.base)
+    # From the link's present pose to its target.
+    moved = candidate.pose @ np.linalg.inv(frames[model.link_index[job.task.link]])
+    found = []
+    for link in sorted(job.hand):
+        for visual in model.robot.links[link].visuals:
+            kind, size = _shape(visual.geometry)
+            if kind is None:
+                continue
+            marker = Marker(ns=candidate.name, id=len(found), type=kind, scale=Vector3(*size), color=ColorRGBA(*colour),
+                            pose=pose_of(moved @ frames[model.link_index[link]] @ visual.origin),
+                            mesh_resource=visual.geometry.filename if kind == Marker.MESH_RESOURCE else "")
+            marker.header.frame_id = model.frame
+            found.append(marker)
+    return found
+
+
+def _shape(geometry):
+    """(type of a Marker, its scale); (None, ()) for what no marker shows."""
+    if isinstance(geometry, Mesh):
+        return Marker.MESH_RESOURCE, tuple(geometry.scale)
+    if isinstance(geometry, Box):
+        return Marker.CUBE, tuple(geometry.size)
+    if isinstance(geometry, Sphere):
+        return Marker.SPHERE, (2.0 * geometry.radius,) * 3
+    if isinstance(geometry, Cylinder):
+        return Marker.CYLINDER, (2.0 * geometry.radius, 2.0 * geometry.radius, geometry.length)
+    return None, ()
