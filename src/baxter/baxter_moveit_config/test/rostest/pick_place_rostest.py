@@ -9,9 +9,10 @@ import rospy
 from geometry_msgs.msg import Pose, PoseStamped, Quaternion
 from moveit_msgs.msg import Grasp, MoveItErrorCodes, PickupAction, PickupGoal, PlaceLocation
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from visualization_msgs.msg import MarkerArray
 
 from baxter_model import SIDES, tip_of
-from lab_testing.waiting import stretched
+from lab_testing.waiting import stretched, wait_until
 from moveit_commander import MoveGroupCommander, PlanningSceneInterface
 
 BLOCK, SIZE = "block", (0.04, 0.04, 0.1)
@@ -54,6 +55,8 @@ class PickPlaceTest(unittest.TestCase):
     def setUpClass(cls):
         cls.arms = {side: MoveGroupCommander(side + "_arm", wait_for_servers=stretched(60.0)) for side in SIDES}
         cls.scene = PlanningSceneInterface(synchronous=True)
+        cls.hands = []
+        cls.subscriber = rospy.Subscriber("/move_group/display_grasp_markers", MarkerArray, cls.hands.append)
 
     def setUp(self):
         self.scene.clear()
@@ -77,6 +80,14 @@ class PickPlaceTest(unittest.TestCase):
         out_of_reach = from_above(side, (3.0, 0.0, 0.0), "far", 0.9)
         self.assertEqual(self.arms[side].pick(BLOCK, [out_of_reach, from_above(side, spot)]), CODES.SUCCESS)
 
+    def assert_shown(self):
+        """The hand is shown at both grasps, and which of them works."""
+        def shown():
+            green = {(marker.ns, marker.color.g > marker.color.r) for marker in self.hands[-1].markers if marker.ns}
+            return green == {("far", False), ("top", True)}
+
+        wait_until(lambda: self.hands and shown(), "the hand at both grasps, red and green")
+
     def held(self):
         return self.scene.get_attached_objects()
 
@@ -89,6 +100,7 @@ class PickPlaceTest(unittest.TestCase):
                 self.assertEqual(arm.pick(BLOCK, from_above(side, spot), plan_only=True), CODES.SUCCESS)
                 np.testing.assert_allclose(arm.get_current_joint_values(), before, atol=1e-3)
                 self.pick(side, spot)
+                self.assert_shown()
                 held = self.held()[BLOCK]
                 self.assertEqual(held.link_name, tip_of(side))
                 self.assertIn(side[0] + "_gripper_r_finger_tip", held.touch_links)
@@ -124,7 +136,7 @@ class PickPlaceTest(unittest.TestCase):
 
     def test_why_none_works(self):
         client = actionlib.SimpleActionClient("pickup", PickupAction)
-        self.assertTrue(client.wait_for_server(rospy.Duration(stretched(20.0))))
+        self.assertTrue(client.wait_for_server(rospy.Duration(stretched(90.0))))
         spot = self.spot("left")
         self.block_at(spot)
         self.scene.add_box("lid", at(*spot[:2], spot[2] + 0.1), (0.2, 0.2, 0.02))
@@ -138,7 +150,7 @@ class PickPlaceTest(unittest.TestCase):
 
         code, text = ended()
         self.assertEqual(code, CODES.GOAL_IN_COLLISION)
-        self.assertRegex(text, "'top' falls at 'grasp pose': .*'lid'")
+        self.assertRegex(text, "'top' fails at 'grasp pose': .*'lid'")
         for fields, expected in (({"target_name": "brick"}, CODES.INVALID_OBJECT_NAME),
                                  ({"group_name": "tail"}, CODES.INVALID_GROUP_NAME),
                                  ({"end_effector": "claw"}, CODES.INVALID_GROUP_NAME),
