@@ -32,7 +32,7 @@ class BringupTest(unittest.TestCase):
     def end_lab(self):
         if self.lab.poll() is None:
             os.killpg(self.lab.pid, signal.SIGINT)
-            self.lab.wait(30.0)
+            self.lab.wait(TIMEOUT_S)
 
     def printed(self, text):
         with open(self.output.name) as file:
