@@ -15,15 +15,27 @@ from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
 from rf_checks.graph import LabFailed
 from rf_checks.isolation import NotIsolated
 from rf_checks.judge import WALL_LIMIT_S, Judge
+from rf_checks.lab import WhichRobot
 
 PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
 
 
 def _listing():
+    lab_width = max(len(exercise.lab) for exercise in EXERCISES)
     width = max(len(exercise.name) for exercise in EXERCISES)
-    lines = ["  %-5s %-*s  %s\n  %s  runs as: %s" % (exercise.lab, width, exercise.name, exercise.title,
-                                                    " " * (5 + 1 + width), exercise.usage) for exercise in EXERCISES]
+    lines = ["  %-*s  %-*s  %s\n  %s  runs as: %s" % (lab_width, exercise.lab, width, exercise.name, exercise.title,
+                                                     " " * (lab_width + 2 + width), exercise.usage)
+             for exercise in EXERCISES]
     return "\n".join(lines)
+
+
+def _command_for(word):
+    """The command that checks what a single word may mean, the name of an exercise or its program; or a list of all."""
+    name = Path(word).stem
+    for exercise in EXERCISES:
+        if exercise.name == name:
+            return "./baxter.sh check %s %s" % (exercise.lab, word if word.endswith(".py") else word + ".py")
+    return "./baxter.sh check LAB %s, where LAB is %s" % (word, " or ".join(LABS))
 
 
 class _Parser(argparse.ArgumentParser):
@@ -36,11 +48,11 @@ class _Parser(argparse.ArgumentParser):
 def _parser():
     parser = _Parser(
         prog="./baxter.sh check", formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Run your program in a lab of its own and say how well it does the exercise. The lab that you may "
-                    "have running is not touched.",
+        description="Run your program in a separate lab and judge the result. A running lab "
+                    "is not affected.",
         epilog="exercises:\n%s\n\nWithout EXERCISE the program's name or a line `# exercise: NAME` in it decides.\n"
-               "Else it is guessed from what the program does; the answer's first line says as what it was taken.\n"
-               "exit status: 0 passed, 1 not passed, 2 wrong words, 3 the check itself failed,\n"
+               "Otherwise it is guessed from the program; the first line of the result names it.\n"
+               "exit status: 0 passed, 1 not passed, 2 wrong arguments, 3 the check itself failed,\n"
                "             4 not graded: this machine is too slow" % _listing())
     parser.add_argument("lab", nargs="?", metavar="LAB", help=" or ".join(LABS))
     parser.add_argument("words", nargs="*", metavar="[EXERCISE] PROGRAM", help="a Python file")
@@ -48,6 +60,10 @@ def _parser():
     parser.add_argument("--start", metavar="EXERCISE",
                         help="copy this exercise's skeleton into the current folder and end")
     parser.add_argument("--seed", type=int, default=0, help="seed of start postures and goals (default: %(default)s)")
+    parser.add_argument("--profile", choices=("sim", "robot"), default="sim",
+                        help="sim: ideal drives and sensors; robot: a physical robot's (default: %(default)s)")
+    parser.add_argument("--serial", type=int, default=0,
+                        help="which robot: its mounts are its own; 0 is the drawing (default: %(default)s)")
     parser.add_argument("--wall-limit", type=float, default=WALL_LIMIT_S, metavar="SECONDS",
                         help="give up ungraded after so long; a slow or busy machine needs more (default: %(default)g)")
     parser.add_argument("--trusted", action="store_true",
@@ -62,6 +78,8 @@ def _program_and_exercise(parser, options):
     words = options.words
     if not options.lab:
         parser.error("say which lab and which program: ./baxter.sh check lab2 my_node.py (--list shows them all)")
+    if not words and options.lab not in LABS:
+        parser.error("there is no lab '%s'; did you mean %s?" % (options.lab, _command_for(options.lab)))
     if options.lab.endswith(".py") or len(words) not in (1, 2):
         parser.error("expected LAB [EXERCISE] PROGRAM, as in ./baxter.sh check lab2 my_node.py, got: %s"
                      % " ".join([options.lab, *words]))
@@ -80,6 +98,8 @@ def _program_and_exercise(parser, options):
         parser.error("the wall limit is %g, expected a positive number of seconds" % options.wall_limit)
     if options.seed < 0:
         parser.error("the seed is %d, expected 0 or more" % options.seed)
+    if options.serial < 0:
+        parser.error("the serial number is %d, expected 0 or more" % options.serial)
     try:
         return path, choose(options.lab, name, path.name, submission.texts(path)[path.name])
     except (UnknownExercise, submission.BadSubmission) as error:
@@ -96,7 +116,8 @@ def start(name):
     folder = Path(rospkg.RosPack().get_path("rf_checks")) / "exercises" / "skeletons"
     source, target = folder / (name + ".py"), Path(name + ".py")
     if name not in [exercise.name for exercise in EXERCISES]:
-        print("there is no exercise '%s'; --list shows them" % name, file=sys.stderr)
+        print("there is no exercise '%s'; there are: %s" % (name, ", ".join(exercise.name for exercise in EXERCISES)),
+              file=sys.stderr)
         return WRONG_WORDS
     if os.path.lexists(target):
         print("%s is there already; it stays as it is" % target, file=sys.stderr)
@@ -137,10 +158,11 @@ def main(argv=None):
         signal.signal(number, lambda *_: sys.exit(130))
     print("Checking %s as %s %s; this takes up to a minute." % (program, exercise.lab, exercise.name), flush=True)
     try:
-        with Judge(options.wall_limit, options.trusted) as judge:
+        which = WhichRobot(options.profile, options.serial)
+        with Judge(options.wall_limit, options.trusted, which) as judge:
             result = judge.check(exercise, program, options.seed)
     except NotIsolated as refusal:
-        print("a stranger's program is not run without walls around it, and this machine allows none: %s" % refusal,
+        print("the program was not run: it is checked in a sandbox, and this machine allows none: %s" % refusal,
               file=sys.stderr)
         return JUDGE_FAILED
     except submission.BadSubmission as refusal:

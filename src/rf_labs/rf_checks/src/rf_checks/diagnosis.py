@@ -37,7 +37,7 @@ def check_syntax(text, name):
             hint = "; the sheet's `generate_posemsg` has its `return` at the margin: indent the line"
         return Fault("syntax", "line %s cannot be read by Python: %s%s" % (error.lineno or "?", error.msg, hint), 0.0)
     except ValueError as error:  # null bytes
-        return Fault("syntax", "the file is no Python program: %s" % error, 0.0)
+        return Fault("syntax", "the file is not a Python program: %s" % error, 0.0)
     return None
 
 
@@ -234,7 +234,9 @@ def diagnose(run, exercise, call, robot, share):
     if fault:
         return fault
     if share < 0.995:
-        fault = (left_on_its_way(run, exercise.sides)
+        foremost = getattr(exercise.task, "foremost", None)
+        fault = (foremost and foremost(call, run)
+                 or left_on_its_way(run, exercise.sides)
                  or (exercise.task.slip(call, run, robot) if run.recording.records else None)
                  or behaviour(run, exercise.sides, call.limit_s))
     if fault is None and run.survivors:

@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 
 from baxter_model import SIDES
-from rf_checks import tasks, tasks_printed
+from rf_checks import tasks, tasks_planning, tasks_printed
 
 #: Points of 100 from which an exercise counts as done.
 PASS_MARK = 80.0
@@ -40,6 +40,8 @@ EXERCISES = (
              ("ik", "frame")),
     Exercise("cwru", "joint_command", "bring the right arm to seven angles by joint commands",
              "joint_command.py Q0 ... Q6", tasks.JointCommand(), ("joint", "command", "stream"), ("right",)),
+    Exercise("moveit", "plan_around", "plan the left arm's way around a pillar, to its state left_neutral",
+             "plan_around.py X Y Z LX LY LZ", tasks_planning.PlanAround(), ("plan", "around", "pillar"), ("left",)),
 )
 LABS = tuple(dict.fromkeys(exercise.lab for exercise in EXERCISES))
 # Texts that only programs of one exercise contain, the most specific first.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Registrations and parameters at the ROS master of the judge's lab, and their changes.
 
-The judge uses rosgraph and is no node. Every process that reaches a master may register, unregister and set parameters
-in any node's name. So a node counts as gone when its process is gone, even if another process has its name.
+The judge uses rosgraph and is not a node. Every process that reaches a master may register, unregister and set
+parameters in any node's name. So a node counts as gone when its process is gone, even if another process has its name.
 """
 import contextlib
 import time

@@ -128,7 +128,7 @@ def _is_script(path):
 
 
 def main(words=None):
-    """Returns the exit status: 0 done, 1 not possible, 2 wrong words."""
+    """Returns the exit status: 0 done, 1 not possible, 2 wrong arguments."""
     words = sys.argv[1:] if words is None else words
     if len(words) != 1 or words[0].startswith("-"):
         print("usage: ./baxter.sh handout FOLDER\n\nMakes the students' copy of this workspace in FOLDER: without "

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The sandbox of a check, from bubblewrap and the kernel's namespaces. Free of ROS; Linux only.
 
-The whole check has a network namespace of its own, with a loopback and nothing else (`enter_network`). In it, the lab
+The whole check has a separate network namespace, with a loopback and nothing else (`enter_network`). In it, the lab
 and the student's program each run in a sandbox (`command`): with own processes and own /dev/shm, with a home and a /tmp
 of limited size that are deleted afterwards, and with only those parts of the machine that programs need, read-only. No
 sandbox shows the solutions or the history of the workspace; a program's does not show the judge either.
@@ -187,6 +187,8 @@ def _hide(roots, names):
     for root in roots:
         for name in names:
             path = os.path.join(root, name)
+            if not path.startswith(root + "/"):
+                continue  # an absolute name elsewhere, which no sandbox shows
             if os.path.isdir(path):
                 options += ["--tmpfs", path, "--remount-ro", path]
             elif os.path.exists(path):
@@ -194,12 +196,12 @@ def _hide(roots, names):
     return options
 
 
-def command(environment, binds=(), hidden=SOLVED, own_network=False):
-    """The command prefix that starts a command in a sandbox of its own.
+def command(environment, binds=(), hidden=SOLVED, own_network=False, further=()):
+    """The command prefix that starts a command in a separate sandbox.
 
     environment: of the command; it shows which workspace is needed. binds: (source, target, writable) of further files
-    and folders. hidden: names below the workspace that are not shown. own_network: for a process that has not called
-    `enter_network`. Raises NotIsolated.
+    and folders. hidden: names below the workspace, or absolute paths, that are not shown. own_network: for a process
+    that has not called `enter_network`. further: more options of bubblewrap. Raises NotIsolated.
     """
     if problem():
         raise NotIsolated(problem())
@@ -212,7 +214,7 @@ def command(environment, binds=(), hidden=SOLVED, own_network=False):
         options += ["--bind" if writable else "--ro-bind", str(source), str(target)]
     # Parent folders that bubblewrap makes are in memory, without a size limit.
     options += ["--remount-ro", "/dev", "--remount-ro", "/", "--chdir", HOME]
-    return ["bwrap", *options, *(("--unshare-net",) if own_network else ()), "--"]
+    return ["bwrap", *options, *(("--unshare-net",) if own_network else ()), *further, "--"]
 
 
 def environment_of(environment):
@@ -224,7 +226,8 @@ def environment_of(environment):
 
 
 def caches(environment, folder):
-    """Copies of what numba has compiled, as `binds` for `command`: numba wants to write beside the source.
+    """Copies of what numba has compiled and of spheres that stand for robots' links, as `binds` for `command`: they are
+    used only where they could be written, beside the source.
 
     folder: folder of the copies, used by nothing else, so that a sandbox cannot change the originals.
     """
@@ -235,7 +238,7 @@ def caches(environment, folder):
             if "__pycache__" in names:
                 names.remove("__pycache__")
                 cache = Path(path) / "__pycache__"
-                if next(cache.rglob("*.nbi"), None):
+                if any(next(cache.rglob(kind), None) for kind in ("*.nbi", "*.npy")):
                     copy = Path(folder) / ("cache-%d" % len(binds))
                     shutil.copytree(cache, copy)
                     binds.append((copy, cache, True))

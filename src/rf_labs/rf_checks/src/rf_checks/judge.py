@@ -9,7 +9,7 @@ import numpy as np
 
 from rf_checks import diagnosis, isolation, submission
 from rf_checks.graph import LabFailed, MasterSilent
-from rf_checks.lab import Lab, TooSlow, robot_description, student_folder
+from rf_checks.lab import Lab, TooSlow, WhichRobot, robot_description, student_folder
 from rf_checks.observing import Observer
 from rf_checks.pacing import Tree
 from rf_checks.recording import RECORD_S, Changes, Criterion, Fault, Recording, Run
@@ -35,13 +35,14 @@ MASTER = "/rosout and with it the ROS master"
 
 @dataclass(frozen=True)
 class RunResult:
-    """One run: the program's arguments, its Criteria, its Fault or None; end: how_it_ended, None when it did not
-    run."""
+    """One run: the program's arguments, its Criteria, its Fault or None; end: how_it_ended, trace: the Run, both None
+    when it did not run."""
 
     arguments: tuple
     criteria: tuple
     fault: Fault | None
     end: dict | None = None
+    trace: Run | None = None
 
     @property
     def points(self):
@@ -62,6 +63,8 @@ class Result:
     not_graded: str = ""
     #: Sentences for the instructor, which change no points.
     notes: tuple = ()
+    #: On which robot it ran.
+    which: WhichRobot = WhichRobot()
 
     @property
     def points(self):
@@ -77,9 +80,10 @@ class Result:
 class Judge:
     """Keeps one lab for any number of programs; a context manager."""
 
-    def __init__(self, wall_limit_s=WALL_LIMIT_S, trusted=False):
+    def __init__(self, wall_limit_s=WALL_LIMIT_S, trusted=False, which=WhichRobot(), hidden=()):  # noqa: B008 (a tuple)
         """`wall_limit_s`: a check that takes longer ends without a grade [s]. `trusted`: if this machine allows no
-        sandbox, run programs without one. Raises isolation.NotIsolated.
+        sandbox, run programs without one. `which`: the robot to judge on, a WhichRobot. `hidden`: further folders that
+        no program may see, as other students' submissions. Raises isolation.NotIsolated, LabFailed.
 
         The caller must call `isolation.try_to_enter_network` before, while no other thread runs.
         """
@@ -87,7 +91,8 @@ class Judge:
         self.has_walls = not isolation.problem()
         if not (self.has_walls or trusted):
             raise isolation.NotIsolated(isolation.problem())
-        self._description = robot_description()
+        self._which, self._hidden = which, tuple(map(str, hidden))
+        self._description = robot_description(which.serial)
         self.robot = Robot(self._description)
         self._lab = None
         adopt_orphans()
@@ -129,18 +134,18 @@ class Judge:
             criteria = tuple(exercise.task.criteria(call, run, self.robot))
             share = sum(one.share * one.weight for one in criteria) / 100.0
             found = diagnosis.diagnose(run, exercise, call, self.robot, share)
-            results.append(RunResult(call.arguments, criteria, found, how_it_ended(run)))
+            results.append(RunResult(call.arguments, criteria, found, how_it_ended(run), run))
             # Such a fault repeats and costs time: the other runs count as this one.
             if found and (found.cap < 0.9 or (found.key in REPEATED and share < 0.5)):
                 fault = found
                 not_run = (Criterion("as the run before", share, 100.0, "not run, for the fault below"),)
         walls = "bubblewrap" if self.has_walls else "none: trusted"
         return Result(exercise, str(program), seed, tuple(results), walls, time.monotonic() - began, not_graded,
-                      tuple(Library(_workspace()).notes(texts)))
+                      tuple(Library(_workspace()).notes(texts)), self._which)
 
     def run(self, program, exercise, call, deadline=float("inf")):
         """One run; returns a Run. Raises TooSlow at `deadline` (monotonic, s)."""
-        lab = self._fresh_lab(call.posture, deadline)
+        lab = self._fresh_lab(call, deadline)
         run = Run(list(call.arguments), Recording(lab.joint_names), program=program.name)
         observer = Observer(call, lambda output: self._is_satisfied(exercise, call, run, output),
                             lambda: self._look_at_graph(lab, run))
@@ -151,7 +156,8 @@ class Judge:
         lab.watch.helpers.roots = lab.helper_pids()
         began = time.monotonic()
         student = observer.student = Student(program, call.arguments, environment, self.has_walls,
-                                             Startup(student_folder(), clock.environment, (clock.descriptor,)))
+                                             Startup(student_folder(), clock.environment, (clock.descriptor,),
+                                                     self._hidden))
         lab.watch.program = tree = Tree((student.pid,))
         lab.watch.gives_up = lambda: time.monotonic() > deadline
         lab.run_clock, lab.is_hurried = clock, True
@@ -182,15 +188,18 @@ class Judge:
             lab.graph.forget_strangers()
         return run
 
-    def _fresh_lab(self, posture, deadline):
+    def _fresh_lab(self, call, deadline):
+        # Nobody resets a move_group.
+        if self._lab is not None and (call.obstacle or self._lab.obstacle):
+            self.close()
         for attempt in (1, 2):
             if self._lab is not None and not self._lab.is_as_it_was():
                 self.close()
             try:
                 if self._lab is None:
-                    self._lab = Lab(self._description, self.has_walls)
+                    self._lab = Lab(self._description, self.has_walls, self._which, call.obstacle)
                     self._lab.start(deadline)
-                self._lab.reset(posture, deadline)
+                self._lab.reset(call.posture, deadline)
                 return self._lab
             except LabFailed:
                 self.close()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A lab of the judge's own: master, simulator and the nodes around it, on a free port.
 
-The judge itself is no ROS node: it gets the robot's motion through the recorder's socket, and the list of nodes from
+The judge itself is not a ROS node: it gets the robot's motion through the recorder's socket, and the list of nodes from
 the master (graph.py).
 """
 import contextlib
@@ -17,8 +17,10 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import rospkg
+from roslib.packages import find_node
 
 from baxter_model import SIDES
 from lab_environment.ports import free_port
@@ -37,12 +39,16 @@ CALM_RECORDS = 20
 _SHORTEST_RECORD_S = 0.0025
 #: Programs whose responses a student's program waits for, or that still process its messages: time must wait for them,
 #: too.
-HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserver")
-#: The node that spawns the robot, and then ends.
-SPAWNER = "/urdf_spawner"
+HELPERS = ("position_kinematics", "robot_state_publisher", "rosmaster", "gzserver", "move_group",
+           "joint_trajectory_action_server")
+#: The nodes that spawn the robot and an obstacle, and then end.
+SPAWNER, OBSTACLE_SPAWNER = "/urdf_spawner", "/obstacle_spawner"
+#: What move_group serves, once it can plan.
+PLANNING_SERVICE = "/plan_kinematic_path"
 #: How the IK nodes report their requests to the recorder.
 OBSERVER = ("IK_OBSERVER", "rf_checks.ik_witness:Witness")
 _NAME = b"__name:="
+_ENDED_NODE = re.compile(r"\[([\w./-]+)\] process has finished cleanly")
 _DEAD_NODE = re.compile(r"\[([\w./-]+)\] process has died \[pid \d+, exit code -?[1-9]")
 
 
@@ -50,15 +56,29 @@ class TooSlow(Exception):
     """This machine was too slow to finish before the deadline; the text gives its speed."""
 
 
+class WhichRobot(NamedTuple):
+    """The robot of a lab: `profile` and `serial` as the arguments of baxter_world.launch."""
+
+    profile: str = "sim"
+    serial: int = 0
+
+    @property
+    def is_usual(self):
+        """Whether it is the one of the labs."""
+        return self == WhichRobot()
+
+
 class Lab:
     """Start with :meth:`start`, end with :meth:`close`; a context manager."""
 
-    def __init__(self, description_xml, walls=True):
-        """`description_xml`: the robot's URDF text. `walls`: in a sandbox of its own, as isolation.py says."""
+    def __init__(self, description_xml, walls=True, which=WhichRobot(), obstacle=None):  # noqa: B008 (a tuple)
+        """`description_xml`: the robot's URDF text. `walls`: in a separate sandbox, as isolation.py says. `which`:
+        a WhichRobot. `obstacle`: tasks_planning.Obstacle, which comes with move_group."""
         self.uri = ""
+        self.obstacle = obstacle
         #: The lab's Graph, once it has started.
         self.graph = None
-        self._walls = walls
+        self._walls, self._which = walls, which
         self.watch = Watch()
         #: Called with each record (dict), in the thread that steps the world: the world waits until it returns.
         self.on_record = lambda record: None
@@ -126,7 +146,8 @@ class Lab:
             description.write_text(re.sub(r"<robot\b[^>]*>", lambda tag: tag[0] + PLUGIN_ELEMENT, self._description,
                                           count=1), encoding="utf-8")
             self._run(["roslaunch", "-p", str(port), str(_share() / "launch" / "lab.launch"),
-                       "description:=%s" % description], environment)
+                       "description:=%s" % description, *("%s:=%s" % item for item in self._which._asdict().items()),
+                       *self._obstacle_arguments()], environment)
             self._own_time.restart()
             self._connection = self._await(lambda: _accept(listener), "the simulator", deadline)
         self._connection.settimeout(None)
@@ -287,9 +308,27 @@ class Lab:
         return {name: functools.partial(is_running, pid) for pid, name in named.items()
                 if not any(named[other] == name and other != pid and pid in children_of((other,)) for other in named)}
 
+    def _obstacle_arguments(self):
+        if self.obstacle is None:
+            return []
+        file = self._folder / "obstacle.urdf"
+        file.write_text(self.obstacle.urdf(), encoding="utf-8")
+        return ["obstacle:=%s" % file, "obstacle_at:=-x %g -y %g -z %g" % self.obstacle.middle]
+
+    def _plans(self):
+        """Whether the obstacle stands there and move_group can plan; True where the lab has neither."""
+        return self.obstacle is None or (
+            PLANNING_SERVICE in self.graph.services() and OBSTACLE_SPAWNER not in self.graph.nodes()
+            and OBSTACLE_SPAWNER[1:] in self._ended_nodes())
+
+    def _ended_nodes(self):
+        """Names of nodes that ended well according to roslaunch."""
+        return {name.rpartition("-")[0] for name in
+                _ENDED_NODE.findall((self._folder / "output.txt").read_text(errors="replace"))}
+
     def _all_there(self):
         services, nodes = self.graph.services(), self.graph.nodes()
-        return (all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services
+        return (self._plans() and all("/ExternalTools/%s/PositionKinematicsNode/IKService" % side in services
                     for side in SIDES)
                 and "/robot_state_publisher" in nodes and self.joint_names and self._has_time
                 # The spawner still waits for the response of a service that the first reset withdraws.
@@ -353,12 +392,13 @@ def student_folder():
     return _share() / "student"
 
 
-def robot_description():
-    """The URDF text of the lab's robot. Raises LabFailed."""
+def robot_description(serial=0):
+    """The URDF text of the lab's robot, of the one with this serial number. Raises LabFailed."""
     packages = rospkg.RosPack()
-    command = [str(Path(packages.get_path("xacro")) / "xacro"),
+    command = [find_node("baxter_sim_hardware", "robot_of_serial")[0], str(serial),
+               str(Path(packages.get_path("xacro")) / "xacro"),
                str(Path(packages.get_path("baxter_description")) / "urdf" / "baxter.urdf.xacro")]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
-        raise LabFailed("xacro fails on the robot's description: %s" % done.stderr.strip())
+        raise LabFailed("the robot's description cannot be made: %s" % done.stderr.strip())
     return done.stdout

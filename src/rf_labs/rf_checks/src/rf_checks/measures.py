@@ -10,7 +10,7 @@ from urdf_model.transforms import rotation_angle
 STANDS_RAD_S = 0.02
 # Above this speed it moves again: at a turning point the speed oscillates about the bound above [rad/s].
 MOVES_RAD_S = 0.06
-# No joint of the robot turns faster than 4 rad/s: a larger step between two records [rad] is no motion.
+# No joint of the robot turns faster than 4 rad/s: a larger step between two records [rad] is not a motion.
 JUMP_RAD = 0.15
 
 

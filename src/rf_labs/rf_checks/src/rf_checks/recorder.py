@@ -61,13 +61,17 @@ class Recorder(ModelPlugin):
         record = {"t": round(time_s, 4), "q": [round(value, 6) for value in self._model.read_joints()[0]],
                   "enabled": self._robot is not None and self._robot.is_enabled, "contacts": self._contacts(),
                   "commands": self._take_commands(), "counts": dict(self._counts), "accepted": dict(self._accepted),
-                  "placed": self._placed, "ik": self._take_requests()}
+                  "placed": self._placed, "ik": self._take_requests(), **self._more()}
         if self._done:
             record["done"] = self._done.pop()
         self._tell(record)
         answer = self._hear()
         if answer:
             self._done.append(self._obey(answer, time_s))
+
+    def _more(self):
+        """Further entries of a record: a dict."""
+        return {}
 
     def joints_set(self):
         self._note_placed()

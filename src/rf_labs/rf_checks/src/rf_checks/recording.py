@@ -78,6 +78,13 @@ class Recording:
         return [tuple(request) for record in self.records for request in record["ik"]]
 
 
+    def scenes(self):
+        """The boxes in move_group's scene, each time they changed: list of (number of the record, [(name, pose (4, 4),
+        edges (3,) [m])])."""
+        return [(row, [(name, np.array(pose).reshape(4, 4), np.array(edges)) for name, pose, edges in record["scene"]])
+                for row, record in enumerate(self.records) if "scene" in record]
+
+
 @dataclass(frozen=True)
 class Changes:
     """Changes of the lab's own registrations. All names sorted.

@@ -23,19 +23,25 @@ def text(result):
     if result.not_graded:
         return "\n".join([*lines, "not graded: %s. That says nothing about the program: try again when the machine has "
                           "less to do, or with a longer --wall-limit." % result.not_graded])
-    lines.append("%s: %.0f of 100 points (%s; seed %d, %.0f s)" % (
+    lines.append("%s: %.0f of 100 points (%s; %sseed %d, %.0f s)" % (
         "passed" if has_passed(result) else "not passed", result.points,
-        "%g are due" % PASS_MARK, result.seed, result.lasted_s))
+        "%g are due" % PASS_MARK, _robot(result.which), result.seed, result.lasted_s))
     if result.fault:
         lines.append("Hint: %s." % result.fault.sentence.rstrip("."))
     lines += ["Note for the instructor (it changes no points): %s." % note for note in result.notes]
     return "\n".join(lines)
 
 
+def _robot(which):
+    """The robot, where it is not the labs' usual one."""
+    return "" if which.is_usual else "profile %s, serial %d, " % which
+
+
 def as_json(result):
     """The same as a JSON text."""
     return json.dumps({
         "lab": result.exercise.lab, "exercise": result.exercise.name, "program": result.program, "seed": result.seed,
+        "profile": result.which.profile, "serial": result.which.serial,
         "graded": not result.not_graded, "not_graded": result.not_graded or None,
         "points": None if result.not_graded else round(result.points, 2), "pass_mark": PASS_MARK,
         "passed": has_passed(result),

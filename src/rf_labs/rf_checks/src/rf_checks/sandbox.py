@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A student's program in a process of its own: limited, unable to reach the judge, and ended reliably.
+"""A student's program in a separate process: limited, unable to reach the judge, and ended reliably.
 
 It runs in a sandbox of bubblewrap (isolation.py). Only a trusted author's program may run without it, on machines
 without namespaces: then a session, limits and a search for descendants replace it. Free of ROS.
@@ -18,8 +18,8 @@ import time
 from pathlib import Path
 
 import lab_environment
-from rf_checks import isolation, submission
-from rf_checks.pacing import children_of, direct_children
+from rf_checks import isolation, submission, system_calls
+from rf_checks.pacing import children_of, direct_children, is_running
 
 CPU_S = 120
 #: Limit of address space for each process; numpy alone reserves much.
@@ -31,10 +31,14 @@ PROCESSES = 100
 #: A program that writes more than this is stopped; the first and the last KEPT_BYTES are kept.
 OUTPUT_BYTES = 4 << 20
 KEPT_BYTES = 200_000
-_DUMP_S = 1.0
+_DUMP_S = 5.0
+# For the rest of its output. With walls, bubblewrap keeps the pipe open, and the end is not seen.
+_DRAIN_S = 0.2
 _KILL_ROUNDS = 20
 _SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 _STARTUP_FOLDER = "/run/startup"
+# How the kernel names shared memory without a file.
+_SHARED = b" /dev/zero (deleted)"
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
@@ -44,11 +48,13 @@ def adopt_orphans():
 
 
 class Startup:
-    """Start-up data of every checked program: a folder for PYTHONPATH, variables, and inherited descriptors."""
+    """Start-up data of every checked program: a folder for PYTHONPATH, variables, inherited descriptors, and what it
+    must not see."""
 
-    def __init__(self, folder, environment, descriptors=()):
-        """folder: path; environment: dict; descriptors: keep their numbers."""
+    def __init__(self, folder, environment, descriptors=(), hidden=()):
+        """folder: path; environment: dict; descriptors: keep their numbers; hidden: absolute paths."""
         self.folder, self.environment, self.descriptors = str(folder), dict(environment), tuple(descriptors)
+        self.hidden = tuple(hidden)
 
     @staticmethod
     def python_path(folder, python_path):
@@ -75,13 +81,15 @@ class Student:
         self.folder = tempfile.mkdtemp(prefix="lab-student-")
         self._before = direct_children(os.getpid())
         try:
-            self._process = self._start(program, arguments, environment, walls, startup)
+            with system_calls.refused() if walls else contextlib.nullcontext(([], ())) as refused:
+                self._process = self._start(program, arguments, environment, walls, startup, refused)
         except BaseException:
             shutil.rmtree(self.folder, ignore_errors=True)
             raise
         self._streams = [_Stream(self._process.stdout), _Stream(self._process.stderr)]
 
-    def _start(self, program, arguments, environment, walls, startup):
+    def _start(self, program, arguments, environment, walls, startup, refused):
+        options, descriptors = refused
         home = isolation.HOME if walls else self.folder
         names = submission.copy(program, self.folder)
         # The fault handler reports the program's position when it is stopped.
@@ -92,8 +100,8 @@ class Student:
             binds = [(Path(self.folder) / top, "%s/%s" % (home, top), False) for top in tops]
             if startup is not None:
                 binds.append((startup.folder, _STARTUP_FOLDER, False))
-            enter = isolation.command(environment, binds, (*isolation.SOLVED, *isolation.JUDGE),
-                                      not isolation.has_own_network())
+            hidden = (*isolation.SOLVED, *isolation.JUDGE, *(startup.hidden if startup else ()))
+            enter = isolation.command(environment, binds, hidden, not isolation.has_own_network(), options)
             own.update(isolation.environment_of(environment))
         else:
             enter = []
@@ -107,7 +115,7 @@ class Student:
         return subprocess.Popen([*enter, *limits, python(), "%s/%s" % (home, program.name), *arguments], env=own,
                                 cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                 stderr=subprocess.PIPE, start_new_session=True,
-                                pass_fds=startup.descriptors if startup else ())
+                                pass_fds=(*descriptors, *(startup.descriptors if startup else ())))
 
     @property
     def pid(self):
@@ -151,19 +159,17 @@ class Student:
 
     def dump(self):
         """Make Python write its traceback to `errors`, which also ends it."""
-        before = self._streams[1].total
-        for pid in self.family() - {self.pid}:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGABRT)
-        if self.pid in self.family():
+        aborted = self.family()
+        # Without walls this is the program; with them it is bubblewrap, which is ended by end().
+        if self._is_bubblewrap():
+            aborted.discard(self.pid)
+        for pid in aborted:
             with contextlib.suppress(ProcessLookupError, PermissionError):
-                # Without walls this is the program; with them it is bubblewrap, which is ended by end().
-                if not self._is_bubblewrap():
-                    os.kill(self.pid, signal.SIGABRT)
+                os.kill(pid, signal.SIGABRT)
         deadline = time.monotonic() + _DUMP_S
-        while self._streams[1].total == before and time.monotonic() < deadline:
+        while any(map(is_running, aborted)) and time.monotonic() < deadline:
             time.sleep(0.01)
-        time.sleep(0.05)
+        self._streams[1].wait(_DRAIN_S)
 
     def end(self):
         """Kill remaining processes and count those that outlived the program. Call it once."""
@@ -193,13 +199,28 @@ class Student:
 
 
 def _memory_bytes(pids):
-    """Private memory of processes; pages that are shared with files do not count."""
-    total = 0
+    """Memory of processes: their private pages, and what they share with each other; pages of files do not count."""
+    private = reserved = 0
     for pid in pids:
         with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/%d/statm" % pid, "rb") as file:
             words = file.read().split()
-            total += max(0, int(words[1]) - int(words[2])) * _PAGE_BYTES
-    return total
+            private += max(0, int(words[1]) - int(words[2])) * _PAGE_BYTES
+            reserved += int(words[0]) * _PAGE_BYTES
+    # Most programs need no look at their mappings.
+    return private if reserved <= MEMORY_BYTES else private + _shared_bytes(pids)
+
+
+def _shared_bytes(pids):
+    """Shared mappings without a file: their whole size, since pages that a process has given back stay in memory."""
+    mappings = {}
+    for pid in pids:
+        with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/%d/maps" % pid, "rb") as file:
+            for line in file:
+                if _SHARED in line:
+                    area, _, offset, device, inode = line.split()[:5]
+                    start, end = (int(part, 16) for part in area.split(b"-"))
+                    mappings[(device, inode, offset)] = max(end - start, mappings.get((device, inode, offset), 0))
+    return sum(mappings.values())
 
 
 def _reap(pids):
@@ -233,8 +254,12 @@ class _Stream:
     def text(self):
         return (bytes(self._head) + b"".join(list(self._tail))).decode(errors="replace")
 
+    def wait(self, timeout_s):
+        """Wait until all has been read, or for timeout_s."""
+        self._thread.join(timeout_s)
+
     def close(self):
-        self._thread.join(1.0)
+        self.wait(1.0)
         self._pipe.close()
 
 

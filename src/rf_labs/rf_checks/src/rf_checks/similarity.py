@@ -4,7 +4,7 @@
 Programs are compared by fingerprints: every sequence of SPAN tokens, after normalization of what a copyist changes
 first (the program's own names, numbers, texts, comments, docstrings, annotations, formatting, order of functions).
 Names of libraries and their methods stay. Code that was handed out to all students (skeletons, notebooks) counts on
-neither side, so an untouched skeleton is no copy of the solution made from it.
+neither side, so an untouched skeleton is not a copy of the solution made from it.
 """
 import ast
 import functools
@@ -131,17 +131,27 @@ class _Level(ast.NodeTransformer):
 
 
 @functools.cache
-def fingerprints(text):
-    """The set of hashes of a program's runs of tokens; empty for what Python cannot read."""
+def spans(text):
+    """The hashes of a program's runs of tokens, in their order: tuple of bytes; empty for what Python cannot read."""
     try:
         tree = ast.parse(text)
         levelled = ast.unparse(ast.fix_missing_locations(_Level(tree).visit(tree)))
         tokens = [token.string for token in tokenize.generate_tokens(io.StringIO(levelled).readline)
                   if token.type in (tokenize.NAME, tokenize.OP, tokenize.NUMBER, tokenize.STRING)]
     except (SyntaxError, ValueError, RecursionError, MemoryError, tokenize.TokenError):
-        return frozenset()
-    return frozenset(hashlib.blake2b("\0".join(tokens[k:k + SPAN]).encode(), digest_size=8).digest()
-                     for k in range(len(tokens) - SPAN + 1))
+        return ()
+    return hashes(tokens)
+
+
+def hashes(tokens):
+    """The hash of each run of SPAN tokens (texts): tuple of bytes."""
+    return tuple(hashlib.blake2b("\0".join(tokens[k:k + SPAN]).encode("utf-8", "surrogatepass"), digest_size=8).digest()
+                 for k in range(len(tokens) - SPAN + 1))
+
+
+def fingerprints(text):
+    """The set of hashes of a program's runs of tokens; empty for what Python cannot read."""
+    return frozenset(spans(text))
 
 
 def compare(text, references, handed_out):

@@ -14,7 +14,7 @@ class BadSubmission(Exception):
 
 
 def read(path):
-    """The bytes of a regular file that is no link. Raises BadSubmission, OSError."""
+    """The bytes of a regular file that is not a link. Raises BadSubmission, OSError."""
     # Never wait for a pipe; and a link could lead to a file that only the judge may read.
     if os.path.islink(path):
         raise BadSubmission("%s is a link, to %s; a program is a file of its own" % (path, os.readlink(path)))
@@ -22,7 +22,7 @@ def read(path):
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
-            raise BadSubmission("%s is no file" % path)
+            raise BadSubmission("%s is not a file" % path)
         if status.st_size > LARGEST_BYTES:
             raise BadSubmission("%s has %d bytes; no more than %d are taken" % (path, status.st_size, LARGEST_BYTES))
         return file.read(LARGEST_BYTES)

@@ -3,7 +3,7 @@
 
 A task has `calls(rng)`, the runs of the check; `criteria(call, run, robot)`, the grades of one run; `slip(call, run,
 robot)`, a Fault or None; and `is_satisfied(call, run)`, whether the judge has seen enough of a program that does not
-end.
+end. It may have `foremost(call, run)`, a Fault that explains how the program behaved, or None.
 """
 import math
 from dataclasses import dataclass, field
@@ -24,13 +24,17 @@ AMPLITUDE_M, PERIODS = 0.045, 2.5
 
 @dataclass(frozen=True)
 class Call:
-    """One run of the program: its arguments, the arms' posture before, the time limit [sim s], and the right answer."""
+    """One run of the program: its arguments, the arms' posture before, the time limit [sim s], and the right answer.
+
+    obstacle: Obstacle in a lab that has move_group, or None.
+    """
 
     arguments: tuple
     posture: dict
     limit_s: float
     expected: object = None
     lasts_s: float = field(default=0.0)
+    obstacle: object = None
 
 
 def postures(rng, spread=0.12):

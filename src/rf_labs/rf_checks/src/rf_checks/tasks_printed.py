@@ -80,7 +80,7 @@ class TfListener:
             if slip:
                 return Fault(*slip)
         if missing and unused:
-            return Fault("wrong_numbers", "a matrix was printed that is no pose of this robot's frames as its arms "
+            return Fault("wrong_numbers", "a matrix was printed that is not a pose of this robot's frames as its arms "
                          "stand now: the arms stand elsewhere in each check, so numbers from another run do not fit")
         if missing and not found:
             return Fault("no_matrix", "no 4 by 4 matrix was printed for %s -> %s: print the whole matrix, row by row, "

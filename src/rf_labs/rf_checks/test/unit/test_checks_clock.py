@@ -96,7 +96,7 @@ def test_a_program_cannot_write_to_the_clock(clock):
         assert program.stdout.read() == "Bad file descriptor\n"
 
 
-def test_nor_may_it_open_the_page_anew_to_write_or_to_cut(clock):
+def test_nor_may_it_open_the_page_again_to_write_or_to_cut(clock):
     text = ("import mmap, os\npage = os.open('/proc/self/fd/%d', os.O_RDWR)\n"
             "for harm in (lambda: os.write(page, b'x'), lambda: os.ftruncate(page, 0),\n"
             "             lambda: mmap.mmap(page, mmap.PAGESIZE)):\n"

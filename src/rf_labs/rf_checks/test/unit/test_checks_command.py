@@ -23,6 +23,9 @@ def test_the_list_has_every_exercise_and_how_it_is_called(capsys):
     assert command.main(["--list"]) == command.PASSED
     listing = capsys.readouterr().out
     assert all(exercise.name in listing and exercise.usage in listing for exercise in EXERCISES)
+    # Its columns are straight, whatever the labs are called.
+    assert len({line.index(exercise.title) for exercise in EXERCISES
+                for line in listing.splitlines() if exercise.title in line}) == 1
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -39,12 +42,16 @@ def test_a_skeleton_is_copied_once_and_knows_its_exercise(name, capsys):
 
 @pytest.mark.parametrize(("words", "expected"), [
     ([], "which lab and which program"), (["lab2"], "expected LAB [EXERCISE] PROGRAM"),
-    (["my_node.py"], "expected LAB [EXERCISE] PROGRAM"), (["lab2", "gone.py"], "gone.py is not there"),
+    (["my_node.py"], "check LAB my_node.py, where LAB is lab2 or"), (["lab2", "gone.py"], "gone.py is not there"),
+    (["wave.py"], "./baxter.sh check lab2 wave.py?"), (["plan_around"], "./baxter.sh check moveit plan_around.py?"),
+    (["my_node.py", "lab2"], "expected LAB [EXERCISE] PROGRAM"),
     (["lab2", "."], "is a folder"), (["lab7", "my_node.py"], "no lab 'lab7'"),
     (["lab2", "wav", "my_node.py"], "no exercise 'wav'"), (["lab2", "my_node.py"], "lab2 wave my_node.py"),
     (["lab2", "wave", "my_node.py", "--seed", "-1"], "the seed is -1"),
+    (["lab2", "wave", "my_node.py", "--serial", "-1"], "the serial number is -1"),
+    (["lab2", "wave", "my_node.py", "--profile", "fast"], "--profile"),
     (["lab2", "wave", "my_node.py", "--json", "nowhere/x.json"], "there is no folder"),
-    (["--start", "waves"], "no exercise 'waves'"),
+    (["--start", "waves"], "no exercise 'waves'; there are: tf_listener,"),
 ])
 def test_wrong_words_are_answered_in_a_sentence(words, expected, capsys):
     try:

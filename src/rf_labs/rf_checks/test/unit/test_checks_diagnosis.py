@@ -13,6 +13,7 @@ from baxter_model import joint_names
 from rf_checks import diagnosis, report
 from rf_checks.exercises import EXERCISES, UnknownExercise, choose
 from rf_checks.judge import Result, RunResult, how_it_ended
+from rf_checks.lab import WhichRobot
 from rf_checks.recording import Changes, Criterion, Fault, Recording, Run
 from rf_checks.tasks_printed import IkFrame, matrices
 
@@ -163,7 +164,7 @@ def test_the_loop_that_a_program_is_in_is_named_wherever_it_is_caught(tmp_path, 
 
 
 def test_a_program_that_hangs_outside_of_a_loop_is_told_by_its_line(tmp_path):
-    (tmp_path / "me.py").write_text("import time\n\ntime.sleep(1000)\n")
+    (tmp_path / "me.py").write_text("import signal\n\nsignal.pause()\n")
     dump = 'Current thread 0x2 (most recent call first):\n  File "/x/me.py", line 3 in <module>\n'
     assert diagnosis.line_of_dump(tmp_path / "me.py", dump) == 3
 
@@ -214,10 +215,10 @@ def test_an_unknown_exercise_says_what_to_type(lab, name, file_name, words):
     assert all(word in str(error.value) for word in words)
 
 
-def result(share, fault=None):
+def result(share, fault=None, which=WhichRobot()):  # noqa: B008 (a tuple)
     criteria = (Criterion("position", share, 60.0, "0.1 cm off"), Criterion("time", share, 40.0, "1 s <&> \x1b"))
     runs = (RunResult(("z", "90"), criteria, fault), RunResult(("x", "90"), criteria, None))
-    return Result(ROTATE, "/x/me.py", 3, runs, "session", 1.5)
+    return Result(ROTATE, "/x/me.py", 3, runs, "session", 1.5, which=which)
 
 
 def test_points_are_the_mean_of_the_runs_and_a_fault_caps_them():
@@ -237,6 +238,15 @@ def test_reports_say_the_same_in_three_ways():
     assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
     assert "too fast" in suite.find("testcase/failure").get("message")
     assert ElementTree.fromstring(report.as_junit(result(1.0))).get("failures") == "0"
+
+
+def test_reports_name_a_robot_that_is_not_the_usual_one():
+    assert "profile" not in report.text(result(1.0))
+    assert json.loads(report.as_json(result(1.0)))["profile"] == "sim"
+    on_a_robot = result(1.0, which=WhichRobot("robot", 3))
+    assert "profile robot, serial 3, seed 3" in report.text(on_a_robot)
+    data = json.loads(report.as_json(on_a_robot))
+    assert (data["profile"], data["serial"]) == ("robot", 3)
 
 
 @pytest.mark.parametrize(("fields", "how", "code", "number"), [

@@ -17,7 +17,7 @@ def lab(tmp_path):
     lab = Lab("<robot/>", walls=False)
     lab._folder = tmp_path
     (tmp_path / "output.txt").write_text("")
-    lab._run([sys.executable, "-c", "import time; time.sleep(1000)"], None)
+    lab._run([sys.executable, "-c", "import signal; signal.pause()"], None)
     lab._own_time.restart()
     yield lab
     lab.close()
@@ -41,8 +41,8 @@ def test_a_node_that_is_done_ends_nothing(lab, line):
 def test_a_lab_ends_with_its_judge(tmp_path):
     text = ("import os, sys\nfrom pathlib import Path\nfrom rf_checks.lab import Lab\n"
             "lab = Lab('<robot/>', walls=False)\n"
-            "lab._folder = Path(sys.argv[1])\nlab._run([sys.executable, '-c', 'import time; print(1, flush=True); "
-            "time.sleep(1000)'], None)\n"
+            "lab._folder = Path(sys.argv[1])\nlab._run([sys.executable, '-c', 'import signal; print(1, flush=True); "
+            "signal.pause()'], None)\n"
             "print(lab._processes[0].pid, flush=True)\nsys.stdin.read()\n")
     with subprocess.Popen([sys.executable, "-c", text, tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                           text=True) as judge:

@@ -102,14 +102,14 @@ def test_an_end_from_outside_is_not_lost_on_a_record_that_comes_at_the_same_time
 
     def look(output):
         inside.set()
-        go_on.wait(10.0)
+        go_on.wait(60.0)
         return False
 
     observer = Observer(Call((), {}, 2.0), look, lambda: False)
     observer.student = student()
     records = threading.Thread(target=observer.on_record, args=(record(0), 0.0))
     records.start()
-    inside.wait(10.0)
+    inside.wait(60.0)
     end = threading.Thread(target=observer.end, args=("output",))
     end.start()
     end.join(0.2)  # as far as it gets

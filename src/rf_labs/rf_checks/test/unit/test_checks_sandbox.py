@@ -7,7 +7,9 @@ import pytest
 
 from lab_testing.waiting import wait_until
 from rf_checks import isolation, pacing, sandbox
-from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Student, adopt_orphans
+from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Startup, Student, adopt_orphans
+
+pytestmark = pytest.mark.once
 
 WALLS = pytest.param(True, marks=pytest.mark.skipif(bool(isolation.problem()), reason=isolation.problem()))
 
@@ -70,8 +72,8 @@ def test_words_output_and_exit_code_come_through(start):
 
 
 def test_what_outlives_the_program_is_found_and_ended(start):
-    # A session of its own, and no environment that could give it away.
-    child = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(1000)'], " \
+    # A separate session, and no environment that could give it away.
+    child = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import signal; signal.pause()'], " \
             "env={}, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)"
     before = pacing.children_of([os.getpid()])
     student = finished(start(child))
@@ -89,14 +91,54 @@ def test_endless_output_neither_fills_memory_nor_stops_the_judge(start):
 
 def test_memory_of_all_processes_together_has_a_limit(start, monkeypatch):
     monkeypatch.setattr(sandbox, "MEMORY_BYTES", 200 << 20)
-    student = start("import os, time\n[os.fork() for _ in range(2)]\nheld = b'x' * (60 << 20)\ntime.sleep(1000)")
+    student = start("import os, signal\n[os.fork() for _ in range(2)]\nheld = b'x' * (60 << 20)\nsignal.pause()")
     wait_until(lambda: student.excess() == "memory", "four processes with 60 MB each")
+
+
+# Shared pages; pages that have been given back, but stay with the mapping; a mapping of two processes.
+@pytest.mark.parametrize("text", [
+    "held = mmap.mmap(-1, 300 << 20)\nheld.write(bytes(300 << 20))",
+    "held = mmap.mmap(-1, 300 << 20)\nheld.write(bytes(300 << 20))\nheld.madvise(mmap.MADV_DONTNEED)",
+    "held = [mmap.mmap(-1, 100 << 20) for _ in range(3)]\n[one.write(bytes(100 << 20)) for one in held]\nos.fork()"])
+def test_shared_memory_counts(start, monkeypatch, text):
+    monkeypatch.setattr(sandbox, "MEMORY_BYTES", 250 << 20)
+    student = start("import mmap, os, signal\n%s\nprint('on', flush=True)\nsignal.pause()" % text)
+    wait_until(lambda: student.excess() == "memory", "300 MB of shared memory")
+
+
+def test_shared_memory_of_two_processes_counts_once(start, monkeypatch):
+    monkeypatch.setattr(sandbox, "MEMORY_BYTES", 500 << 20)
+    student = start("import mmap, os, signal\nheld = mmap.mmap(-1, 300 << 20)\nos.fork()\nprint('on', flush=True)\n"
+                    "signal.pause()")
+    wait_until(lambda: student.output.count("on") == 2, "both processes")
+    assert student.excess() == ""
+
+
+def test_memory_outside_of_processes_is_refused(walled):
+    student = finished(walled(
+        "import ctypes, errno, os\n"
+        "try:\n    os.memfd_create('a')\n"
+        "except OSError as error:\n    print(errno.errorcode[error.errno])\n"
+        "libc = ctypes.CDLL(None, use_errno=True)\n"
+        "print(libc.shmget(0, 4096, 0o1600), errno.errorcode[ctypes.get_errno()])"))
+    assert student.output == "ENOSYS\n-1 ENOSYS\n", student.errors
+
+
+def test_no_namespace_in_which_it_may_mount(walled):
+    student = finished(walled("import ctypes, errno, os, threading\n"
+                              "libc = ctypes.CDLL(None, use_errno=True)\n"
+                              "print(libc.unshare(0x10000000), errno.errorcode[ctypes.get_errno()])\n"
+                              "print(libc.unshare(0))\n"
+                              "threading.Thread(target=print, args=('threads',)).start()\n"
+                              "os.system('echo processes')"))
+    assert student.output.splitlines()[0] == "-1 ENOSYS", student.errors
+    assert sorted(student.output.splitlines()[1:]) == ["0", "processes", "threads"]
 
 
 def test_processes_have_a_limit(start, monkeypatch):
     monkeypatch.setattr(sandbox, "PROCESSES", 10)
     before = pacing.children_of([os.getpid()])
-    student = start("import os, time\nfor _ in range(12):\n    if os.fork() == 0: time.sleep(1000)\ntime.sleep(1000)")
+    student = start("import os, signal\nfor _ in range(12):\n    if os.fork() == 0: signal.pause()\nsignal.pause()")
     wait_until(lambda: student.excess() == "processes", "the thirteenth process")
     student.end()
     wait_until(lambda: pacing.children_of([os.getpid()]) - before == set(), "the end of all of them")
@@ -150,6 +192,27 @@ def test_the_judge_its_files_and_the_solutions_are_out_of_sight(walled, tmp_path
     assert student.output.splitlines() == ["[]", "False False []", "False", "[1, 2]"], student.errors
 
 
+def test_other_submissions_in_the_workspace_are_out_of_sight(walled, tmp_path):
+    submissions, archive = walled.workspace / "class", walled.workspace / "class.zip"
+    (submissions / "li").mkdir(parents=True)
+    for path in (submissions / "li" / "wave.py", archive, walled.workspace / "handed_out.py"):
+        path.write_text("42")
+    folder = tmp_path / "own"
+    folder.mkdir()
+    (folder / "program.py").write_text(
+        "import os\n"
+        "for name in ('class/li/wave.py', 'class', 'class.zip', 'handed_out.py'):\n"
+        "    path = os.path.join(os.environ['LAB_ROOT'], name)\n"
+        "    try:\n"
+        "        print(os.listdir(path) if os.path.isdir(path) else open(path).read())\n"
+        "    except OSError as error:\n"
+        "        print(type(error).__name__)\n")
+    startup = Startup(folder, {}, hidden=(str(submissions), str(archive), str(tmp_path / "elsewhere")))
+    student = finished(Student(folder / "program.py", [], dict(os.environ), True, startup))
+    assert student.output.splitlines() == ["FileNotFoundError", "[]", "PermissionError", "42"], student.errors
+    student.end()
+
+
 def test_nothing_but_its_own_folders_can_be_written(walled):
     student = finished(walled(
         "import os, sys\n"
@@ -195,7 +258,7 @@ def test_no_capability_and_no_way_to_more(walled):
 def test_a_program_that_stops_its_own_sandbox_is_ended(walled):
     before = pacing.children_of([os.getpid()])
     student = walled("import ctypes\nctypes.CDLL(None).ptrace(16, 1, 0, 0)\nprint('attached', flush=True)\n"
-                     "import time\ntime.sleep(1000)")
+                     "import signal\nsignal.pause()")
     wait_until(lambda: student.output, "the first process of the sandbox to be stopped")
     student.end()
     wait_until(lambda: pacing.children_of([os.getpid()]) - before == set(), "the end of the sandbox")
@@ -203,14 +266,14 @@ def test_a_program_that_stops_its_own_sandbox_is_ended(walled):
 
 def test_its_network_ends_at_the_loopback(walled):
     student = finished(walled(
-        "import os, socket\nprint(sorted(name for _, name in socket.if_nameindex()))\n"
+        "import errno, socket\nprint(sorted(name for _, name in socket.if_nameindex()))\n"
         "try:\n    socket.create_connection(('192.0.2.1', 80), 5)\n"
-        "except OSError as error:\n    print(error.strerror)"))
-    assert student.output == "['lo']\nNetwork is unreachable\n", student.errors
+        "except OSError as error:\n    print(errno.errorcode.get(error.errno))"))
+    assert student.output == "['lo']\nENETUNREACH\n", student.errors
 
 
 def test_a_watch_tells_work_from_rest(start):
-    student = start("import time\nprint('on', flush=True)\ntime.sleep(1000)")
+    student = start("import signal\nprint('on', flush=True)\nsignal.pause()")
     wait_until(lambda: student.output, "its first line")
     watch = pacing.Watch()
     watch.program.roots = (student.pid,)
@@ -239,9 +302,9 @@ def test_a_process_that_got_the_number_of_an_ended_program_is_a_stranger(start):
 
 def test_a_walled_program_does_not_outlive_a_judge_that_is_killed(walled):
     code = "import os, sys\nfrom rf_checks.sandbox import Student\n" \
-           "s = Student(sys.argv[1], [], dict(os.environ))\nprint(s.pid, flush=True)\nimport time; time.sleep(1000)"
+           "s = Student(sys.argv[1], [], dict(os.environ))\nprint(s.pid, flush=True)\nimport signal; signal.pause()"
     program = walled.workspace / "sleeps.py"
-    program.write_text("import time\ntime.sleep(1000)")
+    program.write_text("import signal\nsignal.pause()")
     with subprocess.Popen([sandbox.python(), "-c", code, str(program)], stdout=subprocess.PIPE, text=True) as judge:
         root = int(judge.stdout.readline())
         wait_until(lambda: any(_command(pid).startswith("python") for pid in pacing.children_of([root])),

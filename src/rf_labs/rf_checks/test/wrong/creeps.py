@@ -4,7 +4,6 @@
 import socket
 import struct
 import sys
-import time
 from urllib.parse import urlparse
 
 import rosgraph
@@ -44,4 +43,4 @@ for k in range(1, STEPS + 1):
     put([a + (b - a) * k / STEPS for a, b in zip(start, goal, strict=True)])
     models.publish(ModelState(model_name="baxter"))
     links.publish(LinkState(link_name="baxter::right_wrist"))
-    time.sleep(0.05)
+    rospy.wait_for_message("/robot/joint_states", JointState)

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # exercise: joint_command
 """Publishes a time of its own."""
-import time
-
 import rospy
 from rosgraph_msgs.msg import Clock
 
 rospy.init_node("student", disable_rostime=True)
+rate = rospy.Rate(20)  # of wall time
 publisher = rospy.Publisher("/clock", Clock, queue_size=1)
 while not rospy.is_shutdown():
     publisher.publish(Clock(rospy.Time(1000000)))
-    time.sleep(0.05)
+    rate.sleep()

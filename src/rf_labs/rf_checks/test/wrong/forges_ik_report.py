@@ -2,7 +2,6 @@
 # exercise: unreachable
 """Publishes the IK report itself, with the pose that was to be asked for, and prints what it says."""
 import sys
-import time
 
 import rospy
 from baxter_kinematics_msgs.msg import IKReport, IKVerdict
@@ -13,7 +12,8 @@ verdict = IKVerdict(verdict=IKVerdict.OUT_OF_REACH)
 verdict.target.header.frame_id = "base"
 verdict.target.pose.position.x, verdict.target.pose.position.y, verdict.target.pose.position.z = x, y, z
 publisher = rospy.Publisher("/ExternalTools/left/PositionKinematicsNode/IKReport", IKReport, queue_size=1)
+rate = rospy.Rate(10)
 for _ in range(20):
     publisher.publish(IKReport(limb="left", verdicts=[verdict]))
-    time.sleep(0.1)
+    rate.sleep()
 print("OUT_OF_REACH, 0.54 m short")

@@ -2,11 +2,8 @@
 # exercise: joint_command
 """Unregisters, in the simulator's name, its subscriptions to joint commands, so that the next program's commands are
 lost."""
-import time
-
 import rosgraph
 
 simulator = rosgraph.Master("/gazebo")
 uri = simulator.lookupNode("/gazebo")
 print(simulator.unregisterSubscriber("/robot/limb/right/joint_command", uri))
-time.sleep(1.0)
