@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Archives of submissions, read without trust: nothing is unpacked to disk, and sizes are limited while they are read.
+
+Only programs and notebooks are read; other files, such as a report or a film, are skipped by their names.
+"""
+import bz2
+import gzip
+import io
+import lzma
+import posixpath
+import tarfile
+import zipfile
+import zlib
+from dataclasses import dataclass
+
+from rf_checks.submission import LARGEST_BYTES
+
+#: Endings of archives that are read, and of those that are named as archives of another kind.
+SUFFIXES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2", ".tbz")
+OTHER_SUFFIXES = (".7z", ".rar", ".tar.xz", ".txz", ".tar.zst", ".gz", ".bz2", ".xz")
+#: Most programs of a submission, and their most bytes.
+MOST_FILES, MOST_TAKEN_BYTES = 200, 16 << 20
+_DAMAGED = (zipfile.BadZipFile, tarfile.TarError, zlib.error, lzma.LZMAError, EOFError, ValueError, OSError,
+            NotImplementedError, RuntimeError, UnicodeError)
+# Entries of a tar file that describe the next one, such as a long name; tarfile reads them whole.
+_DESCRIPTIONS = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE, tarfile.GNUTYPE_LONGNAME,
+                 tarfile.GNUTYPE_LONGLINK)
+_MOST_DESCRIPTION_BYTES = 1 << 20
+_UTF8_FLAG, _ENCRYPTED_FLAG = 0x800, 0x1
+_LINK, _FILE_KIND, _REGULAR = 0o120000, 0o170000, 0o100000
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Most entries of an archive, its most unpacked bytes, the most files that are taken from it and their most
+    bytes."""
+
+    entries: int
+    bytes: int
+    files: int
+    taken_bytes: int
+
+
+OF_A_STUDENT = Bounds(10_000, 1 << 30, MOST_FILES, MOST_TAKEN_BYTES)
+#: The export of a whole class: a thousand submissions.
+OF_A_CLASS = Bounds(500_000, 32 << 30, 50_000, 1 << 30)
+
+
+class BadArchive(Exception):
+    """An archive that is not read; the text says why."""
+
+
+def is_archive(name):
+    return name.lower().endswith(SUFFIXES)
+
+
+def is_other_archive(name):
+    return name.lower().endswith(OTHER_SUFFIXES) and not is_archive(name)
+
+
+def stem(name):
+    """The name of an archive without its ending."""
+    ending = max((suffix for suffix in SUFFIXES + OTHER_SUFFIXES if name.lower().endswith(suffix)), key=len, default="")
+    return name[:len(name) - len(ending)] if ending else name
+
+
+def is_litter(name):
+    """Whether a path belongs to what systems and editors add by themselves."""
+    parts = name.split("/")
+    return any(part in ("__MACOSX", "__pycache__", ".ipynb_checkpoints", ".git") or part.startswith("._")
+               for part in parts) or parts[-1] in (".DS_Store", "Thumbs.db", "desktop.ini")
+
+
+def safe_name(name):
+    """The normal form of a path in an archive. Raises BadArchive if it leads out of the archive's folder."""
+    plain = name.replace("\\", "/")
+    if plain.startswith("/") or ":" in plain.partition("/")[0] or ".." in plain.split("/") or "\0" in plain:
+        raise BadArchive("holds a file whose path leads out of its folder: %s" % name)
+    return posixpath.normpath(plain)
+
+
+def read(source, name, is_wanted, bounds=OF_A_STUDENT):
+    """{path in the archive: bytes} of the wanted files, and the list of the other files' paths.
+
+    source: path, or bytes. name: its name, which tells the kind. is_wanted: function of a path. bounds:
+    Bounds. Raises BadArchive.
+    """
+    try:
+        with (io.BytesIO(source) if isinstance(source, bytes) else open(source, "rb")) as stream:
+            entries = _zip_entries(stream) if name.lower().endswith(".zip") else _tar_entries(
+                stream, name.lower(), bounds)
+            return _take(entries, is_wanted, bounds)
+    except _DAMAGED as error:
+        raise BadArchive("is damaged and cannot be unpacked: %s" % (error or type(error).__name__)) from error
+
+
+def _take(entries, is_wanted, bounds):
+    taken, others, seen, size = {}, [], set(), 0
+    for count, (path, read_it) in enumerate(entries, 1):
+        if count > bounds.entries:
+            raise BadArchive("holds more than %d files" % bounds.entries)
+        path = safe_name(path)
+        if is_litter(path):
+            continue
+        if path in seen:
+            raise BadArchive("holds two files named %s" % path)
+        seen.add(path)
+        if not is_wanted(path):
+            others.append(path)
+            continue
+        content = read_it()
+        if len(content) > LARGEST_BYTES and not is_archive(path):
+            raise BadArchive("holds %s with more than %d bytes" % (path, LARGEST_BYTES))
+        size += len(content)
+        if len(taken) >= bounds.files or size > bounds.taken_bytes:
+            raise BadArchive("holds more than %d programs, or %d MiB of them" % (
+                bounds.files, bounds.taken_bytes >> 20))
+        taken[path] = content
+    return taken, others
+
+
+def _zip_entries(stream):
+    with zipfile.ZipFile(stream) as archive:
+        for info in archive.infolist():
+            kind = info.external_attr >> 16 & _FILE_KIND
+            if info.is_dir():
+                continue
+            path = _zip_name(info)
+            if kind == _LINK:
+                raise BadArchive("holds a link, %s; links are not followed" % path)
+            if kind not in (0, _REGULAR):
+                raise BadArchive("holds %s, which is not a file" % path)
+            if info.flag_bits & _ENCRYPTED_FLAG:
+                raise BadArchive("is encrypted")
+            yield path, lambda info=info: _zip_content(archive, info)
+
+
+def _zip_content(archive, info):
+    with archive.open(info) as file:
+        return file.read(MOST_TAKEN_BYTES + 1)
+
+
+def _zip_name(info):
+    """Names without the mark for UTF-8 are often UTF-8 all the same; zipfile has read them as code page 437."""
+    if info.flag_bits & _UTF8_FLAG:
+        return info.filename
+    try:
+        return info.filename.encode("cp437").decode("utf-8")
+    except UnicodeError:
+        return info.filename
+
+
+class _Limited(io.RawIOBase):
+    """A stream that ends with BadArchive after `most` bytes."""
+
+    def __init__(self, stream, most):
+        self._stream, self._left, self._most = stream, most, most
+
+    def readable(self):
+        return True
+
+    def read(self, size=-1):
+        data = self._stream.read(min(size, 1 << 20) if size >= 0 else 1 << 20)
+        self._left -= len(data)
+        if self._left < 0:
+            raise BadArchive("holds more than %d MiB" % (self._most >> 20))
+        return data
+
+
+class _TarInfo(tarfile.TarInfo):
+    """An entry of a tar file; refuses descriptions that would fill the memory."""
+
+    @classmethod
+    def frombuf(cls, buf, encoding, errors):
+        info = super().frombuf(buf, encoding, errors)
+        if info.type in _DESCRIPTIONS and info.size > _MOST_DESCRIPTION_BYTES:
+            raise BadArchive("holds a file name or attributes of %d bytes" % info.size)
+        return info
+
+
+def _tar_entries(stream, name, bounds):
+    if name.endswith((".gz", ".tgz")):
+        stream = gzip.GzipFile(fileobj=stream)
+    elif name.endswith((".bz2", ".tbz2", ".tbz")):
+        stream = bz2.BZ2File(stream)
+    with tarfile.open(fileobj=_Limited(stream, bounds.bytes), mode="r|", tarinfo=_TarInfo) as archive:
+        for info in archive:
+            if info.isdir():
+                continue
+            if info.issym() or info.islnk():
+                raise BadArchive("holds a link, %s to %s; links are not followed" % (info.name, info.linkname))
+            if not info.isreg():
+                raise BadArchive("holds %s, which is not a file" % info.name)
+            yield info.name, lambda info=info: archive.extractfile(info).read(MOST_TAKEN_BYTES + 1)

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Results in the forms that other programs read: CSV, JUnit, nbgrader's export of grades, Gradescope. Free of ROS."""
+import csv
+import io
+import json
+import re
+from xml.etree import ElementTree
+
+from rf_grading.results import GRADED, NOT_GRADED, POINTS, as_data
+
+#: The columns that nbgrader's own export of grades has.
+NBGRADER_COLUMNS = ("assignment", "duedate", "timestamp", "student_id", "last_name", "first_name", "email", "raw_score",
+                    "late_submission_penalty", "score", "max_score")
+#: A spreadsheet takes a cell that begins so for a formula.
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def plain(text):
+    """A text without characters that files in UTF-8 and XML cannot hold; each becomes a question mark."""
+    return _NO_XML.sub("?", str(text))
+
+
+def _points(value):
+    return "" if value is None else "%g" % round(value, 2)
+
+
+def as_json(results):
+    return json.dumps(as_data(results), indent=1) + "\n"
+
+
+def _table(header, rows):
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        cells = [plain(cell) for cell in row]
+        writer.writerow(["'" + cell if cell.startswith(_FORMULA) and not _is_number(cell) else cell for cell in cells])
+    return stream.getvalue()
+
+
+def _is_number(text):
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def as_csv(results):
+    """A line for each student: points in each exercise, their sum, the reasons for lost points, notes."""
+    names = [exercise.name for exercise in results.exercises]
+    return _table(["entry", "student", "name", "email", "status", *names, "points", "of", "reasons", "notes"], (
+        [row.submission.entry, row.submission.student, row.submission.name, row.submission.email, row.status,
+         *(_points(row.cells[name].points) for name in names), _points(row.points), _points(results.most_points),
+         " / ".join(row.sentences), " / ".join("%s: %s" % one for one in row.notes)] for row in results.rows))
+
+
+def as_nbgrader(results):
+    """The form of `nbgrader export`: a line for each student. A student without grade has an empty score."""
+    def line(row):
+        first, _, last = row.submission.name.rpartition(" ")
+        score = _points(row.points)
+        return [results.assignment, "", "", row.submission.student, last, first, row.submission.email, score, "0",
+                score, _points(results.most_points)]
+
+    return _table(NBGRADER_COLUMNS, map(line, results.rows))
+
+
+def as_junit(results):
+    """A suite for each exercise, a case for each student."""
+    top = ElementTree.Element("testsuites", name=plain(results.assignment))
+    for exercise in results.exercises:
+        cells = [(row, row.cells[exercise.name]) for row in results.rows]
+        suite = ElementTree.SubElement(
+            top, "testsuite", name="%s.%s" % (exercise.lab, exercise.name), tests=str(len(cells)),
+            failures=str(sum(cell.status != NOT_GRADED and not cell.has_passed for _, cell in cells)),
+            errors=str(sum(cell.status == NOT_GRADED for _, cell in cells)))
+        for row, cell in cells:
+            case = ElementTree.SubElement(suite, "testcase", name=plain(row.submission.entry),
+                                          classname="%s.%s" % (exercise.lab, exercise.name),
+                                          time="%.2f" % (cell.verdict or {}).get("wall_s", 0.0))
+            text = "%s of %g points: %s" % (_points(cell.points), POINTS, cell.sentence)
+            if cell.status == NOT_GRADED:
+                ElementTree.SubElement(case, "error", message=plain(cell.sentence))
+            elif not cell.has_passed:
+                ElementTree.SubElement(case, "failure", message=plain(text))
+            else:
+                ElementTree.SubElement(case, "system-out").text = plain(text)
+    return ElementTree.tostring(top, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def as_gradescope(row):
+    """One student's results.json: a test for each criterion of each run, with the points that count.
+
+    Has no notes for the instructor: students read it.
+    """
+    tests = []
+    for number, (name, cell) in enumerate(row.cells.items(), 1):
+        if cell.status != GRADED:
+            tests.append({"number": str(number), "name": name, "score": 0.0, "max_score": POINTS, "status": "failed",
+                          "output": plain(cell.sentence)})
+            continue
+        runs = cell.verdict["runs"]
+        tests += [{"number": "%d.%d" % (number, place), "name": plain(" ".join([name, *run["arguments"]])),
+                   "score": round(run["points"] / len(runs), 2), "max_score": round(POINTS / len(runs), 2),
+                   "status": "passed" if run["points"] >= cell.verdict["pass_mark"] else "failed",
+                   "output": plain("\n".join("%s: %g of %g (%s)" % (one["name"], one["points"], one["of"], one["found"])
+                                             for one in run["criteria"]))} for place, run in enumerate(runs, 1)]
+    found = {"output": plain("\n".join(row.sentences)), "output_format": "text", "test_output_format": "text",
+             "visibility": "visible", "stdout_visibility": "hidden", "tests": tests,
+             "execution_time": round(sum((cell.verdict or {}).get("wall_s", 0.0) for cell in row.cells.values()))}
+    # Without a score Gradescope reports that the autograder failed.
+    if row.points is not None:
+        found["score"] = round(row.points, 2)
+    return json.dumps(found, indent=1) + "\n"

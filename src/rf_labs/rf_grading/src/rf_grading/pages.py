@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pages in HTML: one for each student, one for the instructor. Free of ROS, without scripts and outside references."""
+import html
+import os
+import shlex
+from urllib.parse import quote
+
+from rf_grading import drawing
+from rf_grading.formats import plain
+from rf_grading.results import GRADED, NOT_GRADED, POINTS
+
+_STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; color: #1c1f22; max-width: 68rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.2rem; margin-top: 2rem; } h3 { font-size: 1rem; }
+table { border-collapse: collapse; margin: 0.6rem 0; } th, td { text-align: left; padding: 0.2rem 0.8rem 0.2rem 0;
+vertical-align: top; border-bottom: 1px solid #e3e6e8; } td.n, th.n { text-align: right; }
+.passed { color: #16703c; } .failed { color: #a12a1c; } .open { color: #85610a; } .hint { background: #fff6d6;
+padding: 0.6rem 0.8rem; border-radius: 4px; } pre { background: #f2f3f4; padding: 0.6rem; overflow: auto;
+max-height: 24rem; font-size: 13px; } svg { max-width: 100%; height: auto; } .small { color: #5b6167; font-size: 13px; }
+.bar { background: #0b6e99; height: 0.8rem; display: inline-block; }
+"""
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>%(title)s</title><style>%(style)s</style></head>
+<body>
+<h1>%(title)s</h1>
+%(body)s
+</body></html>
+"""
+
+
+def _text(value):
+    return html.escape(plain(value))
+
+
+def _page(title, parts):
+    return _PAGE % {"title": _text(title), "style": _STYLE, "body": "\n".join(parts)}
+
+
+def _points(value):
+    return "not graded" if value is None else "%g" % round(value, 1)
+
+
+def _class_of(cell):
+    if cell.status == NOT_GRADED:
+        return "open"
+    return "passed" if cell.has_passed else "failed"
+
+
+def link_to(path):
+    """The address of a file below the page's folder. path: text as from os.listdir."""
+    return "/".join(quote(os.fsencode(part)) for part in path.split("/"))
+
+
+# -- a student's page
+
+def feedback(results, row, motions):
+    """The page of one student; it has nothing of other students, and no notes for the instructor.
+
+    motions: {key: [motion of each run]}.
+    """
+    who = row.submission.name or row.submission.student
+    total = ('<p><b class="n">%s of %g points</b></p>' % (_points(row.points), results.most_points)
+             if row.points is not None else "<p><b>Not graded yet</b></p>")
+    parts = [total]
+    for exercise in results.exercises:
+        parts += _exercise(results, exercise, row.cells[exercise.name], motions)
+    parts.append('<p class="small">Graded by version %s. On your own machine the same version gives the same points: '
+                 "<code>./baxter.sh grade --version</code> prints it.</p>" % _text(results.version))
+    return _page("%s: %s" % (results.assignment, who), parts)
+
+
+def _exercise(results, exercise, cell, motions):
+    yield "<h2>%s: %s</h2>" % (_text(exercise.name), _text(exercise.title))
+    yield '<p><b class="%s">%s of %g points</b></p>' % (_class_of(cell), _points(cell.points), POINTS)
+    if cell.sentence:
+        yield '<p class="hint">%s</p>' % _text(cell.sentence.rstrip(".") + ".")
+    if cell.note:
+        yield "<p>%s: %s.</p>" % (_text(cell.program), _text(cell.note))
+    if cell.status != GRADED:
+        return
+    runs = cell.verdict["runs"]
+    for number, run in enumerate(runs):
+        yield "<h3><code>%s</code></h3>" % _text(" ".join([cell.verdict["program"], *run["arguments"]]))
+        yield _criteria(run)
+        shown = motions.get(cell.key, [])
+        if number < len(shown) and shown[number]:
+            yield ('<p class="small">What the robot did, in a loop: left arm blue, right arm orange, both at the '
+                   "start grey, the hands' paths thin.</p>")
+            yield drawing.of_run(shown[number])
+        for title, name in (("It printed", "output"), ("Its errors", "errors")):
+            if run.get(name):
+                yield "<details><summary>%s</summary><pre>%s</pre></details>" % (title, _text(run[name]))
+    yield "<p>The same check on your own machine:</p><pre>%s</pre>" % _text(_command(results, exercise, cell))
+
+
+def _criteria(run):
+    rows = "".join('<tr><td>%s</td><td class="n">%g</td><td class="n">%g</td><td>%s</td></tr>' % (
+        _text(one["name"]), round(one["points"], 1), one["of"], _text(one["found"])) for one in run["criteria"])
+    end = ""
+    if run["end"]:
+        end = '<p class="small">The run: %s, after %.1f s of simulated time.</p>' % (
+            _text(run["end"]["how"]), run["end"]["simulated_s"])
+    return ('<table><tr><th>criterion</th><th class="n">points</th><th class="n">of</th><th>found</th></tr>%s</table>'
+            "<p>%g points for this run.</p>%s" % (rows, round(run["points"], 1), end))
+
+
+def _command(results, exercise, cell):
+    words = ["./baxter.sh", "check", exercise.lab, exercise.name, cell.program]
+    for name, usual in (("seed", 0), ("profile", "sim"), ("serial", 0)):
+        if results.conditions[name] != usual:
+            words += ["--" + name, str(results.conditions[name])]
+    return shlex.join(words)
+
+
+# -- the instructor's page
+
+def overview(results, seconds, feedback_of):
+    """The instructor's page. seconds: how long this start took, or None. feedback_of: function of a Row, the path of
+    the student's page."""
+    graded = [row.points for row in results.rows if row.points is not None]
+    conditions = ", ".join("%s %s" % one for one in results.conditions.items())
+    parts = ["<p>%d submissions, %d graded; %s; version %s%s.</p>" % (
+        len(results.rows), sum(row.status == GRADED for row in results.rows), _text(conditions), _text(results.version),
+        "" if seconds is None else "; this start took %.0f s" % seconds)]
+    if graded:
+        parts.append("<p>Mean %.1f of %g points, median %.1f.</p>" % (
+            sum(graded) / len(graded), results.most_points, sorted(graded)[len(graded) // 2]))
+        parts.append(_histogram(graded, results.most_points))
+    parts.append('<p>Files: <a href="results.csv">results.csv</a>, <a href="results.json">results.json</a>, '
+                 '<a href="results.xml">results.xml</a> (JUnit), <a href="nbgrader.csv">nbgrader.csv</a>; '
+                 "results.json for Gradescope is beside each student's page.</p>")
+    parts += ["<h2>Submissions</h2>", _submissions(results, feedback_of)]
+    parts += ["<h2>What went wrong, by number</h2>", _faults(results)]
+    parts += ["<h2>Submissions that are alike</h2>", *_alike(results, feedback_of)]
+    notes = [(row, name, note) for row in results.rows for name, note in row.notes]
+    if notes:
+        parts.append("<h2>Notes</h2><p>They change no points.</p><table>%s</table>" % "".join(
+            "<tr><td>%s</td><td>%s</td><td>%s</td></tr>" % (_text(row.submission.entry), _text(name), _text(note))
+            for row, name, note in notes))
+    if results.left_out:
+        parts.append("<p>Not a submission, and left out: %s.</p>" % _text(", ".join(results.left_out)))
+    return _page("%s: the class" % results.assignment, parts)
+
+
+def _histogram(points, most):
+    counts = [0] * 10
+    for value in points:
+        counts[min(9, int(10 * value / most))] += 1
+    rows = "".join('<tr><td class="n">%g to %g</td><td class="n">%d</td><td><span class="bar" style="width: %dpx">'
+                   "</span></td></tr>" % (most * k / 10, most * (k + 1) / 10, count, round(300 * count / max(counts)))
+                   for k, count in enumerate(counts))
+    return "<table>%s</table>" % rows
+
+
+def _submissions(results, feedback_of):
+    head = "".join('<th class="n">%s</th>' % _text(exercise.name) for exercise in results.exercises)
+    lines = []
+    for row in results.rows:
+        cells = "".join('<td class="n %s">%s</td>' % (_class_of(row.cells[exercise.name]),
+                                                      _points(row.cells[exercise.name].points))
+                        for exercise in results.exercises)
+        lines.append('<tr><td><a href="%s">%s</a></td><td>%s</td>%s<td class="n">%s</td><td>%s</td></tr>' % (
+            link_to(feedback_of(row)), _text(row.submission.entry), _text(row.submission.name), cells,
+            _points(row.points), _text("; ".join(row.sentences))))
+    return ('<table><tr><th>submission</th><th>name</th>%s<th class="n">points</th><th>reasons</th></tr>%s</table>'
+            % (head, "".join(lines)))
+
+
+def _faults(results):
+    counts = {}
+    for row in results.rows:
+        for name, cell in row.cells.items():
+            what = (cell.verdict or {}).get("fault") or (cell.status if cell.status != GRADED else "")
+            if what:
+                counts[name, what] = counts.get((name, what), 0) + 1
+    if not counts:
+        return "<p>Nothing.</p>"
+    return "<table>%s</table>" % "".join(
+        '<tr><td class="n">%d</td><td>%s</td><td>%s</td></tr>' % (count, _text(name), _text(what))
+        for (name, what), count in sorted(counts.items(), key=lambda one: (-one[1], one[0])))
+
+
+def _alike(results, feedback_of):
+    if not results.alike:
+        yield "<p>None share half of their own code.</p>"
+        return
+    yield ("<p>Names, numbers, texts and formatting do not count, nor does code that was handed out or that a large "
+           "part of the class shares. Compare the two programs: this is no proof.</p>")
+    pages = {row.submission.entry: link_to(feedback_of(row)) for row in results.rows}
+    yield "<table><tr><th>first</th><th>second</th><th>found</th></tr>%s</table>" % "".join(
+        '<tr><td><a href="%s">%s</a></td><td><a href="%s">%s</a></td><td>%s</td></tr>' % (
+            pages[pair.first], _text(pair.first), pages[pair.second], _text(pair.second),
+            "the same files, byte for byte" if pair.is_same else
+            "%.0f %% of the first's own code is in the second, %.0f %% of the second's in the first" % (
+                100 * pair.of_first, 100 * pair.of_second)) for pair in results.alike)

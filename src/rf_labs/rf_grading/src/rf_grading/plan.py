@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is to be judged: a task for each program of each submission, its files laid out in a folder. Free of ROS."""
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rf_checks import submission as files_of_programs
+from rf_grading import keys, programs
+
+
+@dataclass(frozen=True)
+class Task:
+    """One verdict to be found. program: path of the laid-out program."""
+
+    key: str
+    exercise: object
+    program: str
+
+
+@dataclass
+class Entry:
+    """A Submission and, for each exercise's name, its key, or the sentence that says why it is not judged.
+
+    paths: the program's path in the submission, notes: about its making; both by the exercise's name. texts: {path:
+    text} of its programs.
+    """
+
+    submission: object
+    keys: dict = field(default_factory=dict)
+    problems: dict = field(default_factory=dict)
+    paths: dict = field(default_factory=dict)
+    notes: dict = field(default_factory=dict)
+    texts: dict = field(default_factory=dict)
+
+
+def make(submissions, exercises, version, conditions, folder, only_used=False):
+    """(exercises, entries, {key: Task}) for Submissions.
+
+    conditions: {"seed", "profile", ...} of every verdict. folder: an empty one for the programs. only_used: leave out
+    exercises for which no submission has a program. Raises OSError.
+    """
+    assigned = {one.entry: programs.assign(one.files, exercises) if one.files else {} for one in submissions}
+    if only_used:
+        exercises = [exercise for exercise in exercises if any(
+            isinstance(found.get(exercise), programs.Program) for found in assigned.values())]
+    entries, tasks = [], {}
+    for number, one in enumerate(submissions):
+        entry = Entry(one)
+        entries.append(entry)
+        laid_out = None
+        for exercise in exercises:
+            found = assigned[one.entry].get(exercise)
+            if not isinstance(found, programs.Program):
+                entry.problems[exercise.name] = one.problem or str(found)
+                continue
+            try:
+                laid_out = laid_out or _lay_out(found.files, Path(folder) / str(number))
+                path = laid_out / found.path
+                used = files_of_programs.files(path)
+            except (OSError, files_of_programs.BadSubmission) as error:
+                entry.problems[exercise.name] = "%s cannot be judged: %s" % (
+                    found.path, _shorter(error, folder, number))
+                continue
+            key = keys.key(version, exercise, conditions, path.name, used)
+            entry.keys[exercise.name], entry.paths[exercise.name] = key, found.path
+            entry.notes[exercise.name] = found.note
+            parent = Path(found.path).parent
+            entry.texts.update({(parent / name).as_posix(): content.decode("utf-8", "replace")
+                                for name, content in used.items()})
+            tasks.setdefault(key, Task(key, exercise, str(path)))
+    return exercises, entries, tasks
+
+
+def _lay_out(files, folder):
+    for path, content in files.items():
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+    return folder
+
+
+def _shorter(error, folder, number):
+    text = "%s" % (getattr(error, "strerror", None) or error)
+    return text.replace("%s/%d/" % (folder, number), "")
