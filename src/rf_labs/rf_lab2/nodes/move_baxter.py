@@ -64,8 +64,8 @@ def solve_ik(arm, point, quaternion):
                        pose=Pose(position=Point(*point), orientation=Quaternion(*quaternion)))
     response = rospy.ServiceProxy(name, SolvePositionIK)(SolvePositionIKRequest(pose_stamp=[pose]))
     if not response.isValid or not response.isValid[0]:
-        raise ProgramFailed("no joint angles put the %s gripper at %s, quaternion %s: out of reach, or against a joint "
-                         "limit (the log of the IK node says which)" % (arm, list(point), list(quaternion)))
+        raise ProgramFailed("no joint angles put the %s gripper at %s, quaternion %s; rostopic echo -n 1 %s says why"
+                            % (arm, list(point), list(quaternion), name.replace("IKService", "IKReport")))
     return dict(zip(response.joints[0].name, response.joints[0].position, strict=True))
 
 

@@ -21,6 +21,8 @@ def run(node_name, body):
     try:
         startup.init_node(node_name)
         body()
+    except rospy.ROSInterruptException:
+        return 130
     except (ProgramFailed, OSError, ValueError, rospy.ROSException, rospy.ServiceException) as error:
         print("%s: %s" % (os.path.basename(sys.argv[0]), getattr(error, "strerror", None) or error), file=sys.stderr)
         return 1

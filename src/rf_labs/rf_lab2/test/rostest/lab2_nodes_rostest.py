@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from baxter_interface import Limb
-from lab_testing.waiting import stretched
+from lab_testing.waiting import stretched, wait_until
 
 DEADLINE_S = stretched(60.0)
 SIDES = ("left", "right")
@@ -57,8 +57,14 @@ class MoveBaxterTest(unittest.TestCase):
             rospy.delete_param("/fake_robot")
         for name, value in knobs.items():
             rospy.set_param("/fake_robot/" + name, value)
-        rospy.wait_for_service("/fake_robot/reload", 10.0)
+        rospy.wait_for_service("/fake_robot/reload", DEADLINE_S)
         rospy.ServiceProxy("/fake_robot/reload", Trigger)()
+
+    def wait_at(self, side, wanted):
+        """A program ends within its tolerance; the robot moves on to the goal."""
+        limb = Limb(side)
+        wait_until(lambda: all(abs(limb.joint_angle(name) - angle) < 0.002 for name, angle in wanted.items()),
+                   lambda: "%s; they are at %s" % (wanted, limb.joint_angles()))
 
     def test_left_arm_goes_to_the_angles_and_they_are_printed(self):
         result = run("move_baxter.py")
@@ -69,10 +75,9 @@ class MoveBaxterTest(unittest.TestCase):
         self.assertEqual((side, pose.header.frame_id), ("left", "base"))
         self.assertEqual((pose.pose.position.x, pose.pose.position.y, pose.pose.position.z), (0.644, 0.0, 0.066))
         self.assertAlmostEqual(pose.pose.orientation.y, 0.923, delta=0.001)
-        for name, angle in printed.items():
-            self.assertAlmostEqual(Limb("left").joint_angle(name), angle, delta=0.002)
+        self.wait_at("left", printed)
         # The other arm is at neutral.
-        self.assertAlmostEqual(Limb("right").joint_angle("right_s1"), -0.55, delta=0.002)
+        self.wait_at("right", {"right_s1": -0.55})
 
     def test_arm_and_pose_are_arguments(self):
         result = run("move_baxter.py", "--arm", "right", "--point", "0.6", "-0.4", "-0.1",
@@ -102,8 +107,7 @@ class MoveBaxterTest(unittest.TestCase):
         for left, right in zip(shift["left"], shift["right"], strict=True):
             self.assertAlmostEqual(left, -right, delta=1e-6)
         for side in SIDES:
-            for joint, angle in LAB_ANGLES.items():
-                self.assertAlmostEqual(Limb(side).joint_angle("%s_%s" % (side, joint)), angle, delta=0.002)
+            self.wait_at(side, {"%s_%s" % (side, joint): angle for joint, angle in LAB_ANGLES.items()})
 
     def test_wave_refuses_a_period_that_no_arm_follows(self):
         result = run("wave.py", "--period", "0.2")
