@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node tf2_web_republisher: an action and a service that send transforms to web pages."""
+import itertools
+import time
+
+import actionlib
+import rospy
+import tf2_ros
+
+from rospy_limits.node import limit_ports
+from rospy_start import end_on_signals
+from tf2_web_republisher.msg import TFArray, TFSubscriptionAction, TFSubscriptionFeedback
+from tf2_web_republisher.srv import RepublishTFs
+from tf2_web_republisher.watch import FrameWatch, Schedule, period_of
+
+
+class Republisher:
+    """Goals and topics of all pages."""
+
+    def __init__(self):
+        self._buffer = tf2_ros.Buffer()
+        self._schedule = Schedule()
+        self._numbers = itertools.count()
+        self._goals = {}  # goal id -> function of the schedule
+        self._server = actionlib.ActionServer("tf2_web_republisher", TFSubscriptionAction, self._begin, self._cancel,
+                                              auto_start=False)
+        self._kept = [tf2_ros.TransformListener(self._buffer),
+                      rospy.Service("republish_tfs", RepublishTFs, self._topic)]
+        self._server.start()
+
+    def _lookup(self, target, source):
+        try:
+            found = self._buffer.lookup_transform(target, source, rospy.Time(0))
+        # Frames that are not there yet, or not connected, or no names.
+        except (tf2_ros.TransformException, TypeError, ValueError):
+            return None
+        move, turn = found.transform.translation, found.transform.rotation
+        return (move.x, move.y, move.z), (turn.x, turn.y, turn.z, turn.w), found
+
+    def _changes(self, watch):
+        return [found for _, _, found in watch.changed(self._lookup)]
+
+    def _begin(self, handle):
+        goal, name = handle.get_goal(), handle.get_goal_id().id
+        watch = FrameWatch(goal.target_frame, goal.source_frames, goal.angular_thres, goal.trans_thres)
+
+        def send():
+            if transforms := self._changes(watch):
+                handle.publish_feedback(TFSubscriptionFeedback(transforms))
+        self._goals[name] = send
+        handle.set_accepted()
+        self._schedule.add(send, period_of(goal.rate))
+
+    def _cancel(self, handle):
+        send = self._goals.pop(handle.get_goal_id().id, None)
+        if send is not None:
+            self._schedule.remove(send)
+            handle.set_canceled()
+
+    def _topic(self, request):
+        """A topic of its own for the request; it ends when nobody has heard it for a while."""
+        name = "tf_repub_%d" % next(self._numbers)
+        publisher = rospy.Publisher(name, TFArray, queue_size=10)
+        watch = FrameWatch(request.target_frame, request.source_frames, request.angular_thres, request.trans_thres)
+        heard = [time.monotonic()]
+
+        def send():
+            now = time.monotonic()
+            if publisher.get_num_connections():
+                heard[0] = now
+                if transforms := self._changes(watch):
+                    publisher.publish(transforms)
+            elif now - heard[0] > request.timeout.to_sec():
+                publisher.unregister()
+                return False
+            return True
+        self._schedule.add(send, period_of(request.rate))
+        return publisher.resolved_name
+
+
+def main():
+    limit_ports()
+    end_on_signals()
+    rospy.init_node("tf2_web_republisher", disable_signals=True)
+    republisher = Republisher()  # noqa: F841  (it serves while it lives)
+    rospy.spin()

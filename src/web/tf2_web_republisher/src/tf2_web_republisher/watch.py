@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which transforms have changed, and when they are looked at. No ROS."""
+import logging
+import math
+import threading
+import time
+
+_LOG = logging.getLogger("tf2_web_republisher")
+#: Lookups of one subscription [Hz].
+SLOWEST_HZ, USUAL_HZ, FASTEST_HZ = 0.1, 10.0, 100.0
+
+
+class FrameWatch:
+    """The transforms of some frames against a target frame, when they have changed.
+
+    Thresholds in rad and m. ``lookup(target, source)`` returns ((x, y, z), (x, y, z, w), anything) or None.
+    """
+
+    def __init__(self, target, sources, angle, distance):
+        self._target = clean(target)
+        self._sources = list(dict.fromkeys(map(clean, sources)))
+        self._angle = angle
+        self._distance = distance
+        self._sent = {}
+
+    def changed(self, lookup):
+        """What ``lookup`` gave for the frames that have moved since they were last returned."""
+        found = []
+        for source in self._sources:
+            transform = lookup(self._target, source)
+            if transform is None:
+                continue
+            last = self._sent.get(source)
+            if last is None or math.dist(transform[0], last[0]) > self._distance \
+                    or angle_between(transform[1], last[1]) > self._angle:
+                self._sent[source] = transform
+                found.append(transform)
+        return found
+
+
+def clean(frame):
+    """A frame's name as tf2 has it, without a leading slash."""
+    return frame.lstrip("/")
+
+
+def angle_between(a, b):
+    """The angle between two orientations (quaternions of length 1) [rad]."""
+    return 2 * math.acos(min(1.0, abs(sum(x * y for x, y in zip(a, b, strict=True)))))
+
+
+def period_of(rate):
+    """Seconds between two lookups at ``rate`` [Hz]; the usual rate where none, or no number, is given."""
+    if not rate > 0:
+        rate = USUAL_HZ
+    return 1 / min(max(rate, SLOWEST_HZ), FASTEST_HZ)
+
+
+class Schedule:
+    """Calls functions periodically in one thread, in wall time: a page that opens while the simulation is paused sees
+    the robot, too.
+    """
+
+    def __init__(self):
+        self._changed = threading.Condition()
+        self._jobs = {}  # function -> [next time, period]
+        self._ended = False
+        self._thread = threading.Thread(target=self._run, name="schedule", daemon=True)
+        self._thread.start()
+
+    def add(self, function, period_s):
+        """Call ``function()`` at once, and then every ``period_s`` until it returns False or raises."""
+        with self._changed:
+            self._jobs[function] = [time.monotonic(), period_s]
+            self._changed.notify()
+
+    def remove(self, function):
+        with self._changed:
+            self._jobs.pop(function, None)
+
+    def end(self):
+        with self._changed:
+            self._ended = True
+            self._changed.notify()
+        self._thread.join(5.0)
+
+    def _run(self):
+        while (function := self._next()) is not None:
+            try:
+                goes_on = function()
+            except Exception:
+                # The subscription of one page; the others go on.
+                _LOG.exception("a subscription ends")
+                goes_on = False
+            with self._changed:
+                job = self._jobs.get(function)
+                if goes_on is False:
+                    self._jobs.pop(function, None)
+                elif job is not None:
+                    job[0] = max(job[0] + job[1], time.monotonic())
+
+    def _next(self):
+        with self._changed:
+            while not self._ended:
+                due = min(self._jobs, key=lambda function: self._jobs[function][0], default=None)
+                wait_s = None if due is None else self._jobs[due][0] - time.monotonic()
+                if wait_s is not None and wait_s <= 0:
+                    return due
+                self._changed.wait(wait_s)
+        return None

@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Topics on their way to clients: one subscription for all, each message converted once for each form that somebody
+wants.
+
+No ROS: the graph (web_bridge.session says which methods it has) is an argument.
+"""
+import threading
+from collections import deque
+from typing import NamedTuple
+
+from web_bridge.errors import BridgeError
+from web_bridge.frames import cbor, json_text, packed_png, split
+
+#: From the weakest to the strongest.
+COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
+#: Bytes of latched messages that are kept for clients that subscribe later, for each publisher.
+LARGEST_LATCHED = 64 << 20
+
+
+class Arrival(NamedTuple):
+    """A message as it came: serialized bytes, its type and sum, the time of receipt (secs, nsecs), its publisher."""
+
+    data: bytes
+    type: str
+    md5: str
+    received: tuple
+    publisher: str = ""
+    is_latched: bool = False
+
+
+class Wish(NamedTuple):
+    """How one subscription wants its messages: milliseconds, messages, characters, one of COMPRESSIONS."""
+
+    throttle_rate: float = 0
+    queue_length: int = 0
+    fragment_size: int = 0
+    compression: str = "none"
+
+    def joined(self, other):
+        """What counts for a client with both subscriptions to one topic."""
+        sizes = [size for size in (self.fragment_size, other.fragment_size) if size]
+        return Wish(min(self.throttle_rate, other.throttle_rate), min(self.queue_length, other.queue_length),
+                    min(sizes, default=0), max(self.compression, other.compression, key=COMPRESSIONS.index))
+
+
+class Packet:
+    """One message of a topic; converts itself when a form is first asked for. Not for two threads at a time."""
+
+    def __init__(self, topic, arrival, codec):
+        self._topic = topic
+        self._arrival = arrival
+        self._codec = codec
+        self._message = self._text = None
+        self._frames = {}
+        self._lock = threading.Lock()
+
+    def frames(self, compression, fragment_size):
+        """The frames of a form: texts, or one bytes object. Raises BridgeError where the message cannot be read."""
+        form = (compression, 0 if compression.startswith("cbor") else fragment_size)
+        with self._lock:
+            if form not in self._frames:
+                self._frames[form] = self._made(*form)
+            return self._frames[form]
+
+    def _made(self, compression, fragment_size):
+        if compression == "cbor-raw":
+            secs, nsecs = self._arrival.received
+            return [self._publish_cbor({"bytes": self._arrival.data, "secs": secs, "nsecs": nsecs})]
+        if self._message is None:
+            self._message = self._codec.decoded(self._arrival)
+        if compression == "cbor":
+            return [self._publish_cbor(self._codec.cbor.values(self._message))]
+        if self._text is None:
+            values = self._codec.json.values(self._message)
+            self._text = json_text({"op": "publish", "topic": self._topic, "msg": values})
+        return split(packed_png(self._text) if compression == "png" else self._text, fragment_size)
+
+    def _publish_cbor(self, values):
+        return cbor({"op": "publish", "topic": self._topic, "msg": values})
+
+
+class ClientFeed:
+    """One client's share of a topic: which messages, when. ``later(delay_s, function)`` returns a handle with
+    ``cancel()``.
+    """
+
+    def __init__(self, client, topic, later, clock):
+        self._client = client
+        self._topic = topic
+        self._later = later
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._wishes = {}
+        self._wish = None
+        self._due = 0.0
+        self._waiting = deque()
+        self._timer = None
+        self._told = ""
+
+    def add(self, name, wish):
+        with self._lock:
+            self._wishes[name] = wish
+            self._join()
+
+    def remove(self, name):
+        """Forget one subscription (None: all); returns whether one is left."""
+        with self._lock:
+            if name is None:
+                self._wishes.clear()
+            self._wishes.pop(name, None)
+            self._join()
+            return bool(self._wishes)
+
+    def _join(self):
+        self._wish = None
+        for wish in self._wishes.values():
+            self._wish = wish if self._wish is None else self._wish.joined(wish)
+        self._waiting = deque(self._waiting, self._wish.queue_length or None) if self._wish else deque()
+        if not self._waiting and self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def offer(self, packet):
+        """Send a message now, later or not at all."""
+        with self._lock:
+            wish = self._wish
+            if wish is None:
+                return
+            now = self._clock()
+            if wish.throttle_rate and (now < self._due or self._waiting):
+                if wish.queue_length:
+                    self._waiting.append(packet)
+                    if self._timer is None:
+                        self._timer = self._later(max(0.0, self._due - now), self._next)
+                return
+            self._due = now + wish.throttle_rate / 1000
+        self._send(packet, wish)
+
+    def _next(self):
+        with self._lock:
+            self._timer = None
+            if not self._waiting or self._wish is None:
+                return
+            packet, wish = self._waiting.popleft(), self._wish
+            self._due = self._clock() + wish.throttle_rate / 1000
+            if self._waiting:
+                self._timer = self._later(wish.throttle_rate / 1000, self._next)
+        self._send(packet, wish)
+
+    def _send(self, packet, wish):
+        try:
+            frames = packet.frames(wish.compression, wish.fragment_size)
+        except BridgeError as error:
+            # The same reason once, not with each message.
+            if str(error) != self._told:
+                self._told = str(error)
+                self._client.status("error", "a message of %s is not sent: %s" % (self._topic, error), None)
+            return
+        self._client.outgoing.offer(frames, self._topic, wish.queue_length)
+
+
+class Latched:
+    """The last latched message of each publisher of a topic, for clients that subscribe later. Its user locks."""
+
+    def __init__(self):
+        self._of = {}  # publisher -> message
+
+    def keep(self, arrival, message):
+        """``message``: what :meth:`of` gives back for this arrival."""
+        if arrival.is_latched and len(arrival.data) <= LARGEST_LATCHED:
+            self._of[arrival.publisher] = message
+        else:
+            self._of.pop(arrival.publisher, None)
+
+    def of(self, subscription):
+        """The messages of publishers that are still connected."""
+        if self._of:
+            alive = subscription.publishers()
+            self._of = {name: message for name, message in self._of.items() if name in alive}
+        return list(self._of.values())
+
+
+class Feed:
+    """One topic for all clients."""
+
+    def __init__(self, topic, codec, later, clock):
+        self._topic = topic
+        self._codec = codec
+        self._later = later
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._clients = {}
+        self._latched = Latched()
+        self.subscription = None
+
+    def arrived(self, arrival):
+        """A message of ROS; on the thread that received it."""
+        packet = Packet(self._topic, arrival, self._codec)
+        with self._lock:
+            self._latched.keep(arrival, packet)
+            clients = list(self._clients.values())
+        for client in clients:
+            client.offer(packet)
+
+    def add(self, client, name, wish):
+        """A subscription of a client; a new client gets the latched messages of publishers that are still there."""
+        with self._lock:
+            share = self._clients.get(client)
+            packets = []
+            if share is None:
+                share = self._clients[client] = ClientFeed(client, self._topic, self._later, self._clock)
+                packets = self._latched.of(self.subscription)
+            share.add(name, wish)
+        for packet in packets:
+            share.offer(packet)
+
+    def remove(self, client, name=None):
+        """Forget one subscription of a client (None: all of its). Returns whether the client had any."""
+        with self._lock:
+            share = self._clients.get(client)
+            if share is not None and not share.remove(name):
+                del self._clients[client]
+            return share is not None
+
+    @property
+    def is_idle(self):
+        with self._lock:
+            return not self._clients
+
+
+class Feeds:
+    """The topics that clients hear. Changes of subscriptions come one at a time; messages from any thread."""
+
+    def __init__(self, graph, codec, later, clock):
+        self._graph = graph
+        self._codec = codec
+        self._later = later
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._feeds = {}
+
+    def subscribe(self, client, name, topic, type_name, wish):
+        """Raises BridgeError, for a type that is not the topic's, for instance."""
+        with self._lock:
+            feed = self._feeds.get(topic)
+            if feed is not None and type_name is None:
+                feed.add(client, name, wish)
+                return
+        # The master may be slow; other topics do not wait for it.
+        self._graph.check_type(topic, type_name)
+        with self._lock:
+            feed = self._feeds.get(topic)
+            if feed is not None:
+                feed.add(client, name, wish)
+                return
+            feed = Feed(topic, self._codec, self._later, self._clock)
+            feed.add(client, name, wish)
+            feed.subscription = self._graph.subscribe(topic, feed.arrived)
+            # Not before the subscription has worked: the next client tries again.
+            self._feeds[topic] = feed
+
+    def unsubscribe(self, client, topic, name=None):
+        """Returns whether the client had a subscription to the topic. The last client takes the subscription along."""
+        with self._lock:
+            feed = self._feeds.get(topic)
+            if feed is None or not feed.remove(client, name):
+                return False
+            if feed.is_idle:
+                del self._feeds[topic]
+                feed.subscription.close()
+            return True
+
+    def forget(self, client):
+        """End all subscriptions of a client."""
+        with self._lock:
+            topics = list(self._feeds)
+        for topic in topics:
+            self.unsubscribe(client, topic)
+
+    @property
+    def topics(self):
+        with self._lock:
+            return sorted(self._feeds)

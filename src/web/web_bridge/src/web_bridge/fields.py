@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The fields of a client's operation, checked."""
+from web_bridge.errors import FieldError, shown
+
+#: A number: milliseconds, messages or characters of a client's wish, of at most so many.
+NUMBER = (int, float)
+_LARGEST_NUMBER = 1e12
+_NEEDED = object()
+
+
+def field(operation, name, kind, default=_NEEDED):
+    """A field of an operation (dict); ``kind``: a type, or NUMBER. JSON's null counts as missing. Raises FieldError."""
+    value = operation.get(name)
+    if value is None:
+        if default is _NEEDED:
+            raise FieldError("the field %s is missing" % name)
+        return default
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool) \
+            or (kind is NUMBER and not abs(value) <= _LARGEST_NUMBER):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        raise FieldError("%s is %s; %s is expected" % (name, shown(value), " or ".join(one.__name__ for one in kinds)))
+    return value

@@ -1,0 +1,357 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The operations of the Foxglove WebSocket protocol for one client. No ROS."""
+import threading
+
+from web_bridge.codec import deserialized, serialized
+from web_bridge.errors import BridgeError, FieldError, Refused, ServiceFailed, shown
+from web_bridge.fields import field
+from web_bridge.foxglove import parameters as values
+from web_bridge.foxglove import wire
+from web_bridge.foxglove.wire import entries, number
+
+#: How clients may publish; services have the first.
+ENCODINGS = ("ros1", "json")
+#: Topics that one client publishes, and parameters that it watches.
+MOST_CHANNELS, MOST_PARAMETERS = 1000, 20000
+_QUEUE = 100
+
+
+class _ClientChannel:
+    def __init__(self, topic, encoding):
+        self.topic = topic
+        self.encoding = encoding
+
+
+class FoxgloveSession:
+    """One client. ``outgoing`` is its OutgoingBuffer; frames come one at a time, from any thread."""
+
+    def __init__(self, bridge, outgoing, rules):
+        self.outgoing = outgoing
+        self._bridge = bridge
+        self._rules = rules
+        self._lock = threading.Lock()
+        self._closed = False
+        self._subscriptions = {}  # id -> channel's id
+        self._subscribed = {}  # channel's id -> id
+        self._channels = {}  # id -> _ClientChannel
+        self._watched = set()
+        self._told = set()
+
+    # To the client; from any thread.
+
+    def send(self, op, **fields):
+        """An answer, which is never dropped."""
+        self.send_text(wire.text(op, **fields))
+
+    def send_text(self, text):
+        """A frame that many clients get; never dropped."""
+        self.outgoing.keep([text])
+
+    def send_message(self, frame):
+        """A message of a topic: beyond the buffer's limit the oldest is dropped, and the client is told once."""
+        dropped = self.outgoing.dropped
+        self.outgoing.offer([frame])
+        if self.outgoing.dropped > dropped:
+            self.tell_once("messages are dropped: this client does not read them as fast as they come", wire.WARNING)
+
+    def send_time(self, frame):
+        self.outgoing.offer([frame], "time", 1)
+
+    def status(self, level, text):
+        # A client that floods with mistakes and reads nothing loses the oldest.
+        self.outgoing.offer([wire.text("status", level=level, message=text)])
+
+    def tell_once(self, text, level=wire.ERROR):
+        """A status that this client gets once."""
+        if text not in self._told and len(self._told) < 1000:
+            self._told.add(text)
+            self.status(level, text)
+
+    def tell_fault(self, text):
+        """The server failed at an operation."""
+        self.status(wire.ERROR, text)
+
+    def has(self, capability):
+        """May this client use a capability?"""
+        return self._rules.has(capability)
+
+    # From the client.
+
+    def open(self):
+        """Say what this server can do, and which channels there are."""
+        options = self._bridge.options
+        capabilities = [name for name in self._rules.capabilities if self.has(name)]
+        self.send("serverInfo", name=options.name, capabilities=capabilities + ["time"] * options.sim_time,
+                  supportedEncodings=list(ENCODINGS), metadata=options.metadata, sessionId=options.session_id)
+        self._bridge.add(self)
+
+    def is_quick(self, _frame):
+        """Nothing is served in the loop."""
+        return False
+
+    def handle(self, frame):
+        """Serve a frame (text or bytes). Errors go to the client as status, never to the caller."""
+        with self._lock:
+            if self._closed:
+                return
+            try:
+                if isinstance(frame, str):
+                    self._serve_text(wire.read_text(frame))
+                else:
+                    self._serve_binary(wire.read_binary(frame))
+            except BridgeError as error:
+                self.status(wire.ERROR, str(error))
+
+    def close(self):
+        """The client has gone: withdraw everything of it."""
+        self.outgoing.close()
+        with self._lock:
+            self._closed = True
+            self._bridge.remove(self)
+            self._bridge.calls.forget(self)
+            for channel_id in self._subscriptions.values():
+                self._bridge.feeds.unsubscribe(self, channel_id)
+            self._bridge.publications.forget(self)
+
+    def _serve_text(self, operation):
+        op = operation.get("op")
+        serve = _OPERATIONS.get(op) if isinstance(op, str) else None
+        if serve is None:
+            raise FieldError("unknown op %s; known are %s" % (shown(op), ", ".join(sorted(_OPERATIONS))))
+        try:
+            serve(self, operation)
+        except BridgeError as error:
+            raise BridgeError("%s: %s" % (op, error)) from None
+
+    def _serve_binary(self, request):
+        if isinstance(request, wire.ClientMessage):
+            self._publish(request)
+        else:
+            self._call(request)
+
+    def _each(self, op, all_entries, serve, level=wire.ERROR):
+        """Serve each entry of an operation; one status for all that fail."""
+        first, failed = None, 0
+        for entry in all_entries:
+            try:
+                serve(entry)
+            except BridgeError as error:
+                first, failed = first or error, failed + 1
+        if failed:
+            more = " (and %d more of %d)" % (failed - 1, len(all_entries)) if failed > 1 else ""
+            self.status(level, "%s: %s%s" % (op, first, more))
+
+    # Topics to the client
+
+    def _subscribe(self, operation):
+        self._each("subscribe", entries(operation, "subscriptions", dict), self._subscribe_to)
+
+    def _subscribe_to(self, entry):
+        name, channel_id = number(entry.get("id"), "id"), number(entry.get("channelId"), "channelId")
+        channels = self._bridge.catalogue.channels
+        channel = channels.get(channel_id)
+        if channel is None:
+            raise BridgeError("channel %d does not exist" % channel_id)
+        if channel_id in self._subscribed:
+            raise BridgeError("channel %d (%s) is subscribed to already, by subscription %d"
+                              % (channel_id, channel.topic, self._subscribed[channel_id]))
+        # A subscription whose channel has gone may be left by the client as it is.
+        if name in self._subscriptions and self._subscriptions[name] in channels:
+            raise BridgeError("a subscription with id %d exists already" % name)
+        self._forget_gone(channels)
+        self._bridge.feeds.subscribe(self, name, channel)
+        self._subscriptions[name], self._subscribed[channel_id] = channel_id, name
+
+    def _forget_gone(self, channels):
+        for name, channel_id in list(self._subscriptions.items()):
+            if channel_id not in channels:
+                self._bridge.feeds.unsubscribe(self, channel_id)
+                del self._subscriptions[name], self._subscribed[channel_id]
+
+    def _unsubscribe(self, operation):
+        self._each("unsubscribe", entries(operation, "subscriptionIds", int), self._unsubscribe_from, wire.WARNING)
+
+    def _unsubscribe_from(self, name):
+        if name not in self._subscriptions:
+            raise BridgeError("there is no subscription with id %s" % shown(name))
+        channel_id = self._subscriptions.pop(name)
+        del self._subscribed[channel_id]
+        self._bridge.feeds.unsubscribe(self, channel_id)
+
+    # Topics from the client
+
+    def _advertise(self, operation):
+        self._rules.check("clientPublish")
+        self._each("advertise", entries(operation, "channels", dict), self._advertise_one)
+        self._bridge.look_soon()
+
+    def _advertise_one(self, entry):
+        name, topic = number(entry.get("id"), "id"), field(entry, "topic", str)
+        encoding, type_name = field(entry, "encoding", str), field(entry, "schemaName", str)
+        if encoding not in ENCODINGS:
+            raise FieldError("encoding is %s; %s are known" % (shown(encoding), " and ".join(ENCODINGS)))
+        if name in self._channels:
+            raise BridgeError("channel %d is advertised already, for %s" % (name, self._channels[name].topic))
+        if len(self._channels) >= MOST_CHANNELS:
+            raise BridgeError("this client publishes %d topics, which is the limit" % MOST_CHANNELS)
+        topic = self._bridge.graph.resolve(topic)
+        self._rules.check_publish(topic)
+        self._bridge.publications.advertise(self, name, topic, type_name, (False, _QUEUE))
+        self._channels[name] = _ClientChannel(topic, encoding)
+
+    def _unadvertise(self, operation):
+        self._each("unadvertise", entries(operation, "channelIds", int), self._unadvertise_one, wire.WARNING)
+
+    def _unadvertise_one(self, name):
+        if name not in self._channels:
+            raise BridgeError("this client does not advertise a channel %s" % shown(name))
+        self._bridge.publications.unadvertise(self, self._channels.pop(name).topic, name)
+
+    def _publish(self, message):
+        self._rules.check("clientPublish")
+        channel = self._channels.get(message.channel_id)
+        if channel is None:
+            raise BridgeError("this client does not advertise a channel %d" % message.channel_id)
+        if channel.encoding == "json":
+            def make(empty):
+                return self._bridge.codec.reader.fill(empty, wire.read_text(message.data))
+        else:
+            # Read and written again: no subscriber gets bytes that are no message.
+            def make(empty):
+                return deserialized(empty, message.data)
+        try:
+            self._bridge.publications.publish_made(self, channel.topic, make)
+        except BridgeError as error:
+            raise BridgeError("%s: %s" % (channel.topic, error)) from None
+
+    # Services
+
+    def _call(self, request):
+        def fail(error):
+            self.send("serviceCallFailure", serviceId=request.service_id, callId=request.call_id, message=str(error))
+
+        def call(under_way):
+            try:
+                self.outgoing.keep([wire.response_frame(request, self._answer(request, entry, under_way))])
+            # A call always gets an answer; the graph runs code of others.
+            except Exception as error:
+                fail(str(error) or type(error).__name__)
+
+        entry = self._bridge.catalogue.services.get(request.service_id)
+        try:
+            self._rules.check("services")
+            if entry is None:
+                raise ServiceFailed("service %d does not exist" % request.service_id)
+            if request.encoding != ENCODINGS[0]:
+                raise ServiceFailed("encoding is %s; services are called in %s"
+                                    % (shown(request.encoding), ENCODINGS[0]))
+            self._bridge.calls.run(self, call)
+        except BridgeError as error:
+            fail(error)
+
+    def _answer(self, request, entry, under_way):
+        """On the thread of the call: the serialized response."""
+        def fill(empty):
+            if empty._type != entry.type + "Request":
+                self._bridge.catalogue.forget_service(entry)
+                raise ServiceFailed("service %s is no longer a %s" % (entry.name, entry.type))
+            return deserialized(empty, request.data)
+        return serialized(self._bridge.graph.call_service(entry.name, fill, under_way))
+
+    # Parameters
+
+    def _get_parameters(self, operation):
+        self._rules.check("parameters")
+        names = entries(operation, "parameterNames", str)
+        tree = self._bridge.parameters()
+        if names:
+            found = {}
+            for name in map(self._bridge.graph.resolve, names):
+                try:
+                    found[name] = values.at(tree, name)
+                except KeyError:
+                    continue
+        else:
+            found = values.flattened(tree)
+        self._send_parameters(found, field(operation, "id", str, None))
+
+    def _send_parameters(self, found, name):
+        seen = (values.shown_parameter(*one) for one in found.items() if self._may_see(*one))
+        self.send("parameterValues", parameters=[one for one in seen if one is not None], id=name)
+
+    def _may_see(self, name, value):
+        return all(map(self._rules.shows_parameter, values.flattened(value, name)))
+
+    def _set_parameters(self, operation):
+        name, done = field(operation, "id", str, None), {}
+
+        def set_one(entry):
+            parameter = self._bridge.graph.resolve(field(entry, "name", str))
+            done[parameter] = self._set(parameter, entry)
+        try:
+            self._each("setParameters", entries(operation, "parameters", dict), set_one)
+        finally:
+            for parameter, value in done.items():
+                self._bridge.tell_parameter(parameter, value)
+            if name is not None:
+                self._send_parameters({one: value for one, value in done.items() if value != {}}, name)
+
+    def _set(self, name, entry):
+        values.check_name(name)
+        graph = self._bridge.graph
+        # A namespace is set or deleted with everything in it.
+        try:
+            before = values.flattened(values.at(graph.parameters(), name), name)
+        except KeyError:
+            before = {}
+        value = {} if entry.get("value") is None else values.given_value(entry)
+        for one in {name, *before, *values.flattened(value, name)}:
+            self._rules.check_set_parameter(one)
+        if entry.get("value") is None:
+            graph.delete_parameter(name)
+        else:
+            graph.set_parameter(name, value)
+        return value
+
+    def _watch(self, operation):
+        self._rules.check("parametersSubscribe")
+        names = {self._bridge.graph.resolve(name) for name in entries(operation, "parameterNames", str)}
+        for name in names:
+            self._rules.check_parameter(name)
+        if len(self._watched | names) > MOST_PARAMETERS:
+            raise Refused("a client may watch %d parameters" % MOST_PARAMETERS)
+        self._watched |= names
+        self._bridge.watch_parameters(self, sorted(names))
+
+    def _leave(self, operation):
+        names = {self._bridge.graph.resolve(name) for name in entries(operation, "parameterNames", str)}
+        self._watched -= names
+        self._bridge.leave_parameters(self, names)
+
+    # The graph, files
+
+    def _follow_graph(self, _operation):
+        self._rules.check("connectionGraph")
+        self._bridge.follow_graph(self)
+
+    def _leave_graph(self, _operation):
+        self._bridge.leave_graph(self)
+
+    def _fetch_asset(self, operation):
+        name = number(operation.get("requestId"), "requestId")
+        try:
+            uri = field(operation, "uri", str)
+            self._rules.check_asset(uri)
+            frame = wire.asset_frame(name, self._bridge.assets.read(uri))
+        except BridgeError as error:
+            frame = wire.asset_frame(name, error=str(error))
+        self.outgoing.keep([frame])
+
+
+_OPERATIONS = {
+    "subscribe": FoxgloveSession._subscribe, "unsubscribe": FoxgloveSession._unsubscribe,
+    "advertise": FoxgloveSession._advertise, "unadvertise": FoxgloveSession._unadvertise,
+    "getParameters": FoxgloveSession._get_parameters, "setParameters": FoxgloveSession._set_parameters,
+    "subscribeParameterUpdates": FoxgloveSession._watch, "unsubscribeParameterUpdates": FoxgloveSession._leave,
+    "subscribeConnectionGraph": FoxgloveSession._follow_graph,
+    "unsubscribeConnectionGraph": FoxgloveSession._leave_graph, "fetchAsset": FoxgloveSession._fetch_asset}

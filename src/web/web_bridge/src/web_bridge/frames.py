@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames of a WebSocket to operations (dicts) and back: JSON, CBOR, PNG, fragments. No ROS."""
+import base64
+import binascii
+import itertools
+import json
+import math
+import struct
+import zlib
+from collections import OrderedDict
+
+import cbor2
+
+from web_bridge.errors import BridgeError, FrameError, shown
+from web_bridge.values import from_tag
+
+#: Fragments that are not complete: bytes and messages of one client; beyond, the oldest message is dropped.
+MOST_BYTES_PENDING, MOST_PENDING = 64 << 20, 100
+MOST_FRAGMENTS = 100000
+_DECODER = json.JSONDecoder()
+_PNG = b"\x89PNG\r\n\x1a\n"
+
+
+def json_text(values):
+    return json.dumps(values, separators=(",", ":"))
+
+
+def read_frame(frame):
+    """The operations of one frame: a text with one or more JSON objects, or bytes with one object in CBOR (or JSON).
+
+    Raises FrameError.
+    """
+    if isinstance(frame, bytes):
+        if frame[:1] != b"{":
+            return [_read_cbor(frame)]
+        try:
+            frame = frame.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise FrameError("a frame of text that is no UTF-8: %s" % error) from None
+    return _read_json(frame)
+
+
+def _read_json(text):
+    found, at = [], 0
+    try:
+        while at < len(text):
+            if text[at] in " \t\r\n\0":
+                at += 1
+                continue
+            value, at = _DECODER.raw_decode(text, at)
+            found.append(_operation(value))
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, FrameError):
+            raise
+        raise FrameError("%s is no JSON object: %s" % (shown(text), error)) from None
+    if not found:
+        raise FrameError("an empty frame; a JSON object with the key op is expected")
+    return found
+
+
+def _read_cbor(data):
+    try:
+        return _operation(cbor2.loads(data, tag_hook=lambda tag, _immutable: from_tag(tag)))
+    except BridgeError:
+        raise
+    # A decoder of bytes from any client: whatever it raises is about these bytes.
+    except Exception as error:
+        raise FrameError("a binary frame of %d bytes is no CBOR object: %s" % (len(data), error)) from None
+
+
+def _operation(value):
+    if not isinstance(value, dict):
+        raise FrameError("%s is no JSON object" % shown(value))
+    return value
+
+
+def png_of(text):
+    """A text as the pixels of an RGB picture, filled up with newlines: bytes of a PNG file."""
+    data = text.encode("utf-8")
+    pixels = math.ceil(len(data) / 3)
+    width = max(1, math.isqrt(pixels))
+    height = max(1, math.ceil(pixels / width))
+    data = data.ljust(width * height * 3, b"\n")
+    row = width * 3
+    # A zero before each row: no filter.
+    rows = b"".join(b"\0" + data[i:i + row] for i in range(0, len(data), row))
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return _PNG + _chunk(b"IHDR", header) + _chunk(b"IDAT", zlib.compress(rows, 3)) + _chunk(b"IEND", b"")
+
+
+def _chunk(kind, data):
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def text_of_png(data, largest):
+    """The text of a picture that :func:`png_of` or another rosbridge program made; ``largest`` in bytes. Raises
+    FrameError.
+    """
+    try:
+        packed, (width, height, kind) = b"", (0, 0, ())
+        for name, content in _chunks(data):
+            if name == b"IHDR":
+                width, height, *kind = struct.unpack(">IIBBBBB", content)
+            elif name == b"IDAT":
+                packed += content
+        size = height * (width * 3 + 1)
+        if kind != [8, 2, 0, 0, 0] or size > largest:
+            raise ValueError("8-bit RGB up to %d bytes is read" % largest)
+        rows = zlib.decompressobj().decompress(packed, size)
+        if len(rows) != size or any(rows[::width * 3 + 1]):
+            raise ValueError("it is not complete, or its rows are filtered")
+        row = width * 3 + 1
+        return b"".join(rows[i + 1:i + row] for i in range(0, size, row)).decode("utf-8").rstrip("\n\0")
+    except (ValueError, struct.error, zlib.error) as error:
+        raise FrameError("a picture of %d bytes cannot be read: %s" % (len(data), error)) from None
+
+
+def _chunks(data):
+    if data[:8] != _PNG:
+        raise ValueError("it is no PNG file")
+    at = 8
+    while at + 12 <= len(data):
+        length, name = struct.unpack_from(">I4s", data, at)
+        yield name, data[at + 8:at + 8 + length]
+        at += 12 + length
+
+
+_NUMBERS = itertools.count()
+
+
+def split(text, size):
+    """A text as fragments (JSON texts) whose data have ``size`` characters at most; itself where it is not longer."""
+    if not size or len(text) <= size:
+        return [text]
+    name, total = "fragment:%d" % next(_NUMBERS), math.ceil(len(text) / size)
+    return [json_text({"op": "fragment", "id": name, "data": text[i * size:(i + 1) * size], "num": i, "total": total})
+            for i in range(total)]
+
+
+class Fragments:
+    """Puts a client's fragments together. ``clock()`` in seconds; a message that stays incomplete is dropped after
+    ``timeout_s``.
+    """
+
+    def __init__(self, clock, timeout_s):
+        self._clock = clock
+        self._timeout_s = timeout_s
+        self._pending = OrderedDict()  # id -> [begin, total, {num: data}, bytes]
+
+    def add(self, operation):
+        """The whole text when its last fragment comes, else None. Raises FrameError."""
+        name, data, num, total = (operation.get(key) for key in ("id", "data", "num", "total"))
+        if not isinstance(name, str | int) or not isinstance(data, str):
+            raise FrameError("a fragment needs id and data, a text")
+        # 0.11.17 itself sends total as a float.
+        if not _whole(num) or not _whole(total) or not 0 <= num < total <= MOST_FRAGMENTS:
+            raise FrameError("fragment %s of %s: num must be from 0 to total - 1, and total at most %d"
+                             % (shown(num), shown(total), MOST_FRAGMENTS))
+        self._forget()
+        entry = self._pending.setdefault(name, [self._clock(), total, {}, 0])
+        if entry[1] != total:
+            del self._pending[name]
+            raise FrameError("fragments of %s say total %s and %s" % (shown(name), entry[1], total))
+        if num not in entry[2]:
+            entry[2][num] = data
+            entry[3] += len(data)
+        if len(entry[2]) == total:
+            del self._pending[name]
+            return "".join(entry[2][i] for i in range(int(total)))
+        return None
+
+    def _forget(self):
+        limit = self._clock() - self._timeout_s
+        while self._pending:
+            oldest = next(iter(self._pending.values()))
+            held = sum(entry[3] for entry in self._pending.values())
+            if oldest[0] >= limit and held <= MOST_BYTES_PENDING and len(self._pending) <= MOST_PENDING:
+                return
+            self._pending.popitem(last=False)
+
+
+def _whole(number):
+    return type(number) in (int, float) and number == number // 1
+
+
+def from_base64(text):
+    """Bytes of a base64 text; raises FrameError."""
+    try:
+        return binascii.a2b_base64(text)
+    except (ValueError, TypeError) as error:
+        raise FrameError("data is no base64 text: %s" % error) from None
+
+
+def packed_png(text, name=None):
+    """A text as an operation png, itself a JSON text."""
+    operation = {"op": "png", "data": base64.b64encode(png_of(text)).decode("ascii")}
+    if name is not None:
+        operation["id"] = name
+    return json_text(operation)
+
+
+def cbor(values):
+    return cbor2.dumps(values)

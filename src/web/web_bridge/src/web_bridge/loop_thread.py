@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An asyncio loop in a separate thread, which runs tornado's servers. No ROS."""
+import asyncio
+import threading
+
+
+class Later:
+    """A call in the loop that :meth:`LoopThread.later` planned."""
+
+    def __init__(self, loop):
+        self._loop = loop
+        self._handle = None
+        self._cancelled = False
+
+    def start(self, delay_s, function):
+        if not self._cancelled:
+            self._handle = self._loop.call_later(delay_s, function)
+
+    def cancel(self):
+        """From any thread; a call that has begun goes on."""
+        self._cancelled = True
+        if self._handle is not None:
+            self._loop.call_soon_threadsafe(self._handle.cancel)
+
+
+class LoopThread:
+    """Starts with the constructor; ``stop`` ends it."""
+
+    def __init__(self, name="web"):
+        self.loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def _run(self):
+        asyncio.set_event_loop(self.loop)
+        self.loop.run_forever()
+        self.loop.run_until_complete(self.loop.shutdown_asyncgens())
+        self.loop.close()
+
+    def soon(self, function, *arguments):
+        """Call a function in the loop; from any thread, nothing where the loop has ended."""
+        try:
+            self.loop.call_soon_threadsafe(function, *arguments)
+        except RuntimeError:
+            if not self.loop.is_closed():
+                raise
+
+    def later(self, delay_s, function):
+        """Call a function in the loop after a delay, unless the returned object's ``cancel()`` comes first; from any
+        thread.
+        """
+        planned = Later(self.loop)
+        self.soon(planned.start, delay_s, function)
+        return planned
+
+    def run(self, coroutine, timeout_s=30.0):
+        """The result of a coroutine that runs in the loop; not from the loop's own thread."""
+        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(timeout_s)
+
+    def stop(self, timeout_s=5.0):
+        """End the loop and wait for its thread."""
+        self.soon(self.loop.stop)
+        self._thread.join(timeout_s)

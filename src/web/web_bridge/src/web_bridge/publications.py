@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Topics that clients publish: one publisher for all of them, which stays a while after the last has gone. No ROS."""
+import threading
+
+from web_bridge.errors import BridgeError, NoSuchTopic
+
+
+class _Publication:
+    def __init__(self, publisher):
+        self.publisher = publisher
+        self.names = {}  # client -> its ids
+        self.timer = None
+
+
+class Publications:
+    """``later(delay_s, function)`` returns a handle with ``cancel()``; a publisher is closed ``linger_s`` after its
+    last client.
+    """
+
+    def __init__(self, graph, codec, later, linger_s):
+        self._graph = graph
+        self._codec = codec
+        self._later = later
+        self._linger_s = linger_s
+        self._lock = threading.Lock()
+        self._publications = {}
+
+    def advertise(self, client, name, topic, type_name, options):
+        """``options`` (latched, queue size) count for the first client of a topic. Raises BridgeError."""
+        with self._lock:
+            found = self._publications.get(topic)
+        if found is None or found.publisher.type != type_name:
+            self._graph.check_type(topic, type_name)
+        with self._lock:
+            found = self._publications.get(topic)
+            if found is not None and found.publisher.type != type_name:
+                if found.names:
+                    raise BridgeError("%s has the type %s here, not %s" % (topic, found.publisher.type, type_name))
+                self._close(topic)
+                found = None
+            if found is None:
+                found = self._publications[topic] = _Publication(self._graph.advertise(topic, type_name, *options))
+            if found.timer is not None:
+                found.timer.cancel()
+                found.timer = None
+            found.names.setdefault(client, set()).add(name)
+
+    def unadvertise(self, client, topic, name=None):
+        """Forget one advertisement of a client (None: all of its). Returns whether there was one."""
+        with self._lock:
+            found = self._publications.get(topic)
+            if found is None or client not in found.names:
+                return False
+            found.names[client].discard(name)
+            if name is None or not found.names[client]:
+                del found.names[client]
+            if not found.names and found.timer is None:
+                found.timer = self._later(self._linger_s, lambda: self._expire_soon(topic, found))
+            return True
+
+    def forget(self, client):
+        """End all advertisements of a client."""
+        with self._lock:
+            topics = list(self._publications)
+        for topic in topics:
+            self.unadvertise(client, topic)
+
+    def publish(self, client, topic, values, options):
+        """Publish ``values`` (a dict); a topic that the client did not advertise needs a known type. Raises
+        BridgeError.
+        """
+        publisher = self._publisher(client, topic)
+        if publisher is None:
+            type_name = self._graph.topic_type(topic)
+            if type_name is None:
+                raise NoSuchTopic("the type of %s is not known: advertise it first" % topic)
+            self.advertise(client, None, topic, type_name, options)
+            publisher = self._publisher(client, topic)
+        publisher.publish(self._codec.reader.fill(publisher.new_message(), values))
+
+    def publish_made(self, client, topic, make):
+        """Publish ``make(empty message)`` on a topic that the client has advertised. Raises BridgeError."""
+        publisher = self._publisher(client, topic)
+        if publisher is None:
+            raise NoSuchTopic("%s is not advertised by this client" % topic)
+        publisher.publish(make(publisher.new_message()))
+
+    def _publisher(self, client, topic):
+        # Without the lock, which another thread may hold while it waits for the master.
+        found = self._publications.get(topic)
+        return found.publisher if found is not None and client in found.names else None
+
+    def is_advertised(self, client, topic):
+        """Whether :meth:`publish` needs no answer of the master."""
+        return self._publisher(client, topic) is not None
+
+    def _expire_soon(self, topic, publication):
+        # The caller is the loop that serves all sockets; closing a publisher waits for the master.
+        threading.Thread(target=self._expire, args=(topic, publication), daemon=True).start()
+
+    def _expire(self, topic, publication):
+        with self._lock:
+            if self._publications.get(topic) is publication and not publication.names:
+                self._close(topic)
+
+    def _close(self, topic):
+        publication = self._publications.pop(topic)
+        if publication.timer is not None:
+            publication.timer.cancel()
+        publication.publisher.close()

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The graph of :mod:`web_bridge.session` in rospy. Only the modules ros_* know ROS."""
+import socket
+import threading
+import time
+from collections import deque
+from io import BytesIO
+from urllib.parse import urlsplit
+from xmlrpc.client import Error
+
+import genpy
+import rosgraph
+import roslib.message
+import rospy
+import rosservice
+
+from web_bridge.codec import serialized
+from web_bridge.errors import BridgeError, ServiceFailed, UnknownType, shown
+from web_bridge.feeds import Arrival
+
+#: What is published within this time after a topic was advertised also reaches subscribers that connect within it [s].
+_FIRST_S = 1.0
+_MOST_FIRST = 100
+_QUEUE = 100
+#: A service that is asked what it is, not called; how long its answer may take [s].
+PROBE = {"probe": "1", "md5sum": "*"}
+_PROBE_S = 2.0
+_CLOSING_S = 0.2  # between two tries to close the connection of a call that nobody waits for
+_LONGEST_TEXT = 200  # of an error of others, which may quote all that a client sent
+
+
+def message_class(type_name):
+    """The class of a message type; raises UnknownType."""
+    return _found(roslib.message.get_message_class, "message", type_name, "serialize")
+
+
+def service_class(type_name):
+    """The class of a service type; raises UnknownType."""
+    return _found(roslib.message.get_service_class, "service", type_name, "_request_class")
+
+
+def _found(load, kind, type_name, attribute):
+    try:
+        cls = load(type_name)
+    # Imports a module by its name, which may be any text and any module.
+    except Exception as error:
+        raise UnknownType("%s is no %s type: %s" % (shown(type_name), kind, str(error)[:_LONGEST_TEXT])) from None
+    # A package's module has more in it than its types.
+    if not hasattr(cls, attribute):
+        raise UnknownType("the %s type %s is not on this machine; build its package and source the workspace"
+                          % (kind, shown(type_name)))
+    return cls
+
+
+def now():
+    """ROS time; zero before /clock has begun."""
+    return rospy.Time.now() if rospy.core.is_initialized() else genpy.Time()
+
+
+def address_of(uri):
+    """(host, port) of a service's or node's address."""
+    parts = urlsplit(uri)
+    return parts.hostname, parts.port
+
+
+def handshake(address, header, timeout_s):
+    """What the publisher or service at (host, port) answers to a header of TCPROS. Raises OSError and
+    ROSHandshakeException.
+    """
+    with socket.create_connection(address, timeout_s) as connection:
+        rosgraph.network.write_ros_handshake_header(connection, {**header, "callerid": rospy.get_name()})
+        return rosgraph.network.read_ros_handshake_header(connection, BytesIO(), 65536)
+
+
+def wait(seconds):
+    """Wait in wall time, because /clock may not run; False where the node ends."""
+    rospy.rostime.wallsleep(seconds)
+    return not rospy.is_shutdown()
+
+
+class RosGraph:
+    """Topics and services of the master."""
+
+    def __init__(self):
+        self._master = rosgraph.Master(rospy.get_name())
+        self._lock = threading.Lock()  # xmlrpc's proxies serve one thread
+
+    def resolve(self, name):
+        """Raises BridgeError for a text that is no name."""
+        if not rosgraph.names.is_legal_name(name):
+            raise BridgeError("%s is no legal name of ROS" % shown(name))
+        resolved = rospy.resolve_name(name)
+        # "" and "/"; the master refuses them, but only after rospy has kept a half-made topic.
+        if resolved == "/":
+            raise BridgeError("%s is a namespace; the name of a topic or service is expected" % shown(name))
+        return resolved
+
+    def topic_type(self, topic):
+        name = self.resolve(topic)
+        return next((kind for known, kind in self._ask("getTopicTypes") if known == name and kind != "*"), None)
+
+    def published_topics(self):
+        """The topics that have a publisher, {name: type}. Raises BridgeError."""
+        return dict(self._ask("getPublishedTopics", "/"))
+
+    def check_type(self, topic, type_name):
+        if type_name is None:
+            self.resolve(topic)
+            return
+        message_class(type_name)
+        established = self.topic_type(topic)
+        if established not in (None, type_name):
+            raise BridgeError("%s has the type %s, not %s" % (topic, established, type_name))
+
+    def subscribe(self, topic, arrived):
+        self.resolve(topic)
+        return _Subscription(topic, arrived)
+
+    def advertise(self, topic, type_name, latched, queue_size):
+        self.resolve(topic)
+        return _Publisher(topic, type_name, latched, queue_size)
+
+    def call_service(self, service, fill, call):
+        name = self.resolve(service)
+        # Asked each time: a program that was restarted may offer another type.
+        try:
+            type_name = rosservice.get_service_type(name)
+        except (rosservice.ROSServiceException, OSError) as error:
+            raise ServiceFailed("service %s: %s" % (name, error)) from None
+        if type_name is None:
+            raise ServiceFailed("service %s does not exist" % name)
+        cls = service_class(type_name)
+        request = fill(cls._request_class())
+        # Only of a persistent proxy can the connection be closed while it waits.
+        proxy, is_over = rospy.ServiceProxy(name, cls, persistent=True), threading.Event()
+        call.ends_by(lambda: threading.Thread(target=_close_until, args=(proxy, is_over), daemon=True).start())
+        try:
+            return proxy(request)
+        except (rospy.ServiceException, rospy.ROSException, genpy.SerializationError, OSError) as error:
+            raise ServiceFailed("service %s: %s" % (name, error)) from None
+        finally:
+            is_over.set()
+            proxy.close()
+
+    def advertise_service(self, service, type_name, handler):
+        name, cls = self.resolve(service), service_class(type_name)
+        self._check_is_free(name)
+
+        def answer(request):
+            try:
+                return handler(request, cls._response_class)
+            except ServiceFailed as error:
+                raise rospy.ServiceException(str(error)) from None
+        try:
+            return _Service(rospy.Service(name, cls, answer))
+        except rospy.service.ServiceException as error:
+            raise BridgeError("service %s: %s" % (name, error)) from None
+
+    def _check_is_free(self, service):
+        """Raise BridgeError where another node offers the service: the master would give the name to the newcomer."""
+        others = set(dict(self._ask("getSystemState")[2]).get(service, ())) - {rospy.get_name()}
+        if not others:
+            return
+        try:
+            handshake(address_of(self._ask("lookupService", service)), {**PROBE, "service": service}, _PROBE_S)
+        except ConnectionRefusedError:
+            return  # that node has crashed: it is still registered, and nobody listens
+        except (OSError, rosgraph.network.ROSHandshakeException):
+            pass  # it hangs, or its machine is out of reach, and it may come back
+        raise BridgeError("the node %s offers the service %s already; choose another name"
+                          % (", ".join(sorted(others)), service))
+
+    def _ask(self, method, *arguments):
+        try:
+            with self._lock:
+                return getattr(self._master, method)(*arguments)
+        except rosgraph.MasterError as error:
+            raise BridgeError("the ROS master refuses %s: %s" % (method, error)) from None
+        except (OSError, rosgraph.MasterException, Error) as error:
+            raise BridgeError("the ROS master does not answer: %s" % error) from None
+
+
+class _Subscription:
+    def __init__(self, topic, arrived):
+        self._arrived = arrived
+        self._subscriber = rospy.Subscriber(topic, rospy.AnyMsg, self._on_message, queue_size=_QUEUE, tcp_nodelay=True)
+
+    def _on_message(self, message):
+        header, received = message._connection_header, rospy.Time.now()
+        # Under simulated time rospy has subscribed to /clock itself, and delivers its own class to everybody.
+        data = message._buff if isinstance(message, rospy.AnyMsg) else serialized(message)
+        self._arrived(Arrival(data, header.get("type", "*"), header.get("md5sum", "*"),
+                              (received.secs, received.nsecs), header.get("callerid", ""),
+                              header.get("latching", "0") == "1"))
+
+    def publishers(self):
+        return {connection.callerid_pub for connection in self._subscriber.impl.connections}
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+class _Publisher(rospy.SubscribeListener):
+    def __init__(self, topic, type_name, latched, queue_size):
+        self.type = type_name
+        self.new_message = message_class(type_name)
+        self._lock = threading.Lock()
+        self._until = time.monotonic() + _FIRST_S
+        self._first = None if latched else deque(maxlen=_MOST_FIRST)
+        self._publisher = rospy.Publisher(topic, self.new_message, subscriber_listener=self, latch=latched,
+                                          queue_size=queue_size, tcp_nodelay=True)
+
+    def peer_subscribe(self, _topic, _publish, peer_publish):
+        """A subscriber has connected; on rospy's thread."""
+        with self._lock:
+            first = list(self._first or ()) if time.monotonic() < self._until else ()
+        for message in first:
+            peer_publish(message)
+
+    def publish(self, message):
+        """Raises BridgeError where the message cannot be serialized."""
+        with self._lock:
+            if self._first is not None:
+                if time.monotonic() < self._until:
+                    self._first.append(message)
+                else:
+                    self._first = None
+        try:
+            self._publisher.publish(message)
+        except (rospy.ROSException, genpy.MessageException) as error:
+            raise BridgeError("%s: %s" % (self._publisher.name, error)) from None
+
+    def close(self):
+        self._publisher.unregister()
+
+
+def _close_until(proxy, is_over):
+    """Close the proxy's connection, which it may be about to make, until the call is over."""
+    while not is_over.is_set():
+        proxy.close()
+        is_over.wait(_CLOSING_S)
+
+
+class _Service:
+    def __init__(self, service):
+        self._service = service
+
+    def close(self):
+        self._service.shutdown("the client that offered it has gone")

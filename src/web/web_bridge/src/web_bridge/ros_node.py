@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How the nodes around this package start, and how those with WebSockets serve, in rospy."""
+import ssl
+
+import rospy
+
+from rospy_limits.node import limit_ports
+from rospy_start import end_on_signals
+from web_bridge import ros_graph
+from web_bridge.parameters import ParameterError
+from web_bridge.serving import listen
+
+
+def run(name, read_parameters, serve):
+    """Start the node ``name`` and call ``serve(parameters)``, which returns when the node ends; returns the exit code.
+
+    ``read_parameters(get)`` returns the parameters; their ``warnings`` go to the log. It and ``serve`` may raise
+    ParameterError: the log says why, and the exit code is 1.
+    """
+    limit_ports()
+    end_on_signals()
+    rospy.init_node(name, disable_signals=True)
+    try:
+        parameters = read_parameters(lambda name, default: rospy.get_param("~" + name, default))
+        for text in parameters.warnings:
+            rospy.logwarn("%s", text)
+        serve(parameters)
+    except ParameterError as error:
+        rospy.logfatal("%s", error)
+        return 1
+    return 0
+
+
+def announce(port):
+    """Tell clients, tests and scripts the port of a node that was started with ~port 0."""
+    rospy.set_param("~actual_port", port)
+
+
+def serve_clients(clients, application, endpoint, what):
+    """Serve the :class:`web_bridge.websocket.Clients` until the node ends; ``what``: the server's name for the log.
+
+    Waits while the port is taken. Raises ParameterError for a certificate or key that TLS cannot use.
+    """
+    try:
+        serving = listen(clients.loop_thread, application, endpoint, ros_graph.wait, rospy.logerr)
+    except (OSError, ssl.SSLError) as error:
+        raise ParameterError("~certfile and ~keyfile: %s" % error) from None
+    if serving is None:
+        return
+    announce(serving.port)
+    rospy.loginfo("%s WebSocket server started at %s", what, serving.url(endpoint))
+    rospy.spin()
+    clients.shut_down()
+    serving.close()

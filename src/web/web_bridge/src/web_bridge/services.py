@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Services both ways: calls of clients, and services that clients offer. No ROS."""
+import itertools
+import threading
+from collections import deque
+
+from web_bridge.errors import BridgeError, ServiceFailed, shown
+
+#: Calls of one client that are under way at a time; further ones wait, up to a number.
+MOST_AT_ONCE, MOST_WAITING = 16, 1000
+#: Calls of all clients that are under way at a time: services that never answer must not take all threads.
+MOST_OF_ALL = 256
+
+
+class Call:
+    """A call that is under way. Whoever waits for its answer says how the wait can be ended."""
+
+    def __init__(self):
+        self._lock = threading.Lock()
+        self._end = None
+        self._is_cancelled = False
+
+    def ends_by(self, end):
+        """``end()`` ends the wait. It is called on another thread, or at once if the call is cancelled already."""
+        with self._lock:
+            self._end = end
+            is_late = self._is_cancelled
+        if is_late:
+            end()
+
+    def cancel(self):
+        with self._lock:
+            self._is_cancelled, end = True, self._end
+        if end is not None:
+            end()
+
+
+class CallPool:
+    """Runs the calls of all clients, each in a separate thread, because a service may take as long as it likes."""
+
+    def __init__(self, most_at_once=MOST_AT_ONCE, most_waiting=MOST_WAITING, most_of_all=MOST_OF_ALL):
+        self._limits = (most_at_once, most_waiting, most_of_all)
+        self._lock = threading.Lock()
+        self._running = {}  # client -> set of Call
+        self._waiting = {}  # client -> calls
+
+    @property
+    def under_way(self):
+        """How many calls wait for their answers."""
+        with self._lock:
+            return sum(map(len, self._running.values()))
+
+    def run(self, client, call):
+        """Call ``call(Call)`` soon. Raises BridgeError where too many calls wait."""
+        at_once, most_waiting, of_all = self._limits
+        with self._lock:
+            if len(self._running.get(client, ())) >= at_once:
+                waiting = self._waiting.setdefault(client, deque())
+                if len(waiting) >= most_waiting:
+                    raise BridgeError("%d service calls of this client wait already" % most_waiting)
+                waiting.append(call)
+                return
+            if sum(map(len, self._running.values())) >= of_all:
+                raise BridgeError("%d service calls wait for their answers already" % of_all)
+            under_way = Call()
+            self._running.setdefault(client, set()).add(under_way)
+        threading.Thread(target=self._work, args=(client, call, under_way), daemon=True).start()
+
+    def forget(self, client):
+        """Drop the calls of a client that have not begun, and wait no longer for the answers to the others."""
+        with self._lock:
+            self._waiting.pop(client, None)
+            running = list(self._running.get(client, ()))
+        for call in running:
+            call.cancel()
+
+    def _work(self, client, call, under_way):
+        while call is not None:
+            try:
+                call(under_way)
+            finally:
+                with self._lock:
+                    running, waiting = self._running[client], self._waiting.get(client)
+                    running.remove(under_way)
+                    call = waiting.popleft() if waiting else None
+                    if call is not None:
+                        under_way = Call()
+                        running.add(under_way)
+                    else:
+                        self._waiting.pop(client, None)
+                        if not running:
+                            del self._running[client]
+
+
+class _Request:
+    def __init__(self, client, service):
+        self.client = client
+        self.service = service
+        self.done = threading.Event()
+        self.answer = None  # (worked, values)
+
+
+class OfferedServices:
+    """Services that clients offer to ROS."""
+
+    def __init__(self, graph, codec):
+        self._graph = graph
+        self._codec = codec
+        self._lock = threading.Lock()
+        self._offers = {}  # service -> (client, handle)
+        self._requests = {}  # id -> _Request
+        self._numbers = itertools.count()
+
+    def advertise(self, client, service, type_name):
+        """Raises BridgeError, where another client offers the service, for instance."""
+        with self._lock:
+            holder, handle = self._offers.get(service, (None, None))
+            if holder is not None:
+                if holder is not client:
+                    raise BridgeError("another client offers the service %s" % service)
+                handle.close()
+                del self._offers[service]
+
+            def handler(request, new_response):
+                return self._ask(client, service, request, new_response)
+            self._offers[service] = (client, self._graph.advertise_service(service, type_name, handler))
+
+    def unadvertise(self, client, service):
+        """Returns whether the client offered it. Waiting callers get an error."""
+        with self._lock:
+            holder, handle = self._offers.get(service, (None, None))
+            if holder is not client:
+                return False
+            del self._offers[service]
+            self._give_up(lambda request: request.client is client and request.service == service)
+            handle.close()
+            return True
+
+    def forget(self, client):
+        """Withdraw everything that a client offers."""
+        with self._lock:
+            mine = [service for service, (holder, _) in self._offers.items() if holder is client]
+            self._give_up(lambda request: request.client is client)
+        for service in mine:
+            self.unadvertise(client, service)
+
+    def answer(self, client, name, worked, values):
+        """A client's answer to request ``name``. Raises BridgeError where that waits for none."""
+        with self._lock:
+            request = self._requests.get(name)
+            if request is None or request.client is not client:
+                raise BridgeError("no service request with id %s waits for an answer" % shown(name))
+            del self._requests[name]
+        request.answer = (worked, values)
+        request.done.set()
+
+    def _ask(self, client, service, request, new_response):
+        """On ROS's thread: the response to a request. Raises ServiceFailed."""
+        waiting = _Request(client, service)
+        with self._lock:
+            if self._offers.get(service, (None,))[0] is not client:
+                raise ServiceFailed("the client that offered %s has gone" % service)
+            name = "service_request:%s:%d" % (service, next(self._numbers))
+            self._requests[name] = waiting
+        client.send({"op": "call_service", "id": name, "service": service, "args": self._codec.json.values(request)})
+        waiting.done.wait()
+        if waiting.answer is None:
+            raise ServiceFailed("the client that offered %s has gone" % service)
+        worked, values = waiting.answer
+        if not worked:
+            raise ServiceFailed(str(values) if values else "the client answered with result false")
+        try:
+            return self._codec.reader.fill(new_response(), values)
+        except BridgeError as error:
+            client.status("error", "the answer to %s: %s" % (service, error), name)
+            raise ServiceFailed("the client's answer does not fit: %s" % error) from None
+
+    def _give_up(self, concerns):
+        for name, request in list(self._requests.items()):
+            if concerns(request):
+                del self._requests[name]
+                request.done.set()

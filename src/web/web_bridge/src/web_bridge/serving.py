@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A tornado application on a port, in a LoopThread. No ROS."""
+import ssl
+
+from tornado import httpserver, netutil
+
+#: Connections that are no WebSocket: streams of cameras, files, clients that have not asked for anything yet. They need
+#: no token, so their number and their memory are limited.
+MOST_CONNECTIONS = 700
+#: A request's body; no server here expects any [bytes].
+LARGEST_BODY = 64 << 10
+#: A connection without a complete request is closed after this time [s].
+IDLE_S = 30.0
+
+
+def tls_context(certfile, keyfile):
+    """The TLS of a server; raises OSError and ssl.SSLError for files that do not fit."""
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    context.load_cert_chain(certfile, keyfile or None)
+    return context
+
+
+def listen(loop_thread, application, endpoint, wait, complain):
+    """A Serving at an Endpoint; where the port is taken, ``complain(text)``, and again after ``wait(seconds)``, until
+    that returns False: then None. Raises OSError and ssl.SSLError for the files of TLS.
+    """
+    tls = tls_context(*endpoint.tls) if endpoint.tls else None
+    while True:
+        try:
+            return Serving(loop_thread, application, endpoint.port, endpoint.address, tls)
+        except OSError as error:
+            complain("port %d of '%s' cannot be opened: %s; trying again in %g s"
+                     % (endpoint.port, endpoint.address, error, endpoint.retry_s))
+            if not wait(endpoint.retry_s):
+                return None
+
+
+class _LimitedServer(httpserver.HTTPServer):
+    """Beyond MOST_CONNECTIONS a new one closes the oldest: without descriptors, tornado's loop would try to accept
+    without a pause, and connections that say nothing must not keep others out.
+    """
+
+    def initialize(self, *args, **kwargs):
+        super().initialize(*args, **kwargs)
+        self._streams = {}  # the oldest first
+
+    def handle_stream(self, stream, address):
+        if len(self._streams) >= MOST_CONNECTIONS:
+            oldest = next(iter(self._streams))
+            del self._streams[oldest]
+            oldest.close()
+        self._streams[stream] = True
+        super().handle_stream(stream, address)
+
+    def on_close(self, server_conn):
+        # Also when the connection has become a WebSocket, or a stream of images.
+        self._streams.pop(server_conn.stream, None)
+        super().on_close(server_conn)
+
+
+class Serving:
+    """Listens from the constructor on; raises OSError where the port is taken. ``address``: "" is every network.
+    ``idle_s``: time for a client's request [s].
+    """
+
+    def __init__(self, loop_thread, application, port, address, tls=None, idle_s=IDLE_S):
+        self._loop_thread = loop_thread
+        self._sockets = netutil.bind_sockets(port, address)
+        loop_thread.run(self._start(application, tls, idle_s))
+
+    async def _start(self, application, tls, idle_s):
+        self._server = _LimitedServer(application, ssl_options=tls, idle_connection_timeout=idle_s, body_timeout=idle_s,
+                                      max_body_size=LARGEST_BODY)
+        self._server.add_sockets(self._sockets)
+
+    @property
+    def port(self):
+        """The first port, where the kernel chose it."""
+        return self._sockets[0].getsockname()[1]
+
+    def url(self, endpoint):
+        """The address for a log."""
+        return "%s://%s:%d" % ("wss" if endpoint.tls else "ws", endpoint.address or "0.0.0.0", self.port)
+
+    def close(self):
+        self._loop_thread.run(self._stop())
+
+    async def _stop(self):
+        self._server.stop()
+        await self._server.close_all_connections()

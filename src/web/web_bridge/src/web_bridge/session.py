@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The operations of rosbridge v2 for one client. No ROS: the graph is an argument, with these methods, all of which may
+block on the master and raise BridgeError:
+
+- ``resolve(name)``: the absolute name of a topic or service
+- ``topic_type(topic)``: the established type, or None
+- ``check_type(topic, type or None)``: raise where the type is unknown here or is not the topic's
+- ``subscribe(topic, arrived)``: calls ``arrived(Arrival)`` on any thread; returns an object with ``close()`` and
+  ``publishers()``, the names of the publishers that are connected
+- ``advertise(topic, type, latched, queue size)``: an object with ``type``, ``new_message()``, ``publish(message)``,
+  ``close()``
+- ``call_service(service, fill, call)``: ``fill(request)`` lays the arguments over an empty request; returns the
+  response. ``call.ends_by(function)`` tells how the wait for it can be ended
+- ``advertise_service(service, type, handler)``: ``handler(request, new_response)`` returns the response or raises
+  ServiceFailed; returns an object with ``close()``
+"""
+import math
+import threading
+import time
+from typing import NamedTuple
+
+from web_bridge.access import Rules
+from web_bridge.codec import Codec
+from web_bridge.errors import BridgeError, FieldError, shown
+from web_bridge.feeds import COMPRESSIONS, Feeds, Wish
+from web_bridge.fields import NUMBER, field
+from web_bridge.frames import Fragments, cbor, from_base64, json_text, packed_png, read_frame, split, text_of_png
+from web_bridge.publications import Publications
+from web_bridge.services import CallPool, OfferedServices
+
+LEVELS = ("none", "error", "warning", "info")
+#: Characters of a text inside of fragments or a picture.
+LARGEST_TEXT = 64 << 20
+#: Operations inside of operations (png in fragments in png ...).
+DEEPEST = 3
+
+
+class BridgeOptions(NamedTuple):
+    """``unregister_timeout``: a publisher stays that long after its last client [s]; ``fragment_timeout`` [s]."""
+
+    unregister_timeout: float = 10.0
+    fragment_timeout: float = 600.0
+
+
+class Bridge:
+    """What all clients share."""
+
+    def __init__(self, graph, codec: Codec, later, options=None, clock=time.monotonic):
+        self.options = options or BridgeOptions()
+        self.clock = clock
+        self.graph = graph
+        self.codec = codec
+        self.feeds = Feeds(graph, codec, later, clock)
+        self.publications = Publications(graph, codec, later, self.options.unregister_timeout)
+        self.services = OfferedServices(graph, codec)
+        self.calls = CallPool()
+
+
+class Session:
+    """One client. ``outgoing`` is its OutgoingBuffer; frames come one at a time, from any thread."""
+
+    def __init__(self, bridge, outgoing, rules=None):
+        self.outgoing = outgoing
+        self._bridge = bridge
+        self._rules = rules or Rules()
+        self._level = "error"
+        self._fragments = Fragments(bridge.clock, bridge.options.fragment_timeout)
+        self._closed = False
+        self._lock = threading.Lock()
+
+    # To the client; from any thread.
+
+    def send(self, operation):
+        """An answer, which is never dropped."""
+        self.outgoing.keep([json_text(operation)])
+
+    def status(self, level, text, name):
+        """Say something about the operation ``name`` (its id, or None) where the client's level asks for it."""
+        if level == "none" or LEVELS.index(level) > LEVELS.index(self._level):
+            return
+        operation = {"op": "status", "level": level, "msg": text}
+        if name is not None:
+            operation["id"] = name
+        # A client that floods with mistakes and reads nothing loses the oldest.
+        self.outgoing.offer([json_text(operation)])
+
+    def tell_fault(self, text):
+        """The server failed at an operation."""
+        self.status("error", text, None)
+
+    # From the client.
+
+    def handle(self, frame):
+        """Serve all operations of a frame (text or bytes). Errors go to the client as status, never to the caller."""
+        with self._lock:
+            if self._closed:
+                return
+            try:
+                operations = read_frame(frame)
+            except BridgeError as error:
+                self.status("error", str(error), None)
+                return
+            for operation in operations:
+                self._serve(operation, 0)
+
+    def is_quick(self, frame):
+        """Can this frame be served without waiting for the master? A small publish on an advertised topic can."""
+        if not isinstance(frame, str) or len(frame) > 4096 or '"publish"' not in frame:
+            return False
+        try:
+            operations = read_frame(frame)
+        except BridgeError:
+            return False
+        return all(operation.get("op") == "publish" and isinstance(operation.get("topic"), str)
+                   and self._bridge.publications.is_advertised(self, operation["topic"]) for operation in operations)
+
+    def close(self):
+        """The client has gone: withdraw everything of it."""
+        self.outgoing.close()
+        # Requests that wait for this client's answers end now: an operation of it may wait for them.
+        self._bridge.services.forget(self)
+        with self._lock:
+            self._closed = True
+            self._bridge.calls.forget(self)
+            self._bridge.feeds.forget(self)
+            self._bridge.publications.forget(self)
+            self._bridge.services.forget(self)
+
+    def _serve(self, operation, depth):
+        name, op = operation.get("id"), operation.get("op")
+        # NaN and infinities have no form in JSON; the answer would be one that no page can read.
+        if not isinstance(name, str | int | float | None) or (isinstance(name, float) and not math.isfinite(name)):
+            self.status("error", "id is %s; a text or a finite number is expected" % shown(name), None)
+            return
+        serve = _OPERATIONS.get(op) if isinstance(op, str) else None
+        if serve is None:
+            self.status("error", "unknown op %s; known are %s" % (shown(op), ", ".join(sorted(_OPERATIONS))), name)
+            return
+        try:
+            if op in ("fragment", "png"):
+                serve(self, operation, depth)
+            else:
+                serve(self, operation, name)
+        except BridgeError as error:
+            self.status("error", "%s: %s" % (op, error), name)
+
+    def _fragment(self, operation, depth):
+        text = self._fragments.add(operation)
+        if text is not None:
+            self._unpacked(text, depth)
+
+    def _png(self, operation, depth):
+        self._unpacked(text_of_png(from_base64(operation.get("data")), LARGEST_TEXT), depth)
+
+    def _unpacked(self, text, depth):
+        if depth >= DEEPEST:
+            raise FieldError("operations are packed into each other more than %d times" % DEEPEST)
+        for operation in read_frame(text):
+            self._serve(operation, depth + 1)
+
+    def _set_level(self, operation, _name):
+        level = operation.get("level")
+        if level not in LEVELS:
+            raise FieldError("level is %s; %s are known" % (shown(level), ", ".join(LEVELS)))
+        self._level = level
+
+    def _advertise(self, operation, name):
+        topic, type_name = field(operation, "topic", str), field(operation, "type", str)
+        self._may_publish(topic)
+        self._bridge.publications.advertise(self, name, topic, type_name, _publisher_options(operation))
+
+    def _unadvertise(self, operation, name):
+        topic = field(operation, "topic", str)
+        if not self._bridge.publications.unadvertise(self, topic, name):
+            self.status("warning", "unadvertise: %s is not advertised by this client" % topic, name)
+
+    def _publish(self, operation, _name):
+        topic = field(operation, "topic", str)
+        self._may_publish(topic)
+        self._bridge.publications.publish(self, topic, operation.get("msg"), _publisher_options(operation))
+
+    def _may_publish(self, topic):
+        self._rules.check_may_act("publish")
+        self._rules.check_topic(self._bridge.graph.resolve(topic))
+
+    def _subscribe(self, operation, name):
+        topic = field(operation, "topic", str)
+        self._rules.check_topic(self._bridge.graph.resolve(topic))
+        type_name = field(operation, "type", str, None)
+        wish = Wish(max(0, field(operation, "throttle_rate", NUMBER, 0)),
+                    max(0, int(field(operation, "queue_length", NUMBER, 0))),
+                    max(0, int(field(operation, "fragment_size", NUMBER, 0))), _compression(operation))
+        # "*" is how ROS writes: any type.
+        self._bridge.feeds.subscribe(self, name, topic, None if type_name in ("", "*") else type_name, wish)
+
+    def _unsubscribe(self, operation, name):
+        topic = field(operation, "topic", str)
+        if not self._bridge.feeds.unsubscribe(self, topic, name):
+            self.status("warning", "unsubscribe: this client has no subscription to %s" % topic, name)
+
+    def _call_service(self, operation, name):
+        service = field(operation, "service", str)
+        compression, size = _compression(operation), int(field(operation, "fragment_size", NUMBER, 0))
+
+        def answer(values, worked, in_cbor=None):
+            response = {"op": "service_response", "service": service, "values": values, "result": worked}
+            if name is not None:
+                response["id"] = name
+            self.outgoing.keep(_packed(response, in_cbor or values, compression, size))
+
+        def call(under_way):
+            try:
+                response = self._bridge.graph.call_service(
+                    service, lambda request: self._bridge.codec.reader.fill(request, operation.get("args")), under_way)
+                answer(self._bridge.codec.json.values(response), True, self._bridge.codec.cbor.values(response))
+            # A call always gets an answer; the graph runs code of others.
+            except Exception as error:
+                answer(str(error) or type(error).__name__, False)
+
+        try:
+            self._rules.check_service(self._bridge.graph.resolve(service))
+            self._bridge.calls.run(self, call)
+        except BridgeError as error:
+            answer(str(error), False)
+
+    def _advertise_service(self, operation, _name):
+        service, type_name = field(operation, "service", str), field(operation, "type", str)
+        self._rules.check_may_act("offer services")
+        self._rules.check_service(self._bridge.graph.resolve(service))
+        self._bridge.services.advertise(self, service, type_name)
+
+    def _unadvertise_service(self, operation, name):
+        service = field(operation, "service", str)
+        if not self._bridge.services.unadvertise(self, service):
+            self.status("warning", "unadvertise_service: this client does not offer %s" % service, name)
+
+    def _service_response(self, operation, name):
+        # A page may answer with anything true, or with values alone; without both it has failed.
+        worked = bool(operation.get("result", "values" in operation))
+        self._bridge.services.answer(self, name, worked, operation.get("values"))
+
+    def _auth(self, _operation, _name):
+        raise FieldError("this server does not use rosauth; where it has a token, it asks for it in the address "
+                         "(?token=…)")
+
+
+_OPERATIONS = {
+    "fragment": Session._fragment, "png": Session._png, "set_level": Session._set_level, "auth": Session._auth,
+    "advertise": Session._advertise, "unadvertise": Session._unadvertise, "publish": Session._publish,
+    "subscribe": Session._subscribe, "unsubscribe": Session._unsubscribe, "call_service": Session._call_service,
+    "advertise_service": Session._advertise_service, "unadvertise_service": Session._unadvertise_service,
+    "service_response": Session._service_response}
+
+
+def _compression(operation):
+    compression = field(operation, "compression", str, "none")
+    if compression not in COMPRESSIONS:
+        raise FieldError("compression is %s; %s are known" % (shown(compression), ", ".join(COMPRESSIONS)))
+    return compression
+
+
+def _publisher_options(operation):
+    return field(operation, "latch", bool, False), max(1, int(field(operation, "queue_size", NUMBER, 100)))
+
+
+def _packed(response, in_cbor, compression, fragment_size):
+    if compression.startswith("cbor"):
+        return [cbor({**response, "values": in_cbor})]
+    text = json_text(response)
+    return split(packed_png(text, response.get("id")) if compression == "png" else text, fragment_size)

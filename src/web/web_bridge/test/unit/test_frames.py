@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import io
+import json
+import random
+
+import cbor2
+import pytest
+from PIL import Image
+
+from web_bridge.errors import FrameError
+from web_bridge.frames import Fragments, from_base64, packed_png, png_of, read_frame, split, text_of_png
+
+
+def test_a_frame_holds_one_or_more_objects():
+    assert read_frame('{"op": 1}\n {"op": 2}\0') == [{"op": 1}, {"op": 2}]
+    assert read_frame(b'{"op": 1}') == read_frame(cbor2.dumps({"op": 1})) == [{"op": 1}]
+    assert read_frame(cbor2.dumps({"a": cbor2.CBORTag(69, b"\1\0\2\0")})) == [{"a": [1, 2]}]
+
+
+@pytest.mark.parametrize("frame", [
+    "", "{", "[1]", "3", '{"op": 1} x', "[" * 100000, '{"a":' * 100000, b"", b"{\xff}", b"\xff", b"\x9b" + b"\xff" * 8,
+    b"\x81" * 100000, cbor2.dumps([1]), cbor2.dumps({"a": cbor2.CBORTag(99, 1)}), b"\xbf", b"\xd8\x1c\x81\xd8\x1d\x00"],
+    ids=lambda frame: repr(frame[:12]))
+def test_anything_else_is_a_frame_error(frame):
+    with pytest.raises(FrameError) as caught:
+        read_frame(frame)
+    assert len(str(caught.value)) < 400
+
+
+def test_bytes_of_any_kind_only_raise_frame_errors():
+    dice = random.Random(4)
+    for _ in range(3000):
+        data = dice.randbytes(dice.randrange(40))
+        try:
+            read_frame(data)
+        except FrameError:
+            pass
+
+
+@pytest.mark.parametrize("text", ["a", '{"é": "你好"}', "x" * 10001])
+def test_a_text_is_the_pixels_of_a_picture(text):
+    data = png_of(text)
+    # Another reader of PNG agrees.
+    assert Image.open(io.BytesIO(data)).convert("RGB").tobytes().decode().rstrip("\n") == text
+    assert text_of_png(data, 1 << 20) == text
+    operation = json.loads(packed_png(text, "n"))
+    assert text_of_png(from_base64(operation["data"]), 1 << 20) == text and operation["id"] == "n"
+
+
+@pytest.mark.parametrize("data", [b"", b"abc", png_of("hello")[:40], png_of("x" * 100000)],
+                         ids=["nothing", "no picture", "half", "too large"])
+def test_other_pictures_are_refused(data):
+    with pytest.raises(FrameError, match="a picture of"):
+        text_of_png(data, 1000)
+
+
+def test_fragments_are_put_together_in_any_order():
+    fragments = Fragments(lambda: 0.0, 10.0)
+    pieces = [json.loads(piece) for piece in split("0123456789", 3)]
+    assert [piece["total"] for piece in pieces] == [4] * 4
+    assert split("012", 3) == ["012"] and split("0123", 0) == ["0123"]
+    dice = random.Random(1)
+    dice.shuffle(pieces)
+    found = [fragments.add(piece) for piece in pieces]
+    assert found == [None] * 3 + ["0123456789"]
+
+
+def test_half_a_message_is_forgotten_after_a_while():
+    time = [0.0]
+    fragments = Fragments(lambda: time[0], 10.0)
+    fragments.add({"id": "a", "data": "x", "num": 0, "total": 2.0})
+    time[0] = 10.1
+    fragments.add({"id": "b", "data": "x", "num": 0, "total": 2})
+    assert fragments.add({"id": "a", "data": "y", "num": 1, "total": 2}) is None
+
+
+def test_halves_do_not_pile_up():
+    fragments = Fragments(lambda: 0.0, 10.0)
+    for number in range(500):
+        fragments.add({"id": number, "data": "x" * 1000, "num": 0, "total": 2})
+    assert len(fragments._pending) <= 101
+
+
+@pytest.mark.parametrize("operation", [
+    {}, {"id": "a"}, {"id": "a", "data": 3, "num": 0, "total": 1}, {"id": "a", "data": "x", "num": 2, "total": 2},
+    {"id": "a", "data": "x", "num": 0.5, "total": 2}, {"id": "a", "data": "x", "num": 0, "total": 1e9},
+    {"id": "a", "data": "x", "num": -1, "total": 2}, {"id": [], "data": "x", "num": 0, "total": 2},
+    {"id": "a", "data": "x", "num": float("nan"), "total": 2}])
+def test_a_fragment_without_its_fields_is_refused(operation):
+    with pytest.raises(FrameError):
+        Fragments(lambda: 0.0, 10.0).add(operation)
+
+
+def test_fragments_that_disagree_are_refused():
+    fragments = Fragments(lambda: 0.0, 10.0)
+    fragments.add({"id": "a", "data": "x", "num": 0, "total": 2})
+    with pytest.raises(FrameError, match="total 2 and 3"):
+        fragments.add({"id": "a", "data": "x", "num": 1, "total": 3})
