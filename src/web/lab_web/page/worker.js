@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The page's connection to the server, in a thread of the browser that drawing does not hold up.
+// Heartbeats say that the page is there: they end when the page itself has not answered for a while.
+const PAGE_SILENCE_MS = 500;
+const RETRY_MS = 1000;
+
+let socket = null;
+let address = "";
+let timer = 0;
+let seen = performance.now();
+
+function connect() {
+  socket = new WebSocket(address);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => postMessage({op: "connected", is: true});
+  socket.onmessage = ({data}) => {
+    if (data instanceof ArrayBuffer) {
+      postMessage({op: "poses", data}, [data]);
+      return;
+    }
+    const operation = JSON.parse(data);
+    if (operation.op === "hello") {
+      clearInterval(timer);
+      timer = setInterval(beat, operation.heartbeat_ms);
+    }
+    postMessage(operation);
+  };
+  socket.onclose = () => {
+    clearInterval(timer);
+    postMessage({op: "connected", is: false});
+    setTimeout(connect, RETRY_MS);
+  };
+}
+
+function beat() {
+  if (performance.now() - seen < PAGE_SILENCE_MS && socket.readyState === WebSocket.OPEN) socket.send("beat");
+}
+
+onmessage = ({data}) => {
+  seen = performance.now();
+  if (data.address) {
+    address = data.address;
+    connect();
+  } else if (data.op && socket.readyState === WebSocket.OPEN) {
+    // A heartbeat first: the server takes operations of pages that it has heard.
+    if (data.op !== "stop") socket.send("beat");
+    socket.send(JSON.stringify(data));
+  }
+};

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What takes a while and is done for pages one after the other, in a thread. No ROS."""
+import queue
+
+from lab_web.lab import RobotError
+
+
+class Errands:
+    """``told(client, code, text)``."""
+
+    def __init__(self, told):
+        self._told = told
+        self._queue = queue.SimpleQueue()
+
+    def add(self, client, work, *arguments):
+        """Have ``work(*arguments)`` done; its RobotError is told to the page ``client`` (None: to no one)."""
+        self._queue.put((client, work, arguments))
+
+    def run(self, ends, last=None):
+        """Work until ``ends()``; then ``last()``, and what it adds."""
+        while not ends():
+            self._work(0.2)
+        if last is not None:
+            last()
+        while self._work(0.0):
+            pass
+
+    def _work(self, timeout_s):
+        try:
+            client, work, arguments = self._queue.get(timeout=timeout_s)
+        except queue.Empty:
+            return False
+        try:
+            work(*arguments)
+        except RobotError as error:
+            if client is not None:
+                self._told(client, "refused", str(error))
+        return True

@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What pages may do with the robot: one holds the control, everybody may stop. No ROS: the robot is an argument, with
+
+- ``limits``: {joint: motion.Limits}, empty until the robot is known; ``poses``: {name: {joint: angle [rad]}}
+- ``measured()``: {joint: position [rad]}; ``why_not_ready()``: "" or a sentence
+- ``command(setpoints)``: {joint: [rad], of a recording also SIDE_gripper: [%]}; ``stop()``, ``enable()``,
+  ``disable()``, ``grip(side, action)``: do not wait, and raise RobotError
+"""
+import math
+import threading
+import time
+
+from lab_web.control import SILENCE_S, Control, NotInControl
+from lab_web.motion import Motion, MotionError
+
+#: Period of commands to the robot while it moves [s].
+TICK_S = 0.01
+#: Period of looks at the page in control while nothing moves [s].
+IDLE_S = 0.04
+
+
+class RobotError(Exception):
+    """The robot cannot do that; the text says why."""
+
+
+class Lab:
+    """All pages share one. Operations come from any thread; ``changed()`` is called after the control has changed,
+    ``told(client, code, text)`` tells one page (None: all) something.
+    """
+
+    def __init__(self, robot, changed, told, silence_s=SILENCE_S, clock=time.monotonic):
+        self._robot = robot
+        self._changed = changed
+        self._told = told
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._control = Control(silence_s)
+        self._motion = Motion({})
+        self._moving = threading.Event()
+        self._served = dict(_OPERATIONS)
+        self._releases = []
+
+    def add(self, name, serve, needs_control=True):
+        """An operation beside those of this module: ``serve(client, operation)`` does not wait, and raises RobotError;
+        with ``needs_control`` only for the page that has the control.
+        """
+        def checked(lab, client, operation):
+            if needs_control:
+                lab._check(client)
+            serve(client, operation)
+        self._served[name] = checked
+
+    def when_lost(self, release):
+        """``release()`` is called when the robot is stopped, and when a page loses the control, goes or falls silent:
+        it ends what the page holds. It does not wait, and may have nothing to end.
+        """
+        self._releases.append(release)
+
+    @property
+    def holder(self):
+        """The client that has the control, or None."""
+        return self._control.holder
+
+    @property
+    def is_moving(self):
+        return self._moving.is_set()
+
+    def serve(self, client, may_act, operation):
+        """One operation of a page, a dict with "op". Errors are told to the client."""
+        op = operation.get("op")
+        if op == "stop":
+            self.stop(client)
+            return
+        serve = self._served.get(op) if isinstance(op, str) else None
+        if serve is None:
+            self._told(client, "unknown", "unknown operation %r" % (op,))
+        elif not may_act:
+            self._told(client, "only_watches", "this address only watches; it can stop the robot, nothing else")
+        else:
+            try:
+                serve(self, client, operation)
+            except NotInControl as error:
+                self._told(client, error.code, str(error))
+            except (MotionError, RobotError) as error:
+                self._told(client, "refused", str(error))
+
+    def stop(self, client):
+        """Stop the robot; every page may."""
+        # Before the lock: nothing must hold this up.
+        self._robot.stop()
+        with self._lock:
+            self._halt()
+        self._told(None, "stopped", "a page has pressed stop")
+
+    def beat(self, client):
+        """A page has shown that it is there."""
+        with self._lock:
+            self._control.beat(client, self._clock())
+
+    def gone(self, client):
+        """A page has gone: what it moved stops."""
+        with self._lock:
+            had = self._control.release(client)
+            if had:
+                self._halt()
+        if had:
+            self._changed()
+
+    def tick(self, dt):
+        """Send the next set-points, ``dt`` [s] after the last ones; stop where the page or the robot is not ready."""
+        with self._lock:
+            if not self._motion.is_moving:
+                self._moving.clear()
+                if not self._control.is_alive(self._clock()):
+                    self._release_held()
+                return
+            client, why, lost = self._control.holder, self._robot.why_not_ready(), None
+            if self._control.is_alive(self._clock()) and not why:
+                try:
+                    self._robot.command(self._motion.step(dt, self._measured()))
+                    return
+                except MotionError as error:
+                    lost = error
+            self._halt()
+        if lost:
+            self._told(client, "refused", str(lost))
+        elif why:
+            self._told(client, "not_ready", why)
+        else:
+            self._told(client, "page_silent", "the arms were stopped: no sign of life of the page that moved them")
+
+    def run(self, ends):
+        """Tick until ``ends()``; for a separate thread."""
+        last = self._clock()
+        while not ends():
+            if not self._moving.wait(IDLE_S):
+                last = self._clock()
+                self.tick(0.0)
+                continue
+            time.sleep(TICK_S)
+            now = self._clock()
+            if now - last > 5.0 * TICK_S:
+                # This process did not get to run; heartbeats that wait in its sockets come first.
+                time.sleep(TICK_S)
+            self.tick(min(now - last, 5.0 * TICK_S))
+            last = now
+
+    def _halt(self):
+        if self._motion.stop():
+            # The set-point in front of the joints: hold where they are now.
+            measured = self._measured()
+            if not self._robot.why_not_ready():
+                self._robot.command({joint: measured[joint] for joint in self._motion.limits if joint in measured})
+        self._moving.clear()
+        self._release_held()
+
+    def _release_held(self):
+        for release in self._releases:
+            release()
+
+    def _measured(self):
+        # A broken sensor, or another node under the robot's topic.
+        return {joint: position for joint, position in self._robot.measured().items() if math.isfinite(position)}
+
+    def _take(self, client, _operation):
+        with self._lock:
+            taken = self._control.take(client, self._clock())
+            if taken:
+                self._halt()
+        if taken:
+            self._changed()
+
+    def _release(self, client, _operation):
+        self.gone(client)
+
+    def _move(self, client, operation):
+        targets = operation.get("joints")
+        if not isinstance(targets, dict):
+            raise MotionError("\"joints\" must be an object of joints and angles")
+        self._aim(client, targets)
+
+    def _pose(self, client, operation):
+        name = operation.get("name")
+        targets = self._robot.poses.get(name) if isinstance(name, str) else None
+        if targets is None:
+            raise MotionError("there is no pose %r; there are %s" % (name, ", ".join(self._robot.poses)))
+        self._aim(client, targets)
+
+    def start(self, client, make):
+        """Move by ``make(limits, measured)``, which has what Motion has, in place of what is under way. Raises
+        NotInControl, MotionError.
+        """
+        with self._lock:
+            self._require_ready(client)
+            self._motion = make(self._robot.limits, self._measured())
+            self._moving.set()
+
+    def _aim(self, client, targets):
+        with self._lock:
+            self._require_ready(client)
+            if not isinstance(self._motion, Motion) or self._motion.limits != self._robot.limits:
+                self._motion = Motion(self._robot.limits)
+            self._motion.aim(targets, self._measured())
+            self._moving.set()
+
+    def _require_ready(self, client):
+        self._control.check(client, self._clock())
+        why = self._robot.why_not_ready()
+        if why:
+            raise NotInControl("not_ready", why)
+
+    def _enable(self, client, _operation):
+        self._check(client)
+        self._robot.enable()
+
+    def _disable(self, client, _operation):
+        self._check(client)
+        self._robot.disable()
+
+    def _grip(self, client, operation):
+        side, action = operation.get("side"), operation.get("action")
+        if not isinstance(side, str) or not isinstance(action, str):
+            raise RobotError("\"side\" and \"action\" must be texts")
+        self._check(client)
+        self._robot.grip(side, action)
+
+    def _check(self, client):
+        with self._lock:
+            self._control.check(client, self._clock())
+
+
+_OPERATIONS = {"take": Lab._take, "release": Lab._release, "move": Lab._move, "pose": Lab._pose, "enable": Lab._enable,
+               "disable": Lab._disable, "grip": Lab._grip}

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node lab_web: serves the page beside a running lab, and prints its address."""
+import argparse
+import contextlib
+import os
+import secrets
+import socket
+import threading
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import rosgraph
+import rospkg
+import rospy
+
+from lab_environment import ports
+from lab_web.buttons import Buttons
+from lab_web.errands import Errands
+from lab_web.hands import Hands, ghost
+from lab_web.lab import Lab
+from lab_web.libraries import LibrariesError, fetched
+from lab_web.parts import SCREEN_TOPIC, Parts
+from lab_web.playback import Recorder, play
+from lab_web.robot import ARM_LINKS, Baxter
+from lab_web.scene import SceneFollower, bodies_of
+from lab_web.serving import Pages, routes, upload_routes
+from lab_web.simulation import Simulation
+from rospy_limits.node import limit_ports
+from rospy_start import end_on_signals
+from web_bridge import ros_graph
+from web_bridge.access import Access
+from web_bridge.cameras import Cameras
+from web_bridge.codec import Codec
+from web_bridge.loop_thread import LoopThread
+from web_bridge.serving import Serving
+from web_bridge.session import Bridge
+from web_bridge.video import SnapshotHandler, VideoOptions, VideoServer
+from web_bridge.websocket import Clients, SocketOptions
+from world_picture.snapshot import SnapshotError
+
+FIRST_PORT = 8090
+#: Period of poses to the pages [s]; of looks at what changes rarely [s].
+_POSES_S, _LOOK_S = 0.05, 1.0
+_COMPRESSED = "sensor_msgs/CompressedImage"
+
+
+class Failure(Exception):
+    """The page cannot be served; the text says why, and what helps."""
+
+
+def main():
+    """Returns the exit code."""
+    options = _parser().parse_args(rospy.myargv()[1:])
+    try:
+        _require_lab()
+        page = Path(rospkg.RosPack().get_path("lab_web")) / "page"
+        serve(options, page, fetched(page))
+    except (Failure, LibrariesError) as error:
+        print("lab_web: %s" % error, flush=True)
+        return 2
+    return 0
+
+
+def _parser():
+    parser = argparse.ArgumentParser(prog="./baxter.sh web", description="The lab's page in a browser, beside a "
+                                     "running lab, until Ctrl-C or until the lab ends.")
+    parser.add_argument("--port", type=int, help="the port; default: the first free one from %d" % FIRST_PORT)
+    parser.add_argument("--public", action="store_true", help="open the page to other machines; see docs/web.md")
+    parser.add_argument("--token", help="the operator's token; default: a new one")
+    parser.add_argument("--view-token", help="the token of those that only watch and stop; default: a new one")
+    return parser
+
+
+def _require_lab():
+    if not rosgraph.is_master_online():
+        raise Failure("no lab runs at %s. Start one in another terminal: "
+                      "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch" % rosgraph.get_master_uri())
+
+
+def serve(options, page, libraries):
+    """Serve until the node or the lab ends. Raises Failure."""
+    tokens = options.token or secrets.token_urlsafe(18), options.view_token or secrets.token_urlsafe(18)
+    if tokens[0] == tokens[1]:
+        raise Failure("--token and --view-token are the same; pages that only watch need another one")
+    limit_ports()
+    end_on_signals()
+    rospy.init_node("lab_web", disable_signals=True)
+    loop_thread = LoopThread("lab_web")
+    access = Access({tokens[0]: True, tokens[1]: False})
+    pages = Pages(access, loop_thread)
+    robot = Baxter(lambda text: pages.tell(None, "refused", text))
+    pages.lab = Lab(robot, pages.control_changed, pages.tell)
+    equipment = _equip(pages, robot)
+    graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, ros_graph.now)
+    bridge = Bridge(graph, codec, loop_thread.later)
+    video = VideoServer(Cameras(graph, codec, loop_thread), VideoOptions(access))
+    clients = Clients(bridge, loop_thread, SocketOptions(access))
+    application = clients.application(*routes(pages, page, libraries), *upload_routes(pages, equipment.recorder),
+                                      (r"/snapshot", SnapshotHandler, {"server": video}))
+    try:
+        serving = Serving(loop_thread, application, _port(options), "" if options.public else "127.0.0.1")
+    except OSError as error:
+        raise Failure("port %s cannot be opened: %s; name another one by --port" % (options.port, error)) from None
+    threads = [threading.Thread(target=loop, args=(rospy.is_shutdown,)) for loop in (
+        pages.lab.run, *equipment.loops)] + [threading.Thread(target=_follow, args=(pages,))]
+    for thread in threads:
+        thread.start()
+    try:
+        _announce(serving.port, tokens, options.public)
+        _watch(robot, equipment, pages)
+    finally:
+        rospy.signal_shutdown("the end")
+        for thread in threads:
+            thread.join()
+        clients.shut_down()
+        serving.close()
+        video.cameras.shut_down()
+        loop_thread.stop()
+
+
+class _Equipment(NamedTuple):
+    """What pages use beside the arms; ``loops``: functions of ``ends``, for a thread each."""
+
+    hands: Hands
+    simulation: Simulation
+    recorder: Recorder
+    loops: tuple
+
+
+def _equip(pages, robot):
+    """Add the operations of all parts to the lab."""
+    lab = pages.lab
+    hands = Hands(robot.measured, lambda chain, joints: ghost(pages.picture, chain, joints), pages.answer)
+    lab.add("reach", hands.ask, needs_control=False)
+    parts = Parts()
+    errands, switches = Errands(pages.tell), Errands(pages.tell)
+    buttons = Buttons(parts.switch, switches)
+    simulation = Simulation(errands, lambda: bodies_of(pages.picture, robot.limits), pages.answer,
+                            lambda state: pages.share("simulation", state))
+    lab.when_lost(buttons.release_all)
+    recorder = Recorder(lambda recording: pages.share("recording", recording))
+    robot.heard = recorder.take
+    lab.add("record", recorder.record, needs_control=False)
+    lab.add("load", recorder.load, needs_control=False)
+    lab.add("play", lambda client, _operation: play(lab, client, recorder))
+    for name, serve in {"press": buttons.press, "turn": buttons.turn, **parts.operations(),
+                        **simulation.operations()}.items():
+        lab.add(name, serve)
+    return _Equipment(hands, simulation, recorder, (
+        hands.run, errands.run, lambda ends: switches.run(ends, buttons.release_all)))
+
+
+def _port(options):
+    if options.port is not None:
+        return options.port
+    try:
+        return ports.free_port(range(FIRST_PORT, FIRST_PORT + 100))
+    except OSError as error:
+        raise Failure(error.strerror) from None
+
+
+def _announce(port, tokens, public):
+    host = os.environ.get("ROS_IP") or socket.gethostname() if public else "localhost"
+    rospy.set_param("~address", "http://%s:%d/" % (host, port))
+    print("Open in a browser:\n\n    http://%s:%d/?token=%s\n\n"
+          "To watch, and to stop the robot:\n\n    http://%s:%d/?token=%s\n"
+          % (host, port, tokens[0], host, port, tokens[1]), flush=True)
+    if public:
+        print("Port %d is open to every machine of the network: who has the first address moves the robot. The "
+              "connection is not encrypted.\n" % port, flush=True)
+    print("Ctrl-C here ends the page; the lab goes on.", flush=True)
+
+
+def _watch(robot, equipment, pages):
+    """Look after what changes rarely, until the node or the lab ends."""
+    shown = None
+    while not rospy.is_shutdown():
+        if not rosgraph.is_master_online():
+            print("The lab has ended, and the page with it.", flush=True)
+            return
+        # The master may end between the two lines.
+        with contextlib.suppress(OSError, rospy.ROSException, rosgraph.MasterException):
+            robot.look_after()
+            description = robot.read_description()
+            if description is not None:
+                equipment.hands.know(description, ARM_LINKS, rospy.logwarn)
+            now = _described(robot, equipment)
+            if now["has_scene"] and len(pages):
+                equipment.simulation.look()
+            if now != shown:
+                pages.share("robot", now)
+                shown = now
+        rospy.rostime.wallsleep(_LOOK_S)
+
+
+def _described(robot, equipment):
+    """What pages are told of the robot: the operation "robot"."""
+    published = dict(rospy.get_published_topics())
+    return {"joints": [{"name": name, "lower": limits.lower, "upper": limits.upper}
+                       for name, limits in robot.limits.items()],
+            "poses": list(robot.poses), "hands": equipment.hands.sides, "grippers": robot.grippers,
+            "cameras": sorted(topic for topic, kind in published.items() if kind == _COMPRESSED),
+            "can_press": Parts.can_press(), "has_screen": SCREEN_TOPIC in published,
+            "has_scene": rospy.has_param("/gazebo/snapshot"), "things": equipment.simulation.things}
+
+
+def _follow(pages):
+    """Send poses while there are pages; across restarts of the simulator."""
+    follower, picture = None, None
+    while not rospy.is_shutdown():
+        began = time.monotonic()
+        if len(pages):
+            try:
+                if follower is None or not follower.is_alive:
+                    follower, picture = SceneFollower(rospy.get_param("/gazebo/snapshot"), rospy.logwarn), None
+                if follower.follow() or follower.picture is not picture:
+                    picture = follower.picture
+                    pages.show_poses(picture, follower.poses())
+            # No simulator, or it is just starting or ending.
+            except (KeyError, SnapshotError, OSError, rosgraph.MasterException):
+                follower = None
+                rospy.rostime.wallsleep(_LOOK_S)
+        rospy.rostime.wallsleep(max(0.0, _POSES_S - (time.monotonic() - began)))

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The simulated world for a browser: shapes once, poses many times a second. No ROS.
+
+The world comes from the simulator's shared memory, as for the cameras; so robots, objects and their meshes are those
+that the cameras see.
+"""
+import hashlib
+import json
+
+import numpy as np
+
+from sensor_renderer.following import WorldFollower
+
+
+class Picture:
+    """One scene. ``text``: JSON with ``revision``, ``bodies`` [{name, links: [[{shape, colour}]]}], ``light``;
+    ``shapes``: {name: bytes of float32, three rows x y z nx ny nz [m] for each triangle}; names belong to contents;
+    ``bodies``: {name: sensor_renderer.mirror.Body} in the scene's order.
+    """
+
+    def __init__(self, revision, text, shapes, bodies=None):
+        self.revision = revision
+        self.text = text
+        self.shapes = shapes
+        self.bodies = bodies or {}
+
+
+class SceneFollower(WorldFollower):
+    """Follows one simulator; for one thread. ``warn(text)``."""
+
+    def __init__(self, folder, warn):
+        """Raises world_picture.snapshot.SnapshotError if there is no snapshot in ``folder``."""
+        super().__init__(folder, warn)
+        self._seen = None
+        #: The newest :class:`Picture`, or None.
+        self.picture = None
+
+    def follow(self):
+        """Read the newest state. Returns whether anything has changed. Raises SnapshotError."""
+        if not super().follow():
+            return False
+        if self.picture is None or self.picture.revision != self.revision:
+            self.picture = picture_of(self.mirror, self.revision)
+        changed, self._seen = self.mirror.version != self._seen, self.mirror.version
+        return changed
+
+    def poses(self):
+        """Bytes: the revision [uint32], then for each link in the scene's order the upper three rows of its pose in the
+        world [float32, (3, 4)].
+        """
+        rows = [body.matrices[:, :3, :].astype("<f4").tobytes() for body in self.mirror.bodies.values()]
+        return np.uint32(self.revision).astype("<u4").tobytes() + b"".join(rows)
+
+
+def picture_of(mirror, revision):
+    """The Picture of all bodies; equal triangles are one shape, floors are left out."""
+    names, shapes, bodies = {}, {}, []
+    for name, body in mirror.bodies.items():
+        links = []
+        for parts in body.parts:
+            shown = []
+            for part in parts:
+                if part.is_floor:
+                    continue
+                if part.key not in names:
+                    content = part.triangles.astype("<f4").tobytes()
+                    names[part.key] = hashlib.sha256(content).hexdigest()[:24]
+                    shapes[names[part.key]] = content
+                shown.append({"shape": names[part.key], "colour": [float(value) for value in part.colour]})
+            links.append(shown)
+        bodies.append({"name": name, "links": links, "joints": len(body.joint_names)})
+    light = {key: [float(value) for value in getattr(mirror.light, key)] for key in ("ambient", "to_sun", "sun")}
+    return Picture(revision, json.dumps({"revision": revision, "bodies": bodies, "light": light}), shapes,
+                   dict(mirror.bodies))
+
+
+def bodies_of(picture, joints):
+    """{name of a body of ``picture`` (or of None) that is more than a floor: whether it has one of the ``joints``}."""
+    return {name: not set(joints).isdisjoint(body.joint_names)
+            for name, body in (picture.bodies.items() if picture else ())
+            if any(body.parts) and not any(part.is_floor for parts in body.parts for part in parts)}

@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The page's files and its socket, on tornado. No ROS."""
+import asyncio
+import base64
+import hashlib
+import json
+import re
+
+from tornado import web
+
+from lab_web.control import HEARTBEAT_S
+from lab_web.motion import MotionError
+from lab_web.playback import recording_of, text_of
+from web_bridge.errors import Refused
+from web_bridge.websocket import BufferedSocket, token_of
+
+#: Pages at a time.
+MOST_PAGES = 100
+#: An operation of a page is small [bytes].
+_LARGEST_OPERATION = 65536
+#: A file from a page, such as ten minutes of both arms [bytes].
+_LARGEST_UPLOAD = 16 << 20
+#: The robot's screen, width and height [pixels]; pages send it whole.
+SCREEN = (1024, 600)
+# Everything comes from this server, so that the page works without a network and loads nothing foreign.
+_POLICY = "default-src 'self'; script-src 'self'%s; img-src 'self' data:; connect-src 'self' ws: wss:; " \
+          "frame-ancestors 'self'"
+
+
+def policy(page_text=""):
+    """The Content-Security-Policy of a page with this text: the only script inside of it is its import map."""
+    inline = re.findall(r'<script type="importmap">(.*?)</script>', page_text, re.DOTALL)
+    return _POLICY % "".join(" 'sha256-%s'" % base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+                             for text in inline)
+
+
+class Pages:
+    """The connected pages. ``access``: web_bridge.access.Access; ``lab``: set by the owner before the first page."""
+
+    def __init__(self, access, loop_thread):
+        self.access = access
+        self.loop_thread = loop_thread
+        self.lab = None
+        #: The scene of now (:class:`lab_web.scene.Picture`) and its newest poses, or None.
+        self.picture = self.poses = None
+        self._shared = {"robot": {"op": "robot"}}
+        self._sockets = {}
+
+    def __len__(self):
+        return len(self._sockets)
+
+    @property
+    def shared(self):
+        """What every page is told first."""
+        return list(self._shared.values())
+
+    @property
+    def is_full(self):
+        return len(self._sockets) >= MOST_PAGES
+
+    def opened(self, socket):
+        self._sockets[socket.number] = socket
+        self.control_changed()
+
+    def closed(self, socket):
+        if self._sockets.pop(socket.number, None) is not None:
+            self.control_changed()
+
+    # From any thread.
+
+    def control_changed(self):
+        """Tell all pages who has the control."""
+        self.loop_thread.soon(self._send_control)
+
+    def tell(self, number, code, text):
+        """Tell one page, or all (None)."""
+        self.loop_thread.soon(self._tell, number, code, text)
+
+    def answer(self, number, operation):
+        """An answer to one page."""
+        self.loop_thread.soon(self._send_one, number, operation)
+
+    def share(self, name, values):
+        """Tell all pages the operation ``name`` with ``values``, and each page that comes later."""
+        operation = {"op": name, **values}
+        self._shared[name] = operation
+        self.loop_thread.soon(self._send_all, operation)
+
+    def show_poses(self, picture, poses):
+        """New poses of the scene ``picture``."""
+        self.picture, self.poses = picture, poses
+        for socket in list(self._sockets.values()):
+            socket.outgoing.offer([poses], "poses", 1)
+
+    # In the loop.
+
+    def _send_all(self, operation):
+        for socket in self._sockets.values():
+            socket.send(operation)
+
+    def _send_one(self, number, operation):
+        if number in self._sockets:
+            self._sockets[number].send(operation)
+
+    def _send_control(self):
+        holder = self.lab.holder
+        for number, socket in self._sockets.items():
+            socket.send({"op": "control", "mine": holder == number, "free": holder is None,
+                         "pages": len(self._sockets)})
+
+    def _tell(self, number, code, text):
+        sockets = self._sockets.values() if number is None else filter(None, [self._sockets.get(number)])
+        for socket in sockets:
+            socket.send({"op": "told", "code": code, "text": text})
+
+
+class _WithToken(web.RequestHandler):
+    """Files that need a token, of either kind."""
+
+    def initialize(self, pages):
+        self.pages = pages
+
+    def prepare(self):
+        try:
+            self.pages.access.may_act(token_of(self.request))
+        except Refused:
+            self.set_status(403)
+            self.finish("This address needs the token that ./baxter.sh web printed: …/?token=…\n")
+
+    def set_default_headers(self):
+        self.set_header("Referrer-Policy", "no-referrer")
+        self.set_header("X-Content-Type-Options", "nosniff")
+        self.set_header("Cache-Control", "no-store")
+
+
+class Index(_WithToken):
+    """The page."""
+
+    def initialize(self, pages, text):
+        super().initialize(pages)
+        self._text = text
+
+    def get(self):
+        self.set_header("Content-Security-Policy", policy(self._text))
+        self.finish(self._text)
+
+
+class Scene(_WithToken):
+    """Which shapes there are, as JSON."""
+
+    def get(self):
+        if self.pages.picture is None:
+            self.set_status(404)
+            return
+        self.set_header("Content-Type", "application/json")
+        self.finish(self.pages.picture.text)
+
+
+class Shape(_WithToken):
+    """The triangles of one shape of the scene."""
+
+    def get(self, name):
+        content = self.pages.picture and self.pages.picture.shapes.get(name)
+        if content is None:
+            self.set_status(404)
+            return
+        self.set_header("Content-Type", "application/octet-stream")
+        # A name belongs to its content.
+        self.set_header("Cache-Control", "private, max-age=604800, immutable")
+        self.finish(content)
+
+
+@web.stream_request_body
+class Upload(_WithToken):
+    """Bytes for an operation of a page, which is told where it fails; ``read`` makes its value of them and raises
+    MotionError. Nothing is read without the token.
+    """
+
+    def initialize(self, pages, operation, read=bytes):
+        super().initialize(pages)
+        self._operation, self._read = operation, read
+        self._body = bytearray()
+
+    def prepare(self):
+        super().prepare()
+        if self._finished:
+            return
+        try:
+            self.pages.access.check_origin(self.request.headers.get("Origin"), self.request.host)
+            may_act = self.pages.access.may_act(token_of(self.request))
+        except Refused as error:
+            self.set_status(403)
+            self.finish(str(error) + "\n")
+            return
+        if may_act:
+            self.request.connection.set_max_body_size(_LARGEST_UPLOAD)
+        else:
+            self.set_status(403)
+            self.finish("this address only watches\n")
+
+    def data_received(self, chunk):
+        self._body += chunk
+
+    async def post(self):
+        number = self.get_query_argument("page", "")
+        number = int(number) if number.isdecimal() else 0
+        self.set_status(204)
+        try:
+            # Reading may take a while; heartbeats go on.
+            content = await asyncio.get_running_loop().run_in_executor(None, self._read, bytes(self._body))
+        except MotionError as error:
+            self.pages.tell(number, "refused", str(error))
+            return
+        self.pages.lab.serve(number, True, {"op": self._operation, "content": content})
+
+
+class RecordingFile(_WithToken):
+    """The recording as a file; ``get_text()``: its text, or None."""
+
+    def initialize(self, pages, get_text):
+        super().initialize(pages)
+        self._get_text = get_text
+
+    async def get(self):
+        text = await asyncio.get_running_loop().run_in_executor(None, self._get_text)
+        if text is None:
+            self.set_status(404)
+            return
+        self.set_header("Content-Type", "text/csv; charset=utf-8")
+        self.set_header("Content-Disposition", "attachment; filename=recording.csv")
+        self.finish(text)
+
+
+class Files(web.StaticFileHandler):
+    """The page's scripts, styles and texts, and its libraries: nothing of the lab, so no token."""
+
+    @classmethod
+    def get_absolute_path(cls, root, path):
+        if "\0" in path:
+            raise web.HTTPError(404)
+        return super().get_absolute_path(root, path)
+
+    def set_extra_headers(self, path):
+        self.set_header("Cache-Control", "no-cache")
+        self.set_header("X-Content-Type-Options", "nosniff")
+        # A worker has the policy of its own file.
+        self.set_header("Content-Security-Policy", policy())
+
+
+class PageSocket(BufferedSocket):
+    """One page: operations of :class:`lab_web.lab.Lab` and heartbeats come in; control, robot and poses go out."""
+
+    _numbers = iter(range(1, 1 << 62))
+
+    def initialize(self, pages):
+        self._pages = pages
+        self.number = next(self._numbers)
+
+    def prepare(self):
+        self.let_in(self._pages.access, self._pages.is_full, MOST_PAGES)
+
+    def open(self, *_):
+        self.start_writing(self._pages.loop_thread)
+        self.send({"op": "hello", "number": self.number, "may_act": self.may_act,
+                   "heartbeat_ms": 1000.0 * HEARTBEAT_S})
+        for operation in self._pages.shared:
+            self.send(operation)
+        if self._pages.poses is not None:
+            self.outgoing.offer([self._pages.poses], "poses", 1)
+        self._pages.opened(self)
+
+    def send(self, operation):
+        """An operation to the page."""
+        self.outgoing.keep([json.dumps(operation)])
+
+    async def on_message(self, message):
+        lab = self._pages.lab
+        # Most frames are heartbeats.
+        if message == "beat":
+            lab.beat(self.number)
+            return
+        try:
+            if not isinstance(message, str) or len(message) > _LARGEST_OPERATION:
+                raise ValueError
+            operation = json.loads(message)
+            if not isinstance(operation, dict):
+                raise ValueError
+        except (ValueError, RecursionError):
+            self.send({"op": "told", "code": "unknown", "text": "an operation is a JSON object"})
+            return
+        lab.serve(self.number, self.may_act, operation)
+
+    def on_close(self):
+        if self.outgoing is None:
+            return
+        self.stop_writing()
+        self._pages.closed(self)
+        self._pages.lab.gone(self.number)
+
+
+def upload_routes(pages, recorder):
+    """The routes of files to and from pages; ``recorder``: :class:`lab_web.playback.Recorder`."""
+    def text():
+        recording = recorder.recording
+        return None if recording is None else text_of(recording)
+    return [(r"/screen", Upload, {"pages": pages, "operation": "screen"}),
+            (r"/recording", Upload, {"pages": pages, "operation": "load", "read": recording_of}),
+            (r"/recording.csv", RecordingFile, {"pages": pages, "get_text": text})]
+
+
+def routes(pages, page, libraries):
+    """The routes of the page; ``page``: the folder of its files, ``libraries``: of node_modules [pathlib.Path]."""
+    text = (page / "index.html").read_text(encoding="utf-8")
+    return [(r"/", Index, {"pages": pages, "text": text}), (r"/lab", PageSocket, {"pages": pages}),
+            (r"/scene", Scene, {"pages": pages}), (r"/scene/([0-9a-f]{24})", Shape, {"pages": pages}),
+            (r"/page/(.*)", Files, {"path": str(page)}),
+            (r"/three/(.*)", Files, {"path": str(libraries / "three")})]
