@@ -36,7 +36,8 @@ def arms():
 
 
 def checker_of(arm):
-    """Return a BulletChecker of an Arm's robot: for Baxter with its own table of what must not touch. Close it."""
+    """Return a BulletChecker of an Arm's robot: for Baxter with its own list of self-collision pairs. The caller closes
+    it."""
     pairs = self_collision_pairs(arm.robot.links)
     if not pairs:
         return BulletChecker.of_robot(arm.robot, find_mesh=ResourceFinder())

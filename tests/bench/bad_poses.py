@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses without a solution whose cause is known because they are built that way, and what a right verdict must say.
+"""Poses that have no solution for a known cause, and what a correct diagnosis must say.
 
-Built and judged with ik_oracle, which shares no code with the solver under test; what touches is asked of bullet_sim.
+Each pose is built and judged with ik_oracle, which shares no code with the solver under test. bullet_sim finds
+contacts.
 """
 from collections import Counter
 from collections.abc import Callable
@@ -16,13 +17,14 @@ from bullet_sim import Pose
 from urdf_model import parse_urdf
 from urdf_model.transforms import axis_rotation, rigid
 
-# A verdict's distance may be longer than the oracle's by this share and this much [m].
+# The distance in a diagnosis may be longer than the oracle's by this share and this length [m].
 _LONGER, _LONGER_M = 0.02, 1e-3
-# Room for the oracle beyond the excess that a verdict names [rad]: exactly there only a single posture arrives.
+# The oracle may exceed a limit by this much more than the diagnosis says [rad]: at exactly that excess only one posture
+# reaches the pose.
 _ROOM = 0.02
-# The pair that a verdict names must touch in this share of the postures that reach the pose.
+# The pair in a diagnosis must touch in this share of the postures that reach the pose.
 _OFTEN = 0.25
-# So many postures of the oracle, at least, must reach a pose before all of them say what is in the way there.
+# The oracle must find at least this many postures that reach a pose, otherwise they do not show what is in the way.
 _ENOUGH = 30
 _POST = parse_urdf("""<robot name="post"><link name="box"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"
 ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>
@@ -31,18 +33,19 @@ ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><box size="0.1 0.1 0.1"
 
 @dataclass(frozen=True)
 class Case:
-    """One pose, how to ask for it, and whether a NoSolution about it is right."""
+    """One pose, how to ask for it, and a function that tells whether a NoSolution about it is correct."""
 
     kind: str
     target: np.ndarray
     right: Callable
     budget: Budget = Budget()
     position_only: bool = False
-    post: tuple | None = None  # where a box of 10 cm stands [m, base frame]
+    post: tuple | None = None  # position of a 10 cm box [m, base frame]
 
 
 class Builder:
-    """Builds cases for one arm. ``checker``: a BulletChecker of its robot. The same ``rng`` state, the same cases."""
+    """Builds cases for one arm. ``checker``: a BulletChecker of its robot. The same ``rng`` state gives the same
+    cases."""
 
     def __init__(self, robot, chain, checker, rng, starts=300):
         self._chain, self._rng, self.checker = chain, rng, checker
@@ -69,7 +72,7 @@ class Builder:
         return cases
 
     def ask(self, case):
-        """Return the NoSolution about a case; None where the pose is solved although it was to be bad."""
+        """Return the NoSolution about a case; None if the pose has a solution after all."""
         options = {"budget": case.budget}
         if case.kind.startswith("touches"):
             options["checker"] = self.checker
@@ -83,7 +86,7 @@ class Builder:
         return None
 
     def right(self, case, failure):
-        """Return whether what :meth:`ask` returned names the cause, and whether its nearest pose can be trusted."""
+        """Return whether the result of :meth:`ask` names the correct cause, and whether its nearest pose is correct."""
         return (failure is not None and self._inside(failure.best) and bool(case.right(failure))
                 and np.allclose(self._oracle.fk(failure.best), failure.nearest, atol=1e-9))
 
@@ -109,7 +112,7 @@ class Builder:
         return axis_rotation(axis / np.linalg.norm(axis), self._rng.uniform(0.0, np.pi))
 
     def _out_of_reach(self, kind, target, over, position_only=False):
-        """``over``: the least distance [m] by which it is missed, as far as lengths alone tell."""
+        """``over``: the least distance [m] to the target that follows from the lengths alone."""
         least = self._oracle.nearest(target, self._rng, position_only)
 
         def right(failure):
@@ -120,12 +123,13 @@ class Builder:
         return Case(kind, target, right, position_only=position_only)
 
     def _too_far(self, kind):
-        """No joint angles bridge more than the lengths of the links put end to end."""
+        """The target is farther away than the sum of the links' lengths."""
         over = self._rng.uniform(0.01, 1.0)
         return self._out_of_reach(kind, rigid(self._rotation(), self._away(self._chain.tip_reach_m + over)), over)
 
     def _wrist_too_far(self, kind):
-        """The pose says where the last joint's axis is, and that point is beyond the lengths."""
+        """The pose fixes a point of the last joint's axis, and that point is farther away than the sum of the links'
+        lengths."""
         chain, rotation = self._chain, self._rotation()
         position = self._away(chain.tip_reach_m * self._rng.uniform(0.8, 0.99))
         wrist = position - rotation @ chain.wrist_in_tip
@@ -134,7 +138,7 @@ class Builder:
         return self._out_of_reach(kind, rigid(rotation, position), 0.0)
 
     def _not_like_this(self, kind):
-        """Not even without limits, although neither tip nor wrist is beyond the lengths."""
+        """The pose is out of reach even without limits, although tip and wrist are close enough."""
         chain, rotation = self._chain, self._rotation()
         position = self._away(chain.tip_reach_m * self._rng.uniform(0.6, 1.0))
         wrist = position - rotation @ chain.wrist_in_tip
@@ -144,7 +148,7 @@ class Builder:
         return self._out_of_reach(kind, target, 0.0)
 
     def _point_too_far(self, kind):
-        """The point alone, in any orientation, limits or none."""
+        """The point is out of reach in every orientation, with or without limits."""
         target = rigid(np.eye(3), self._away(self._chain.tip_reach_m * self._rng.uniform(0.9, 1.2)))
         free = np.full(len(self._chain), np.inf)
         if self._oracle.nearest(target, self._rng, True, -free, free) < MISSED:
@@ -168,12 +172,13 @@ class Builder:
         return oracle.fk(q), excess
 
     def _gives_way(self, target, failure):
-        """Whether the pose is reached when the named joints, alone, go as far as the verdict says."""
+        """Whether the pose is reached if only the named joints exceed their limits, as far as the diagnosis says."""
         by = {name: abs(excess) + _ROOM for name, excess in zip(failure.joints, failure.excess, strict=True)}
         return bool(self._oracle.reaches(target, self._rng, *self._oracle.widened(by)))
 
     def _one_limit(self, kind):
-        """Inside the limits nothing arrives; with one joint beyond it does, by as much as it was built with."""
+        """No posture inside the limits reaches the pose. One does with a single joint beyond its limit, by the amount
+        that the case was built with."""
         target, excess = self._beyond([self._rng.integers(len(self._chain))])
         if self._oracle.reaches(target, self._rng) is not False:
             return None
@@ -186,7 +191,7 @@ class Builder:
         return Case(kind, target, right)
 
     def _two_limits(self, kind):
-        """No single joint does it, however far beyond its limits it goes."""
+        """No single joint beyond its limits is enough."""
         target, _ = self._beyond(self._rng.choice(len(self._chain), 2, replace=False))
         alone = ({name: 2.0 * np.pi} for name in self._oracle.names)
         if self._oracle.reaches(target, self._rng) is not False or any(
@@ -202,8 +207,8 @@ class Builder:
     # -- collisions ----------------------------------------------------------------------------------------------
 
     def _touches(self, target):
-        """Return {(link, link, with the world): share} of the deepest touches of all postures found, or {} where one is
-        clear or there are too few."""
+        """Return {(link, link, with the world): share} of the deepest contacts of all postures found. It is {} if a
+        posture is free of contacts or there are too few postures."""
         found, _ = self._oracle.solutions(target, self._rng)
         touches = Counter()
         if len(found) < _ENOUGH:
@@ -226,7 +231,7 @@ class Builder:
         return self._touching(kind, target, self._touches(target), False)
 
     def _touches_world(self, kind):
-        """A box stands where the hand would have to be, or a little behind it."""
+        """A box stands at the hand's target position, or a little behind it."""
         target = self._oracle.fk(self._posture())
         post = tuple(target[:3, 3] - self._rng.uniform(0.0, 0.15) * target[:3, 2])
         self._stand(post)
@@ -237,7 +242,7 @@ class Builder:
     def _touching(self, kind, target, touches, with_world, post=None):
         often = {frozenset(key[:2]) for key, share in touches.items() if share >= _OFTEN and key[2] == with_world}
         other = sum(share for key, share in touches.items() if key[2] != with_world)
-        # Where half of the postures touch the one and half the other, no cause is the right one.
+        # If half of the postures touch one pair and half another, there is no single cause.
         if not often or other > _OFTEN:
             return None
         wanted = Reason.WORLD_COLLISION if with_world else Reason.SELF_COLLISION
@@ -250,7 +255,8 @@ class Builder:
     # -- not converged -------------------------------------------------------------------------------------------
 
     def _not_converged(self, kind, budget):
-        """The pose was made from a posture; it is left out where the search finds one although it was to fail."""
+        """The pose was made from a posture, so it has a solution. The case is left out if the short search finds
+        one."""
         target = self._oracle.fk(self._posture())
         try:
             solve(self._chain, target, self._chain.mid_range, budget=budget)
@@ -262,7 +268,7 @@ class Builder:
         return self._not_converged(kind, Budget(max_starts=1, max_iterations=int(self._rng.integers(1, 4))))
 
     def _too_fine(self, kind):
-        """Finer than a double can tell at this distance."""
+        """The tolerance is finer than the resolution of a double at this distance."""
         return self._not_converged(kind, Budget(tolerance_m=1e-18, tolerance_rad=1e-18))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A model plugin with a thread that never rests, for the suite that asks whether a lab keeps up."""
+"""A model plugin whose thread computes without pause, for the suite `keeps_up`."""
 
 import threading
 
@@ -7,7 +7,7 @@ from gazebo_ros.model_plugin import ModelPlugin
 
 
 class BusyPlugin(ModelPlugin):
-    """Computes in a thread of its own until it is closed."""
+    """Computes in a separate thread until it is closed."""
 
     def __init__(self, context):
         super().__init__(context)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Cameras: one picture beside PyBullet's own rendering of the vendor's meshes, and a lab that delivers many."""
+"""Cameras: one picture compared with PyBullet's own rendering of the vendor's meshes, and the picture rate of a lab."""
 import re
 import select
 import socket
@@ -27,7 +27,7 @@ SECONDS, PICTURES, NAIVE_PICTURES = 10.0, 40, 4
 SIZE = (640, 400)
 FIELD_RAD = 1.2
 CAMERAS = ("head_camera", "left_hand_camera", "right_hand_camera")
-# Where pictures are taken from: the whole robot seen from the front left; its own hand's camera, looking at the floor.
+# Camera poses: the whole robot seen from the front left; its hand camera, which looks at the floor.
 OUTSIDE = pose_matrix((2.6, 1.2, 1.6), (0.0, 0.25, np.pi + 0.45)) @ OPTICAL
 CWRU = ("cwru_baxter_sim", "baxter_world.launch")
 
@@ -39,7 +39,7 @@ def measure(report, quick, number):
 
 
 def pictures(report, count, naive_count):
-    """One renderer beside the other, in this process, the robot moving between pictures: CPU time, all threads."""
+    """Both renderers in this process, in turns, with the robot moving between pictures: CPU time of all threads."""
     file = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
     xml = xacro.process_file(file).toxml()
     merged = merge_fixed(parse_urdf(xml, source=file))
@@ -63,7 +63,7 @@ def pictures(report, count, naive_count):
                                              np.full(len(joints), angle)]))
             begin = time.process_time()
             renderer.render(mirror, pinhole, pose())
-            if step >= 0:  # the first ones hand the meshes over
+            if step >= 0:  # the first pictures load the meshes
                 ours.append(1e3 * (time.process_time() - begin))
         theirs = [naive.picture(joints, 0.3 + 0.01 * step, pinhole, pose()) for step in range(naive_count)]
         report.add("CPU of a picture of %d x %d, %s" % (*SIZE, title), statistics.median(ours), "ms",
@@ -73,11 +73,12 @@ def pictures(report, count, naive_count):
 
 
 class Naive:
-    """The way without a renderer of one's own: the physics client draws the description as it stands."""
+    """Without our renderer: the physics client draws the description as it is."""
 
     def __init__(self, xml, finder):
         self._client = pybullet.connect(pybullet.DIRECT)
-        # PyBullet reads a thousand characters of a line at a time and puts a new line after each lot, also in words.
+        # PyBullet reads a line in parts of a thousand characters and adds a line break after each part, also within
+        # words.
         lines = xml.replace(">", ">\n")
         with tempfile.NamedTemporaryFile("w", suffix=".urdf", encoding="utf-8") as file:
             file.write(re.sub(r"package://[^\"']+", lambda found: finder(found.group()) or "", lines))
@@ -89,7 +90,7 @@ class Naive:
                        for k in range(pybullet.getNumJoints(self._robot, physicsClientId=self._client))}
 
     def picture(self, joints, angle, pinhole, pose):
-        """Draw one; returns what it took [ms]."""
+        """Draw one picture; return the time that it took [ms]."""
         for name in joints:
             pybullet.resetJointState(self._robot, self._index[name], angle, physicsClientId=self._client)
         turn = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -108,7 +109,7 @@ class Naive:
 def streams(report, seconds, pace="1.0"):
     """Case Western's world with both arms moving: the real-time factor without pictures, then with them.
 
-    ``pace``: the real-time factor that is asked for; at 0, as fast as can be, physics alone is looked at.
+    ``pace``: the requested real-time factor; at 0, as fast as possible, only physics is measured.
     """
     with Lab(CWRU, gui="false", enable="true", real_time_factor=pace) as lab:
         lab.part("swing")
@@ -130,7 +131,8 @@ def streams(report, seconds, pace="1.0"):
 
 
 def count_messages(lab, watched, seconds):
-    """How many messages come on each of [(topic, class)] in ``seconds``, and the real-time factor meanwhile."""
+    """Return the number of messages on each of [(topic, class)] in ``seconds``, and the real-time factor during that
+    time."""
     counters = [Counter(lab.sink(topic, message_class)) for topic, message_class in watched]
     for counter in counters:
         counter.wait(1)
@@ -146,7 +148,7 @@ def count_messages(lab, watched, seconds):
 
 
 class Counter:
-    """Counts the messages of a connection, and looks at nothing but their lengths."""
+    """Counts the messages of a connection; reads only their lengths."""
 
     _scratch = bytearray(1 << 22)
 
@@ -158,11 +160,11 @@ class Counter:
         self.messages = -1  # the first block is the publisher's header
 
     def fileno(self):
-        """For select: there is something to take in."""
+        """The socket's descriptor, for select."""
         return self._connection.fileno()
 
     def drain(self):
-        """Take in what has come."""
+        """Read the bytes that have arrived."""
         while True:
             try:
                 if self._missing:
@@ -180,7 +182,7 @@ class Counter:
                 raise SystemExit("the publisher closed the connection")
 
     def wait(self, messages, timeout_s=60.0):
-        """Until so many have come."""
+        """Read until this many messages have arrived."""
         def have_come():
             self.drain()
             return self.messages >= messages

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the controllers of 18 joints cost in a tick, beside the physics step of the same world.
+"""Cost of the controllers of 18 joints in a tick, compared with the physics step of the same world.
 
-A tick is what libgazebo_ros_control.so does in one: read the joints, update three controllers of six joints each and
-the joint states, enforce the limits, drive the joints. All figures of one run on one machine, so that ratios mean
-something.
+A tick is the work of libgazebo_ros_control.so: read the joints, update three controllers of six joints each and the
+joint states, enforce the limits, drive the joints. All figures are of one run on one machine, so that ratios are valid.
 """
 import statistics
 import time
@@ -61,7 +60,7 @@ def group_command(names, tick):
 
 
 def trajectory_command(names, tick):
-    """Quintics through five points that last longer than the measurement; sent once."""
+    """Quintic splines through five points, longer than the measurement; sent once."""
     if tick > 1:
         return None
     points = [JointTrajectoryPoint([0.3 * (-1) ** k] * len(names), [0.1] * len(names), [0.0] * len(names), [],
@@ -110,7 +109,7 @@ def measure_kind(table, interface, kind, gains, ticks):
         for times, start, end in zip(parts, marks, marks[1:], strict=False):
             times.append(end - start)
     if np.abs(hardware.position).max() < 1e-3:
-        raise SystemExit("%s: the joints did not move, so the figures mean nothing" % kind)
+        raise SystemExit("%s: the joints did not move, so the figures are invalid" % kind)
     world.close()
     return [median_us(times) for times in parts]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A recording of a physical Baxter, replayed through joint_command: with its actuators, and with ideal drives.
+"""Replays a recording of a physical Baxter through joint_command, with modelled actuators and with ideal drives.
 
 `./baxter.sh bench fidelity [--recording FILE]` prints a line for each joint, and draws commanded, recorded and
 simulated curves. FILE: a CSV file with the columns of recordings/baxter_tracking_100hz.csv.
@@ -12,11 +12,13 @@ from pathlib import Path
 import numpy as np
 from labs import HERE, Lab
 from pictures import curves
-from recording import JOINT_NAMES, Recording, delay_s, overshoots, rest
+from recording import JOINT_NAMES, Recording, delay_s, overshoots, rest, step_overshoot
 
 RECORDING = HERE / "recordings" / "baxter_tracking_100hz.csv"
 # Each joint's root mean square of simulated minus recorded position [rad].
 RMSE_RAD = 0.012
+# Largest difference of the overshoots of a step, in percent of the step.
+OVERSHOOT_POINTS = 3.0
 QUICK_S = 4.0
 
 
@@ -24,21 +26,27 @@ def measure(report, quick, number):
     path = Path(os.environ.get("BENCH_RECORDING") or RECORDING)
     recording = Recording.read(path, QUICK_S if quick else None)
     simulated = {effects: replay(path, len(recording.time_s), effects) for effects in ("all", "lag", "none")}
-    lines = ["%-9s %8s %8s %8s  %17s  %17s  %17s" % (
-        "joint", "RMSE", "largest", "ideal", "delay [s]", "overshoot [rad]", "at rest [mrad]")]
+    steps = [step_overshoot(recording.commanded, values, recording.period_s)
+             for values in (recording.sensed, simulated["all"])]
+    lines = ["%-9s %8s %8s %8s  %17s  %17s  %17s  %17s" % (
+        "joint", "RMSE", "largest", "ideal", "delay [s]", "beyond [rad]", "of a step [%]", "at rest [mrad]")]
     for j, name in enumerate(JOINT_NAMES):
         error = simulated["all"][:, j] - recording.sensed[:, j]
         ideal = simulated["none"][:, j] - recording.sensed[:, j]
         commanded, pair = recording.commanded[:, j], (recording.sensed[:, j], simulated["all"][:, j])
-        lines.append("%-9s %8.4f %8.4f %8.4f  %8.3f %8.3f  %8.4f %8.4f  %8.2f %8.2f" % (
+        lines.append("%-9s %8.4f %8.4f %8.4f  %8.3f %8.3f  %8.4f %8.4f  %8.1f %8.1f  %8.2f %8.2f" % (
             name, rms(error), np.abs(error).max(), rms(ideal),
             *(delay_s(commanded, values, recording.period_s) for values in pair),
             *(overshoots(commanded, values) for values in pair),
+            *(overshoot[j] for overshoot in steps),
             *(1e3 * rest(commanded, values) for values in pair)))
         report.add("replay of a recording, %s: RMSE" % name, rms(error), "rad", ("ideal drives", rms(ideal)),
                    samples=len(error), **({} if quick else {"most": RMSE_RAD}))
         report.add("replay of a recording, %s: largest error" % name, float(np.abs(error).max()), "rad",
                    ("ideal drives", float(np.abs(ideal).max())), samples=len(error))
+        report.add("replay of a recording, %s: overshoot of a step, off by" % name,
+                   float(abs(steps[1][j] - steps[0][j])), "points", samples=len(error),
+                   **({} if quick else {"most": OVERSHOOT_POINTS}))
     print("simulated against recorded; pairs: recorded, simulated", *lines, sep="\n", flush=True)
     if number == 0:
         folder = HERE.parents[1] / ".baxter/bench"
@@ -53,7 +61,7 @@ def rms(values):
 
 
 def replay(path, count, effects):
-    """(count, 14) positions [rad] as joint states have them, at the times of the recording's rows."""
+    """Return the positions (count, 14) [rad] from the joint states, at the times of the recording's rows."""
     with tempfile.TemporaryDirectory() as folder, Lab(
             ready="/gazebo/advance", gui="false", enable="true", paused="true", joint_state_rate="500", effects=effects,
             left_electric_gripper="false", right_electric_gripper="false") as lab:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Forward kinematics and Jacobian, one call from Python: ours beside PyKDL and PyBullet."""
+"""Forward kinematics and Jacobian, one call from Python: ours compared with PyKDL and PyBullet."""
 import re
 import tempfile
 import time
@@ -38,7 +38,7 @@ def measure(report, quick, number):
 
 
 def check(arm, postures, name, fk):
-    """The peer computes the same point, or the comparison means nothing."""
+    """Check that the peer computes the same point; the comparison is invalid otherwise."""
     for q in postures:
         if np.linalg.norm(fk(q) - arm.chain.fk(q)[:3, 3]) > 1e-5:
             raise SystemExit("%s puts the tip of the %s elsewhere" % (name, arm.name))
@@ -63,14 +63,14 @@ def with_kdl(arm):
 
 
 def bare(urdf):
-    """A URDF without shapes, whose meshes need not be found then, and without what PyBullet's reader stumbles over."""
+    """A URDF without shapes, which needs no meshes, and without elements that PyBullet's reader cannot read."""
     for element in (r"<!--.*?-->", r"<(visual|collision|gazebo|transmission)\b.*?</\1>"):
         urdf = re.sub(element, "", urdf, flags=re.DOTALL)
     return urdf.replace(">", ">\n")
 
 
 def with_bullet(arm):
-    """PyBullet's own calls, as few as there can be: joints in, the body's pose or the Jacobian out."""
+    """The fewest calls of PyBullet that take joint angles and return the body's pose or the Jacobian."""
     client = pybullet.connect(pybullet.DIRECT)
     with tempfile.NamedTemporaryFile("w", suffix=".urdf") as file:
         file.write(bare(arm.urdf))
@@ -84,7 +84,7 @@ def with_bullet(arm):
     joints = [number[name] for name in arm.chain.joint_names]
     columns = [moving.index(joint) for joint in joints]
     still, everything, zeros = [[0.0]] * len(joints), np.zeros(len(moving)), [0.0] * len(moving)
-    # PyBullet counts from the root's centre of mass, which may not be where the chain's base is.
+    # PyBullet's origin is the root's centre of mass, which may differ from the chain's base.
     root = {joint.child: joint for joint in arm.robot.joints.values()}
     offset = np.zeros(3) if arm.chain.base not in root else root[arm.chain.base].origin[:3, 3]
     inertial = arm.robot.links[arm.robot.root].inertial

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A lab at real time while descriptions are spawned that are too large, endless or not what they say: do joint states
-pause, how long does an answer take, and does memory come back?"""
+"""A lab at real time while hostile descriptions are spawned: too large, endless, or with a false header. Measures the
+longest pause of the joint states, the time to each answer, and the memory that is not freed."""
 import concurrent.futures
 import json
 
@@ -17,7 +17,7 @@ def measure(report, quick, number):
         lab.part("swing")
         quiet = max(gap(lab) for _ in range(1 if quick else QUIET_SLICES))
         pid = lab.process("/gazebo").pid
-        # The first time loads what reading such files takes, and stays.
+        # The first time loads the readers of such files, which stay in memory.
         once, before = spawn(lab), memory_mb(pid)
         again, after = spawn(lab), memory_mb(pid)
     report.add("longest gap between joint states, hostile descriptions spawned", max(once[0], again[0]), "ms",
@@ -28,7 +28,7 @@ def measure(report, quick, number):
 
 
 def spawn(lab):
-    """Returns (longest gap between joint states meanwhile [ms], {description: time to its answer [s]})."""
+    """Return (longest gap between joint states during the spawning [ms], {description: time to its answer [s]})."""
     part, gaps = lab.part("hostile"), []
     with concurrent.futures.ThreadPoolExecutor(1) as executor:
         answer = executor.submit(part.stdout.readline)

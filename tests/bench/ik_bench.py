@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics on random reachable poses: ours beside TRAC-IK and KDL, to 1e-5 m and rad from mid-range.
+"""Inverse kinematics of random reachable poses, to 1e-5 m and rad from mid-range: ours compared with TRAC-IK and KDL.
 
 Every pose is the forward kinematics of a posture drawn evenly between the limits. A pose counts as solved when our
-forward kinematics confirms it to 2e-5 m and 2e-5 rad inside the limits. TRAC-IK gets its usual limit of 5 ms a pose,
-and KDL with restarts as much. A round has 2,000 poses of each arm, five make 10,000; the shares solved are of all
-rounds together. TRAC-IK takes the first arrival, so the first row beside it does as well; the IK service takes the
-nearest of several, and has a row of its own.
+forward kinematics confirms it to 2e-5 m and 2e-5 rad inside the limits. TRAC-IK gets its usual limit of 5 ms per pose,
+and so does KDL with restarts. A round has 2,000 poses of each arm, so five rounds have 10,000; the shares solved are of
+all rounds together. TRAC-IK returns the first solution found, and so does ours in the first row. The IK service returns
+the nearest of several; it has its own row.
 """
 import tempfile
 import time
@@ -22,7 +22,7 @@ from baxter_sim_kinematics.target import METRES_PER_RADIAN
 from urdf_model.transforms import rotation_angle
 
 POSES = 2000
-KDL_POSES = 500  # of those: KDL takes milliseconds for each that it does not find
+KDL_POSES = 500  # of those: KDL takes milliseconds for each pose that it does not solve
 TOLERANCE = 1e-5
 CONFIRMED = 2e-5
 # KDL weighs a radian as a hundredth of a metre, so this is 1e-5 of either.
@@ -30,9 +30,9 @@ KDL_TOLERANCE = 0.01 * TOLERANCE
 LIMIT_SLACK = 1e-6  # rad; pytracik keeps limits in single precision
 LIMIT_S = 0.005
 TRAC = "TRAC-IK"
-# As far as a hand moves between two commands at 50 Hz [rad].
+# Joint motion between two commands at 50 Hz [rad].
 SERVO_STEP = 0.02
-# Starts of an independent search that say whether a clear posture exists.
+# Number of starts of the independent search that tells whether a collision-free posture exists.
 RESTARTS = 200
 
 
@@ -159,7 +159,7 @@ def compare(report, arm, count, rng):
 
 
 def servo(report, arm, postures, rng):
-    """Targets a small step away from the posture that each search starts at."""
+    """Targets that are a small step away from the start posture."""
     chain = arm.chain
     near = np.clip(postures + rng.normal(0.0, SERVO_STEP, postures.shape), chain.lower, chain.upper)
     targets = [chain.fk(q) for q in near]
@@ -190,7 +190,7 @@ def batch(report, arm, count, rng):
 
 
 def clear(report, arm, count, rng):
-    """Poses for which some clear posture is met among those that RESTARTS independent starts arrive at."""
+    """Poses for which at least one of RESTARTS independent starts finds a collision-free posture."""
     chain = arm.chain
     checker = checker_of(arm)
     oracle = Oracle(arm.robot, chain.base, chain.tip, METRES_PER_RADIAN, RESTARTS)

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Inverse kinematics to judge ours by: slow, thorough, and sharing no code with it. Numpy, hundreds of starts at once.
+"""Reference inverse kinematics: slow, thorough, independent of the product's code. It runs hundreds of starts at once
+in numpy.
 
-The joints are taken as the URDF has them, turned by Rodrigues' formula. What hundreds of starts do not reach counts as
-out of reach of the limits that were given.
+Joints are rotated by Rodrigues' formula, directly from the URDF. A pose that no start reaches counts as out of reach
+within the given limits.
 """
 import numpy as np
 
 # A start has arrived when its error, see Oracle, is below this [m].
 ARRIVED = 1e-5
-# A pose of which the best start stays farther away than this is missed for certain, not for want of iterations [m].
+# If the best start stays farther from the pose than this [m], the pose is out of reach; more iterations would not help.
 MISSED = 1e-3
 _ITERATIONS = 120
-# An iteration that gains less than this share of the squared error is the last of its start.
+# A start ends with the first iteration that reduces the squared error by less than this share.
 _GAIN = 1e-7
 
 
@@ -31,7 +32,7 @@ class Oracle:
                 self._joints.append((pending[:3, :3], pending[:3, 3], axis, joint))
                 pending = np.eye(4)
         self._tip = pending
-        assert all(joint.type == "revolute" for *_, joint in self._joints), "made for arms that turn"
+        assert all(joint.type == "revolute" for *_, joint in self._joints), "the oracle handles revolute joints only"
         self.names = [joint.name for *_, joint in self._joints]
         self.lower = np.array([joint.limit.lower for *_, joint in self._joints])
         self.upper = np.array([joint.limit.upper for *_, joint in self._joints])
@@ -59,29 +60,30 @@ class Oracle:
         return pose
 
     def solutions(self, target, rng, lower=None, upper=None, enough=None):
-        """Return (postures (k, n) that arrived at ``target`` (4, 4), least error [m] of all starts).
+        """Return (postures (k, n) that reach ``target`` (4, 4), least error [m] of all starts).
 
-        ``lower``, ``upper``: limits in place of the arm's. ``enough``: so many will do.
+        ``lower``, ``upper``: limits that replace the arm's. ``enough``: stop after this many postures.
         """
         q, error = self._descend(target, rng, lower, upper, enough)
         return q[error < ARRIVED], error.min()
 
     def reaches(self, target, rng, lower=None, upper=None):
-        """Return whether a posture between the limits arrives; None where one came too close to be sure of either."""
+        """Return whether a posture within the limits reaches the target; None if the closest one is too close to
+        decide."""
         found, least = self.solutions(target, rng, lower, upper, enough=1)
         return True if len(found) else False if least > MISSED else None
 
     def nearest(self, target, rng, position_only=False, lower=None, upper=None):
-        """Return the least error [m] with which the tip comes to ``target``, see :meth:`solutions`."""
+        """Return the least error [m] of the tip's pose relative to ``target``, see :meth:`solutions`."""
         return self._descend(target, rng, lower, upper, rows=3 if position_only else 6)[1].min()
 
     def widened(self, excess):
-        """Return (lower, upper) with the limits of ``excess`` {joint: [rad]} moved outwards on both sides."""
+        """Return (lower, upper) with the limits of the joints in ``excess`` {joint: [rad]} widened on both sides."""
         by = np.array([excess.get(name, 0.0) for name in self.names])
         return self.lower - by, self.upper + by
 
     def _descend(self, target, rng, lower=None, upper=None, enough=None, rows=6):
-        """Levenberg and Marquardt from random starts, each with its own damping; (postures (m, n), errors (m,))."""
+        """Levenberg-Marquardt from random starts, each with its own damping; (postures (m, n), errors (m,))."""
         lower = self.lower if lower is None else lower
         upper = self.upper if upper is None else upper
         q = rng.uniform(np.maximum(lower, -np.pi), np.minimum(upper, np.pi), (self.starts, len(self.names)))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A whole lab at real time, both arms moving: does it keep up with its window, rviz, a reader that has stopped, a busy
-thread inside /gazebo?"""
+"""A whole lab at real time with both arms moving. Measures whether it keeps real time with its window, with rviz, with
+a subscriber that has stopped reading, and with a busy thread inside /gazebo."""
 import os
 import signal
 import statistics
@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 
 SECONDS = 15.0
 PLAN = [("/clock", Clock, 10), ("/robot/joint_states", JointState, 5)]
-# The least real-time factor with nothing else at work.
+# The least real-time factor on an otherwise idle machine.
 HEADLESS, DRAWN, DISTURBED = 0.99, 0.98, 0.95
 
 
@@ -36,7 +36,7 @@ def measure(report, quick, number):
 
 
 def add(report, lab, what, seconds, least):
-    """Note the real-time factor over ``seconds`` of wall time, with the readers of PLAN."""
+    """Note the real-time factor over ``seconds`` of wall time, with the subscribers of PLAN."""
     gazebo = lab.process("/gazebo")
     simulated, wall, used = lab.now(), time.monotonic(), gazebo.cpu_s()
     states, = arrivals(lab, PLAN, ("/robot/joint_states",), seconds)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Processes that a bench sets beside a lab: lab_part.py swing | press | client | busy | boxes N | empty |
+"""Processes that a bench runs beside a lab: lab_part.py swing | press | client | busy | boxes N | empty |
 answers FILE | posture | latency N | lockstep TICKS | replay RECORDING ROWS FILE | hostile.
 
-Each prints "up" when it is at work.
+Each prints "up" when it is running.
 """
 import hashlib
 import json
@@ -30,11 +30,11 @@ from std_srvs.srv import Empty
 
 from baxter_model import JOINTS, SIDES, joint_names, poses
 from lab_testing.hostile_descriptions import chain, write_ball, write_entity_bomb
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import beats, wait_until
 
 # The same numbers on both arms.
 NEUTRAL = tuple(poses().angles("neutral", "left").values())
-# Both hands drawn against the body, where they stop.
+# Both hands pulled against the body, where they stop.
 PRESSING = {"s0": -1.7, "s1": -0.3, "e1": 2.6}
 BOX = """<sdf version="1.6"><model name="box"><link name="link"><inertial><mass>0.5</mass><inertia><ixx>0.001</ixx>
 <iyy>0.001</iyy><izz>0.001</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial><collision name="c"><geometry>
@@ -46,7 +46,8 @@ OF_MESH = """<robot name="hostile"><link name="l"><inertial><mass value="1"/><in
 <collision><geometry><mesh filename="%s"/></geometry></collision></link></robot>"""
 TICK_S = 0.002
 COMMAND_TICKS = 5
-FIRST_TICK = 500  # by then all subscribers have connected, and the robot stands
+ON_WAY_TICKS = 10  # longer than the robot's messages take
+FIRST_TICK = 500  # by then all subscribers have connected, and the robot is at rest
 
 
 def up():
@@ -60,11 +61,10 @@ def command_arms(target):
     enable = rospy.Publisher("/robot/set_super_enable", Bool, latch=True, queue_size=1)
     enable.publish(True)
     up()
-    while not rospy.is_shutdown():
+    for _ in beats(100.0, rospy.is_shutdown):
         for side, publisher in publishers.items():
             publisher.publish(JointCommand(JointCommand.POSITION_MODE, target(side, time.monotonic()),
                                            list(joint_names(side))))
-        time.sleep(0.01)
 
 
 def swing():
@@ -82,7 +82,7 @@ def press():
 
 
 def client():
-    """What a lab's own node does: it follows the joint states, in simulation time."""
+    """A typical node of a lab: it follows the joint states in simulation time."""
     rospy.Subscriber("/robot/joint_states", JointState, lambda message: None, queue_size=1)
     rospy.wait_for_message("/robot/joint_states", JointState, timeout=60)
     up()
@@ -90,7 +90,7 @@ def client():
 
 
 def boxes(count):
-    """Boxes on the floor in rows behind the robot; up once the last has been spawned."""
+    """Boxes on the floor in rows behind the robot. Prints "up" after the last has been spawned."""
     spawn = rospy.ServiceProxy("/gazebo/spawn_sdf_model", SpawnModel)
     spawn.wait_for_service(60)
     for number in range(int(count)):
@@ -103,7 +103,8 @@ def boxes(count):
 
 
 def busy():
-    """A thread inside /gazebo that computes without pause, in Python: the plugin that the bench has made known."""
+    """A thread inside /gazebo that computes without pause, in Python: the plugin `busy_plugin`, which the bench
+    registers."""
     spawn = rospy.ServiceProxy("/gazebo/spawn_urdf_model", SpawnModel)
     spawn.wait_for_service(60)
     answer = spawn("busy", BUSY_MODEL, "", Pose(), "")
@@ -120,7 +121,7 @@ def empty():
 
 
 def answers(path):
-    """Services /bench_answers/NAME that do nothing but answer. path: JSON {name: (type, answer in hex)}."""
+    """Services /bench_answers/NAME that return a fixed answer. path: JSON {name: (type, answer in hex)}."""
     for name, (kind, data) in json.loads(Path(path).read_text()).items():
         service = roslib.message.get_service_class(kind)
         answer = service._response_class().deserialize(bytes.fromhex(data))
@@ -130,20 +131,20 @@ def answers(path):
 
 
 def posture():
-    """The joint states of a robot that stands in its neutral posture, at the robot's own rate."""
+    """The joint states of a robot at rest in its neutral posture, at the robot's own rate."""
     names = [name for side in SIDES for name in joint_names(side)]
     publisher = rospy.Publisher("/robot/joint_states", JointState, queue_size=1)
-    wait_until(publisher.get_num_connections, "somebody to listen", 60.0)
+    wait_until(publisher.get_num_connections, "a subscriber", 60.0)
     up()
-    while not rospy.is_shutdown():
+    for _ in beats(50.0, rospy.is_shutdown):
         message = JointState(name=names, position=2 * NEUTRAL)
         message.header.stamp = rospy.Time.now()
         publisher.publish(message)
-        time.sleep(0.02)
 
 
 def latency(count):
-    """Lock-step: how many ticks after the one that takes a command in has the joint moved? Prints them as JSON."""
+    """Lock-step: the number of ticks from the one that receives a command to the joint's first motion. Prints them as
+    JSON."""
     rospy.Publisher("/robot/set_super_enable", Bool, latch=True, queue_size=1).publish(True)
     rospy.Publisher("/robot/joint_state_publish_rate", UInt16, latch=True, queue_size=1).publish(round(1 / TICK_S))
     topic = "/robot/limb/left/joint_command"
@@ -156,7 +157,7 @@ def latency(count):
     rospy.Subscriber("/robot/joint_states", JointState, note)
     advance = rospy.ServiceProxy("/gazebo/advance", AdvanceTicks, persistent=True)
     advance.wait_for_service(60)
-    wait_until(commands.get_num_connections, "the robot to listen", 60.0)
+    wait_until(commands.get_num_connections, "the robot to subscribe", 60.0)
     rospy.ServiceProxy("/gazebo/pause_physics", Empty)()
 
     def position_after(ticks, await_topics=()):
@@ -190,7 +191,7 @@ class LockStep:
         self._advance = rospy.ServiceProxy("/gazebo/advance", AdvanceTicks, persistent=True)
         self._advance.wait_for_service(60)
         for side, publisher in self._publishers.items():
-            wait_until(publisher.get_num_connections, "the robot to listen on " + self._topics[side], 60.0)
+            wait_until(publisher.get_num_connections, "the robot to subscribe to " + self._topics[side], 60.0)
 
     def send(self, mode, values):
         """Command the joints of both arms; values: {side: seven numbers}."""
@@ -198,7 +199,8 @@ class LockStep:
             publisher.publish(JointCommand(mode, list(values[side]), list(joint_names(side))))
 
     def step(self, count, after_commands=False):
-        """Advance by so many ticks, when both arms' commands have come where asked for; returns the response."""
+        """Advance by this many ticks, after both arms' commands have arrived if the caller asks for it; returns the
+        response."""
         answer = self._advance(count, list(self._topics.values()) if after_commands else [], 60.0)
         if not answer.success:
             raise SystemExit(answer.status_message)
@@ -206,14 +208,15 @@ class LockStep:
 
 
 def lockstep(ticks):
-    """Swing both arms of a world that was launched paused, for so many ticks, a command for each arm every
-    COMMAND_TICKS. Prints a digest of all joint states, and how many there were, as JSON."""
+    """Swing both arms of a world that was launched paused, for this many ticks, with a command for each arm every
+    COMMAND_TICKS. Prints a digest of all joint states, and their number, as JSON."""
     states = {}
 
     def note(message):
         seconds, nanoseconds = struct.unpack_from("<II", message._buff, 4)
-        # Without its sequence number, which counts from whenever somebody began to listen.
-        states[1_000_000_000 * seconds + nanoseconds] = message._buff[4:]
+        # Without its sequence number, which counts from the first subscription on. A stamp may have two.
+        stamp = 1_000_000_000 * seconds + nanoseconds
+        states[stamp] = states.get(stamp, b"") + message._buff[4:]
 
     rospy.Subscriber("/robot/joint_states", rospy.AnyMsg, note)
     world = LockStep()
@@ -223,20 +226,21 @@ def lockstep(ticks):
         swing = 0.3 * math.sin(2.0 * number * COMMAND_TICKS * TICK_S)
         world.send(JointCommand.POSITION_MODE, dict.fromkeys(SIDES, [angle + swing for angle in NEUTRAL]))
         end = world.step(COMMAND_TICKS, after_commands=True).sim_time.to_nsec()
-    wait_until(lambda: end in states, "joint states of %d ns" % end, 60.0)
+    world.step(ON_WAY_TICKS)
+    wait_until(lambda: max(states, default=0) > end, "joint states after %d ns" % end, 60.0)
     counted = sorted(stamp for stamp in states if begin < stamp <= end)
     digest = hashlib.sha256(b"".join(states[stamp] for stamp in counted))
     print(json.dumps({"digest": digest.hexdigest(), "states": len(counted)}), flush=True)
 
 
 def replay(path, rows, file):
-    """Send a recording's set-points as raw positions, from its first posture on, in lock-step; write where the joints
-    are at the times of its first so many rows, (rows, 14) [rad], into a file of numpy."""
+    """Send a recording's set-points as raw positions in lock-step, starting at its first posture. Write the joints'
+    positions at the times of its first ``rows`` rows, (rows, 14) [rad], into a numpy file."""
     recording = Recording.read(path)
     ticks = round(recording.period_s / TICK_S)
     states = {}
-    rospy.Subscriber("/robot/joint_states", JointState, lambda message: states.__setitem__(
-        message.header.stamp.to_nsec(), dict(zip(message.name, message.position, strict=True))))
+    rospy.Subscriber("/robot/joint_states", JointState, lambda message: states.setdefault(
+        message.header.stamp.to_nsec(), {}).update(zip(message.name, message.position, strict=True)))
     place = rospy.ServiceProxy("/gazebo/set_model_configuration", SetModelConfiguration)
     world = LockStep()
     up()
@@ -250,18 +254,20 @@ def replay(path, rows, file):
         world.send(JointCommand.RAW_POSITION_MODE,
                    {side: [angles[name] for name in joint_names(side)] for side in SIDES})
         times.append(world.step(ticks, after_commands=True).sim_time.to_nsec())
-    wait_until(lambda: times[-1] in states, "joint states of %d ns" % times[-1], 60.0)
+    world.step(ON_WAY_TICKS)
+    wait_until(lambda: max(states, default=0) > times[-1], "joint states after %d ns" % times[-1], 60.0)
     np.save(file, np.array([[states[time][name] for name in JOINT_NAMES] for time in times]))
 
 
 def hostile():
-    """Spawn and delete what is too large, endless or not what it says. Prints the time to each answer [s] as JSON."""
+    """Spawn and delete hostile descriptions: too large, endless, or with a false header. Prints the time to each answer
+    [s] as JSON."""
     spawn = rospy.ServiceProxy("/gazebo/spawn_urdf_model", SpawnModel)
     delete = rospy.ServiceProxy("/gazebo/delete_model", DeleteModel)
     spawn.wait_for_service(60)
     with tempfile.TemporaryDirectory() as folder:
         large, lie, bomb = (str(Path(folder) / name) for name in ("large.stl", "lie.stl", "bomb.dae"))
-        write_ball(large, 548, radius=random.uniform(0.5, 1.5))  # no cache knows it
+        write_ball(large, 548, radius=random.uniform(0.5, 1.5))  # in no cache
         write_ball(lie, 5, announced=2**32 - 1)
         write_entity_bomb(bomb)
         descriptions = {"600,000 triangles": OF_MESH % (large, large), "a header that lies": OF_MESH % (lie, lie),
@@ -278,7 +284,7 @@ def hostile():
 
 
 def main():
-    name, *arguments = rospy.myargv(sys.argv)[1:]  # without what roslaunch adds
+    name, *arguments = rospy.myargv(sys.argv)[1:]  # without the arguments that roslaunch adds
     rospy.init_node("bench_" + name, anonymous=True, disable_rostime=name not in ("client",))
     parts = (swing, press, client, boxes, busy, empty, answers, posture, latency, lockstep, replay, hostile)
     {function.__name__: function for function in parts}[name](*arguments)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Labs that a bench starts, each on a master of its own, and what is connected to them. Nothing here is a ROS node."""
+"""Labs that a bench starts, each with its own master, and connections to them. Nothing here is a ROS node."""
 import contextlib
 import os
 import selectors
@@ -26,10 +26,10 @@ START_LIMIT_S = 120.0
 
 
 class Lab:
-    """A launched file with a master, as a context: it ends with everything that was started in it.
+    """A launch file with its master, as a context manager: at the end, everything started in it is ended.
 
     launch: (package, file); arguments: of the launch file. started_s: roslaunch to the first message on ``ready``, a
-    latched std_msgs/Empty, or to the service ``ready`` where it is no topic. screen: draw on a screen that nobody sees.
+    latched std_msgs/Empty, or to the service ``ready`` if it is not a topic. screen: start a virtual display (Xvfb).
     parameters: {name: value} that the master holds before the launch.
     """
 
@@ -71,7 +71,7 @@ class Lab:
         return process
 
     def part(self, name, *arguments):
-        """Start `lab_part.py NAME`, and return its Popen once it has said that it is up."""
+        """Start `lab_part.py NAME`, wait until it prints "up", and return its Popen."""
         process = self.start(sys.executable, str(HERE / "lab_part.py"), name, *map(str, arguments),
                              stdout=subprocess.PIPE, text=True, bufsize=1)
         line = process.stdout.readline()
@@ -100,7 +100,7 @@ class Lab:
         return secs + 1e-9 * nsecs
 
     def factor(self, seconds):
-        """Return how much simulation time goes by in each second, over ``seconds`` of wall time."""
+        """Return the real-time factor over ``seconds`` of wall time."""
         simulated, wall = self.now(), time.monotonic()
         time.sleep(seconds)
         return (self.now() - simulated) / (time.monotonic() - wall)
@@ -123,9 +123,9 @@ class Lab:
 
 
 def subscribe(master, topic, message_class, caller):
-    """Open one TCPROS connection to the publisher of ``topic``; a rospy process would share one among all.
+    """Open one TCPROS connection to the publisher of ``topic``; all subscribers in a rospy process would share one.
 
-    ``caller`` names a node that does not exist, another one each time: rospy keeps one connection for each.
+    ``caller`` is the name of a node that does not exist, a new one each time: rospy keeps one connection per node.
     """
     published = dict(master.getSystemState("/bench")[2][0])
     uri = master.lookupNode("/bench", published[topic][0])[2]
@@ -146,7 +146,7 @@ class Process:
         self.pid = pid
 
     def cpu_s(self):
-        """Of all of its threads since it began [s]."""
+        """Of all of its threads since its start [s]."""
         fields = Path("/proc/%d/stat" % self.pid).read_text().rsplit(")", 1)[1].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -177,8 +177,8 @@ class Sink:
 
 
 def arrivals(lab, plan, watched, seconds):
-    """Read from ``plan`` ([(topic, class, how many connections)]) for ``seconds``; return the times at which something
-    arrived on the first connection of topic ``watched`` [s], a tuple of lists for several."""
+    """Read from ``plan`` ([(topic, class, number of connections)]) for ``seconds``. Return the arrival times [s] on the
+    first connection of topic ``watched``; for several topics, a tuple of lists."""
     selector, connections = selectors.DefaultSelector(), []
     times = {topic: [] for topic in watched}
     for topic, message_class, count in plan:
@@ -187,7 +187,7 @@ def arrivals(lab, plan, watched, seconds):
             connections.append(connection)
             selector.register(connection, selectors.EVENT_READ, topic if number == 0 else None)
     end = time.monotonic() + seconds + 0.5
-    begin = end - seconds  # what is measured is the steady state
+    begin = end - seconds  # only the steady state is measured
     while time.monotonic() < end:
         for key, _ in selector.select(0.1):
             key.fileobj.recv(65536)
@@ -200,12 +200,12 @@ def arrivals(lab, plan, watched, seconds):
 
 
 def plan_of(count):
-    """What ``count`` subscribers of a robot connect to."""
+    """The topics that ``count`` subscribers of a robot connect to."""
     return [("/clock", Clock, count), ("/robot/joint_states", JointState, count)]
 
 
 def memory_mb(pid):
-    """Return the memory of a process, shared pages in parts [MB]."""
+    """Return the memory of a process, with shared pages divided among their users [MB]."""
     for line in Path("/proc/%d/smaps_rollup" % pid).read_text().splitlines():
         if line.startswith("Pss:"):
             return int(line.split()[1]) / 1024.0

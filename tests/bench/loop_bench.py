@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lab at real time with both arms moving: what it takes of a core, how evenly it ticks, how soon it obeys."""
+"""The lab at real time with both arms moving: its share of a core, the jitter of its ticks, the delay of a command."""
 import json
 import multiprocessing
 import statistics
@@ -12,7 +12,7 @@ RATE_HZ = 100
 
 
 def bare_timer(seconds, queue):
-    """A loop that only sleeps until its next beat, in a process of its own; the times of the beats."""
+    """Return the times of the beats of a loop that only sleeps until its next beat, in a separate process."""
     times, beat = [], time.monotonic()
     end = beat + seconds
     while beat < end:

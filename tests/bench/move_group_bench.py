@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""move_group of PROBOT with fake controllers: how soon it is up; round trips of its services beside services that do
-nothing with messages of the same sizes; how soon a cancelled goal ends."""
+"""PROBOT's move_group with fake controllers: its start-up time and memory; round trips of its services, compared with
+empty services with messages of the same sizes; the time until a cancelled goal ends."""
 import json
 import os
 import tempfile
 import time
 
 import numpy as np
-from labs import Lab
+from labs import Lab, memory_mb
 
 from lab_testing.waiting import wait_until
 
@@ -19,15 +19,17 @@ LIMIT_S = 60.0
 
 
 def measure(report, quick, number):
-    # The first start compiles and makes spheres where nobody has yet.
+    # The first start compiles code and makes the spheres, unless they are in the cache.
     with Lab(("probot_anno_moveit_config", "demo.launch"), "/clear_octomap", rviz="false"):
         pass
     with Lab(("probot_anno_moveit_config", "demo.launch"), "/clear_octomap", rviz="false") as lab:
         report.add("roslaunch to the last service of move_group", lab.started_s, "s", most=5.0)
-        # rospy reads where its master is when it is first used, so only now.
+        # rospy reads the master's address when it is first used, so import it only now.
         os.environ.update(ROS_MASTER_URI=lab.environment["ROS_MASTER_URI"], ROS_HOSTNAME="localhost")
         times, planning, points = round_trips(lab, CALLS // 10 if quick else CALLS)
         cancels = cancelled(2 if quick else CANCELS)
+        report.add("memory of move_group after all of this", memory_mb(lab.process("/move_group").pid), "MB",
+                   most=200.0)
     count = len(planning)
     middle = {name: float(np.median(found)) for name, found in times.items()}
     rest = float(np.median(times["plan"] - planning))
@@ -44,7 +46,7 @@ def measure(report, quick, number):
 
 
 def round_trips(lab, count):
-    """Return ({what: times [ms]}, planning times [ms], points of the Cartesian path); the calls take turns."""
+    """Return ({name: times [ms]}, planning times [ms], points of the Cartesian path); the calls take turns."""
     import rospy
     from moveit_msgs.srv import GetCartesianPath, GetMotionPlan, GetPositionFK, GetPositionFKRequest, GetPositionIK
 
@@ -87,7 +89,7 @@ def state_of(values):
 
 
 def requests_of(pose):
-    """{what: request}. pose: the tool's at FREE (PoseStamped)."""
+    """Return {name: request}. pose: of the tool at FREE (PoseStamped)."""
     from geometry_msgs.msg import Point, Pose
     from moveit_msgs.srv import GetCartesianPathRequest, GetMotionPlanRequest, GetPositionIKRequest
 
@@ -123,14 +125,19 @@ def serialized(message):
 
 
 def cancelled(count):
-    """{phase: times from the cancel to the result [ms]}"""
+    """Return {phase: times from the cancel to the result [ms]}."""
     import actionlib
     import rospy
-    from moveit_msgs.msg import MoveGroupAction, MoveGroupGoal, MoveItErrorCodes, PlanningScene
+    from moveit_msgs.msg import MoveGroupAction, MoveGroupActionFeedback, MoveGroupGoal, MoveItErrorCodes, PlanningScene
     from moveit_msgs.srv import ApplyPlanningScene
 
     client = actionlib.SimpleActionClient("move_group", MoveGroupAction)
     client.wait_for_server()
+    # The client itself drops feedback that comes before its send_goal() has returned.
+    states = []
+    feedback = rospy.Subscriber("move_group/feedback", MoveGroupActionFeedback,
+                                lambda message: states.append(message.feedback.state))
+    wait_until(lambda: feedback.get_num_connections() > 0, "move_group's feedback", LIMIT_S)
     apply = rospy.ServiceProxy("apply_planning_scene", ApplyPlanningScene)
 
     def goal(values, speed):
@@ -143,9 +150,10 @@ def cancelled(count):
         return goal
 
     def took(goal, wait_s, phase):
-        """From cancelling a goal to its end [ms]; it is cancelled so long after its feedback names the phase."""
-        states = []
-        client.send_goal(goal, feedback_cb=lambda message: states.append(message.state))
+        """Return the time from cancelling a goal to its end [ms]. The goal is cancelled ``wait_s`` after its feedback
+        names the phase."""
+        states.clear()
+        client.send_goal(goal)
         wait_until(lambda: phase in states, phase, LIMIT_S, 0.001)
         time.sleep(wait_s)
         begin = time.perf_counter()
@@ -166,12 +174,12 @@ def cancelled(count):
     return found
 
 
-# Beyond a wall that no way leads around: the first joint cannot turn once about.
+# Behind a wall that no path leads around: the first joint cannot make a full turn.
 BEHIND = (2.4, 0.3, 0.4, 0.0, 0.6, 0.0)
 
 
 def wall():
-    """Two walls from the arm's axis outwards, higher than it reaches, at 1.6 rad and on the other side."""
+    """Two walls from the arm's axis outwards, higher than the arm reaches, at 1.6 rad and on the opposite side."""
     from geometry_msgs.msg import Point, Pose, Quaternion
     from moveit_msgs.msg import CollisionObject
     from shape_msgs.msg import SolidPrimitive

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""bullet_sim beside PyBullet's own ways of loading the same robot: load time, tick time, gravity torques.
+"""bullet_sim compared with PyBullet's own ways of loading the same robot: load time, tick time, gravity torques.
 
 """
 

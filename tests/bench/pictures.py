@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures of a bench: ratios to the peers as bars, distributions as steps. Drawn with OpenCV, which is there."""
+"""Pictures of a bench: ratios to the peers as bars, distributions as steps. Drawn with OpenCV, which is installed."""
 import math
 
 import cv2
 import numpy as np
 
 _INK, _PAPER, _GRID = (60, 60, 60), (255, 255, 255), (225, 225, 225)
-# Blue, green, red, violet, orange, brown [BGR], from dark to light grounds easy to tell apart.
+# Blue, green, red, violet, orange, brown [BGR]: easy to distinguish on dark and on light backgrounds.
 _COLOURS = ((176, 114, 31), (60, 150, 60), (50, 50, 200), (150, 80, 130), (20, 130, 240), (70, 90, 120))
 _WIDTH, _LEFT, _ROW = 1000, 470, 22
 
 
 def ratios(rows, path):
-    """Draw the ratio of ours to the peer's of each row that has one, on a logarithmic axis; goals as ticks.
+    """Draw the ratio of ours to the peer's for each row with a peer, on a logarithmic axis; goals as ticks.
 
-    A row that was zero in some round, such as poses left unsolved, has no place on that axis.
+    A row that was zero in some round, such as unsolved poses, is left out: that axis has no zero.
     """
     rows = [row for row in rows if row.ratio and min(row.ratios) > 0.0]
     if not rows:
@@ -46,7 +46,8 @@ def ratios(rows, path):
 
 
 def distribution(title, entry, path):
-    """Draw {"unit": ..., "values": {name: numbers}} as the share of values below x, logarithmic if it spans much."""
+    """Draw {"unit": ..., "values": {name: numbers}} as the share of values below x, on a logarithmic axis if the values
+    span several decades."""
     values = {name: np.sort(some) for name, some in entry["values"].items() if len(some)}
     if not values:
         return
@@ -85,7 +86,7 @@ def _write(canvas, text, x, y, size=0.4):
 
 
 def curves(time_s, joints, path):
-    """Draw curves over the time, a field for each joint, left arm's joints beside the right's.
+    """Draw curves over time, one plot per joint, the left arm's joints beside the right's.
 
     joints: {name: {title of a curve: (n,) values}}; time_s: (n,).
     """

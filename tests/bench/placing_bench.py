@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pick and place by friction: pick_and_place_bench.py, twenty seeds a round, other ones each round."""
+"""Pick and place by friction: pick_and_place_bench.py with twenty seeds per round, different ones in each round."""
 import pick_and_place_bench as trials
 
 SEEDS = 20

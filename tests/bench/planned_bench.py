@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What planning calls valid, looked at by PyBullet, which shares nothing with the planner.
+"""Checks planned trajectories with PyBullet, which shares no code with the planner.
 
-Trajectories are made as move_group makes them, and sampled as controllers play them: 10,000 states in five rounds. No
-state may touch anything or be out of limits, nor move faster or accelerate more than the joints may. Meshes are
-the meshes themselves; PyBullet does not compare two of them with each other.
+Trajectories are made as in move_group and sampled as in a controller: 10,000 states in five rounds. No state may touch
+anything or exceed the limits of position, velocity and acceleration. Meshes are used as they are, not as convex hulls;
+PyBullet does not check two such meshes against each other.
 """
 import functools
 import re
@@ -23,9 +23,10 @@ from motion_planning.pipeline import PlanningFailure, PlanQuery, Tools, plan
 from motion_planning.planners import plan_path, prepare
 from urdf_model import Box, Cylinder
 
-# States of each of five kinds of problems in a round, seen so far apart [s]; problems of a kind at most.
+# States of each of five kinds of problems in a round, time between two states [s], and greatest number of problems of a
+# kind.
 STATES, STEP_S, PROBLEMS = 400, 0.05, 40
-# PyBullet keeps a margin of 1 mm around what is convex: a contact is deeper than that [m].
+# PyBullet keeps a margin of 1 mm around convex shapes: a contact is deeper than that [m].
 MARGIN = 0.001
 
 
@@ -50,7 +51,7 @@ def measure(report, quick, number):
 
 
 def look(report, title, some, worlds, states):
-    """Note what is wrong with the first ``states`` states of trajectories for ``some`` problems."""
+    """Note the faults of the first ``states`` states of trajectories for ``some`` problems."""
     seen = touching = beyond = 0
     speed = acceleration = 0.0
     for problem in some:
@@ -63,7 +64,7 @@ def look(report, title, some, worlds, states):
         indices = model.groups[problem.group].indices
         times = np.append(np.arange(0.0, timed.times[-1], STEP_S), timed.times[-1])
         postures, velocities, accelerations = timed.sampled(times)
-        # How far the joints really get between two states, not only what the trajectory says of itself.
+        # The joints' actual motion between two states, not only the velocities in the trajectory.
         travelled = np.abs(np.diff(postures, axis=0)) / np.diff(times)[:, None].clip(1e-9)
         fastest = np.concatenate([np.abs(velocities), travelled[np.diff(times) > 1e-6]])
         speed = max(speed, float((fastest / model.velocity[indices]).max()))
@@ -71,7 +72,7 @@ def look(report, title, some, worlds, states):
         world.furnish(problem.scene)
         for posture in postures:
             q = problem.scene.state.with_q(posture, indices).q
-            touches = world.touching(model.joint_values(q))  # those that mimic others too
+            touches = world.touching(model.joint_values(q))  # including joints that mimic others
             if touches:
                 print("%s: %s" % (problem.name, touches))
             touching += bool(touches)
@@ -87,7 +88,7 @@ def look(report, title, some, worlds, states):
 
 
 def trajectory(problem):
-    """Return the Timed of a problem, None where there is no plan."""
+    """Return the Timed of a problem, None if there is no plan."""
     group = problem.robot.model.groups[problem.group]
     goal = ConstraintSet("goal", [JointTarget(joint, float(value), 1e-4, 1e-4)
                                   for joint, value in zip(group.joints, problem.goal, strict=True)])
@@ -101,7 +102,7 @@ def trajectory(problem):
 
 
 class World:
-    """A robot and what stands around it, in PyBullet."""
+    """A robot and the objects around it, in PyBullet."""
 
     def __init__(self, package, file, model):
         self.client = pybullet.connect(pybullet.DIRECT)
@@ -129,7 +130,7 @@ class World:
             about = pybullet.getJointInfo(self.robot, number, physicsClientId=self.client)
             if about[2] != pybullet.JOINT_FIXED or about[16] in self.moving:
                 self.moving.add(number)
-        # Pairs that the SRDF leaves out, and two links that no joint moves apart, are no collisions.
+        # Pairs that the SRDF disables, and pairs of links without a moving joint between them, are not collisions.
         disabled = {frozenset(pair) for pair in model.disabled}
         shaped = [number for number in self.links
                   if pybullet.getCollisionShapeData(self.robot, number, physicsClientId=self.client)]
@@ -138,7 +139,7 @@ class World:
                       and (a in self.moving or b in self.moving)]
 
     def furnish(self, scene):
-        """Put the objects of a Scene in place of those before."""
+        """Replace all objects by those of a Scene."""
         for thing in self.things:
             pybullet.removeBody(thing, physicsClientId=self.client)
         self.things = {}
@@ -154,19 +155,20 @@ class World:
             made = pybullet.createCollisionShape(pybullet.GEOM_CYLINDER, radius=shape.radius, height=shape.length,
                                                  physicsClientId=self.client)
         else:
-            raise TypeError("the problems have boxes and cylinders, not a %s" % type(shape).__name__)
+            raise TypeError("expected a box or a cylinder, found a %s" % type(shape).__name__)
         if not np.allclose(pose[:3, :3], np.eye(3), atol=1e-6):
-            raise ValueError("the problems have upright things only, this one is turned: %s" % pose[:3, :3].tolist())
+            raise ValueError("expected an upright object, found a rotated one: %s" % pose[:3, :3].tolist())
         return pybullet.createMultiBody(0.0, made, -1, pose[:3, 3].tolist(), physicsClientId=self.client)
 
     def touching(self, values):
-        """The names of two things that touch with the joints at ``values`` {joint: rad}, an empty tuple if none do."""
+        """Return the names of two bodies that touch with the joints at ``values`` {joint: rad}, an empty tuple if none
+        do."""
         for joint, value in values.items():
             if joint in self.joints:
                 pybullet.resetJointState(self.robot, self.joints[joint], value, physicsClientId=self.client)
         for thing, name in self.things.items():
             for point in pybullet.getClosestPoints(self.robot, thing, 0.0, physicsClientId=self.client):
-                # What holds the robot may stand on what it likes.
+                # The robot's base link may touch the furniture that it stands on.
                 if point[8] < -MARGIN and point[3] in self.moving:
                     return self.links[point[3]], name
         for a, b in self.pairs:

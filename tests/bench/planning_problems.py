@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Problems to plan for: 1,800 of others with both of Baxter's arms at a shelf, and one arm's of our own generator.
+"""Planning problems: 1,800 published ones with both of Baxter's arms at a shelf, and generated ones for one arm.
 
-The 1,800 (bookshelf_tall_both_arms) are messages in the source archive of vamp-planner, 65 MB, which
-is fetched from PyPI into the user's cache. Nothing of it is run.
+The 1,800 (bookshelf_tall_both_arms) are messages in the source archive of vamp-planner, 65 MB, which is downloaded from
+PyPI into the user's cache. No code in it is run.
 """
 import hashlib
 import io
@@ -31,7 +31,7 @@ INDEX = "https://pypi.org/simple/vamp-planner/"
 ARCHIVE = "vamp_planner-0.6.4.tar.gz"
 SHA256 = "d3150c6b67ff941af9ad56480b31d3fb73b12211ea21dc684f7737b059f6daba"
 LEVELS = ("easy", "medium", "hard")
-# How long a fetch may take [s].
+# Time limit of the download [s].
 PATIENCE_S = 120
 
 
@@ -75,7 +75,7 @@ def probot():
 # -- the bookshelf --------------------------------------------------------------------------------------------------
 
 def bookshelf(robot):
-    """Return the 1,800 Problems, easy, medium, hard. Raises OSError where they cannot be fetched."""
+    """Return the 1,800 Problems: easy, medium, hard. Raises OSError if they cannot be downloaded."""
     return [_bookshelf_problem(robot, *entry) for entry in _messages()]
 
 
@@ -131,7 +131,7 @@ def _bookshelf_problem(robot, name, request, objects):
                    np.array([goal[joint] for joint in group.joints]))
 
 
-def _allowed(robot, known={}):  # noqa: B006  one for all scenes of a robot: what is worked out of it is kept by identity
+def _allowed(robot, known={}):  # noqa: B006  one dict for all scenes: caches use its identity
     return known.setdefault(id(robot), Scene(robot.model).allowed)
 
 
@@ -164,7 +164,7 @@ PROBOT_PLACE = Place("manipulator", "tool0", (0.3, 0.0, 0.15), 0.4)
 
 
 def table(robot, place, seed):
-    """Return a Problem: from a posture above one end of a table with seven things to one above the other end."""
+    """Return a Problem: from a posture above one end of a table with seven objects to one above the other end."""
     rng = np.random.default_rng((abs(seed), seed < 0, 1))
     s, (x, y, z) = place.size, place.centre
     things = [("table", Box((0.7 * s, 1.1 * s, 0.04 * s)), (x, y, z - 0.1 * s))]
@@ -178,7 +178,7 @@ def table(robot, place, seed):
 
 
 def shelf(robot, place, seed):
-    """Return a Problem: from one compartment of a shelf, two by two, into another."""
+    """Return a Problem: from one compartment of a shelf with two by two of them into another."""
     rng = np.random.default_rng((abs(seed), seed < 0, 2))
     s, (x, y, z) = place.size, place.centre
     x += rng.uniform(0.0, 0.1) * s
@@ -198,7 +198,7 @@ def _between(name, robot, place, things, ends, rng):
 
 
 def _posture(robot, scene, place, target, rng):
-    """A random posture, free by exact geometry, with the tip near ``target``, nearer the longer it is looked for."""
+    """Return a random posture, free by exact geometry, with the tip near ``target``; "near" widens until one exists."""
     model, group = robot.model, robot.model.groups[place.group]
     bounds = model.bounds[group.indices]
     near = 0.08 * place.size

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recordings of both arms: commanded and sensed positions, and what is worked out of them. Nothing here knows ROS."""
+"""Recordings of both arms: commanded and sensed positions, and figures computed from them. No ROS needed."""
 from typing import NamedTuple
 
 import numpy as np
@@ -7,9 +7,12 @@ import numpy as np
 from baxter_model import SIDES, joint_names
 
 JOINT_NAMES = tuple(name for side in SIDES for name in joint_names(side))
-# A set-point rests where it has not moved by this [rad] for so many rows.
+# A set-point is at rest if it has not changed by this [rad] for this many rows.
 REST_RAD, REST_ROWS = 2e-4, 100
-# So long ago was a set-point where its joint may still be, behind as it is [rows].
+# Natural frequencies [rad/s] and dampings of the systems of second order that a joint is compared with; steps of their
+# integration in a row.
+FREQUENCIES, DAMPINGS, STEPS = np.geomspace(4.0, 60.0, 40), np.geomspace(0.3, 2.0, 40), 5
+# A joint's lag behind its set-point is at most this [rows].
 BEHIND_ROWS = 100
 
 
@@ -26,7 +29,7 @@ class Recording(NamedTuple):
 
     @classmethod
     def read(cls, path, seconds=None):
-        """Read a CSV file with a line of names. Raises SystemExit that says what is wrong with it."""
+        """Read a CSV file with a line of names. Raises SystemExit with the reason if the file cannot be used."""
         try:
             table = np.genfromtxt(path, delimiter=",", names=True)
         except (OSError, ValueError) as error:
@@ -44,7 +47,7 @@ class Recording(NamedTuple):
 
 
 def delay_s(commanded, position, period_s):
-    """The delay [s] of a copy of `commanded` that is nearest to `position`, both (n,); up to half a second."""
+    """Return the delay [s], up to half a second, that brings `commanded` closest to `position`, both (n,)."""
     most = min(round(0.5 / period_s), len(position) // 2)
     errors = [np.mean((position[most:] - commanded[most - shift:len(commanded) - shift]) ** 2)
               for shift in range(most + 1)]
@@ -52,13 +55,30 @@ def delay_s(commanded, position, period_s):
 
 
 def overshoots(commanded, position):
-    """Farthest [rad] that `position` goes beyond everything that was `commanded`, (n,) both, in the second before."""
+    """Return how far [rad] `position` goes beyond all values of `commanded` in the second before; both (n,)."""
     windows = np.lib.stride_tricks.sliding_window_view(commanded, BEHIND_ROWS + 1)
     there = position[BEHIND_ROWS:]
     return float(max((there - windows.max(axis=1)).max(), (windows.min(axis=1) - there).max(), 0.0))
 
 
+def step_overshoot(commanded, position, period_s):
+    """(k,) [%] by how much the joints of `position` (n, k) would overshoot a step of `commanded` (n, k): that of the
+    system of second order which is nearest to what they did, from a grid."""
+    frequency, damping = (grid.ravel()[:, None] for grid in np.meshgrid(FREQUENCIES, DAMPINGS))
+    where = np.tile(position[0], (len(frequency), 1))
+    speed, error = np.zeros_like(where), np.zeros_like(where)
+    dt = period_s / STEPS
+    for target, there in zip(commanded, position, strict=True):
+        error += (where - there) ** 2
+        for _ in range(STEPS):
+            speed += dt * frequency * (frequency * (target - where) - 2.0 * damping * speed)
+            where += dt * speed
+    zeta = np.minimum(damping[np.argmin(error, axis=0), 0], 1.0)
+    return 100.0 * np.exp(-np.pi * zeta / np.sqrt(np.maximum(1.0 - zeta ** 2, 1e-9)))
+
+
 def rest(commanded, position):
-    """Largest distance [rad] of `position` from `commanded`, (n,) both, where that has rested for a while, or 0."""
+    """Return the largest distance [rad] of `position` from `commanded` while the set-point is at rest, else 0; both
+    (n,)."""
     at_rest = [k for k in range(2 * REST_ROWS, len(commanded)) if np.ptp(commanded[k - REST_ROWS:k + 1]) < REST_RAD]
     return float(np.abs(position[at_rest] - commanded[at_rest]).max()) if at_rest else 0.0

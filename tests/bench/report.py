@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures of a bench: collected round by round, then put together as median, spread and ratio to a peer."""
+"""Figures of a bench: collected round by round, then summarized as median, spread and ratio to a peer."""
 import json
 import statistics
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-# What a goal may be about: our figure, or its ratio to the peer's. "least" is a lower bound, "most" an upper one.
+# Kinds of goals: for our figure, or for its ratio to the peer's. "least" is a lower bound, "most" an upper one.
 GOALS = ("most", "least", "ratio_most", "ratio_least")
 
 
 @dataclass
 class Row:
-    """One figure. ours, peer: one number a round; peer is empty where there is nothing to compare with. goal: {one of
-    GOALS: bound}, or empty. samples: of how many measurements each round's number was made, where that is known.
-    pooled: the number is a share of its samples, and all rounds count as one: a miss in any of them is a miss."""
+    """One figure. ours, peer: one number per round; peer is empty if there is nothing to compare with. goal: {one of
+    GOALS: bound}, or empty. samples: number of measurements behind each round's number, if known. pooled: the number is
+    a share of its samples, and all rounds count as one: a miss in any of them is a miss."""
 
     suite: str
     what: str
@@ -27,7 +27,7 @@ class Row:
 
     @property
     def figure(self):
-        """What counts: the share of all rounds' samples where they are pooled, else the median of the rounds."""
+        """The figure's value: the share of all rounds' samples if they are pooled, else the median of the rounds."""
         if self.pooled:
             shares = zip(self.ours, self.samples, strict=True)
             return sum(share * count for share, count in shares) / sum(self.samples)
@@ -35,7 +35,7 @@ class Row:
 
     @property
     def ratios(self):
-        """Ours to the peer's, round by round: what disturbs a round disturbs both."""
+        """Ratio of ours to the peer's, round by round: a disturbance in a round affects both."""
         return [ours / peer for ours, peer in zip(self.ours, self.peer, strict=False) if peer]
 
     @property
@@ -54,18 +54,18 @@ class Row:
 
 
 class Report:
-    """What one round of one suite measures."""
+    """The measurements of one round of one suite."""
 
     def __init__(self):
         self.rows, self.samples = [], {}
 
     def add(self, what, ours, unit="", peer=None, samples=None, pooled=False, **goal):
-        """Note a figure. ``peer``: (name, figure), measured in the same round. ``samples``: how many measurements it
-        was made of. ``pooled``: it is a share of them, and rounds are put together as one. ``goal``: one of GOALS."""
+        """Note a figure. ``peer``: (name, figure), measured in the same round. ``samples``: the number of measurements
+        behind it. ``pooled``: it is a share of them, and all rounds count as one. ``goal``: one of GOALS."""
         if len(goal) > 1 or not set(goal) <= set(GOALS):
-            raise ValueError("a goal is one of %s, got %s" % (", ".join(GOALS), goal))
+            raise ValueError("the goal must be one of %s, got %s" % (", ".join(GOALS), goal))
         if pooled and not samples:
-            raise ValueError("a share that is pooled needs its number of samples, got %r for %s" % (samples, what))
+            raise ValueError("a pooled share needs its number of samples, got %r for %s" % (samples, what))
         name, other = peer if peer is not None else ("", None)
         self.rows.append({"what": what, "unit": unit, "ours": float(ours), "peer_name": name,
                           "peer": None if other is None else float(other), "goal": goal, "samples": samples,
@@ -134,12 +134,12 @@ def markdown(rows):
 
 
 def count(row):
-    """Measurements of all rounds together, or nothing where they were not counted."""
+    """Number of measurements of all rounds together; empty if they were not counted."""
     return number(sum(row.samples)) if row.samples else ""
 
 
 def goal_text(row):
-    """The goal in words, with whether it is kept."""
+    """The goal in words, and whether the figure meets it."""
     for kind, bound in row.goal.items():
         sign = "<=" if kind.endswith("most") else ">="
         verdict = {None: "no peer", True: "yes", False: "NO"}[row.met]
@@ -153,18 +153,18 @@ def spread(values):
 
 
 def number(value):
-    """Four digits that matter, never in powers of ten where a table has to be read."""
+    """Four significant digits, without an exponent, so that the table is easy to read."""
     if value is None:
         return ""
     if value == int(value) and abs(value) < 1e6:
         return "%d" % value
     if abs(value) >= 1000:
         return "%.0f" % value
-    # 99.99 % and 100 % are worlds apart.
+    # 99.99 % must not be rounded to 100 %.
     return "%.2f" % value if abs(value) >= 10 else "%.3f" % value if abs(value) >= 0.1 else "%.4g" % value
 
 
 def as_json(rows, samples, machine):
-    """Return what goes into the JSON file."""
+    """Return the data for the JSON file."""
     return json.dumps({"machine": machine, "rows": [{**asdict(row), "figure": row.figure, "ratio": row.ratio,
                                                      "met": row.met} for row in rows], "samples": samples}, indent=1)

@@ -12,7 +12,7 @@ from urdf_model import parse_urdf
 
 SECONDS = 4.0
 TICKS = int(SECONDS / 0.002)
-CASES = (  # (title, command mode or None, whether somebody listens to every topic)
+CASES = (  # (title, command mode or None, whether every topic has a subscriber)
     ("idle, nobody listens", None, False),
     ("idle, all topics", None, True),
     ("position, commands at 100 Hz, all topics", 1, True),
@@ -65,7 +65,7 @@ def measure(report, quick, number):
                 swing = wave * np.sin(0.01 * tick)
                 lab.command(mode, start + swing if mode in (1, 4) else swing)
 
-        # The first tick loads the compiled set-points, once in a process's life.
+        # The first tick loads the compiled set-points, once per process.
         tick_costs(lab, command, listeners, 10)
         update, publish, step = tick_costs(lab, command, listeners, TICKS // 10 if quick else TICKS)
         report.add("%s: update and publish" % title, update + publish, "us", ("physics step", step))

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Say where the stack stands: every figure beside its peer in the same run, median and spread over rounds.
+"""Benchmarks of the stack: every figure beside its peer in the same run, median and spread over rounds.
 
-    ./baxter.sh bench [NAME...] [--rounds 5] [--quick]
+    ./baxter.sh bench [NAME...] [--rounds 5] [--quick] [--all]
 
-A NAME is a suite, see --list; all run without one. The table goes to the terminal; JSON, Markdown and pictures to
-.baxter/bench. Suites take turns, round by round, so that a busy minute of the machine hits all of them.
+A NAME is a suite, see --list; without one, all suites run. The table goes to the terminal; JSON, Markdown and pictures
+go to .baxter/bench. Suites take turns, round by round, so that a busy minute of the machine affects all of them.
 """
 import argparse
 import datetime
@@ -24,50 +24,54 @@ from report import Report, as_json, markdown, put_together, table
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 PEERS = ROOT / ".baxter/bench/python"
-# Name: (module with a function `measure(report, quick, number)`, what it is about). Each round has its own process.
+# Name: (module with a function `measure(report, quick, number)`, description). Each round has its own process.
 SUITES = {
     "ik": ("ik_bench", "inverse kinematics beside TRAC-IK and KDL: solved, time; batches; clear of collisions"),
-    "verdict": ("verdict_bench", "poses without a solution, their cause known: verdicts that name it"),
+    "verdict": ("verdict_bench", "poses without a solution for a known cause: the share of correct diagnoses"),
     "fk": ("fk_bench", "forward kinematics and Jacobian beside PyKDL and PyBullet"),
     "load": ("physics_bench", "loading and stepping Baxter beside PyBullet's own loaders"),
     "control": ("control_tick_bench", "the controllers of 18 joints beside a physics step"),
     "robot": ("robot_bench", "a tick of Baxter's control logic beside the physics step of the same world"),
     "planning": ("planning_bench", "paths for Baxter and PROBOT beside OMPL's RRTConnect on exact geometry"),
-    "planned": ("planned_bench", "10,000 states of planned trajectories looked at by PyBullet: contacts, limits"),
-    "tick": ("tick_bench", "a tick of /gazebo beside the physics step in it, CPU time, without a lab around it"),
+    "planned": ("planned_bench", "10,000 states of planned trajectories checked by PyBullet: contacts, limits"),
+    "tick": ("tick_bench", "a tick of /gazebo beside the physics step in it, CPU time, without other nodes"),
     "collision": ("self_collision_bench", "a physics step of Baxter with self-collision beside one without"),
-    "physics": ("world_bench", "the whole stack flat out beside bare steps: alone, with objects, clients, in contact"),
+    "physics": ("world_bench", "the stack at full speed beside bare steps: alone, with objects, clients, contact"),
     "loop": ("loop_bench", "real time: CPU, joint_states jitter, latency, with 0, 5 and 20 subscribers"),
     "keeps_up": ("keeps_up_bench", "real time with the window, rviz, a stopped reader, a busy thread in /gazebo"),
     "hostile": ("hostile_bench", "hostile descriptions spawned: the longest gap in joint_states, the longest answer"),
     "lockstep": ("lockstep_bench", "two fresh labs in lock-step, the same commands: joint states bit for bit"),
-    "services": ("service_bench", "IK service beside an empty service"),
-    "move_group": ("move_group_bench", "move_group's services beside empty ones; how soon it is up, and cancels"),
-    "tracking": ("tracking_bench", "trajActionServer: evenness of its commands, how closely the arm follows"),
+    "services": ("service_bench", "the IK service beside an empty service"),
+    "move_group": ("move_group_bench", "move_group's services beside empty ones; its start-up time, and cancels"),
+    "tracking": ("tracking_bench", "trajActionServer: the jitter of its commands, the arm's tracking error"),
     "fidelity": ("fidelity_bench", "a recording of a physical robot's arms, replayed: --recording FILE for another"),
     "placing": ("placing_bench", "pick and place by friction, twenty seeds a round: 100 in five"),
     "start": ("start_bench", "launch to /robot/sim/started; memory of each process"),
-    "cameras": ("camera_bench", "pictures beside PyBullet's own; how many a second, and what they cost physics"),
+    "cameras": ("camera_bench", "pictures beside PyBullet's own; pictures per second, and their cost to physics"),
     "labs": ("labs_bench", "1, 2 and 4 labs side by side: factor and memory of each"),
 }
-# Longest that a round of a suite may take before it counts as hung [s].
+# Time limit of a round of a suite [s]; after that it counts as hung.
 LIMIT_S = 1200
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help="suites to run (default: all)")
-    parser.add_argument("--rounds", type=int, default=5, help="how often everything is measured (default: 5)")
-    parser.add_argument("--quick", action="store_true", help="a tenth of the work, to see that it runs")
+    parser.add_argument("--rounds", type=int, default=5, help="number of rounds (default: 5)")
+    parser.add_argument("--quick", action="store_true", help="a tenth of the work, only to see that it runs")
+    parser.add_argument("--all", action="store_true",
+                        help="planning: in five rounds all 1,800 bookshelf problems, not a fifth of them")
     parser.add_argument("--list", action="store_true", help="list the suites")
     parser.add_argument("--out", type=Path, default=ROOT / ".baxter/bench", help="folder for JSON and pictures")
-    parser.add_argument("--recording", type=Path, help="what `fidelity` replays (default: the one that is here)")
+    parser.add_argument("--recording", type=Path, help="what `fidelity` replays (default: the one in the tree)")
+    parser.add_argument("--fit", choices=("left", "right", "both"),
+                        help="fidelity: fit the actuators' numbers to this arm instead, and test them on the other")
     parser.add_argument("--child", help=argparse.SUPPRESS)
     parser.add_argument("--number", type=int, default=0, help=argparse.SUPPRESS)
     options = parser.parse_args()
     unknown = [name for name in options.names if name not in SUITES]
     if unknown:
-        parser.error("no suite is called %s; there are %s" % (", ".join(unknown), ", ".join(SUITES)))
+        parser.error("unknown suite: %s; the suites are %s" % (", ".join(unknown), ", ".join(SUITES)))
     if options.rounds < 1:
         parser.error("--rounds must be at least 1, got %d" % options.rounds)
     if options.list:
@@ -80,6 +84,12 @@ def main():
         if not options.recording.is_file():
             parser.error("--recording: there is no file %s" % options.recording)
         os.environ["BENCH_RECORDING"] = str(options.recording.resolve())
+    if options.all:
+        os.environ["BENCH_ALL"] = "1"
+    if options.fit is not None:
+        if options.names != ["fidelity"]:
+            parser.error("--fit belongs to fidelity: ./baxter.sh bench fidelity --fit %s" % options.fit)
+        return fit(options)
     names = options.names or list(SUITES)
     options.out.mkdir(parents=True, exist_ok=True)
     install_peers()
@@ -110,6 +120,14 @@ def main():
     return 1 if missed or broken else 0
 
 
+def fit(options):
+    """Fit the actuators in this process."""
+    from fidelity_bench import QUICK_S, RECORDING
+    from fidelity_fit import ROUNDS, main
+    main(os.environ.get("BENCH_RECORDING") or RECORDING, options.fit, *((1, QUICK_S) if options.quick else (ROUNDS,)))
+    return 0
+
+
 def child(options):
     """Measure one round of one suite in this process."""
     sys.path.append(str(PEERS))
@@ -120,7 +138,7 @@ def child(options):
 
 
 def run_child(name, number, options):
-    """Return what one round of a suite found, or None when it failed; its output goes through."""
+    """Return the results of one round of a suite, or None if it failed; its output is passed through."""
     saved = options.out / ("round_%s.json" % name)
     saved.unlink(missing_ok=True)
     command = [sys.executable, str(HERE / "run.py"), "--child", name, "--number", str(number), "--out", str(saved)]
@@ -130,7 +148,7 @@ def run_child(name, number, options):
     except subprocess.TimeoutExpired:
         print("%s has not ended within %d s" % (name, LIMIT_S))
     finally:
-        # A suite that was interrupted leaves a lab behind; the group is its own.
+        # An interrupted suite leaves a lab behind; the process group is only the suite's.
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGTERM)
             process.wait()
@@ -142,7 +160,8 @@ def run_child(name, number, options):
 
 
 def install_peers():
-    """Put the packages of requirements.txt where only the bench finds them; without a network they are left out."""
+    """Install the packages of requirements.txt in a folder that only the bench uses; without a network they are left
+    out."""
     wanted = (HERE / "requirements.txt").read_text()
     stamp = PEERS / "installed.txt"
     if stamp.exists() and stamp.read_text() == wanted:

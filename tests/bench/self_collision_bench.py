@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Baxter's self-collision costs: the physics step with it, without it, and while parts press on each other.
+"""Cost of Baxter's self-collision: the physics step with it, without it, and while parts press on each other.
 
-The worlds take turns, step by step, so that what else the machine does hits all of them.
+The worlds take turns, step by step, so that other load on the machine affects all of them.
 """
 import statistics
 import time
@@ -18,7 +18,7 @@ from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 
 NAMES = [name for side in SIDES for name in joint_names(side)]
-PRESSING = {  # where the arms start, and where they are told to go, through each other or the body
+PRESSING = {  # the arms' start, and their targets, behind each other or the body
     "arm on arm": (dict.fromkeys(NAMES, 0.0), {"left_s0": -1.5, "right_s0": 1.5}),
     "hand on body": ("neutral", {"left_s0": -1.7, "left_s1": -0.3, "left_e1": 2.6}),
     "both hands": ("neutral", {"left_s0": -1.7, "left_s1": -0.3, "left_e1": 2.6,
@@ -49,7 +49,7 @@ class Lab:
         self.model.drive_position(self.everything, position, self.model.max_effort)
 
     def go(self, goal, seconds=4.0):
-        """Ramp the joints to {joint: angle}; what is in the way stops them, while they go on pushing."""
+        """Ramp the joints to {joint: angle}; obstacles stop them, and they keep pushing."""
         start = self.model.read_joints()[0]
         end = start.copy()
         end[self.model.index(list(goal))] = list(goal.values())
@@ -100,5 +100,5 @@ def measure(report, quick, number):
         whole.go(goal)
         off, on = step_times((bare, whole), steps)
         if not whole.touches():
-            raise SystemExit("%s: nothing touches, so the figure means nothing" % title)
+            raise SystemExit("%s: there are no contacts, so the figure is invalid" % title)
         report.add("step, %s" % title, on, "us", ("without self-collision", off))

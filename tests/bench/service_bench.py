@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Round trips of Baxter's IK service beside those of a rospy service that does nothing, non-persistent calls both."""
+"""Round trips of Baxter's IK service compared with those of an empty rospy service, both by non-persistent calls."""
 import os
 import time
 
@@ -14,7 +14,7 @@ def measure(report, quick, number):
              "/ExternalTools/left/PositionKinematicsNode/IKService", load_robot_description="true") as lab:
         lab.part("empty")
         lab.part("posture")
-        # rospy reads where its master is when it is first used, so only now.
+        # rospy reads the master's address when it is first used, so import it only now.
         os.environ.update(ROS_MASTER_URI=lab.environment["ROS_MASTER_URI"], ROS_HOSTNAME="localhost")
         times = calls(CALLS // 10 if quick else CALLS)
     for name, found in times.items():
@@ -27,7 +27,7 @@ def measure(report, quick, number):
 
 
 def calls(count):
-    """Return {what: times [ms]}; the calls take turns."""
+    """Return {name: times [ms]}; the calls take turns."""
     import rospy
     from baxter_core_msgs.srv import SolvePositionIK, SolvePositionIKRequest
     from geometry_msgs.msg import Point, PoseStamped, Quaternion

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From roslaunch to a robot that stands and answers, and the memory of every process of the lab."""
+"""The time from roslaunch to a robot that is ready, and the memory of every process of the lab."""
 import tempfile
 from pathlib import Path
 
 from labs import HERE, Lab, memory_mb
 
-# A launch file with one node that does nothing: what roslaunch and rospy take by themselves.
+# A launch file with one empty node measures the time of roslaunch and rospy alone.
 EMPTY = '<launch><node name="bench_empty" pkg="workspace_tests" type="lab_part.py" args="empty"/></launch>'
 
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A whole tick of /gazebo with Baxter in it, beside the physics step in it: CPU time of the loop's thread, nobody
-connected, both arms swinging in free space with self-collision. Without a master, and the least of many turns, so that
-it says the same on a busy machine; "physics" measures the same with everything that a lab adds to it."""
+"""A whole tick of /gazebo with Baxter, compared with the physics step in it: CPU time of the loop's thread, without
+subscribers, both arms swinging in free space with self-collision. It runs without a master and takes the least of many
+turns, so that a busy machine gives the same figure. The suite `physics` measures the same with all other parts of a
+lab."""
 import contextlib
 import time
 from types import SimpleNamespace
@@ -28,14 +29,14 @@ from world_picture.snapshot import SnapshotWriter
 # The same numbers on both arms.
 NEUTRAL = tuple(poses().angles("neutral", "left").values())
 NAMES = {side: list(joint_names(side)) for side in SIDES}
-TICKS = 50  # of a turn; a command for each arm comes before it, as at ten times real time and 100 Hz
+TICKS = 50  # of a turn; each turn begins with a command for each arm, as at ten times real time and 100 Hz
 TURNS = 100
 ASLEEP_TICKS = 2500
 SLEEPERS = 100
 
 
 class _Ros:
-    """Topics that nobody has connected to."""
+    """Topics without subscribers."""
 
     def __init__(self):
         self.hub, self.subscriptions = PublisherHub(), {}
@@ -75,7 +76,7 @@ class BareWorld:
 
 
 class Loop(BareWorld):
-    """What the node builds, without the node."""
+    """The parts of the node /gazebo, without the node."""
 
     def _build(self, stack):
         super()._build(stack)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How evenly trajActionServer commands and how closely the arm follows: traj_bench.py in a lab of its own."""
+"""Jitter of trajActionServer's commands and tracking error of the arm: traj_bench.py in a separate lab."""
 import re
 import subprocess
 import sys
@@ -9,7 +9,7 @@ from labs import HERE, Lab
 # Streaming at 100 Hz: the greatest deviation of its period [ms], the greatest error in motion and at rest [rad].
 JITTER_MS = 2.0
 ERROR_RAD = {"moving": 0.02, "at rest": 0.003}
-# A move takes some ten simulated seconds; a busy machine takes its time.
+# A motion takes some ten simulated seconds, and much longer on a busy machine.
 LIMIT_S = 180.0
 
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Send an arm to the pre-pose by the notes' rule: command jitter, tracking error, a picture of commanded and measured.
+"""Send an arm to the pre-pose of the lab notes: command jitter, tracking error, a picture of commanded and measured.
 
     ./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch gui:=false enable:=true
     ./baxter.sh sim rosrun baxter_traj_streamer traj_interpolator_as
-    ./baxter.sh sim tests/bench/traj_bench.py --png traj.png        each in a terminal of its own
+    ./baxter.sh sim tests/bench/traj_bench.py --png traj.png        each in a separate terminal
 """
 import argparse
 import os
@@ -25,7 +25,7 @@ from lab_testing.waiting import wait_until
 
 # Where the move begins [rad]: neutral, the same signs for both arms.
 NEUTRAL = list(poses().angles("neutral", "left").values())
-# How long after the last command the arm counts as at rest, and how long it is then watched [s, simulated].
+# Time after the last command until the arm counts as at rest, and time that it is then watched [s, simulated].
 SETTLED_S, REST_S = 0.5, 1.0
 PICTURE_SIZE = (1000, 900)
 
@@ -42,7 +42,8 @@ class Recorder:
             rospy.Subscriber("/robot/joint_states", JointState, self._on_states, tcp_nodelay=True)]
 
     def wait_until_still(self, seconds):
-        """Until joint states reach so long [s, simulated] after the last command, or after the first of them."""
+        """Wait until joint states reach this long [s, simulated] after the last command, or after the first joint
+        state."""
         def have_come():
             since = self.commands[-1][0] if self.commands else self.states[0][0] if self.states else None
             return since is not None and bool(self.states) and self.states[-1][0] >= since + seconds
@@ -102,7 +103,7 @@ def draw(path, names, commands, states, errors):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("side", nargs="?", choices=SIDES, default="right")
-    parser.add_argument("--png", help="where the picture goes (default: none)")
+    parser.add_argument("--png", help="file for the picture (default: none)")
     options = parser.parse_args()
     rospy.init_node("traj_bench", anonymous=True)
     client = TrajClient()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Verdicts on poses without a solution whose cause is known, 510 a round: how many are right, and what they take."""
+"""Diagnoses of poses that have no solution for a known cause, 510 per round: the share of correct ones, and their
+time."""
 import time
 
 import numpy as np
@@ -8,7 +9,7 @@ from bad_poses import KINDS, Builder
 
 from baxter_sim_kinematics import warm_up
 
-# Share of the verdicts that must name the cause [%].
+# Share of the diagnoses that must name the cause [%].
 RIGHT = 95.0
 
 

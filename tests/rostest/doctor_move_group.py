@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The doctor asks a running move_group: all is well; then a box stands in the arm, and joint states do not come."""
+"""The doctor checks a running move_group: first without problems, then with a box in the arm and without joint
+states."""
 
 import contextlib
 import os
@@ -22,11 +23,11 @@ from lab_testing.waiting import stretched, wait_until
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
-from lab_doctor import move_group_checks, probe  # noqa: E402  (the tools are no installed package)
+from lab_doctor import move_group_checks, probe  # noqa: E402  (the tools are not installed package)
 from lab_doctor.findings import Level  # noqa: E402
 
 JOINTS = ["joint_%d" % number for number in range(1, 7)]
-# A process has to be started, and listens for two seconds.
+# The command starts a process that listens for two seconds.
 probe.DEADLINE_S = stretched(60.0)
 
 
@@ -68,7 +69,7 @@ class DoctorTest(unittest.TestCase):
         publisher = ServerProxy(master.lookupNode("/joint_state_publisher"))
         with contextlib.suppress(OSError):  # it may be gone before it has answered
             publisher.shutdown("/doctor_move_group", "the test has it so")
-        wait_until(lambda: not dict(master.getSystemState()[0]).get("/joint_states"), "the joint states to end", 30.0)
+        wait_until(lambda: not dict(master.getSystemState()[0]).get("/joint_states"), "the joint states to end")
         try:
             found = self.ask()
         finally:

@@ -18,7 +18,7 @@ from urdf_model.transforms import matrix_from_quaternion
 
 DEADLINE_S = 20.0  # [simulated s]
 BASE_HEIGHT_M = 0.93
-# It has no weight, so that a hand finds it in place.
+# Without gravity, so that it stays in place.
 BOX = """<robot name="box"><link name="box">
   <inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>
   <collision><geometry><box size="0.04 0.04 0.04"/></geometry></collision></link>
@@ -32,7 +32,7 @@ class Box:
         self._side, self._ahead_m = side, ahead_m
 
     def __enter__(self):
-        tip = rospy.wait_for_message(f"/robot/limb/{self._side}/endpoint_state", EndpointState, 10.0).pose
+        tip = rospy.wait_for_message(f"/robot/limb/{self._side}/endpoint_state", EndpointState, 90.0).pose
         turn = [getattr(tip.orientation, axis) for axis in "xyzw"]
         ahead = matrix_from_quaternion(turn)[:3, 2] * self._ahead_m
         pose = Pose(tip.position, tip.orientation)
@@ -70,7 +70,7 @@ class ElectricTest(unittest.TestCase):
             self.assertTrue(self.gripper.command_position(percent, block=True, timeout=DEADLINE_S))
             wait_for(lambda: not self.gripper.moving(), DEADLINE_S)
             self.assertAlmostEqual(self.gripper.position(), percent, delta=5.0)
-        fingers = rospy.wait_for_message("/robot/joint_states", JointState, 10.0)
+        fingers = rospy.wait_for_message("/robot/joint_states", JointState, 90.0)
         for finger, opening in (("l", 0.020833), ("r", -0.020833)):
             index = fingers.name.index(f"r_gripper_{finger}_finger_joint")
             self.assertAlmostEqual(fingers.position[index], opening, delta=0.001)
@@ -87,7 +87,7 @@ class ElectricTest(unittest.TestCase):
                      timeout_msg="the force on the box is not the holding force")
             self.assertGreater(gripper.position(), 10.0)
             self.assertFalse(gripper.missed() or gripper.moving())
-        wait_for(gripper.missed, DEADLINE_S, timeout_msg="it did not notice that the box is gone")
+        wait_for(gripper.missed, DEADLINE_S, timeout_msg="it did not notice that the box was removed")
 
     def test_calibration_reboot_reset_stop(self):
         gripper = self.gripper
@@ -98,7 +98,7 @@ class ElectricTest(unittest.TestCase):
         self.assertTrue(gripper.calibrated() and gripper.ready())
         with Box("right", 0.0):
             self.assertFalse(gripper.calibrate(timeout=3.0))
-            wait_for(gripper.error, DEADLINE_S, timeout_msg="a calibration with something in the way is no error")
+            wait_for(gripper.error, DEADLINE_S, timeout_msg="a calibration with something in the way is not an error")
             self.assertTrue(gripper.reset(timeout=DEADLINE_S))
             self.assertFalse(gripper.error())
         self.assertTrue(gripper.calibrate(timeout=DEADLINE_S))
@@ -155,7 +155,7 @@ class SuctionTest(unittest.TestCase):
                      timeout_msg="no vacuum under the cup")
             gripper.open()
             wait_for(gripper.blowing, DEADLINE_S, timeout_msg="it does not blow")
-            wait_for(lambda: not gripper.blowing(), DEADLINE_S, timeout_msg="it blows for ever")
+            wait_for(lambda: not gripper.blowing(), DEADLINE_S, timeout_msg="it does not stop blowing")
             self.assertFalse(gripper.vacuum() or gripper.gripping() or gripper.sucking())
 
 

@@ -17,7 +17,7 @@ from std_srvs.srv import Empty
 from baxter_model import SIDES, joint_names
 from lab_testing.waiting import wait_until
 
-DEADLINE_S = 60.0  # [s, wall] for what takes a second on a machine with nothing else to do
+DEADLINE_S = 60.0  # [s, wall] for actions that take a second on an idle machine
 BEAT_TICKS, TICK_S = 5, 0.002
 # Longest wait for a command after each beat [s, wall]: external programs must keep up, and a program that sends no more
 # commands must not block the world.

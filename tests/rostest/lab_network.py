@@ -16,7 +16,7 @@ from std_msgs.msg import Empty
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
-from lab_doctor import probe  # noqa: E402  (the tools are no installed package)
+from lab_doctor import probe  # noqa: E402  (the tools are not installed package)
 
 # Debian's C++ nodes: roscpp opens its XML-RPC port on all addresses.
 KNOWN_OPEN = {"rosout", "base_to_world", "robot_state_publisher"}
@@ -37,7 +37,7 @@ class LabNetwork(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.init_node("lab_network", disable_rostime=True)
-        rospy.wait_for_message("/robot/sim/started", Empty, timeout=40)
+        rospy.wait_for_message("/robot/sim/started", Empty, timeout=90)
 
     def own_listeners(self):
         """Open ports of this lab's processes alone: known by this test's master."""
@@ -61,7 +61,7 @@ class LabNetwork(unittest.TestCase):
 
     def test_doctor_finds_the_running_lab_healthy(self):
         done = subprocess.run(
-            [sys.executable, str(ROOT / "tools/doctor.py")], capture_output=True, text=True, timeout=60, check=False
+            [sys.executable, str(ROOT / "tools/doctor.py")], capture_output=True, text=True, timeout=120, check=False
         )
         for line in ("ok    master", "ok    clock      simulation time advances", "ok    python", "enable_robot.py -e"):
             self.assertIn(line, done.stdout)

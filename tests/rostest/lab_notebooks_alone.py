@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""The notebooks that start a simulator of their own, from top to bottom, twice in one kernel; Jupyter; no process is
+"""The notebooks that start their own simulator, from top to bottom, twice in one kernel; Jupyter. No process may be
 left."""
 import json
 import os
@@ -14,7 +14,7 @@ import uuid
 
 import cv2
 import numpy as np
-from notebook_runs import CELL_TIMEOUT_S, MOVING, OWN_LAB, ROOT, WATCHING, faults_of, is_blank, prepare, tool
+from notebook_runs import CELL_TIMEOUT_S, MOVING, OWN_LAB, ROBOT, ROOT, WATCHING, faults_of, is_blank, prepare, tool
 
 from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
@@ -44,7 +44,7 @@ class LabNotebooksAloneTest(unittest.TestCase):
         self.assertFalse(is_blank(cv2.imencode(".png", pixels)[1].tobytes()))
 
     def test_no_notebook_is_left_out(self):
-        self.assertEqual(sorted(path.stem for path in tool.notebooks()), sorted([*WATCHING, *MOVING, *OWN_LAB]))
+        self.assertEqual(sorted(path.stem for path in tool.notebooks()), sorted([*WATCHING, *MOVING, *OWN_LAB, *ROBOT]))
 
     def test_jupyter_starts_a_kernel_and_ctrl_c_leaves_nothing(self):
         run_id = uuid.uuid4().hex

@@ -72,7 +72,7 @@ class Stream(Motion):
         self._publisher = rospy.Publisher("/robot/limb/%s/joint_command" % self.side, JointCommand, queue_size=1,
                                           tcp_nodelay=True)
         # The robot, and the bench.
-        wait_until(lambda: self._publisher.get_num_connections() >= 2, "the robot hears the commands", DEADLINE_S)
+        wait_until(lambda: self._publisher.get_num_connections() >= 2, "the robot receives the commands", DEADLINE_S)
         self.alive = True
 
     def beat(self):
@@ -173,7 +173,7 @@ class TrajectoryAction(ActionMotion):
 
     def make_goal(self, goal):
         made = FollowJointTrajectoryGoal(trajectory=self.trajectory(goal))
-        made.goal_time_tolerance = rospy.Duration(20.0)  # a busy machine fails no goals
+        made.goal_time_tolerance = rospy.Duration(20.0)  # no goal fails because the machine is busy
         return made
 
 

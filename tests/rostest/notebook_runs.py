@@ -17,7 +17,7 @@ from nbclient.exceptions import CellExecutionError
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
-import notebook as tool  # noqa: E402  (a tool at the root of the workspace is no installed package)
+import notebook as tool  # noqa: E402  (a tool at the root of the workspace is not an installed package)
 
 PICTURES = ROOT / ".baxter" / "pictures"
 CELL_TIMEOUT_S = 150
@@ -25,6 +25,8 @@ CELL_TIMEOUT_S = 150
 WATCHING = ("1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro")
 MOVING = ("5_moving_baxter", "6_rotating_the_gripper", "7_waving")
 OWN_LAB = ("joint_states_and_trajectories", "ros_control", "planning")
+# The one that starts the physical robot's profile, and takes minutes.
+ROBOT = ("8_before_the_real_robot",)
 # The pictures of docs/labs.md, drawn by a cell after the last one: notebook -> (file, expression for a matplotlib
 # figure).
 DRAWN = {
@@ -48,7 +50,7 @@ def is_blank(png):
 
 
 class Run:
-    """One notebook in a kernel of its own."""
+    """One notebook in its own kernel."""
 
     def __init__(self, path, environment):
         self.path = path
@@ -58,7 +60,7 @@ class Run:
                                      resources={"metadata": {"path": str(path.parent)}})
 
     def twice(self):
-        """Execute everything twice; returns the errors, a line each."""
+        """Execute everything twice; return the errors, one per line."""
         faults = []
         with self.client.setup_kernel(env=self.environment):
             for number in (1, 2):
@@ -97,7 +99,7 @@ def prepare():
 
 
 def faults_of(*rows, environment=lambda: dict(os.environ)):
-    """Run rows of notebooks in parallel, those of a row in turn; returns the errors, a line each."""
+    """Run lists of notebooks in parallel, those of one list in turn; return the errors, one per line."""
     def run(names):
         return [fault for name in names for fault in Run(tool.find(name), environment()).twice()]
 

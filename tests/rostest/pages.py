@@ -27,12 +27,12 @@ END_LIMIT_S = 30
 
 
 def wait_for_service(master_uri, name, process=None):
-    """Until a service is registered; ``process``: the process that serves it, which must not end before."""
+    """Wait until a service is registered; ``process``: its process, which must not end before."""
     master = xmlrpc.client.ServerProxy(master_uri)
 
     def is_there():
         if process is not None and process.poll() is not None:
-            raise AssertionError("the lab ended with %d before %s was there" % (process.returncode, name))
+            raise AssertionError("the lab ended (%d) before %s was registered" % (process.returncode, name))
         with contextlib.suppress(OSError):
             return master.lookupService("/pages", name)[0] == 1
 
@@ -41,7 +41,7 @@ def wait_for_service(master_uri, name, process=None):
 
 @contextlib.contextmanager
 def started(block, folder):
-    """The lab that a page starts itself, on a master of its own, whose address this yields."""
+    """The lab that a page starts itself, on a separate master; yields the master's address."""
     uri = "http://localhost:%d" % free_port()
     environment = page_blocks.environment(folder, ROS_MASTER_URI=uri)
     with open(folder / "lab.txt", "w+") as said:

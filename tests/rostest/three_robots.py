@@ -26,7 +26,7 @@ GOALS = {
 
 
 def running(name):
-    """Whether the arm's trajectory controller runs; its action is there as soon as it is loaded."""
+    """Whether the arm's trajectory controller runs; its action exists as soon as it is loaded."""
     service = f"/{name}/probot_anno/controller_manager/list_controllers"
     rospy.wait_for_service(service, 60.0)
     listing = rospy.ServiceProxy(service, ListControllers)().controller
@@ -34,7 +34,7 @@ def running(name):
 
 
 def enabled():
-    """Whether Baxter is."""
+    """Whether Baxter is enabled."""
     return rospy.wait_for_message("/robot/state", AssemblyState, timeout=60.0).enabled
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which messages may move an arm and which must not: what docs/interface.md says of them, in code. No ROS needed."""
+"""Tells which messages may move an arm, by the rules of docs/interface.md. No ROS needed."""
 import math
 import re
 
@@ -7,15 +7,16 @@ from baxter_model import SIDES, joint_names
 
 MODES = (1, 2, 3, 4)
 _LIMB = re.compile(r"/robot/limb/(left|right)/(\w+)$")
-# Single joints as in the vendor's simulator, and procedures that take an arm through postures; the field that says so.
+# Topics for single joints as in the vendor's simulator, and for procedures that move an arm; the field with the
+# command.
 _JOINT = re.compile(r"/robot/\w+_joint_\w+_controller/joints/\w+/command$")
 _PROCEDURE = re.compile(r"/robustcontroller/\w+/\w+/enable$")
-# Whatever they say, it is not for the arms; a world that is changed, started anew or paused is another matter.
+# These never command the arms. Changing, restarting or pausing the world is a separate case.
 _WORLD = re.compile(r"^/gazebo/|/goal$|^/robot/sim/|^/robot/set_super_|/set_(parameters|physics)")
 
 
 def is_refused(side, value):
-    """Whether a baxter_core_msgs/JointCommand must be refused as a whole, or says nothing."""
+    """Whether a baxter_core_msgs/JointCommand must be refused as a whole, or is empty."""
     names, command = value["names"], value["command"]
     known = set(joint_names(side))
     return (value["mode"] not in MODES or len(names) != len(command) or len(set(names)) != len(names)
@@ -23,10 +24,10 @@ def is_refused(side, value):
 
 
 def may_move(name, value, style):
-    """Whether a message or request may move an arm, as far as can be told from it.
+    """Whether a message or request may move an arm, judged from its content.
 
-    name: of the topic or service; value: the message, None where it cannot be read; style: "damaged" where its bytes
-    say something else than value.
+    name: of the topic or service; value: the message, None if it cannot be decoded; style: "damaged" if its bytes
+    differ from value.
     """
     if _WORLD.search(name):
         return True

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a robot and a controller manager should do, in a few lines, to hold the real ones against. No ROS needed.
+"""Short reference models of a robot and a controller manager, to compare the real ones with. No ROS needed.
 
-Written from docs/interface.md ("States") and from ros_control's rules, not from the code that it judges.
+They follow docs/interface.md ("States") and ros_control's rules, not the code under test.
 """
 DISABLED, ENABLED, STOPPED, PRESSED, RELEASED = "disabled", "enabled", "stopped", "pressed", "released"
 
@@ -44,28 +44,28 @@ class ExpectedRobot:
 
 
 class ExpectedControllers:
-    """Load, unload and switch. Attribute ``running``: name to whether it runs, of those that are loaded."""
+    """Load, unload and switch. Attribute ``running``: {name: whether it runs} of the loaded controllers."""
 
     def __init__(self, claims):
         """claims: controller's name to the joints that it commands."""
         self._claims, self.running = claims, {}
 
     def load(self, name):
-        """Returns whether it can be."""
+        """Return whether it is possible."""
         if name in self.running:
             return False
         self.running[name] = False
         return True
 
     def unload(self, name):
-        """Returns whether it can be."""
+        """Return whether it is possible."""
         if self.running.get(name, True):
             return False
         del self.running[name]
         return True
 
     def switch(self, start, stop):
-        """Strictly: all or nothing. Returns whether it can be. start, stop: a name each, or ""."""
+        """Strict: all or nothing. Return whether it is possible. start, stop: one name each, or ""."""
         if (start and self.running.get(start, True)) or (stop and not self.running.get(stop, False)):
             return False
         stays = {name for name, runs in self.running.items() if runs and name != stop}

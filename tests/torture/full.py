@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Small file systems that are full: what a lab does on them."""
+"""Small full file systems, and checks of a lab on them."""
 import contextlib
 import os
 import shutil
@@ -14,15 +14,15 @@ BLOCK = 1 << 16
 
 
 def require_root():
-    """Raises Skip where file systems cannot be mounted."""
+    """Raises Skip if file systems cannot be mounted."""
     if os.geteuid() != 0 or not shutil.which("unshare"):
         raise Skip("mounting a small file system takes root")
     if subprocess.run(["unshare", "--mount", "true"], capture_output=True).returncode:
-        raise Skip("this machine does not let even root mount anything (a container?)")
+        raise Skip("root may not mount anything on this machine (a container?)")
 
 
 def fill(folder):
-    """Write a file until nothing more goes in; returns its path."""
+    """Write a file until the file system is full; return its path."""
     path = Path(folder) / "filler"
     with path.open("wb", buffering=0) as stream, contextlib.suppress(OSError):
         while stream.write(b"\0" * BLOCK) == BLOCK:
@@ -33,7 +33,7 @@ def fill(folder):
 
 
 def bear(lab, watch, options, journal, minutes):
-    """Have the arms follow commands, again and again, with every node alive; failures go to the journal."""
+    """Check again and again that the arms follow commands and that every node runs; failures go to the journal."""
     robot, processes = Robot(watch), lab.processes()
     until = time.monotonic() + 60.0 * minutes
     number = 0

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hostile messages on every subscriber and service of the running lab, found through the master.
+"""Hostile messages to every subscriber and service of the running lab. The targets come from the master.
 
-Messages come in batches. In every other batch nothing is sent that may move an arm; the arms then have to stay where
-they are. After each batch all nodes live, and after some the arms follow a valid command. Message k of a seed is the
-same whatever came before it.
+Messages come in batches. In every other batch no message may move an arm, and the arms must stay where they are. After
+each batch all nodes must run, and after some batches the arms must follow a valid command. Message k of a seed does not
+depend on the messages before it.
 """
 import collections
 import contextlib
@@ -25,18 +25,18 @@ from lab_testing.waiting import wait_until
 BATCH = 250
 FOLLOW_EVERY = 2  # batches
 LISTENERS_S, RECONNECTIONS, REGISTRATION_S = 20.0, 4, 1.0
-# An answer to a request that cannot be read is waited for so long [s].
+# Time limit for the answer to a request that cannot be decoded [s].
 DAMAGED_S = 2.0
 TOPIC_WEIGHT, SERVICE_WEIGHT = 4, 1
-# A message that may move an arm is drawn anew so often, before another receiver is taken.
+# A message that may move an arm is drawn again up to this many times; after that, another target is drawn.
 REDRAWS = 8
 # Not fuzzed, and why.
 LEFT_OUT = {
-    "/clock": "is the time of all nodes: only the simulator publishes there",
-    "/gazebo/advance": "waits as long as it is asked to; the state machine drives it",
-    "/gazebo/pause_physics": "the state machine pauses; here simulated time has to go on",
+    "/clock": "is the time of all nodes: only the simulator publishes it",
+    "/gazebo/advance": "waits as long as the request says; the state machine tests it",
+    "/gazebo/pause_physics": "the state machine pauses; here simulation time must advance",
 }
-# What a node may hold more after than before: rospy keeps a thread and a descriptor for each client.
+# A node's usage may grow by this much: rospy keeps a thread and a descriptor for each client.
 ALLOWED = Usage(threads=30, descriptors=60, memory=150_000_000)
 
 
@@ -55,14 +55,14 @@ class Hub:
 
     def __init__(self, lab):
         self._lab, self._publishers = lab, {}
-        #: How often a subscriber had cut us off, as it may after a message that cannot be read.
+        #: How often a subscriber has closed its connection; it may do so after a message that it cannot decode.
         self.cut_off = 0
         self.services = Services(lab)
         self.specs = {}
         self.targets = []
 
     def find(self):
-        """Look for targets and connect to them. Raises LabError where a subscriber does not connect."""
+        """Find targets and connect to them. Raises LabError if a subscriber does not connect."""
         self.targets = [Target("topic", *row) for row in self._lab.subscriptions() if row[0] not in LEFT_OUT]
         for name, node in self._lab.services():
             if name not in LEFT_OUT:
@@ -76,8 +76,8 @@ class Hub:
         self._await_connections()
 
     def await_listeners(self):
-        """Until every topic's subscriber is connected, to a publisher of ours that is new where it had cut the old one
-        off. Raises LabError."""
+        """Wait until every topic's subscriber is connected. If it had closed the connection to a publisher of ours, the
+        publisher is replaced. Raises LabError."""
         for _ in range(RECONNECTIONS):
             deaf = self._deaf()
             if not deaf:
@@ -86,8 +86,8 @@ class Hub:
             kinds = {name: self._publishers[name].data_class for name in deaf}
             for name in deaf:
                 self._publishers.pop(name).unregister()
-            # rospy takes us for the publisher that it has cut off, unless it has heard meanwhile that we left; nothing
-            # tells when it has.
+            # rospy takes us for the publisher that it has disconnected, until the master has told it that we left;
+            # there is no way to see when.
             time.sleep(REGISTRATION_S)
             for name, kind in kinds.items():
                 self._publishers[name] = rospy.Publisher(name, kind, queue_size=None)
@@ -96,7 +96,7 @@ class Hub:
         self._await_connections()
 
     def _deaf(self):
-        """Topics of ours that nobody is connected to."""
+        """Our topics without a subscriber."""
         return sorted(name for name, publisher in self._publishers.items() if not publisher.get_num_connections())
 
     def _await_connections(self):
@@ -106,12 +106,13 @@ class Hub:
         try:
             wait_until(lambda: not self._deaf(), what, LISTENERS_S, 0.05)
         except AssertionError as error:
-            raise LabError("no longer heard: %s" % error) from None
+            raise LabError("no longer subscribed: %s" % error) from None
 
     def send(self, target, data, is_damaged):
-        """Send the bytes of a message. Returns whether somebody got it. Raises LabError where a service fell silent.
+        """Send the bytes of a message. Return whether it has a receiver. Raises LabError if a service does not answer
+        any more.
 
-        is_damaged: a request that cannot be read need not be answered; rospy leaves its connection as it is.
+        is_damaged: a request that cannot be decoded may stay without an answer; rospy keeps its connection open.
         """
         if target.kind == "topic":
             publisher = self._publishers[target.name]
@@ -124,7 +125,7 @@ class Hub:
         try:
             self.services.call_raw(target.name, target.node, data, DAMAGED_S if is_damaged else PATIENCE_WALL_S)
         except tcpros.ConnectionLost:
-            pass  # a request that cannot be read may cost its connection, and no more
+            pass  # a request that cannot be decoded may end its connection, but nothing else
         except (LabError, OSError):
             if target.node not in FOREIGN and not is_damaged:
                 raise
@@ -136,7 +137,7 @@ class Hub:
 
 
 class Fuzz:
-    """A run: a failure ends its batch, and the lab is started anew where it does not stand any more."""
+    """A run: a failure ends its batch, and the lab is restarted if it does not recover."""
 
     def __init__(self, lab, watch, journal, seed):
         self._lab, self._watch, self._journal, self._seed = lab, watch, journal, seed
@@ -146,7 +147,7 @@ class Fuzz:
         self.relaunches = 0
 
     def run(self, first, count, until=None):
-        """Send messages first .. first + count - 1, or as many as time allows. until: of time.monotonic() [s]."""
+        """Send messages first .. first + count - 1, or as many as time allows. until: by time.monotonic() [s]."""
         self._begin()
         for start in range(first - first % BATCH, first + count, BATCH):
             if until is not None and time.monotonic() > until:
@@ -194,11 +195,12 @@ class Fuzz:
         if number % FOLLOW_EVERY == 0:
             self._robot.follow()
         self.hub.await_listeners()
-        if number == FOLLOW_EVERY:  # warm by now: caches filled, every client connected
+        if number == FOLLOW_EVERY:  # warmed up: caches filled, every client connected
             self._usage = {node: usage(pid) for node, pid in self._lab.processes().items()}
 
     def draw(self, index, is_quiet):
-        """(Target, style, value, bytes) of message ``index``. Where the arms must not move, none that may move them."""
+        """Return (Target, style, value, bytes) of message ``index``. In batches without motion, no message may move an
+        arm."""
         choose = random.Random("%d/%d" % (self._seed, index))
         targets = self.hub.targets
         weights = [TOPIC_WEIGHT if target.kind == "topic" else SERVICE_WEIGHT for target in targets]
@@ -210,7 +212,7 @@ class Fuzz:
                     return target, style, value, data
 
     def _check_alive(self):
-        """Raises LabError where a node is not the process that it was, or does not answer."""
+        """Raises LabError if a node has another process than before, or does not answer."""
         now = self._lab.processes()
         for node in FOREIGN:
             if now.get(node) != self._pids[node]:
@@ -232,7 +234,7 @@ class Fuzz:
             self._robot.follow()
             self.hub.await_listeners()
         except (LabError, OSError) as error:
-            self._journal.echo("the lab is started anew, because it does not recover: %s" % error)
+            self._journal.echo("the lab is restarted, because it does not recover: %s" % error)
             self.relaunches += 1
             self._watch.stamps.announce_reset()
             self._lab.relaunch()

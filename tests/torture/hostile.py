@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Messages that no well-behaved program sends, and some that one could. No ROS needed; same seed, same messages.
+"""Messages that no correct program sends, and some that one could. No ROS needed; the same seed gives the same
+messages.
 
-A message is one of: plausible, plausible but for one field, made of boundary values alone, or damaged on the wire.
+A message is one of: plausible, plausible except for one field, made of boundary values only, or damaged on the wire.
 """
 import json
 import math
@@ -13,7 +14,7 @@ from message_spec import FLOATS, FORMATS, TIMES, VARIABLE, MessageSpec, encode, 
 FLOAT64 = (0.0, -0.0, 1.0, -1.0, 1e-320, 1e9, -1e9, 1e12, 1e30, 1e308, -1e308, math.nan, math.inf, -math.inf)
 FLOAT32 = (0.0, -0.0, 1.0, -1.0, 1e-44, 1e9, 3.4e38, -3.4e38, math.nan, math.inf, -math.inf)
 LONG_TEXT = 100_000
-# Lengths of arrays that have none of their own; the longest is drawn seldom.
+# Lengths of arrays without a fixed length; the longest is rare.
 LENGTHS = (0, 1, 1, 2, 7, 7, 8, 100)
 DEEP = 5_000
 DIGITS = 400
@@ -35,7 +36,7 @@ PLAIN_JSON = ("{}", '{"position": 50.0}', '{"velocity": 50.0, "moving_force": 40
 
 
 def hostile_json(choose):
-    """A text that is read as JSON somewhere. choose: a random.Random."""
+    """A text for fields that are read as JSON. choose: a random.Random."""
     number = choose.choice(("1" * DIGITS, "-" + "9" * DIGITS, "1e400", "NaN", "-Infinity", "1e308", '"50"', "null",
                             "[]"))
     key = choose.choice(("position", "velocity", "moving_force", "holding_force", "dead_zone", "grip_attempt_seconds",
@@ -49,7 +50,7 @@ def hostile_json(choose):
 
 
 def hostile_text(choose):
-    """A string, or bytes that are no UTF-8."""
+    """A string, or bytes that are not UTF-8."""
     return choose.choice((
         "", "\0", "a\0b", "\n", " ", "../../../../etc/passwd", "/", "~", "%s%n%d{}{0}", "nan", "-1", "\ud800",
         "ß" * 50, "𝕬\u202e\u0301", b"\xff\xfe\x80", b"\xc0\x80", "a" * choose.choice((256, 4096, LONG_TEXT)),
@@ -58,7 +59,7 @@ def hostile_text(choose):
 
 
 def boundary(kind, choose):
-    """A value of a primitive that is often handled wrongly."""
+    """A value of a primitive that programs often handle wrongly."""
     if kind == "string":
         return hostile_text(choose)
     if kind in FLOATS:
@@ -78,15 +79,15 @@ def boundary(kind, choose):
 class Generator:
     """Messages of any type.
 
-    words: field name to values that make sense there ("*" for strings of other names); a name of the words may be
-    plural where the field is an array.
+    words: {field name: plausible values} ("*" for all other strings); for an array field the name may be the plural.
     """
 
     def __init__(self, words):
         self._words = words
 
     def draw(self, spec, seed):
-        """(style, value, bytes) of one message; style is one of STYLES. The same for the same spec and seed."""
+        """Return (style, value, bytes) of one message; style is one of STYLES. The same spec and seed give the same
+        message."""
         choose = random.Random(seed)
         style = choose.choice(STYLES)
         value = self.value(spec, choose, style == "boundary")
@@ -98,7 +99,7 @@ class Generator:
         return style, value, data
 
     def value(self, spec, choose, extreme=False):
-        """A message's value, of boundary values alone if ``extreme``. Its arrays are as long as each other, mostly."""
+        """A message's value, of boundary values only if ``extreme``. Usually all its arrays have the same length."""
         length = choose.choice(LENGTHS)
         return {field.name: self._field(field, choose, extreme, length) for field in spec.fields}
 
@@ -128,7 +129,8 @@ class Generator:
         return choose.choice((0, 1, 1, 2, 3, 4)) if field.kind != "bool" else choose.choice((0, 1))
 
     def _fitting(self, field):
-        """The words for a field, if they are of its kind: a `command` is numbers here and a text there."""
+        """The words for a field, if they have its type: a `command` is an array of numbers in one message and a text in
+        another."""
         words = self._words.get(field.name, ())
         return words if words and isinstance(words[0], str) == (field.kind == "string") else ()
 
@@ -146,7 +148,7 @@ class Generator:
 
 
 def damaged(data, choose):
-    """Bytes of a message, cut off, too long, with flipped bits, or with an array's or string's length that is a lie."""
+    """Bytes of a message: cut off, too long, with flipped bits, or with a false length of an array or string."""
     way = choose.randrange(4)
     if way == 0:
         return data[:choose.randrange(len(data) + 1)]

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What must hold whatever is done to a lab. No ROS needed: messages are objects with ``__slots__``.
+"""Invariants of a lab, whatever messages it gets. No ROS needed: messages are objects with ``__slots__``.
 
-Each check returns the texts of what it found wrong, none where all is well.
+Each check returns a list of texts, one per fault.
 """
 import math
 from dataclasses import dataclass
 
 # Slack of a joint's limit [rad]: a hard push against the stop of a joint that a contact holds.
 LIMIT_SLACK = 0.02
-# Topics' types that state "no echo" as infinity (sensor_msgs/LaserScan says so itself); NaN is wrong there, too.
+# Message types in which infinity means "no echo" (as sensor_msgs/LaserScan defines it); NaN is wrong there, too.
 INFINITE_BY_DEFINITION = ("sensor_msgs/LaserScan", "sensor_msgs/Range")
 
 
@@ -26,7 +26,7 @@ def numbers(message, path=""):
 
 
 def not_finite(topic, message_type, message):
-    """NaN anywhere; infinity but where the type defines it."""
+    """NaN is a fault everywhere; infinity is one unless the type defines it."""
     allows_infinity = message_type in INFINITE_BY_DEFINITION
     found = [(path, value) for path, value in numbers(message)
              if math.isnan(value) or (math.isinf(value) and not allows_infinity)]
@@ -37,7 +37,7 @@ class JointLimits:
     """Positions stay between the limits of the robot's description."""
 
     def __init__(self, limits, slack=LIMIT_SLACK):
-        """limits: joint's name to (lower, upper) [rad or m]; other joints are not looked at."""
+        """limits: {joint: (lower, upper)} [rad or m]; other joints are not checked."""
         self._limits, self._slack = limits, slack
 
     def check(self, names, positions):
@@ -50,21 +50,21 @@ class JointLimits:
 
 
 class Stamps:
-    """Time stamps of a topic go forward, but where a reset of the time was announced."""
+    """Time stamps of a topic increase, except after an announced reset of the time."""
 
     def __init__(self):
         self._last, self._announced, self._seen = {}, 0, {}
 
     def announce_reset(self):
-        """Before it: from now on, each topic may go back once more."""
+        """Announce a reset: from now on, each topic's time may go back once."""
         self._announced += 1
 
     def settle(self):
-        """All resets that were announced are over: a topic that goes back from now on is wrong."""
+        """End of all announced resets: from now on, a topic's time must not go back."""
         self._seen = dict.fromkeys(self._last, self._announced)
 
     def check(self, topic, stamp):
-        """stamp: [s]"""
+        """Check the next stamp [s] of a topic."""
         last = self._last.get(topic)
         self._last[topic] = stamp
         if last is not None and stamp < last:
@@ -77,22 +77,22 @@ class Stamps:
 
 
 class Still:
-    """Joints stay where they are, while armed."""
+    """Joints must not move while the check is armed."""
 
     def __init__(self, tolerance):
-        """tolerance: farthest that a joint may move [rad]."""
+        """tolerance: greatest distance that a joint may move [rad]."""
         self._tolerance, self._reference = tolerance, None
         self.farthest = 0.0
 
     def arm(self, positions):
-        """positions: joint's name to where it is and has to stay; joints that are not in it may move."""
+        """positions: {joint: position to keep}; other joints may move."""
         self._reference = dict(positions)
 
     def disarm(self):
         self._reference = None
 
     def check(self, names, positions):
-        reference = self._reference  # another thread may disarm at any time
+        reference = self._reference  # another thread can disarm at any time
         if reference is None:
             return []
         found = []
@@ -100,13 +100,13 @@ class Still:
             moved = abs(position - reference.get(name, position))
             self.farthest = max(self.farthest, moved)
             if not moved <= self._tolerance:
-                found.append("%s moved by %.5f rad, though nothing that was sent may move it" % (name, moved))
+                found.append("%s moved by %.5f rad, although no message that was sent may move it" % (name, moved))
         return found
 
 
 @dataclass(frozen=True)
 class Usage:
-    """What a process holds: threads, open descriptors, memory of its own [bytes]."""
+    """Usage of a process: threads, open descriptors, private memory [bytes]."""
 
     threads: int
     descriptors: int
@@ -114,7 +114,7 @@ class Usage:
 
 
 def grown(node, before, after, allowed):
-    """What of ``after`` exceeds ``before`` by more than ``allowed`` (each a Usage)."""
+    """Return a text for each figure of ``after`` that exceeds ``before`` by more than ``allowed`` (each a Usage)."""
     found = []
     for what in ("threads", "descriptors", "memory"):
         first, last, more = getattr(before, what), getattr(after, what), getattr(allowed, what)
@@ -124,34 +124,34 @@ def grown(node, before, after, allowed):
 
 
 class Patience:
-    """A deadline in work done rather than in time gone by: a process that gets no processor is not to blame.
+    """A deadline in CPU time instead of wall time: a process that gets no CPU must not fail.
 
-    It ends when the answering process has computed for ``cpu_s`` [s] since, or after ``wall_s`` [s] if it computes
-    less: then it waits for something that does not come.
+    It ends when the answering process has used ``cpu_s`` [s] of CPU time since the request, or after ``wall_s`` [s] if
+    it uses less: then the process is stuck.
     """
 
     def __init__(self, cpu_s, wall_s):
         self._cpu_s, self._wall_s = cpu_s, wall_s
 
     def check(self, what, cpu_s, wall_s):
-        """cpu_s, wall_s: gone by since the request [s]."""
+        """cpu_s, wall_s: since the request [s]."""
         if cpu_s > self._cpu_s:
-            return ["%s did not answer within %.0f s of its node's computing" % (what, self._cpu_s)]
+            return ["%s did not answer within %.0f s of its node's CPU time" % (what, self._cpu_s)]
         if wall_s > self._wall_s:
-            return ["%s did not answer within %.0f s, in which its node computed for %.1f s" % (
+            return ["%s did not answer within %.0f s, in which its node used %.1f s of CPU time" % (
                 what, self._wall_s, cpu_s)]
         return []
 
 
 class EmergencyStop:
-    """After a stop has arrived, the state says so within ``ticks``, and the arms are at rest within ``rest_ticks``."""
+    """After a stop has arrived, the state shows it within ``ticks``, and the arms are at rest within ``rest_ticks``."""
 
     def __init__(self, ticks, rest_ticks, rest_speed):
         """rest_speed: of a joint that counts as at rest [rad/s]."""
         self._ticks, self._rest_ticks, self._rest_speed = ticks, rest_ticks, rest_speed
 
     def check(self, ticks_since, is_stopped, speeds):
-        """ticks_since: from the tick that took the stop in to the state; speeds: of the arms' joints [rad/s]."""
+        """ticks_since: from the tick that received the stop to the state; speeds: of the arms' joints [rad/s]."""
         found = []
         if ticks_since >= self._ticks and not is_stopped:
             found.append("%d ticks after the stop the state says that the robot is not stopped" % ticks_since)

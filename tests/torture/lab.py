@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lab under torture: started, looked into, started again. It has a master and a log of its own."""
+"""The lab under test: starts it, inspects it, restarts it. It has its own master and log."""
 import contextlib
 import os
 import re
@@ -18,7 +18,7 @@ from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
 
 LAUNCH = ("workspace_tests", "torture.launch")
-# The lab stands when these are registered: the last that each of its nodes brings.
+# The lab is ready when these are registered: the last topic or service of each node.
 NEEDED_TOPICS = ("/robot/sim/started", "/robot/limb/right/follow_joint_trajectory/goal", "/trajActionServer/goal",
                  "/robot/end_effector/right_gripper/gripper_action/goal", "/robot/head/head_action/goal")
 NEEDED_SERVICES = ("/robot/sim/press", "/one/controller_manager/list_controllers", "/cameras/list",
@@ -27,19 +27,19 @@ NEEDED_SERVICES = ("/robot/sim/press", "/one/controller_manager/list_controllers
 START_LIMIT_S = 300.0
 STOP_LIMIT_S = 40.0
 CALLER = "/torture"
-# Nodes that are not the lab's: ourselves, what comes for a moment and goes, and roscore's own, which nobody needs.
+# Nodes that are not the lab's: this program, short-lived nodes, and roscore's own node.
 NOT_OURS = re.compile(r"^/(torture|rosservice|rostopic|record|urdf_spawner|two_joints_spawner|rosout)")
-# Nodes of Debian's ROS, in C++. A damaged request can end them (roscpp 1.16 ends with a segmentation fault); roslaunch
-# starts them again.
+# Nodes of Debian's ROS, in C++. A damaged request can end them (roscpp 1.16 has a segmentation fault); roslaunch
+# restarts them.
 FOREIGN = ("/robot_state_publisher", "/base_to_world")
 
 
 class Lab:
-    """A launched file with a master. Context manager: everything that was started in it ends with it."""
+    """A launch file with its master. Context manager: at the end, everything started in it is ended."""
 
     def __init__(self, folder, launch=LAUNCH, prefix=(), environment=None, **arguments):
-        """folder: of logs; prefix: words in front of the roslaunch command; environment: more variables for all that is
-        started; arguments: of the launch file."""
+        """folder: of logs; prefix: words in front of the roslaunch command; environment: more variables for all
+        processes; arguments: of the launch file."""
         self._folder, self._launch, self._prefix, self._arguments = Path(folder), launch, prefix, arguments
         self._environment = environment or {}
         self._stack = contextlib.ExitStack()
@@ -66,11 +66,11 @@ class Lab:
 
     @property
     def master(self):
-        """The master's XML-RPC interface; another one each time, since threads cannot share one."""
+        """The master's XML-RPC interface; a new proxy for each call, since threads cannot share one."""
         return xmlrpc.client.ServerProxy(self.uri)
 
     def launch(self):
-        """Start the launch file and return how long it took until the robot stood [s]."""
+        """Start the launch file and return the time until the robot was ready [s]."""
         begin = time.monotonic()
         words = [*self._prefix, "roslaunch", *self._launch, *("%s:=%s" % pair for pair in self._arguments.items())]
         self.launched = self.start(*words)
@@ -79,9 +79,9 @@ class Lab:
         return time.monotonic() - begin
 
     def relaunch(self):
-        """End the launched nodes and start them again; returns how long the start took [s]."""
+        """End the launched nodes and start them again; return the start-up time [s]."""
         end(self.launched)
-        # What was killed is still registered with the master.
+        # Killed nodes are still registered with the master.
         wait_until(lambda: not any(map(self.is_node_alive, self.nodes())), "the lab's end", STOP_LIMIT_S)
         for node in self.nodes():
             self.forget(node)
@@ -101,7 +101,7 @@ class Lab:
         return sorted({node for kind in state for _, nodes in kind for node in nodes if not NOT_OURS.match(node)})
 
     def pid(self, node):
-        """Process id of a node, asked of itself; None where it does not answer."""
+        """Process id of a node, from the node itself; None if it does not answer."""
         uri = self.master.lookupNode(CALLER, node)[2]
         try:
             with xmlrpc.client.ServerProxy(uri) as proxy:
@@ -114,19 +114,19 @@ class Lab:
         return pid is not None and is_alive(pid)
 
     def processes(self):
-        """Node to process id of all nodes that answer."""
+        """{node: process id} of all nodes that answer."""
         found = {node: self.pid(node) for node in self.nodes()}
         return {node: pid for node, pid in found.items() if pid is not None}
 
     def subscriptions(self):
-        """[(topic, type)] of what the lab's nodes listen to, sorted."""
+        """[(topic, type)] that the lab's nodes subscribe to, sorted."""
         types = dict(self.master.getTopicTypes(CALLER)[2])
         listened = self.master.getSystemState(CALLER)[2][1]
         return sorted((topic, types[topic]) for topic, nodes in listened
                       if any(not NOT_OURS.match(node) for node in nodes) and types.get(topic, "*") != "*")
 
     def publications(self):
-        """[(topic, type, node)] of what the lab's nodes publish, sorted."""
+        """[(topic, type, node)] that the lab's nodes publish, sorted."""
         types = dict(self.master.getTopicTypes(CALLER)[2])
         published = self.master.getSystemState(CALLER)[2][0]
         return sorted((topic, types[topic], node) for topic, nodes in published for node in nodes
@@ -138,14 +138,14 @@ class Lab:
         return sorted((service, node) for service, nodes in offered for node in nodes if not NOT_OURS.match(node))
 
     def service_address(self, service):
-        """(host, port) of a service's node. Raises KeyError where nobody offers it."""
+        """(host, port) of a service's node. Raises KeyError if there is no such service."""
         code, text, uri = self.master.lookupService(CALLER, service)
         if code != 1:
             raise KeyError(text)
         return address_of(uri)
 
     def forget(self, node):
-        """Take a node that died without a word out of the master's books, as `rosnode cleanup` does."""
+        """Unregister a node that died without unregistering itself, as `rosnode cleanup` does."""
         uri = self.master.lookupNode(CALLER, node)
         published, listened, services = self.master.getSystemState(CALLER)[2]
         for topic, nodes in published:
@@ -178,7 +178,7 @@ class Lab:
 
 
 def end(child):
-    """End a process as Ctrl-C does, with what it started; by force where that does not help."""
+    """End a process and its children as Ctrl-C does; kill them if that does not help."""
     for number, limit_s in ((signal.SIGINT, STOP_LIMIT_S), (signal.SIGKILL, STOP_LIMIT_S)):
         if child.poll() is None:
             with contextlib.suppress(ProcessLookupError):
@@ -194,10 +194,10 @@ def address_of(uri):
 
 
 def class_of(message_type):
-    """The class of a message type, e.g. "std_msgs/Bool". Raises KeyError where this workspace does not know it."""
+    """The class of a message type, e.g. "std_msgs/Bool". Raises KeyError if this workspace does not have it."""
     found = roslib.message.get_message_class(message_type)
     if found is None:
-        raise KeyError("message type %s is not known here" % message_type)
+        raise KeyError("this workspace has no message type %s" % message_type)
     return found
 
 
@@ -212,7 +212,7 @@ def response_class(service_type):
 
 
 def usage(pid):
-    """What a process holds now. Raises OSError where it has ended."""
+    """Usage of a process. Raises OSError if it has ended."""
     folder = Path("/proc/%d" % pid)
     status = dict(line.split(":", 1) for line in (folder / "status").read_text().splitlines())
     memory = sum(int(status[name].split()[0]) for name in ("RssAnon", "RssShmem")) * 1024
@@ -220,7 +220,7 @@ def usage(pid):
 
 
 def cpu_s(pid):
-    """Processor time that a process has used [s]; 0 where it has ended."""
+    """CPU time that a process has used [s]; 0 if it has ended."""
     try:
         fields = Path("/proc/%d/stat" % pid).read_text().rpartition(")")[2].split()
     except OSError:
@@ -229,9 +229,9 @@ def cpu_s(pid):
 
 
 def subscribe(lab, topic, message_type, node, who="_watch"):
-    """A connection on which a node's messages of a topic come in. Raises OSError, tcpros.ConnectionLost.
+    """A connection that receives a node's messages of a topic. Raises OSError, tcpros.ConnectionLost.
 
-    who: end of the name of the node that listens, which does not exist; a publisher keeps one connection for each.
+    who: suffix for the name of the subscribing node, which does not exist; a publisher keeps one connection per node.
     """
     uri = lab.master.lookupNode(CALLER, node)[2]
     try:
@@ -243,4 +243,4 @@ def subscribe(lab, topic, message_type, node, who="_watch"):
         raise tcpros.ConnectionLost(text)
     fields = {"callerid": CALLER + who, "topic": topic, "type": message_type, "tcp_nodelay": "1",
               "md5sum": class_of(message_type)._md5sum}
-    return tcpros.shake_hands((protocol[1], protocol[2]), fields)[0]
+    return tcpros.handshake((protocol[1], protocol[2]), fields)[0]

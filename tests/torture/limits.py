@@ -6,7 +6,7 @@ import rospy
 
 
 def arm_limits():
-    """Joint's name to (lower, upper) [rad] of all joints with limits in robot_description."""
+    """{joint: (lower, upper)} [rad] of all joints with limits in robot_description."""
     found = {}
     for joint in ElementTree.fromstring(rospy.get_param("/robot_description")).iter("joint"):
         limit = joint.find("limit")

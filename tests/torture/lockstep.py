@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The lab in lock-step: what is published arrives before the ticks in which its effect is looked for."""
+"""The lab in lock-step: a message arrives before the ticks in which the test looks for its effect."""
 import concurrent.futures
 
 import rospy
@@ -15,7 +15,7 @@ STATES_PERIOD_S = 0.02
 
 
 class LockStep:
-    """Publishes, advances, waits for what the robot says of it. The world has to be paused: `pause`."""
+    """Publishes, advances the world and waits for the robot's messages. The world must be paused: `pause`."""
 
     def __init__(self, watch):
         self._watch, self._publishers = watch, {}
@@ -27,28 +27,28 @@ class LockStep:
         rospy.ServiceProxy("/gazebo/pause_physics", Empty)()
 
     def run_free(self, seconds):
-        """Unpause until so much simulated time [s] has gone by, and pause again."""
+        """Unpause until this much simulation time [s] has passed, and pause again."""
         begin = self._now()
         rospy.ServiceProxy("/gazebo/unpause_physics", Empty)()
         try:
-            wait_until(lambda: self._now() >= begin + seconds, "simulated time to go on", WALL_S)
+            wait_until(lambda: self._now() >= begin + seconds, "simulation time to advance", WALL_S)
         finally:
             self.pause()
 
     def connect(self, topic, message_class):
-        """Have a publisher that the robot listens to."""
+        """Return a publisher that the robot has subscribed to."""
         if topic not in self._publishers:
             self._publishers[topic] = rospy.Publisher(topic, message_class, queue_size=None)
-        wait_until(self._publishers[topic].get_num_connections, "the robot to listen to " + topic, WALL_S)
+        wait_until(self._publishers[topic].get_num_connections, "the robot to subscribe to " + topic, WALL_S)
         return self._publishers[topic]
 
     def send(self, topic, message, ticks):
-        """Publish, and advance by so many ticks, the first of which takes the message in."""
+        """Publish, and advance by this many ticks; the first one handles the message."""
         self.connect(topic, type(message)).publish(message)
         self.advance(ticks, [topic])
 
     def advance(self, ticks, topics=()):
-        """Advance, and wait for the joint states of the end. Raises LabError."""
+        """Advance, and wait for the joint states of the last tick. Raises LabError."""
         answer = self._advance(ticks, list(topics), WALL_S)
         if not answer.success:
             raise LabError(answer.status_message)
@@ -65,18 +65,18 @@ class LockStep:
             raise LabError(str(error)) from None
 
     def forget_state(self):
-        """The next state that is looked at is one that comes from now on."""
+        """Discard the last state, so that `state` waits for a new one."""
         self._watch.latest.pop(STATE, None)
 
     def state(self):
-        """The last AssemblyState since `forget_state`. Raises LabError where none comes."""
+        """The last AssemblyState since `forget_state`. Raises LabError if there is none in time."""
         try:
             return wait_until(lambda: self._watch.latest.get(STATE), "a message on " + STATE, WALL_S, 0.001)
         except AssertionError as error:
             raise LabError(str(error)) from None
 
     def await_state(self, fields):
-        """Wait for the state; the world stands, so what it says last is what it says. Raises LabError."""
+        """Wait for the expected state. The world is paused, so the last state is final. Raises LabError."""
         def says():
             state = self._watch.latest.get(STATE)
             return state is not None and fields == (
@@ -89,7 +89,7 @@ class LockStep:
                 fields, self._watch.latest.get(STATE))) from None
 
     def call_while_advancing(self, function, *arguments):
-        """Call a service that is answered after a tick; returns its answer."""
+        """Call a service that answers after a tick; return its answer."""
         answer = self._executor.submit(function, *arguments)
         for _ in range(1000):
             if answer.done():

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A state machine over the lab's services and topics, in lock-step.
 
-Hypothesis picks the steps; each is held against what docs/interface.md promises, and after each the invariants hold.
+Hypothesis picks the steps. The result of each is compared with docs/interface.md, and after each the invariants must
+hold.
 """
 import errno
 import functools
@@ -33,10 +34,10 @@ from watch import STATES
 
 from baxter_model import JOINTS, SIDES
 
-# A state is published every 5 ticks, and a tick goes by before it is on its way.
-REST_SPEED = 0.05  # slower counts as at rest [rad/s]
+# A state is published every 5 ticks, one tick late.
+REST_SPEED = 0.05  # slower joints count as at rest [rad/s]
 STATED_TICKS = 10
-# The hardest stop that the joints' torques allow takes up to 0.36 s from full speed (4,000 random postures).
+# The hardest stop within the joints' torque limits takes up to 0.36 s from full speed (4,000 random postures).
 REST_TICKS = 200
 STOP = EmergencyStop(STATED_TICKS, REST_TICKS, REST_SPEED)
 SETTLED_TICKS, WATCHED_TICKS, MOVE_TICKS = 250, 100, 1000
@@ -54,10 +55,10 @@ SIDE, WRIST = st.sampled_from(SIDES), st.floats(-1.5, 1.5)
 
 
 def _remembering(function):
-    """``function`` of a Machine; its first error is kept.
+    """Wraps ``function`` of a Machine; keeps its first error.
 
-    Hypothesis repeats the steps that failed, which on a lab that is broken by now fails otherwise, and then tells of
-    that.
+    Hypothesis repeats failed steps. On a lab that is broken by then they fail differently, and hypothesis reports that
+    later failure.
     """
 
     @functools.wraps(function)
@@ -83,7 +84,7 @@ def invariant():
 
 
 class Machine(RuleBasedStateMachine):
-    """One example: a robot as after the start, and steps. Class attributes are set by who runs it."""
+    """One example: a robot as after the start, and steps. The runner sets the class attributes."""
 
     watch = lockstep = journal_step = first_error = None
 
@@ -97,7 +98,7 @@ class Machine(RuleBasedStateMachine):
 
     @initialize(disabled=st.booleans())
     def start(self, disabled):
-        """Whatever the example before left behind is undone through the interface."""
+        """Undo the effects of the previous example through the interface."""
         self.step("start", "disabled" if disabled else "enabled")
         robot = Robot(self.watch)
         self.lockstep.pause()
@@ -196,10 +197,10 @@ class Machine(RuleBasedStateMachine):
 
     @rule(side=SIDE, by_position=st.booleans(), how=st.sampled_from(("stop", "press", "disable")))
     def interrupt_motion(self, side, by_position, how):
-        """A motion that is commanded, and its end in the middle."""
+        """Command a motion and end it halfway."""
         self.step("a motion, and an end of it", side, by_position, how)
         name = "%s_w0" % side
-        if by_position:  # a position counts until it is reached, a velocity for 0.2 s
+        if by_position:  # a position command is valid until it is reached, a velocity for 0.2 s
             away = -1.5 if self.positions().get(name, 0.0) > 0.0 else 1.5
             self.command(side, JointCommand.POSITION_MODE, [name], [away], 40)
         else:
@@ -313,7 +314,7 @@ class Machine(RuleBasedStateMachine):
 
     @invariant()
     def cameras_are_as_expected(self):
-        if self.lockstep.ticks % 7 == 0 and self.lockstep.ticks:  # now and then: it costs a call
+        if self.lockstep.ticks % 7 == 0 and self.lockstep.ticks:  # not always: it costs a call
             listed = set(self.call("/cameras/list", ListCameras).cameras)
             assert self.cameras <= listed, "open are %s, listed %s" % (self.cameras, listed)
 
@@ -342,14 +343,14 @@ class Machine(RuleBasedStateMachine):
         return [speed for name, speed in zip(message.name, message.velocity, strict=True) if name[-2:] in JOINTS]
 
     def settle(self):
-        """Let commands that were given before run out."""
+        """Wait until earlier commands have expired."""
         for _ in range(20):
             self.lockstep.advance(SETTLED_TICKS)
             if all(abs(speed) < 0.001 for speed in self.speeds()):
                 return
 
     def stays(self, before=None):
-        """No arm moves from here on, or from ``before``, as nobody has commanded anything."""
+        """Expect that no arm moves from now on, or from ``before``, since there is no command."""
         if before is None:
             self.settle()
             before = self.positions()
@@ -358,7 +359,7 @@ class Machine(RuleBasedStateMachine):
         self.watch.still.disarm()
 
     def has_stopped(self):
-        """The robot says that it is stopped and the arms come to rest, in time, and stay."""
+        """Expect that the robot reports the stop in time, and that the arms come to rest in time and stay at rest."""
         self.lockstep.await_state(self.robot.fields)
         self.lockstep.advance(REST_TICKS - STATED_TICKS)
         found = STOP.check(REST_TICKS, self.lockstep.state().stopped, self.speeds())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a message consists of, as plain data, and its bytes on the wire (http://wiki.ros.org/msg). No ROS needed.
+"""A message's structure as plain data, and its bytes on the wire (http://wiki.ros.org/msg). No ROS needed.
 
 A value of a message is a dict: field name to number, bool, string, list or dict; ``time`` and ``duration`` are pairs
 (seconds, nanoseconds). A string may be given as bytes, which need not be UTF-8.
@@ -48,7 +48,7 @@ def spec_of(message_class, class_of):
 
 
 def encode(spec, value):
-    """The bytes of a message, without the length in front of it.
+    """The bytes of a message, without the leading length.
 
     Raises struct.error for a number that its field cannot hold, KeyError for a missing field.
     """
@@ -74,7 +74,7 @@ def _encode_one(kind, value):
 
 
 def leaves(spec, value, path=()):
-    """(path, kind, value) of everything in a message that is no message itself; a path is names and list indices."""
+    """(path, kind, value) of all primitive values in a message; a path is a tuple of names and list indices."""
     for field in spec.fields:
         here, found = (*path, field.name), value[field.name]
         several = [((*here, k), one) for k, one in enumerate(found)] if field.length is not None else [(here, found)]
@@ -86,7 +86,7 @@ def leaves(spec, value, path=()):
 
 
 def replaced(value, path, new):
-    """A copy of a message's value with what is at ``path`` (as in `leaves`) replaced."""
+    """A copy of a message's value in which the value at ``path`` (as in `leaves`) is replaced."""
     first, *rest = path
     copy = dict(value) if isinstance(value, dict) else list(value)
     copy[first] = replaced(copy[first], rest, new) if rest else new

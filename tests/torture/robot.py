@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a well-behaved client does: calls services, enables, waits for rest, moves an arm and sees it follow."""
+"""A correct client: calls services, enables, waits for rest, moves an arm and checks that it follows."""
 import time
 
 import rospy
@@ -16,31 +16,32 @@ from watch import STATE, STATES
 from baxter_model import JOINTS, SIDES
 from lab_testing.waiting import wait_until
 
-# A service's answer: within so much of its node's computing, or of time gone by where it computes less [s].
+# Time limits of a service's answer [s]: CPU time of its node, and wall time.
 PATIENCE_CPU_S, PATIENCE_WALL_S = 60.0, 180.0
 PATIENCE = Patience(PATIENCE_CPU_S, PATIENCE_WALL_S)
 REST_SPEED = 0.005  # [rad/s]
-REST_S = 0.3  # for so long at rest counts as at rest [simulated s]
+REST_S = 0.3  # time without motion until the arm counts as at rest [simulated s]
 ARRIVED = 0.02  # [rad]
 STATES_HZ = 50
-STEP = 0.1  # how far a joint is sent to see that the arm follows [rad]
-# A command that has no effect for so long has none [simulated s, and wall s where the clock stands].
+STEP = 0.1  # distance of a test motion [rad]
+# Time limit for the effect of a command [simulated s, and wall s if the clock stops].
 FOLLOW_S, WALL_S = 10.0, 180.0
-OURS = ("baxter", "two_joints")  # models that stay
+OURS = ("baxter", "two_joints")  # models that are kept
 
 
 class LabError(Exception):
-    """The lab does not do what every client may expect of it."""
+    """The lab does not behave as a client may expect."""
 
 
 class Services:
-    """Calls the lab's services by raw requests, with a deadline in work done."""
+    """Calls the lab's services by raw requests, with a deadline in CPU time."""
 
     def __init__(self, lab):
         self._lab, self._connections = lab, {}
 
     def call_raw(self, name, node, request, wall_s=PATIENCE_WALL_S):
-        """(True, the answer's bytes) or (False, the error's text). Raises LabError where the answer did not come."""
+        """Return (True, the answer's bytes) or (False, the error's text). Raises LabError if there is no answer in
+        time."""
         pid = self._lab.pid(node)
         if pid is None:
             raise LabError("%s, the node of %s, does not answer" % (node, name))
@@ -56,7 +57,7 @@ class Services:
         return answer
 
     def forget(self):
-        """Close all connections; needed where nodes were started anew."""
+        """Close all connections; needed after nodes have been restarted."""
         for connection in self._connections.values():
             connection.close()
         self._connections.clear()
@@ -70,7 +71,7 @@ class Services:
 
 
 class Robot:
-    """The robot, seen through a Watch and commanded by topics. One for each lab; needs an initialised rospy node."""
+    """The robot, observed by a Watch and commanded by topics. One per lab; needs an initialised rospy node."""
 
     def __init__(self, watch):
         self.watch = watch
@@ -103,17 +104,16 @@ class Robot:
             if name[-2:] in JOINTS}
 
     def await_fresh(self, what, condition):
-        """Until ``condition(joint states)`` holds of a message that comes in from now on, and the next 15 (0.3 s).
-
-        Raises LabError, if it does not within FOLLOW_S [simulated s]; or if nothing comes in.
+        """Wait until ``condition(joint states)`` holds for a new message and the next 15 (0.3 s). Raises LabError if it
+        does not within FOLLOW_S [simulated s], or if there are no messages.
         """
         begin, last, since = None, self.watch.latest.get(STATES), None
-        deadline = time.monotonic() + WALL_S
-        while time.monotonic() < deadline:
+
+        def has_held():
+            nonlocal begin, last, since
             message = self.watch.latest.get(STATES)
             if message is last or message is None:
-                time.sleep(0.005)
-                continue
+                return False
             last, now = message, message.header.stamp.to_sec()
             begin = now if begin is None or now < begin else begin
             if not condition(message):
@@ -121,16 +121,20 @@ class Robot:
             elif since is None or now < since:
                 since = now
             elif now - since >= REST_S:
-                return
+                return True
             if now - begin > FOLLOW_S:
                 raise LabError("%s: not within %.0f simulated s" % (what() if callable(what) else what, FOLLOW_S))
-        raise LabError("%s: not within %.0f s, and the clock stands or crawls" % (
-            what() if callable(what) else what, WALL_S))
+            return False
+
+        try:
+            wait_until(has_held, what, WALL_S, 0.005)
+        except AssertionError as error:
+            raise LabError("%s, and the simulation clock has stopped or is very slow" % error) from None
 
     def enable(self):
         """Reset, enable and wait for both, at full speed. Raises LabError."""
         def is_enabled():
-            # Somebody may have told the arms to creep, and rightly been obeyed.
+            # An earlier command may have set a low speed, which is correct behaviour.
             for ratio in self._ratios:
                 ratio.publish(1.0)
             self._rate.publish(STATES_HZ)
@@ -148,7 +152,8 @@ class Robot:
             raise LabError(str(error)) from None
 
     def tidy(self):
-        """Undo what hostile but valid requests did: clock running, buttons released, foreign models gone."""
+        """Undo the effects of hostile but valid requests: start the clock, release the buttons, delete foreign
+        models."""
         self.call("/gazebo/unpause_physics", EmptyService)
         self.call("/robot/sim/press", Press, "estop", PressRequest.RELEASE, 0)
         for name in self.call("/gazebo/get_world_properties", GetWorldProperties).model_names:
@@ -168,7 +173,7 @@ class Robot:
         self.await_fresh("arms at rest", is_at_rest)
 
     def follow(self):
-        """Send a joint of each arm somewhere, and see it arrive. Raises LabError."""
+        """Move a joint of each arm and check that it arrives. Raises LabError."""
         self.enable()
         start = self.positions()
         goals = {}
@@ -191,5 +196,5 @@ class Robot:
 
 
 def init_node():
-    """Become a node on the lab's master; ROS_MASTER_URI names it."""
+    """Start as a node on the master in ROS_MASTER_URI."""
     rospy.init_node(CALLER[1:], anonymous=False, disable_signals=True, disable_rostime=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""torture.py bag: rosbag record -a, pictures and all, and what is in the bag."""
+"""torture.py bag: rosbag record -a with all pictures, then a check of the bag."""
 import collections
 
 import rosbag
@@ -13,12 +13,12 @@ from watch import BULKY, STATES, Watch
 STILL_RAD = 0.001
 MINUTES = 2.0
 STATES_HZ = 50.0
-# Of the joint states, how many must be in it; the recorder gets only what is left of a busy machine.
+# Share of the joint states that must be in the bag; on a busy machine the recorder loses some.
 LEAST_PART = 0.5
 
 
 def run(options, journal):
-    """Record everything while the arms move, then read the bag; returns figures for the result."""
+    """Record everything while the arms move, then read the bag; return figures for the result."""
     path = options.out / "all.bag"
     with Lab(options.out) as lab:
         init_node()
@@ -42,7 +42,7 @@ def run(options, journal):
 
 
 def look_into(path):
-    """(messages by topic, texts of what is wrong with them)."""
+    """Return ({topic: number of messages}, texts of faults in them)."""
     counts, stamps, found = collections.Counter(), Stamps(), []
     with rosbag.Bag(str(path)) as bag:
         kinds = {topic: info.msg_type for topic, info in bag.get_type_and_topic_info().topics.items()}

@@ -21,7 +21,7 @@ CALL_S = 60.0
 
 
 def run(options, journal):
-    """Hang clients onto a lab, and see that each of them gets what it asked for; returns figures for the result."""
+    """Connect clients to a lab, and check that each gets its messages and answers; return figures for the result."""
     with Lab(options.out) as lab:
         init_node()
         with Watch(lab, arm_limits(), STILL_RAD, options.seed) as watch, Crowd(lab) as crowd:
@@ -39,7 +39,7 @@ def run(options, journal):
 
 
 class Crowd(threading.Thread):
-    """Clients with connections of their own. Attributes: read, bytes by client; calls; problems, texts."""
+    """Clients, each with its own connections. Attributes: read, bytes per client; calls; problems, texts."""
 
     def __init__(self, lab):
         super().__init__(name="crowd", daemon=True)
@@ -91,7 +91,7 @@ class Crowd(threading.Thread):
     def _call(self, number):
         try:
             is_fine, data = self._services[number].call(self._request, CALL_S)
-        except Exception as error:  # whatever it is, it is what the client got
+        except Exception as error:  # any error is a result of the test
             self.problems.append("client %d: %s: %s" % (number, type(error).__name__, error))
             return
         answer = self._answer_class()

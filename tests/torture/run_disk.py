@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""torture.py disk: logs and temporary files on a small file system, which is full from some moment on."""
+"""torture.py disk: logs and temporary files on a small file system that becomes full during the run."""
 import subprocess
 
 from full import bear, fill, require_root
@@ -14,7 +14,7 @@ MINUTES = 1.0
 
 
 def run(options, journal):
-    """Fill the disk under a running lab; returns figures for the result."""
+    """Fill the disk of a running lab; return figures for the result."""
     require_root()
     disk = options.out / "disk"
     disk.mkdir()

@@ -17,13 +17,13 @@ from lab_testing.waiting import wait_until
 
 STILL_RAD = 0.001
 BACK_S, END_S = 120.0, 60.0
-# When this one ends, the whole lab does: it is what everybody else works on.
+# When this node ends, the whole lab ends: all others depend on it.
 ENDS_THE_LAB = "/gazebo"
 STOPPED_S = (0.2, 3.0)
 
 
 def run(options, journal):
-    """Kill and stop nodes until the time or the rounds (--messages) are used up; without either, one round."""
+    """Kill and stop nodes until the time or the number of rounds (--messages) is reached; without either, one round."""
     rounds = options.messages if options.messages_given else 1 if options.until is None else 10**9
     with Lab(options.out) as lab:
         init_node()
@@ -41,7 +41,7 @@ def run(options, journal):
 
 
 class Faults:
-    """Does harm to nodes and measures what it takes them to come back."""
+    """Kills and stops nodes and measures their recovery time."""
 
     def __init__(self, lab, watch, robot, journal):
         self._lab, self._watch, self._robot, self._journal = lab, watch, robot, journal
@@ -49,14 +49,14 @@ class Faults:
         self.stops = self.kills = 0
 
     def round(self, seed, number):
-        """Every node once killed and once stopped, in an order of the seed's."""
+        """Kill every node once and stop every node once, in an order that depends on the seed."""
         choose = random.Random("%d/%d" % (seed, number))
         harm = [(node, kind) for node in self._lab.nodes() for kind in ("kill", "stop")]
         choose.shuffle(harm)
         for node, kind in harm:
             moment = choose.uniform(0.0, 2.0)
             self._journal.note(number, node, kind, "%.2f s" % moment)
-            time.sleep(moment)  # the moment is what is random here; nothing is waited for
+            time.sleep(moment)  # a random delay is wanted here, not a condition
             try:
                 self._robot.enable()
                 if kind == "kill":
@@ -100,18 +100,18 @@ class Faults:
         before = self._watch.simulated_s
         os.kill(pid, signal.SIGSTOP)
         try:
-            time.sleep(seconds)  # so long it stands
+            time.sleep(seconds)  # the time that it stays stopped
             if node != ENDS_THE_LAB:
-                wait_until(lambda: self._watch.simulated_s > before, "time to go on while %s stands" % node, END_S)
+                wait_until(lambda: self._watch.simulated_s > before, "time to pass while %s is stopped" % node, END_S)
         finally:
             os.kill(pid, signal.SIGCONT)
         wait_until(lambda: self._lab.pid(node) == pid, "%s to answer again" % node, BACK_S, 0.05)
 
     def _registered(self, node):
-        """Names of what a node publishes, listens to and serves."""
+        """Names of a node's topics, subscriptions and services."""
         state = self._lab.master.getSystemState("/torture")[2]
         return {(kind, name) for kind, rows in enumerate(state) for name, nodes in rows if node in nodes
-                # Goals come and go with connections; what a node answers to is what counts.
+                # Action topics come and go with connections; only subscriptions and services count.
                 and "/torture" not in name}
 
     def _start_again(self):
@@ -130,6 +130,6 @@ class Faults:
 
 
 def summary(times):
-    """Of durations [s]: median, longest and how many."""
+    """Return median, longest and number of durations [s]."""
     return {} if not times else {
         "median": round(statistics.median(times), 1), "longest": round(max(times), 1), "times": len(times)}

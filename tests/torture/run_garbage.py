@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""torture.py garbage: bytes that are no TCPROS and no XML-RPC, and connections that are never finished."""
+"""torture.py garbage: bytes that are neither TCPROS nor XML-RPC, and connections that never complete a request."""
 import contextlib
 import random
 import socket
@@ -14,13 +14,13 @@ from watch import Watch
 
 STILL_RAD = 0.001
 BATCH = 50
-# So many connections are left open without a word, or in the middle of one, while the others go on.
+# Number of connections that stay open without a complete request during the test.
 IDLE = 100
 CONNECT_S = 60.0
 
 
 def run(options, journal):
-    """Write to every port of every node; returns figures for the result."""
+    """Write to every port of every node; return figures for the result."""
     with Lab(options.out) as lab:
         init_node()
         with Watch(lab, arm_limits(), STILL_RAD, options.seed) as watch, contextlib.ExitStack() as idle:
@@ -80,7 +80,7 @@ def ports_of(lab):
 
 
 def write(address, data, stays):
-    """Connect and write; returns the connection if it is to stay open. A node may close it at any time."""
+    """Connect and write; return the connection if it stays open. A node may close it at any time."""
     connection = socket.create_connection(address, CONNECT_S)
     with contextlib.suppress(OSError):
         connection.settimeout(CONNECT_S)

@@ -12,12 +12,12 @@ from robot import init_node
 from watch import Watch
 
 STILL_RAD = 0.001
-# Of a round. The first example of hypothesis is always the plainest there is: one and the same step, again and again.
+# Of a round. The first example of hypothesis is always the simplest: the same step again and again.
 EXAMPLES, STEPS = 20, 25
 
 
 def run(options, journal):
-    """Rounds of examples, each with a seed of its own, until the steps or the time are used up."""
+    """Run rounds of examples, each with its own seed, up to the limit of steps or time."""
     with Lab(options.out) as lab:
         init_node()
         with Watch(lab, arm_limits(), STILL_RAD, options.seed) as watch:
@@ -25,7 +25,7 @@ def run(options, journal):
 
 
 def machine(lab, watch, options, journal, examples=EXAMPLES, steps=STEPS):
-    """The same with a lab that stands, and a Watch. A round is of so many examples of at most so many steps."""
+    """The same with a running lab, and a Watch. A round has this many examples of at most this many steps."""
     lockstep = LockStep(watch)
     Machine.watch, Machine.lockstep = watch, lockstep
     Machine.journal_step = staticmethod(lambda text: journal.note(journal.sent, "step", "", text))
@@ -35,7 +35,7 @@ def machine(lab, watch, options, journal, examples=EXAMPLES, steps=STEPS):
         try:
             run_state_machine_as_test(hypothesis.seed(seed)(Machine),
                                       settings=settings(examples, min(steps, options.messages)))
-        except Exception as error:  # whatever it is, it is what the round found
+        except Exception as error:  # any error is a result of the round
             error = Machine.first_error or error
             count = journal.sent - first
             steps = "; ".join(journal.last(min(count, 12)))
@@ -46,13 +46,13 @@ def machine(lab, watch, options, journal, examples=EXAMPLES, steps=STEPS):
             lab.relaunch()
             watch.take_found()
         seed += 1
-    return {"rounds": seed - options.seed, "ticks_in_lock_step": lockstep.ticks, "labs_started_anew": relaunches,
+    return {"rounds": seed - options.seed, "ticks_in_lock_step": lockstep.ticks, "labs_restarted": relaunches,
             "messages_read_and_checked": sum(watch.counts.values())}
 
 
 def settings(examples, steps):
-    """So many examples of at most that many steps. Shrinking would repeat steps on a lab that is broken by now; the
-    journal has what they were."""
+    """Hypothesis settings for this many examples of at most that many steps. There is no shrinking: it would repeat
+    steps on a lab that is broken by then. The journal lists the steps."""
     return hypothesis.settings(
         max_examples=examples, stateful_step_count=steps, deadline=None, database=None,
         phases=[hypothesis.Phase.generate], suppress_health_check=list(hypothesis.HealthCheck))

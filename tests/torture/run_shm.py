@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""torture.py shm: a /dev/shm of the lab's own, which is full from some moment on; then a start on a full one."""
+"""torture.py shm: a separate /dev/shm for the lab, which becomes full during the run; then a start on a full one."""
 from pathlib import Path
 
 from full import bear, fill, require_root
@@ -11,14 +11,14 @@ from watch import Watch
 SIZE = "64m"
 STILL_RAD = 0.001
 MINUTES = 1.0
-# In a mount name space, so that nobody else's /dev/shm is touched.
+# In a mount namespace, so that the machine's /dev/shm is not changed.
 MOUNT = "mount -t tmpfs -o size=%s tmpfs /dev/shm && %s exec \"$@\""
 FILL = "{ head -c 1g /dev/zero >/dev/shm/filler || true; } 2>/dev/null;"
 START_LIMIT_S = 120.0
 
 
 def run(options, journal):
-    """Fill /dev/shm under a running lab, then start another on a full one; returns figures for the result."""
+    """Fill the /dev/shm of a running lab, then start another on a full one; return figures for the result."""
     require_root()
     with Lab(options.out, prefix=prefix("")) as lab:
         init_node()
@@ -28,12 +28,12 @@ def run(options, journal):
             simulated_s = watch.simulated_s
     said = start_on_a_full_one(options)
     if "/dev/shm" not in said and "No space left" not in said and "shared memory" not in said:
-        journal.fail("a start on a full /dev/shm does not say what is full: %s" % said[-400:], options.seed, 0, 1)
+        journal.fail("the error of a start on a full /dev/shm does not name it: %s" % said[-400:], options.seed, 0, 1)
     return {"simulated_s": simulated_s, "also": {"shared_memory": SIZE}}
 
 
 def start_on_a_full_one(options):
-    """Start a lab where /dev/shm is full from the beginning; returns the end of what it printed."""
+    """Start a lab on a full /dev/shm; return the end of its output."""
     output = options.out / "second"
     try:
         with Lab(output, prefix=prefix(FILL)):
@@ -43,5 +43,5 @@ def start_on_a_full_one(options):
 
 
 def prefix(fill_first):
-    """Words in front of a command that give it a /dev/shm of its own."""
+    """Command prefix that gives a command its own /dev/shm."""
     return ("unshare", "--mount", "--propagation", "private", "bash", "-c", MOUNT % (SIZE, fill_first), "bash")

@@ -11,7 +11,7 @@ EXAMPLES, STEPS = 6, 15
 
 
 def run(options, journal):
-    """Returns figures for the result."""
+    """Run both; return figures for the result."""
     with Lab(options.out) as lab:
         init_node()
         with Watch(lab, arm_limits(), STILL_RAD, options.seed) as watch:

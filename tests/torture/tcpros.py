@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""TCPROS spoken by hand (http://wiki.ros.org/ROS/TCPROS), so that anything at all can be said. No ROS needed."""
+"""The TCPROS protocol (http://wiki.ros.org/ROS/TCPROS) without rospy, so that any bytes can be sent. No ROS needed."""
 import contextlib
 import socket
 import struct
@@ -10,7 +10,7 @@ LARGEST = 1 << 28
 
 
 class ConnectionLost(Exception):
-    """The other side closed the connection, or answered with something that is no TCPROS."""
+    """The other side closed the connection, or its answer is not TCPROS."""
 
 
 def header(fields):
@@ -21,7 +21,7 @@ def header(fields):
 
 
 def parsed(body):
-    """The dict that a header's bytes, without their length, say. Raises ConnectionLost where they are none."""
+    """Decode a header's bytes, without their length, to a dict. Raises ConnectionLost if they are not header."""
     fields, at = {}, 0
     while at < len(body):
         if at + _LENGTH.size > len(body):
@@ -36,7 +36,7 @@ def parsed(body):
 
 
 def read_exactly(connection, count):
-    """That many bytes. Raises ConnectionLost, TimeoutError."""
+    """Read this many bytes. Raises ConnectionLost, TimeoutError."""
     if count > LARGEST:
         raise ConnectionLost("the other side announces %d bytes" % count)
     data = bytearray()
@@ -52,11 +52,11 @@ def read_exactly(connection, count):
 
 
 def read_block(connection):
-    """The bytes behind a length."""
+    """Read a length and that many bytes."""
     return read_exactly(connection, _LENGTH.unpack(read_exactly(connection, 4))[0])
 
 
-def shake_hands(address, fields, timeout_s=HANDSHAKE_S):
+def handshake(address, fields, timeout_s=HANDSHAKE_S):
     """(connection, the other side's header). Raises ConnectionLost, OSError; TimeoutError after timeout_s [s]."""
     connection = socket.create_connection(address, timeout_s)
     try:
@@ -72,7 +72,7 @@ def shake_hands(address, fields, timeout_s=HANDSHAKE_S):
 def service_type(address, name):
     """(type, MD5 sum) that a service's node states."""
     fields = {"probe": "1", "md5sum": "*", "callerid": "/torture", "service": name}
-    connection, answer = shake_hands(address, fields)
+    connection, answer = handshake(address, fields)
     connection.close()
     if "type" not in answer:
         raise ConnectionLost("%s does not say its type: %s" % (name, answer))
@@ -88,11 +88,11 @@ class ServiceConnection:
         self._connection = None
 
     def call(self, request, timeout_s):
-        """(True, the answer's bytes) or (False, the error's text). Raises ConnectionLost where there was no answer but
-        an end, and TimeoutError after timeout_s [s]; the next call connects anew."""
+        """Return (True, the answer's bytes) or (False, the error's text). Raises ConnectionLost if the connection ended
+        without an answer, and TimeoutError after timeout_s [s]; the next call connects again."""
         try:
             if self._connection is None:
-                self._connection, refusal = shake_hands(self._address, self._fields)
+                self._connection, refusal = handshake(self._address, self._fields)
                 if "error" in refusal:
                     raise ConnectionLost(refusal["error"])
             self._connection.settimeout(timeout_s)
@@ -115,7 +115,7 @@ class ServiceConnection:
 
 
 def garbage(choose, port_is_xmlrpc=False):
-    """What a broken program, a port scanner or a browser writes to a port. choose: a random.Random."""
+    """Bytes as from a broken program, a port scanner or a browser. choose: a random.Random."""
     request = b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n"
     call = b"<?xml version='1.0'?><methodCall><methodName>%s</methodName><params>%s</params></methodCall>"
     noise = bytes(choose.randrange(256) for _ in range(choose.choice((1, 3, 4, 100, 5000))))

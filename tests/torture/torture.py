@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Do to a lab of its own what no lab should have to bear, and say what it did not bear.
+"""Stress tests of a lab that this program starts: hostile messages, killed nodes, full disks and more.
 
     ./baxter.sh sim rosrun workspace_tests torture.py fuzz --seed 7 --messages 100000
     ./baxter.sh sim rosrun workspace_tests torture.py machine --seed 7 --minutes 10
 
 Each failure prints the seed and the command that repeats it. Logs, journal and result.json: --out. Exit code: 0 without
-failures, 1 with, 77 where this machine cannot do what was asked.
+failures, 1 with, 77 if the test cannot run on this machine.
 """
 import argparse
 import importlib
@@ -19,20 +19,20 @@ import time
 import warnings
 from pathlib import Path
 
-# Publishing without a queue is what is wanted here: it waits until the message is on its way.
+# Publishing without a queue is intended here: it waits until the message is sent.
 warnings.filterwarnings("ignore", "The publisher should be created", SyntaxWarning)
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from journal import Journal, Skip, report  # noqa: E402
 
 SKIPPED = 77
-# Name: (module with `run(options, journal)`, which returns figures; what it is about).
+# Name: (module with `run(options, journal)`, which returns figures; description).
 SUITES = {
     "slice": ("run_slice", "a little of fuzz and machine"),
     "fuzz": ("run_fuzz", "hostile messages on every subscriber and service"),
-    "garbage": ("run_garbage", "bytes that are no TCPROS and no XML-RPC, half-open connections, on every node's ports"),
+    "garbage": ("run_garbage", "bytes that are neither TCPROS nor XML-RPC, half-open connections, on all nodes' ports"),
     "machine": ("run_machine", "a state machine over services and topics, in lock-step (hypothesis)"),
-    "faults": ("run_faults", "nodes killed and stopped at random moments; how long each takes to come back"),
+    "faults": ("run_faults", "nodes killed and stopped at random moments; the recovery time of each"),
     "disk": ("run_disk", "a full disk under logs and temporary files (root)"),
     "shm": ("run_shm", "a full /dev/shm (root)"),
     "crowd": ("run_crowd", "60 clients for two minutes"),
@@ -44,10 +44,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     abouts = ("%s: %s" % (name, about) for name, (_, about) in SUITES.items())
     parser.add_argument("suite", choices=SUITES, help="; ".join(abouts))
-    parser.add_argument("--seed", type=int, default=None, help="default: another one each time")
-    parser.add_argument("--messages", type=int, default=None, help="how many; steps of the machine, rounds of faults")
+    parser.add_argument("--seed", type=int, default=None, help="default: a random one")
+    parser.add_argument("--messages", type=int, default=None, help="number of messages, steps or rounds")
     parser.add_argument("--first", type=int, default=0, help="number of the first message or round")
-    parser.add_argument("--minutes", type=float, default=None, help="end after so long, whatever is left")
+    parser.add_argument("--minutes", type=float, default=None, help="time limit of the run")
     parser.add_argument("--out", type=Path, default=None, help="folder of logs and results (default: a temporary one)")
     options = parser.parse_args(without_remappings(sys.argv[1:]))
     options.messages_given = options.messages is not None
@@ -71,12 +71,12 @@ def main():
 
 
 def end_as_by_ctrl_c(*_):
-    """roslaunch's second signal to a test that takes too long: the lab has to end with it."""
+    """roslaunch sends a second signal to a test that takes too long; the lab must end with it."""
     raise KeyboardInterrupt
 
 
 def without_remappings(words):
-    """Without what roslaunch and rosrun add."""
+    """The arguments without those that roslaunch and rosrun add."""
     return [word for word in words if ":=" not in word]
 
 
@@ -85,5 +85,5 @@ if __name__ == "__main__":
     signal.signal(signal.SIGTERM, end_as_by_ctrl_c)
     code = main()
     sys.stdout.flush()
-    # rospy's threads may wait for a lab that has gone.
+    # rospy's threads may wait for a lab that has ended.
     os._exit(code)

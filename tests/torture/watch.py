@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads what the lab's nodes publish, by connections of its own, and holds it against what must be true."""
+"""Reads the messages of the lab's nodes on its own connections, and checks the invariants."""
 import collections
 import contextlib
 import math
@@ -20,11 +20,11 @@ from baxter_model import SIDES
 STATES, STATE = "/robot/joint_states", "/robot/state"
 CORE = {"/clock", STATES, STATE, "/robot/limb/left/endpoint_state", "/robot/limb/right/endpoint_state",
         "/robot/end_effector/left_gripper/state", "/robot/end_effector/right_gripper/state"}
-# Repeat what they are told, and what they are told is ours: states as transforms, requests with why they were refused.
+# These topics repeat the test's own input: states as transforms, refused requests with the reason.
 ECHOES = {("/tf", "/robot_state_publisher")} | {
     ("/ExternalTools/%s/PositionKinematicsNode/IKReport" % side, "/baxter_sim_kinematics_" + side)
     for side in SIDES}
-# Pictures and clouds are bytes to a reader; their cost is drawing them.
+# Pictures and clouds are only read as bytes; the renderer has the cost.
 BULKY = ("sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2")
 SAMPLE = 15
 LOOK_S = 1.0
@@ -32,7 +32,7 @@ _LENGTH = struct.Struct("<I")
 
 
 class _Reader:
-    """One connection: cuts what comes in into messages."""
+    """One connection: splits the stream into messages."""
 
     def __init__(self, connection, topic, node, message_type):
         connection.setblocking(False)
@@ -41,7 +41,7 @@ class _Reader:
         self._held = bytearray()
 
     def messages(self):
-        """The bytes of the messages that are complete. Raises ConnectionError where there will be no more."""
+        """The bytes of the complete messages. Raises ConnectionError if the connection has ended."""
         with contextlib.suppress(BlockingIOError):
             more = self.connection.recv(1 << 18)
             if not more:
@@ -56,10 +56,10 @@ class _Reader:
 
 
 class Watch(threading.Thread):
-    """Follows the topics of CORE all the time and a changing sample of the others. Context manager.
+    """Subscribes to the topics of CORE all the time and to a changing sample of the others. Context manager.
 
-    Attributes: ``found``, texts of what was wrong; ``counts``, messages read by topic; ``latest``, topic to its last
-    message; ``stamps``, ``still``: what is expected of the messages, set by the test.
+    Attributes: ``found``, texts of faults; ``counts``, messages read per topic; ``latest``, {topic: last message};
+    ``stamps``, ``still``: checks, configured by the test.
     """
 
     def __init__(self, lab, limits, tolerance, seed=0):
@@ -68,7 +68,7 @@ class Watch(threading.Thread):
         self._lab, self._limits, self._choose = lab, JointLimits(limits), random.Random(seed)
         self.found, self.counts, self.latest = [], collections.Counter(), {}
         self.stamps, self.still = Stamps(), Still(tolerance)
-        #: False while somebody rewrites the world by force, links of the robot included.
+        #: False while a test changes the world by force, including the robot's links.
         self.checks_limits = True
         self.simulated_s = 0.0
         self.watched_topics = set()
@@ -84,7 +84,7 @@ class Watch(threading.Thread):
         self.join()
 
     def take_found(self):
-        """What was wrong since the last call."""
+        """Return the faults found since the last call."""
         found, self.found = self.found, []
         return found
 
@@ -110,7 +110,7 @@ class Watch(threading.Thread):
             self._drop(reader)
 
     def _connect(self):
-        """Connect to what is missing, and now and then to another sample."""
+        """Connect to topics without a connection, and from time to time to another sample."""
         try:
             published = [row for row in self._lab.publications()
                          if row[1] not in BULKY and (row[0], row[2]) not in ECHOES]
@@ -127,7 +127,7 @@ class Watch(threading.Thread):
         for (topic, node), kind in wanted.items():
             if (topic, node) in self._readers:
                 continue
-            with contextlib.suppress(OSError, tcpros.ConnectionLost, KeyError):  # it is tried again
+            with contextlib.suppress(OSError, tcpros.ConnectionLost, KeyError):  # `connect` tries again
                 reader = _Reader(subscribe(self._lab, topic, kind, node), topic, node, kind)
                 self._readers[topic, node] = reader
                 self._selector.register(reader.connection, selectors.EVENT_READ, reader)
@@ -153,7 +153,7 @@ class Watch(threading.Thread):
             self.check(reader.topic, reader.type, message)
 
     def check(self, topic, message_type, message):
-        """Hold one message against everything that is expected."""
+        """Check one message against all expectations."""
         self.counts[topic] += 1
         self.watched_topics.add(topic)
         self.found += not_finite(topic, message_type, message)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tools at the root and the helpers here are no installed packages: tests import them from their folders."""
+"""The tools at the root and the helpers here are not installed packages: tests import them from their folders."""
 
 import sys
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A few of the poses of `bench verdict`: the cause is known by construction, and the verdict must name it."""
+"""A few of the poses of `bench verdict`: the cause is known by construction, and the diagnosis must name it."""
 import importlib
 import sys
 from pathlib import Path

@@ -11,6 +11,8 @@ import pytest
 
 from lab_tests import comma_locale
 
+pytestmark = pytest.mark.once
+
 ROOT = Path(__file__).resolve().parents[2]
 ROS_VARIABLES = ("ROS_MASTER_URI", "ROS_HOSTNAME", "ROS_IP")
 # Stand-ins for the resolver and the routing table, so that the tests need no network.
@@ -263,7 +265,7 @@ def test_a_set_up_in_another_shell_holds_up_nobody_while_nothing_has_changed(set
 def test_ones_own_package_that_does_not_build_locks_nobody_out_and_is_tried_once(set_up_copy):
     new_package(set_up_copy, "foo")
     (set_up_copy / "broken").touch()
-    for text in ("does not build", "going on without it"):
+    for text in ("does not build", "continuing without it"):
         done = baxter("sim", "echo", "works", script=set_up_copy / "baxter.sh")
         assert done.stdout == "works\n" and text in done.stderr
     assert builds(set_up_copy) == ["foo"]
@@ -313,3 +315,19 @@ def test_a_skeleton_does_not_wait_for_a_set_up(workspace, words, is_set_up):
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.split() == words
     assert (workspace / "was_set_up").exists() == is_set_up
+
+
+def test_the_doctor_of_a_fresh_clone_names_the_missing_set_up_and_no_variables(tmp_path):
+    shutil.copy(ROOT / "baxter.sh", tmp_path)
+    shutil.copytree(ROOT / "tools", tmp_path / "tools", ignore=shutil.ignore_patterns("__pycache__"))
+    done = subprocess.run(["bash", str(tmp_path / "baxter.sh"), "doctor"], env={"PATH": "/usr/bin:/bin"},
+                          capture_output=True, text=True)
+    assert done.returncode == 1, done.stderr
+    assert "./baxter.sh setup" in done.stdout and "ROS_MASTER_URI is" not in done.stdout
+
+
+def test_a_forgotten_sim_is_put_in_front_of_the_command():
+    done = subprocess.run(["bash", str(ROOT / "baxter.sh"), "roslaunch", "baxter_gazebo", "baxter_world.launch"],
+                          capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch?" in done.stderr

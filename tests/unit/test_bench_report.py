@@ -138,4 +138,4 @@ def test_runner_names_its_suites_and_refuses_others():
     done = subprocess.run([sys.executable, str(BENCH / "run.py"), "--list"], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0 and done.stdout.startswith("ik ")
     done = subprocess.run([sys.executable, str(BENCH / "run.py"), "chess"], capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2 and "no suite is called chess; there are ik, verdict, fk" in done.stderr
+    assert done.returncode == 2 and "unknown suite: chess; the suites are ik, verdict, fk" in done.stderr

@@ -13,6 +13,8 @@ from model_files.resources import ResourceFinder
 from urdf_model import parse_urdf
 from urdf_model.transforms import rigid
 
+pytestmark = pytest.mark.once
+
 
 @pytest.fixture(scope="module")
 def robot():
@@ -39,13 +41,13 @@ def locked(chain, q):
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_pair_that_touches_is_named(robot, checker, side):
-    """The pairs that overlap are those that the physics itself finds in a world of its own, a step later."""
+    """The overlapping pairs are those that the physics finds in a separate world, one step later."""
     chain = Chain.from_robot(robot, "base", side + "_gripper")
     world = World(find_mesh=ResourceFinder())
     model = world.spawn(robot, "baxter", static=True, self_collision_pairs=self_collision_pairs(robot.links),
                         mesh_cuts=MESH_CUTS)
     index = model.index(chain.joint_names)
-    checker.set_posture(model.joint_names, model.read_joints()[0])  # the other arm as in that world
+    checker.set_posture(model.joint_names, model.read_joints()[0])  # the other arm's posture in that world
     right, built = 0, 0
     for q in np.random.default_rng(61).uniform(chain.lower, chain.upper, (300, 7)):
         model.set_joint_positions(index, q)

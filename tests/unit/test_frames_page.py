@@ -34,7 +34,7 @@ def drawn_tree():
 def model_tree():
     """The same of the robot model, all variants together."""
     file = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
-    tree = {"world": ("", ""), "base": ("world", "")}  # this joint is the launch file's
+    tree = {"world": ("", ""), "base": ("world", "")}  # the launch file defines this joint
     for arguments in VARIANTS:
         robot = parse_urdf(xacro.process_file(file, mappings=dict(arguments)).toxml(), source=file)
         tree.update({joint.child: (joint.parent, joint.name if joint.movable else "")

@@ -30,7 +30,7 @@ def place(tmp_path_factory):
     made, moved = folder / "here", folder / "moved"
     build = ["catkin_make", "-C", str(ROOT), "install", f"-DCMAKE_INSTALL_PREFIX={made}",
              "--build", str(folder / "build"), f"-DCATKIN_DEVEL_PREFIX={folder / 'devel'}"]
-    # A space that is built beside this workspace's own would be laid over it.
+    # A space that is built with this workspace sourced would be an overlay of it.
     environment = {key: value for key, value in os.environ.items() if key != "CMAKE_PREFIX_PATH"}
     done = subprocess.run(build, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
@@ -60,4 +60,4 @@ def test_the_lab_runs(place, tmp_path):
                 assert done.returncode == 0, done.stdout + done.stderr + (tmp_path / "launch.txt").read_text()
         finally:
             os.killpg(lab.pid, signal.SIGINT)
-            assert lab.wait(20) == 0
+            assert lab.wait(60) == 0

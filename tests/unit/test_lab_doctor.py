@@ -31,6 +31,8 @@ from lab_doctor.probe import (
     users_python,
 )
 
+pytestmark = pytest.mark.once
+
 ENABLED = {"enabled": True, "stopped": False, "error": False}
 HEALTHY_LAB = Facts(
     root="/ws",
@@ -104,7 +106,7 @@ SICK = {
     ),
     "address of another machine": (
         replace(ON_ROBOT, addresses={**ON_ROBOT.addresses, "10.0.0.7": ("10.0.0.7", False)}),
-        "network", "no address of this machine", "unset ROS_IP",
+        "network", "not an address of this machine", "unset ROS_IP",
     ),
     "localhost to a robot": (
         with_variables(ON_ROBOT, ROS_HOSTNAME="localhost", ROS_IP=""), "network", "cannot call", "unset ROS_HOSTNAME",
@@ -165,7 +167,7 @@ SICK = {
         planning(contacts=[("left_wrist", "table")]), "move_group", "left_wrist and table touch", "disable_collisions",
     ),
     "a camera that is not there": (
-        planning(sensors=[Sensor("/points", [], False)]), "move_group", "nobody publishes /points", "sensors_3d.yaml",
+        planning(sensors=[Sensor("/points", [], False)]), "move_group", "no node publishes /points", "sensors_3d.yaml",
     ),
     "a camera that is silent": (
         planning(sensors=[Sensor("/points", ["/camera"], False)]),
@@ -269,7 +271,7 @@ def test_questions_that_take_long_are_named_and_counted_as_open():
     def refuses():
         raise TimeoutError
 
-    # Long enough for immediate answers on a busy machine.
+    # Immediate answers arrive within this time, also on a busy machine.
     answers, timed_out = answer_all({"quick": lambda: 1, "late": late, "refuses": refuses}, 3.0, said.append, 1.5)
     go_on.set()
     assert answers == {"quick": 1} and timed_out == {"late", "refuses"}
@@ -334,7 +336,7 @@ def silent_server():
 def test_hung_master_does_not_hang_the_doctor(silent_server, tmp_path):
     started = time.monotonic()
     facts = gather(tmp_path, {"ROS_MASTER_URI": f"http://localhost:{silent_server}", "ROS_HOSTNAME": "localhost"})
-    assert time.monotonic() - started < 5.0
+    assert time.monotonic() - started < 30.0
     assert facts.master is None or facts.master.error
     assert facts.topics is None
     assert not facts.is_built

@@ -14,6 +14,8 @@ from lab_tests import quota
 from lab_tests.discovery import select, take_inventory
 from lab_tests.quota import Quota, QuotaError
 
+pytestmark = pytest.mark.once
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

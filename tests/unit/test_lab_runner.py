@@ -11,9 +11,12 @@ from pathlib import Path
 
 import pytest
 
+import run_tests
 from lab_tests import comma_locale, processes, rostests
 from lab_tests.discovery import Rostest, SelectionError, select, take_inventory
 from lab_tests.results import read_junit, read_rostest_results
+
+pytestmark = pytest.mark.once
 
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = "<package format='3'><name>%s</name></package>"
@@ -74,7 +77,7 @@ def test_long_brings_in_long_rostests(workspace):
 @pytest.mark.parametrize(
     ("name", "units", "rostest_names"),
     [
-        ("alpha", ["test_alpha.py"], ["alpha.test"]),  # a package, though a test file is called so too
+        ("alpha", ["test_alpha.py"], ["alpha.test"]),  # a package that has the same name as a test file
         ("beta", ["test_beta.py"], []),
         ("workspace_tests", ["test_whole.py"], ["whole.test"]),
         ("test_alpha", ["test_alpha.py"], []),
@@ -113,7 +116,7 @@ def test_unknown_name_lists_the_packages(workspace):
         ({"rostest-x.xml": RAN, "T.xml": PASSING}, 2, 0),
         ({"rostest-x.xml": RAN, "T.xml": FAILING}, 0, 1),
         ({"rostest-x.xml": CRASHED}, 0, 1),
-        ({"rostest-x.xml": RAN}, 0, 1),  # the test node ran to its end and tested nothing
+        ({"rostest-x.xml": RAN}, 0, 1),  # the test node ended normally and tested nothing
         ({}, 0, 1),
         ({"rostest-x.xml": RAN, "T.xml": "<testsuite"}, 0, 1),  # its writer died half-way
     ],
@@ -137,7 +140,7 @@ def test_processes_left_behind_are_found_and_ended():
     try:
         assert list(processes.wait_until_gone(run_id, 0.2)) == [child.pid]
         processes.kill_all(run_id)
-        assert child.wait(5) != 0
+        assert child.wait(60) != 0
         assert processes.wait_until_gone(run_id, 5.0) == {}
     finally:
         child.kill()
@@ -145,7 +148,7 @@ def test_processes_left_behind_are_found_and_ended():
 
 
 FAKE_ROSTEST = """#!/bin/bash
-# Plays one of rostest's fates; the .test file's name says which.
+# Behaves like rostest in the way that the .test file's name says.
 case $1 in
     *leaves.test) setsid sleep 60 & ;;
     *hangs.test) sleep 60 ;;
@@ -156,15 +159,15 @@ echo "<testsuite><testcase name='a' classname='T'/></testsuite>" >$ROS_TEST_RESU
 
 
 @pytest.mark.parametrize(
-    ("name", "passed", "failed", "detail"),
+    ("name", "limit_s", "passed", "failed", "detail"),
     [
-        ("works", 1, 0, None),
-        ("leaves", 1, 1, "left processes behind"),
-        ("hangs", 0, 1, "not finished after"),
-        ("dies", 0, 1, "no test"),
+        ("works", 60.0, 1, 0, None),
+        ("leaves", 60.0, 1, 1, "left processes behind"),
+        ("hangs", 1.0, 0, 1, "not finished after"),
+        ("dies", 60.0, 0, 1, "no test"),
     ],
 )
-def test_every_fate_of_a_rostest_is_counted(tmp_path, monkeypatch, name, passed, failed, detail):
+def test_every_fate_of_a_rostest_is_counted(tmp_path, monkeypatch, name, limit_s, passed, failed, detail):
     fake = tmp_path / "bin" / "rostest"
     fake.parent.mkdir()
     fake.write_text(FAKE_ROSTEST)
@@ -172,7 +175,7 @@ def test_every_fate_of_a_rostest_is_counted(tmp_path, monkeypatch, name, passed,
     monkeypatch.setenv("PATH", f"{fake.parent}:{os.environ['PATH']}")
     monkeypatch.setattr(rostests, "LEFTOVER_GRACE_S", 0.2)
     test = Rostest(tmp_path / f"{name}.test", "alpha", False)
-    tally = rostests.run(test, tmp_path / "work", time_limit_s=1.0)
+    tally = rostests.run(test, tmp_path / "work", time_limit_s=limit_s)
     assert (tally.passed, tally.failed) == (passed, failed)
     assert detail is None or detail in tally.details[0]
 
@@ -186,6 +189,22 @@ def test_a_rostest_beside_others_ends_with_them(tmp_path, monkeypatch):
     ending.set()
     with pytest.raises(rostests.Ended):
         rostests.run(Rostest(tmp_path / "hangs.test", "alpha", False, True), tmp_path / "work", 60.0, ending)
+
+
+def test_rostests_with_the_longest_limits_begin_first(tmp_path, monkeypatch):
+    begun = []
+    monkeypatch.setattr(run_tests, "BESIDE", 1)
+    monkeypatch.setattr(rostests, "run", lambda test, *_, **__: begun.append(test.path.name))
+    tests = []
+    for name, limit_s in (("short", 60), ("long", 900), ("middle", 300)):
+        path = tmp_path / name
+        path.write_text(f"<launch><test time-limit='{limit_s}'/></launch>")
+        tests.append(Rostest(path, "alpha", False, True))
+    beside = run_tests.Beside(tests)
+    for test in beside.tests:
+        beside.tally(test)
+    beside.end()
+    assert begun == [test.path.name for test in beside.tests] == ["long", "middle", "short"]
 
 
 def test_comma_locale_is_in_force(tmp_path):

@@ -11,7 +11,8 @@ import pytest
 import notebook as tool
 
 ROOT = Path(__file__).resolve().parents[2]
-NAMES = ["1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro", "5_moving_baxter", "6_rotating_the_gripper", "7_waving"]
+NAMES = ["1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro", "5_moving_baxter", "6_rotating_the_gripper", "7_waving",
+         "8_before_the_real_robot"]
 
 
 def test_there_is_a_notebook_for_every_part_of_the_courses():

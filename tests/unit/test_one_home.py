@@ -23,7 +23,7 @@ COPIES = (LIBRARY, IK_LAUNCH)
 FOR_READERS = ("src/rf_labs/rf_checks/exercises/", ".md", ".rst", ".ipynb", ".svg")
 #: Files about the physical robot's own data.
 DESCRIPTION = ("src/baxter/baxter_common/baxter_description/", "src/baxter/baxter_common/rethink_ee_description/")
-#: Parts of the workspace that know no Baxter: vehicles have left and right wheels.
+#: Parts of the workspace without Baxter: vehicles have left and right wheels.
 NO_BAXTER = ("src/bullet_gazebo/", "src/ros_control/", "src/probot/")
 #: Tests contain expected values on purpose.
 EXPECTATIONS = re.compile(r"src/.*/test/|tests/unit/|tests/rostest/(custom_gripper|grippers)\.py")

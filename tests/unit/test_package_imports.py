@@ -83,7 +83,7 @@ def test_package_xml_names_what_is_imported():
 
 
 def circle(edges):
-    """One circle in a graph, {node: set of nodes}, as a list of nodes; empty where there is none."""
+    """One circle in a graph, {node: set of nodes}, as a list of nodes; empty if there is none."""
     done = set()
 
     def walk(node, path):

@@ -66,7 +66,7 @@ def run_page(page, kind, folder):
         if block.kind == "file":
             page_blocks.write_file(block, folder)
         elif block.kind == kind:
-            # No master: what needs one is marked `lab`.
+            # No master: blocks that need one are marked `lab`.
             page_blocks.run(block, folder, LIMIT_S[kind], ROS_MASTER_URI="http://localhost:1")
 
 
@@ -131,7 +131,7 @@ def test_a_command_that_fails_before_its_end_or_takes_too_long_is_noticed(tmp_pa
     failing, slow = page_blocks.marked_blocks("p.md", "```bash run\nfalse\ntrue\n```\n```bash run\nsleep 30\n```\n")
     with pytest.raises(AssertionError, match="ends with 1"):
         page_blocks.run(failing, tmp_path, 30)
-    with pytest.raises(AssertionError, match="not through"):
+    with pytest.raises(AssertionError, match="has not ended"):
         page_blocks.run(slow, tmp_path, 0.2)
 
 

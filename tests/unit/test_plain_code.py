@@ -13,7 +13,7 @@ MOST_PARAMETERS = 7
 
 
 def product_code():
-    """(file, text) of every Python file that is no test."""
+    """(file, text) of every Python file that is not a test."""
     return [(name, (ROOT / name).read_text(encoding="utf-8")) for name in own_files()
             if is_python(name) and not is_in_tests(name)]
 

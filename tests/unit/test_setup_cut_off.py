@@ -83,13 +83,13 @@ whole_work() {
 }
 if [[ $line == $(cat "$here/hang" 2>/dev/null) ]]; then
     half_work
-    # No process of its own: bash goes on when an interrupt hits a command that ends well.
+    # Not a child process: bash continues if an interrupt hits a command that ends with success.
     : >"$here/hanging"
     exec sleep 300
 fi
 if [[ $line == $(cat "$here/fail" 2>/dev/null) ]]; then
     cat "$here/words" >&2
-    # A command that ran to its end has tidied up; on a full disk it stopped half-way.
+    # A command that ended by itself has removed its partial results; on a full disk it stopped half-way.
     if grep -q "No space left" "$here/words"; then half_work; fi
     exit 9
 fi
@@ -130,7 +130,7 @@ def start(root):
 
 
 def finish(process):
-    """(exit status, what it said)"""
+    """(exit status, output)"""
     try:
         said, _ = process.communicate(timeout=LIMIT_S)
     finally:
@@ -180,7 +180,7 @@ def test_a_failure_names_step_cause_command_and_log(workspace, step):
     status, said = finish(start(root))
     assert status != 0
     assert f"failed in step '{TITLES[step]}'" in said
-    assert "cause:   no way to the network" in said and "Temporary failure in name resolution" in said
+    assert "cause:   the network cannot be reached" in said and "Temporary failure in name resolution" in said
     assert f"log:     {root}/.baxter/logs/{step}.log" in said
     (fakes / "fail").unlink()
     status, said = finish(start(root))
@@ -204,7 +204,7 @@ def test_a_step_that_refuses_to_start_is_not_cut_off(workspace):
     root, _ = workspace
     (root / "theirs.rosinstall").rename(root / "elsewhere")
     status, said = finish(start(root))
-    assert status == 1 and "cannot go on in step 'other people's packages': there is no file" in said
+    assert status == 1 and "cannot continue in step 'other people's packages': there is no file" in said
     (root / "elsewhere").rename(root / "theirs.rosinstall")
     status, said = finish(start(root))
     assert status == 0 and "cut off" not in said, said
@@ -277,11 +277,12 @@ def test_an_optional_package_is_asked_for_where_the_system_has_it(workspace):
 SAYINGS = [
     (1, "ERROR: Could not install packages due to an OSError: [Errno 28] No space left on device", "the disk is full"),
     (100, "E: You don't have enough free space in /var/cache/apt/archives/.", "the disk is full"),
-    (100, "Err:1 http://archive.example\n  Temporary failure resolving 'archive.example'", "no way to the network"),
-    (1, "NewConnectionError('Failed to establish a new connection: [Errno -2]", "no way to the network"),
+    (100, "Err:1 http://archive.example\n  Temporary failure resolving 'archive.example'",
+     "the network cannot be reached"),
+    (1, "NewConnectionError('Failed to establish a new connection: [Errno -2]", "the network cannot be reached"),
     (1, "SSLError(SSLCertVerificationError(1, '[SSL: CERTIFICATE_VERIFY_FAILED]", "a certificate that is not trusted"),
-    (100, "E: Unable to locate package ros-desktop", "this system's package sources lack something"),
-    (1, "cannot create directory 'build': Permission denied", "files that may not be written"),
+    (100, "E: Unable to locate package ros-desktop", "a package is missing in the system's sources"),
+    (1, "cannot create directory 'build': Permission denied", "no permission to write files"),
     (137, "c++: fatal error", "it was killed"),
     (2, "CMake Error at CMakeLists.txt:7\n-- Configuring incomplete, errors occurred!", "-- Configuring incomplete"),
 ]

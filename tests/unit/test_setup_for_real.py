@@ -103,7 +103,7 @@ def make_overlay(folder):
 
 def leave_free(disk, folder, free_kb):
     """Make the file system ``disk`` so small that ``free_kb`` [kB] are left."""
-    # Set-up begins each log anew: those of steps that had much to say would make room for the step that is meant.
+    # Set-up overwrites each log: those of steps that had much to say would make room for the step that is meant.
     for log in (folder / ".baxter" / "logs").glob("*.log"):
         log.write_text("")
     used = subprocess.run(["df", "-k", "--output=used", disk], capture_output=True, text=True, check=True)
@@ -131,7 +131,7 @@ def test_without_network_and_killed_at_every_step(tmp_path):
     folder = clone(tmp_path / "ws")
     status, said = set_up(folder, prefix=["unshare", "-n"])
     assert status != 0
-    assert_failed(said, folder, "pip", "no way to the network")
+    assert_failed(said, folder, "pip", "the network cannot be reached")
     overlay = ["--with", str(make_overlay(tmp_path))]
     shutil.rmtree(folder / ".venv")
     for step in KILL_AFTER_S:

@@ -82,8 +82,8 @@ def test_growth_is_told_by_what_grew(modules):
 def test_patience_counts_work_first(modules):
     patience = modules.invariants.Patience(cpu_s=10.0, wall_s=100.0)
     assert patience.check("/s", 9.0, 99.0) == []
-    assert "10 s of its node's computing" in patience.check("/s", 11.0, 12.0)[0]
-    assert "in which its node computed for 0.1 s" in patience.check("/s", 0.1, 101.0)[0]
+    assert "10 s of its node's CPU time" in patience.check("/s", 11.0, 12.0)[0]
+    assert "in which its node used 0.1 s of CPU time" in patience.check("/s", 0.1, 101.0)[0]
 
 
 def test_emergency_stop(modules):

@@ -43,7 +43,7 @@ def test_undamaged_bytes_are_what_genpy_reads_and_writes(modules, message_class)
     spec, read = spec_of(modules, message_class), 0
     for style, value, data in draws(modules, message_class, 200):
         if style == "damaged" or not all(map(is_clean, modules.spec.leaves(spec, value))):
-            continue  # genpy replaces what is no UTF-8
+            continue  # genpy replaces what is not UTF-8
         message, buffer = message_class(), io.BytesIO()
         message.deserialize(data)
         message.serialize(buffer)

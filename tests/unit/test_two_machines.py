@@ -109,7 +109,7 @@ def cable():
                 cleanup.callback(ip, "netns", "delete", name)
             ip("link", "add", "cable", "netns", names[0], "type", "veth", "peer", "name", "cable", "netns", names[1])
         except subprocess.CalledProcessError as error:
-            pytest.skip(f"this machine lets not even root lay a cable between two network namespaces: {error.stderr}")
+            pytest.skip(f"root may not connect two network namespaces on this machine: {error.stderr}")
         for name, address in zip(names, (SERVER_ADDRESS, CLIENT_ADDRESS), strict=True):
             ip("-n", name, "address", "add", f"{address}/24", "dev", "cable")
             for link in ("lo", "cable"):

@@ -32,6 +32,13 @@ def test_the_last_line_begins_as_ever_and_counts_what_did_not_run():
     assert summary(Tally(passed=1, failed=1)) == "1 passed, 1 failed, 0 skipped, 0 long not run"
 
 
+def test_failures_are_told_once_more_before_the_last_line():
+    lines = summary(Tally(failed=1, details=["a.b\nassert 1 == 2"])).splitlines()
+    assert lines == ["failed:", "    a.b", "    assert 1 == 2", "0 passed, 1 failed, 0 skipped, 0 long not run"]
+    lines = summary(Tally(failed=25, details=["x" * 5000] * 25)).splitlines()
+    assert len(lines) == 23 and lines[-2] == "    and 5 more" and len("".join(lines)) < 30_000
+
+
 @pytest.mark.parametrize(("reason", "skipped", "failed"), [
     ("not root", 2, 0), ("", 1, 1), ("unconditional skip", 1, 1)])
 def test_a_skip_needs_a_reason(tmp_path, reason, skipped, failed):

@@ -9,12 +9,14 @@ from workspace_tree import ROOT, own_files
 pytestmark = pytest.mark.tree
 
 LIST, HERE = "CONTRIBUTING.md", "tests/unit/test_words.py"
-#: File -> words in it that others chose: names in messages, a part of the machine.
+#: File -> words in it that others chose: names in messages, a part of the machine, licences.
 OF_OTHERS = {
     "src/baxter/baxter_common/baxter_core_msgs/msg/AssemblyState.msg": {"brain"},
     "src/baxter/baxter_simulator/baxter_sim_hardware/src/baxter_sim_hardware/robot_state.py": {"brain"},
+    "LICENSE": {"shall"},
+    "tests/bench/recordings/LICENSE.klampt-examples": {"shall"},
 }
-#: History keeps the names of its time.
+#: Historical texts keep their old names.
 HISTORY = ("CHANGELOG.rst", "docs/performance_archive.md", "docs/decisions/")
 BINARY = (".png", ".dae", ".stl", ".svg", ".jpg", ".json", ".bag", ".rest")
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lab_testing.skipping import skip
+from lab_testing.waiting import wait_until
 
 WIDTH, HEIGHT = 1200, 800
 #: Why a test of windows is skipped.
@@ -60,17 +61,19 @@ class VirtualScreen:
         part: function that returns the relevant part of a picture, or None while it does not exist yet.
         Raises AssertionError after timeout_s.
         """
-        deadline = time.monotonic() + timeout_s
         last, since = None, time.monotonic()
-        while time.monotonic() < deadline:
+
+        def still_picture():
+            nonlocal last, since
             picture = self.picture()
             seen = part(picture)
             if seen is None or last is None or not np.array_equal(seen, last):
                 last, since = seen, time.monotonic()
             elif time.monotonic() - since > still_s:
-                return picture
-            time.sleep(0.25)
-        raise AssertionError("the screen did not come to rest within %g s" % timeout_s)
+                return (picture,)
+            return None
+
+        return wait_until(still_picture, "the screen to come to rest", timeout_s, 0.25)[0]
 
     def close(self):
         self._server.terminate()

@@ -5,6 +5,8 @@ import threading
 import time
 
 POLL_S = 0.01
+# Only keeps a test from hanging: so long that no busy machine fails it.
+DEADLINE_S = 90.0
 # `./baxter.sh test --busy` gives the tests a part of one core, and sets the factor of their time limits.
 STRETCH = float(os.environ.get("LAB_TEST_STRETCH", "1"))
 
@@ -14,7 +16,7 @@ def stretched(seconds):
     return seconds * STRETCH
 
 
-def wait_until(condition, what="the condition", timeout_s=20.0, interval_s=POLL_S):
+def wait_until(condition, what="the condition", timeout_s=DEADLINE_S, interval_s=POLL_S):
     """Call ``condition()`` every ``interval_s`` [s] of wall time and return its first true result.
 
     what: description of the condition, for the error; a function is called then, to report the progress. Raises
@@ -33,7 +35,20 @@ def wait_until(condition, what="the condition", timeout_s=20.0, interval_s=POLL_
         time.sleep(interval_s)
 
 
-def wait_for_publishers(subscriber, *nodes, timeout_s=20.0):
+def beats(rate_hz, is_over):
+    """Yield at ``rate_hz`` of wall time until ``is_over()`` is true: the pace of a part that publishes.
+
+    Beats that were missed are left out.
+    """
+    period_s = 1.0 / rate_hz
+    beat = time.monotonic()
+    while not is_over():
+        yield
+        beat = max(beat + period_s, time.monotonic())
+        time.sleep(max(0.0, beat - time.monotonic()))
+
+
+def wait_for_publishers(subscriber, *nodes, timeout_s=DEADLINE_S):
     """Wait until ``subscriber`` (a ``rospy.Subscriber``) is connected to these nodes, by their absolute names; others
     do not count.
 
@@ -45,7 +60,7 @@ def wait_for_publishers(subscriber, *nodes, timeout_s=20.0):
     wait_until(lambda: not missing(), lambda: "%s on %s" % (", ".join(sorted(missing())), subscriber.name), timeout_s)
 
 
-def wait_for_message(topic, message_class, wanted=lambda message: True, timeout_s=60.0):
+def wait_for_message(topic, message_class, wanted=lambda message: True, timeout_s=DEADLINE_S):
     """The first message on ``topic`` for which ``wanted(message)`` is true.
 
     Raises AssertionError after ``timeout_s`` [s] of wall time.

@@ -8,7 +8,7 @@ import pytest
 
 from lab_testing import subtests, waiting
 from lab_testing.processes import is_alive, living
-from lab_testing.waiting import wait_for_publishers, wait_until
+from lab_testing.waiting import beats, wait_for_publishers, wait_until
 
 
 def test_the_first_true_answer_is_returned():
@@ -37,6 +37,24 @@ def test_the_condition_is_asked_once_more_after_the_deadline(monkeypatch):
     assert wait_until(lambda: asked.append(1) or len(asked) == 2, timeout_s=1.0)
     with pytest.raises(AssertionError):
         wait_until(lambda: asked.append(1) or len(asked) == 5, timeout_s=1.0)
+
+
+def test_beats_keep_their_rate_and_leave_out_missed_ones(monkeypatch):
+    class Clock:
+        now = 0.0
+
+        def monotonic(self):
+            return self.now
+
+        def sleep(self, seconds):
+            self.now += seconds
+
+    clock, seen = Clock(), []
+    monkeypatch.setattr(waiting, "time", clock)
+    for _ in beats(100.0, lambda: len(seen) == 5):
+        seen.append(round(clock.now, 6))
+        clock.now += 0.025 if len(seen) == 2 else 0.002  # the second is slow
+    assert seen == [0.0, 0.01, 0.035, 0.045, 0.055]
 
 
 def test_a_share_of_the_machine_makes_deadlines_longer(monkeypatch):
