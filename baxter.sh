@@ -23,10 +23,15 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
   test [NAMES] [--long] lint, unit tests and rostests. NAMES: packages, test files, or pytest arguments such as -k;
                         --busy[=PERCENT]: with that share of one core (default 40), the main flows
   notebook [NAME]       the labs' notebooks in a browser: starts Jupyter on this machine alone and prints the address
-  check LAB PROGRAM     run a student's program in a lab of its own and say how well it does its exercise; --list, --help
+  web                   the lab's page in a browser, beside a running lab: prints its address; --help
+  check LAB PROGRAM     run a student's program in a separate lab and judge the result; --list, --help
+  grade FOLDER [LAB [EXERCISE…]]
+                        judge the submissions of a class, several at a time, and write results and pages; --help
   handout FOLDER        make the students' copy of this workspace: without solutions, and without what reveals them
-  bench [NAMES]         measure where the stack stands, beside its peers; --list says which suites there are
-  doctor [HOST]         look for what is wrong with master, network, clock, build, Python and robot, and say the fix
+  batch JOB --seeds A:B run a job once for each seed on all processors; --list names the jobs, --help the options
+  bench [NAMES]         run the benchmarks, beside other libraries; --list shows the suites
+  conformance [HOST]    compare the robot with a physical Baxter's interface, and print a score by group
+  doctor [HOST]         check master, network, clock, build, Python and robot; print a fix for each problem
   help                  this text
 
   ./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch
@@ -72,6 +77,8 @@ main() {
             LAB_USERS_PYTHON=$(command -v python3)
             export LAB_USERS_PYTHON
             use_build_if_there
+            # The build's hooks set it; without a build one fault is enough.
+            if [[ -z ${ROS_MASTER_URI:-} ]]; then use_loopback; fi
             if ! command -v python3 >/dev/null; then
                 echo "There is no python3 on this machine yet. fix: ./baxter.sh setup"
                 exit 1
@@ -91,6 +98,13 @@ main() {
             use_build || exit
             exec python3 "$LAB_ROOT/src/rf_labs/rf_checks/scripts/check" "$@"
             ;;
+        grade)
+            bring_up_to_date || exit
+            use_loopback
+            use_build || exit
+            # -P: no module is taken from the current folder, which may hold submissions.
+            exec python3 -P -m rf_grading "$@"
+            ;;
         handout)
             PYTHONPATH=$LAB_ROOT/src/rf_labs/rf_checks/src exec python3 -m rf_checks.handout "$@"
             ;;
@@ -100,11 +114,36 @@ main() {
             use_build || exit
             exec python3 "$LAB_ROOT/tests/bench/run.py" "$@"
             ;;
+        conformance)
+            # Without a host, or with options first: the simulator on this machine.
+            if [[ $# -gt 0 && $1 != -* && $1 != localhost ]]; then
+                use_robot "$1" || exit
+                shift
+            else
+                [[ ${1:-} == localhost ]] && shift
+                use_loopback
+            fi
+            bring_up_to_date || exit
+            use_build || exit
+            exec rosrun baxter_conformance conformance "$@"
+            ;;
+        batch)
+            bring_up_to_date || exit
+            use_loopback
+            use_build || exit
+            exec python3 -m lab_batch "$@"
+            ;;
         notebook)
             bring_up_to_date || exit
             use_loopback
             use_build || exit
             exec python3 "$LAB_ROOT/tools/notebook.py" "$@"
+            ;;
+        web)
+            bring_up_to_date || exit
+            use_loopback
+            use_build || exit
+            exec rosrun lab_web lab_web "$@"
             ;;
         sim | local | localhost | 127.*)
             local command=("$@")
@@ -124,6 +163,10 @@ main() {
         -*)
             echo "baxter.sh: unknown option '$mode'" >&2
             usage >&2
+            exit 2
+            ;;
+        roslaunch | rosrun | rostopic | rosnode | rosservice | rosparam | rosmsg | rossrv | rosbag | rviz | python | python3 | catkin_make)
+            echo "baxter.sh: did you mean ./baxter.sh sim $mode $*?" >&2
             exit 2
             ;;
         *)

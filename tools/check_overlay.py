@@ -13,7 +13,7 @@ SHOWN = 10
 
 
 def is_python(path: Path) -> bool:
-    """By its suffix, or by a first line that starts a Python interpreter."""
+    """Whether a file is Python: by its suffix, or by a first line that starts a Python interpreter."""
     if path.suffix == ".py":
         return True
     if path.suffix:
@@ -44,8 +44,8 @@ def main(argv):
     if not found:
         return 0
     print(
-        f"{len(found)} files in {folder} are not Python 3, and this system has no other. Take a branch or fork of that "
-        f"package that is, or convert it (2to3 does most), or remove its folder.",
+        f"{len(found)} files in {folder} are not Python 3. Take a Python 3 branch or fork of that "
+        f"package, or convert it (2to3 does most of it), or remove its folder.",
         file=sys.stderr,
     )
     return 1

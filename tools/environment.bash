@@ -3,7 +3,7 @@
 
 DEFAULT_MASTER_URI=http://localhost:11311
 # The folders of src whose packages are the lab's; all others are the user's own.
-LAB_FOLDERS=(baxter bullet_gazebo compat cwru_baxter lab_testing lab_tools moveit overlay probot rf_labs ros_control workspace_tests)
+LAB_FOLDERS=(baxter bullet_gazebo compat cwru_baxter lab_testing lab_tools moveit overlay probot rf_labs ros_control web workspace_tests)
 
 # host_of URI: the host in http://host:port/
 host_of() {
@@ -20,7 +20,7 @@ is_loopback() {
     esac
 }
 
-# Simulator on this machine: everything announces itself as localhost and so listens on 127.0.0.1 only.
+# Simulator on this machine: all nodes announce themselves as localhost and so listen on 127.0.0.1 only.
 use_loopback() {
     if [[ -z ${ROS_MASTER_URI:-} ]] || ! is_loopback "$(host_of "$ROS_MASTER_URI")"; then
         ROS_MASTER_URI=$DEFAULT_MASTER_URI
@@ -29,8 +29,8 @@ use_loopback() {
     export ROS_MASTER_URI ROS_HOSTNAME=localhost
 }
 
-# use_public [ADDRESS]: the simulator on this machine, for other machines too: everything announces an address that they
-# can call. ADDRESS, or ROS_IP or ROS_HOSTNAME where one is set, or the address this machine has towards its network.
+# use_public [ADDRESS]: the simulator on this machine, for other machines too: all nodes announce an address that they
+# can connect to: ADDRESS, or ROS_IP or ROS_HOSTNAME if set, or this machine's address in its network.
 use_public() {
     local address=${1:-} variable=ROS_IP port=11311
     if [[ -z $address && -n ${ROS_HOSTNAME:-} ]] && ! is_loopback "$ROS_HOSTNAME"; then
@@ -58,7 +58,7 @@ use_public() {
     echo "Open to every machine that reaches $address (docs/security.md). There: ./baxter.sh $address" >&2
 }
 
-# use_robot HOST: a master on another machine, which must be able to call us back at the address we announce.
+# use_robot HOST: a master on another machine, which must be able to connect to the address that we announce.
 use_robot() {
     local host=$1 address source_address
     address=$(getent ahostsv4 "$host" | awk '{ print $1; exit }')
@@ -82,7 +82,7 @@ use_robot() {
     export ROS_IP=$source_address
 }
 
-# own_folders: the folders of src that are not the lab's and have packages, one a line
+# own_folders: the folders of src that are not the lab's and have packages, one per line
 own_folders() {
     local folder
     for folder in "$LAB_ROOT"/src/*/; do
@@ -161,12 +161,12 @@ build_own() {
     if [[ -z $strict ]] && ! names_own "$@"; then
         case ${1:-} in rosrun | roslaunch | rosnode | rosservice | rosparam | rviz | roscore) return 0 ;; esac
         if [[ -f $state/own_failed && $(<"$state/own_failed") == "$now" ]]; then
-            echo "baxter.sh: a package of your own does not build; going on without it. Its log: .baxter/logs/own-NAME.log" >&2
+            echo "baxter.sh: a package of your own does not build; continuing without it. Its log: .baxter/logs/own-NAME.log" >&2
             return 0
         fi
         exec 8>>"$state/own_lock"
         flock -n 8 || {
-            echo "baxter.sh: another shell is building a package; going on with what was built before." >&2
+            echo "baxter.sh: another shell is building a package; continuing with the previous build." >&2
             exec 8>&-
             return 0
         }
@@ -197,14 +197,14 @@ set_up_the_lab() {
         # A failed set-up fails again; not every command should wait for it.
         printf '%s\n' "$now" >"$state/failed"
     fi
-    echo "baxter.sh: set-up has failed; going on with the build from before. ./baxter.sh setup tries again." >&2
+    echo "baxter.sh: set-up has failed; continuing with the previous build. ./baxter.sh setup tries again." >&2
 }
 
 has_earlier_build() {
     [[ -f $LAB_ROOT/.baxter/build.stamp && -f $LAB_ROOT/devel/setup.bash && -x $LAB_ROOT/.venv/bin/python3 ]]
 }
 
-# Take on the environment of the built workspace; its hooks put the virtual environment first in PATH.
+# Use the environment of the built workspace; its hooks put the virtual environment first in PATH.
 use_build() {
     # Left-over settings of another workspace would be chained in front of ours.
     unset CMAKE_PREFIX_PATH ROS_PACKAGE_PATH PYTHONPATH PYTHONHOME ROS_DISTRO

@@ -22,9 +22,9 @@ STATE = ROOT / ".baxter" / "jupyter"
 KERNEL = "baxter"
 FIRST_PORT = 8888
 START_TIMEOUT_S = 60.0
-# Settings of JupyterLab's own, as defaults: it would ask each new user whether to fetch news.
+# Default settings of JupyterLab: without them it asks each new user whether to fetch news.
 SETTINGS = {"@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False}}
-# Time for the end of simulators that notebooks have started: as long as roslaunch may need.
+# Time limit for the end of simulators that notebooks have started: as long as roslaunch may need.
 STOP_TIMEOUT_S = 40.0
 
 
@@ -38,7 +38,7 @@ def notebooks() -> list[Path]:
 
 
 def find(name: str) -> Path:
-    """The one notebook whose name contains these letters; raises NotebookError for none or several."""
+    """Return the only notebook whose name contains these letters; raises NotebookError for none or several."""
     wanted = name.removesuffix(".ipynb")
     exact = [path for path in notebooks() if path.stem == wanted]
     found = exact or [path for path in notebooks() if wanted in path.stem]
@@ -77,11 +77,11 @@ def free_port(first: int) -> int:
     try:
         return ports.free_port(range(first, first + 100))
     except OSError as error:
-        raise NotebookError(f"{error.strerror}, or name another one by --port") from error
+        raise NotebookError(f"{error.strerror}, or name another port by --port") from error
 
 
 def command(port: int) -> list[str]:
-    """JupyterLab on loopback. It looks for no updates, asks nothing, and writes warnings only."""
+    """JupyterLab on loopback. It checks for no updates, asks no questions, and prints only warnings."""
     options = {
         "ServerApp.ip": "127.0.0.1", "ServerApp.port": port, "ServerApp.port_retries": 0,
         "ServerApp.open_browser": False, "ServerApp.root_dir": str(ROOT), "ServerApp.answer_yes": True,
@@ -101,7 +101,7 @@ def wait_for(url: str, server: subprocess.Popen):
             return
         except OSError:
             time.sleep(0.1)
-    raise NotebookError("Jupyter did not start; what it said stands above")
+    raise NotebookError("Jupyter did not start; its messages are above")
 
 
 def serve(page: str, first_port: int) -> int:
@@ -110,7 +110,7 @@ def serve(page: str, first_port: int) -> int:
     write_kernel(STATE)
     # In the environment and not on the command line, since every user of the machine can read the latter.
     marked = {**environment(STATE), "JUPYTER_TOKEN": token, processes.NOTEBOOK_MARKER: run_id}
-    # A session of its own: Ctrl-C reaches only this process, which then ends the server once.
+    # A separate session: Ctrl-C reaches only this process, which then ends the server once.
     server = subprocess.Popen(command(port), env=marked, stdin=subprocess.DEVNULL, start_new_session=True)
     try:
         wait_for(f"http://127.0.0.1:{port}/api?token={token}", server)

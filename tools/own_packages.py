@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Build the packages in src that are not the lab's, each by itself into the devel space; nothing else is touched.
+"""Build the packages in src that are not the lab's, one by one into the devel space; nothing else changes.
 
     own_packages.py ROOT FOLDER…
 
 A package that has not changed since its last build is skipped, unless one of the user's own packages that it depends on
-was built. Exit code 0: all are built; 1: one is not, and the lines on standard error name it and its log.
+was built. Exit code 0: all are built; 1: a package does not build, and standard error names it and its log.
 """
 
 import hashlib
@@ -28,9 +28,9 @@ def packages(root: Path, folders):
     found = []
     for folder in folders:
         for path, package in topological_order(str(root / "src" / folder)):
-            # A cycle is reported in the place of a path.
+            # The function reports a cycle in place of a path.
             if path is None:
-                raise RuntimeError(f"these packages need each other: {package}")
+                raise RuntimeError(f"these packages depend on each other: {package}")
             found.append((root / "src" / folder / path, package))
     by_name = {package.name: (path, package) for path, package in found}
     ordered, placed = [], set()

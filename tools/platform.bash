@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-# Detects the system, and what is known about the workspace on it; docs/platforms.md has the long form. Sourced by
+# Detects the system, and prints whether the workspace supports it; docs/platforms.md has the long form. Sourced by
 # set-up.
 
 OLDEST_PYTHON=3.10
@@ -15,9 +15,9 @@ platform_line() {
         "ubuntu 24.04") verdict="untested; ROS 1 has to come from Ubuntu's own packages, and pybullet is compiled" ;;
         "ubuntu 20.04")
             verdict="not supported: its Python is 3.8, the pinned packages need $OLDEST_PYTHON"
-            if [[ -f $2 ]]; then verdict+="; ros-noetic is there, and stays unused"; fi
+            if [[ -f $2 ]]; then verdict+="; ros-noetic is installed and not used"; fi
             ;;
-        *) verdict="unknown here; it takes apt, ROS 1 packages and Python $OLDEST_PYTHON or newer" ;;
+        *) verdict="unknown; the workspace needs apt, ROS 1 packages and Python $OLDEST_PYTHON or newer" ;;
     esac
     if [[ $3 != x86_64 ]]; then verdict+="; on $3 untested: pybullet has no wheel for it and is compiled"; fi
     echo "System: ${name:-unknown}: $verdict (docs/platforms.md)"

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """`./baxter.sh test`: lint, unit tests, unit tests under a comma-decimal locale, rostests.
 
-At the end it prints the tests that did not run, with reasons, and one line of counts.
+At the end it prints the tests that did not run, with reasons, those that failed, and one line of counts.
 
 With --busy[=PERCENT] everything gets that share of one core, and without names the suites of the main flows run.
 """
@@ -47,9 +47,11 @@ MAIN_FLOWS = (
     "checks_exercises.test",  # the judge
 )
 BUSY_PERCENT = 40.0
-# Limits are for a machine of two cores.
+# The limits are for a machine with two cores.
 WHOLE_MACHINE_PERCENT = 200.0
 EXIT_SKIPPED = 77
+# Rostests that run at a time beside another one on a whole machine. They mostly wait, and do not fill a core each.
+BESIDE = 2
 
 
 def run_linter(name: str) -> Tally:
@@ -90,8 +92,7 @@ class UnitRun:
             return failure(f"{died}\n{said}".rstrip())
         tally = read_junit(self._report)
         tally.long = long
-        if self._output is None:
-            tally.details.clear()  # pytest has shown them
+        tally.is_told = self._output is None
         if code != 0 and tally.failed == 0:
             tally.add(failure(f"{self._title}: pytest ended with exit code {code}"))
         return tally
@@ -111,7 +112,7 @@ class FailedStart:
         return failure(self._detail)
 
     def kill(self):
-        """There is nothing to kill."""
+        """Nothing to stop."""
 
 
 def start_unit_under_comma_locale(targets):
@@ -163,13 +164,18 @@ def folder_of(test: rostests.Rostest) -> Path:
 
 
 class Beside:
-    """Runs rostests that start no simulator, one after the other, while others run."""
+    """Runs rostests that leave processor time to others, some at a time, while others run.
+
+    tests: in the order in which they begin: those with the longest limits first, because a long one that begins last
+    would run alone.
+    """
 
     def __init__(self, tests, stretch: float = 1.0):
-        self.tests, self._stretch = tests, stretch
+        self.tests = sorted(tests, key=lambda test: rostests.declared_s(test.path), reverse=True)
+        self._stretch = stretch
         self._ending = threading.Event()
-        self._executor = concurrent.futures.ThreadPoolExecutor(max_workers=1)
-        self._tallies = {test: self._executor.submit(self._run, test) for test in tests}
+        self._executor = concurrent.futures.ThreadPoolExecutor(max_workers=BESIDE if stretch == 1.0 else 1)
+        self._tallies = {test: self._executor.submit(self._run, test) for test in self.tests}
 
     def _run(self, test):
         if self._ending.is_set():
@@ -195,8 +201,8 @@ def run_layers(selection, long: bool, stretch: float = 1.0) -> Tally:
             started = time.monotonic()
             tally = run()
             tally.refuse_bare_skips()
-            for detail in tally.details:
-                print(detail)
+            if not tally.is_told:
+                print(*tally.details, sep="\n", end="\n" if tally.details else "")
             verdict = "FAILED" if tally.failed else "ok" if tally.passed else "nothing to run"
             counts = f"{tally.passed} passed, {tally.failed} failed, {tally.skipped} skipped"
             print(f"--- {title}: {verdict} ({counts}; {time.monotonic() - started:.1f} s)", flush=True)
@@ -214,7 +220,7 @@ def run_with_share(selection, options) -> Tally:
 
 
 def separate_busy(words: list[str]) -> list[str]:
-    """`--busy NAME` is a share left out and a name, not a share called NAME."""
+    """`--busy NAME` means the default share and a test's name; NAME is not the share."""
     return [f"--busy={BUSY_PERCENT:g}" if word == "--busy" else word for word in words]
 
 
@@ -239,7 +245,7 @@ def main() -> int:
         print(f"--busy: {error}", file=sys.stderr)
         return 2
     except QuotaError as error:
-        print(f"--busy: skipped. A share of a core takes root, or control groups that users may make: {error}")
+        print(f"--busy: skipped. A share of a core needs root, or control groups that users may make: {error}")
         print(summary(Tally()))
         return EXIT_SKIPPED
     if total.passed + total.failed == 0:

@@ -47,8 +47,8 @@ hash_of() { sha256sum "$@" 2>/dev/null | sha256sum; }
 
 # --- the steps --------------------------------------------------------------------------------------------------------
 
-# Packages of tools/apt_packages.txt that are not installed, one a line. Which of the optional ones the system has is known
-# after `apt-get update`; before, none.
+# Packages of tools/apt_packages.txt that are not installed, one per line. Before `apt-get update` the system lists no
+# optional ones.
 missing_packages() {
     local have wanted name kind
     mapfile -t wanted < <(sed 's/#.*//' tools/apt_packages.txt | while read -r name kind; do
@@ -60,10 +60,10 @@ missing_packages() {
     LC_ALL=C comm -23 <(printf '%s\n' "${wanted[@]}" | LC_ALL=C sort) <(LC_ALL=C sort <<<"$have")
 }
 
-# Checked before a gigabyte is downloaded in vain.
+# Checked first, to avoid a useless download of a gigabyte.
 require_python() {
     /usr/bin/python3 -c "import sys; sys.exit(sys.version_info < (${OLDEST_PYTHON/./, }))" 2>>"$step_log" ||
-        refuse "what requirements.txt pins needs Python $OLDEST_PYTHON or newer; this is $(/usr/bin/python3 --version)"
+        refuse "the packages in requirements.txt need Python $OLDEST_PYTHON or newer; this is $(/usr/bin/python3 --version)"
 }
 
 step_apt() {
@@ -92,7 +92,7 @@ step_apt() {
         run "${as_root[@]}" apt-get install -y --no-install-recommends --fix-broken
         run "${as_root[@]}" apt-get install -y --no-install-recommends "${missing[@]}"
     } 9>&-
-    note="${#missing[@]} asked for"
+    note="${#missing[@]} requested"
 }
 
 # Wait until no other program installs packages: a background update, or a process of a killed set-up.
@@ -131,7 +131,7 @@ make_venv() {
     # Always Debian's Python: rospy is installed for that one, not the first one in PATH.
     run /usr/bin/python3 -m venv --clear --system-site-packages "$VENV"
     # This also removes packages that a killed pip left incomplete.
-    mended pip
+    repaired pip
 }
 
 step_pip() {
@@ -223,13 +223,13 @@ step_build() {
     # make takes a file that a killed compiler has half written as finished.
     if was_cut_off build; then
         run rm -rf build devel
-        mended build
+        repaired build
     fi
     if stamp_is "$key" && [[ -f devel/setup.bash && -f build/CMakeCache.txt ]]; then
         note="up to date"
         return
     fi
-    # A build folder made elsewhere makes CMake refuse, so a moved or copied workspace starts afresh.
+    # A build folder made elsewhere makes CMake refuse, so a moved or copied workspace is built from scratch.
     if [[ -f build/CMakeCache.txt ]] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$LAB_ROOT/src" build/CMakeCache.txt; then
         run rm -rf build devel
     fi
@@ -270,13 +270,18 @@ step_kernels() {
     # The collision spheres are cached in the same way, beside the compiled code.
     run bash -c 'source "$1/tools/environment.bash" && use_build && shift &&
         rosrun motion_planning prepare_robots "$@"' prepare "$LAB_ROOT" "${PLANNED_FOR[@]}"
+    # Message packages are much generated code, 9 MB for moveit_msgs alone. Where Python is not to write bytecode, each node
+    # would compile it at every start: a second, and 20 MB.
+    if [[ -d devel/lib/python3/dist-packages ]]; then
+        run "$VENV/bin/python3" -m compileall -q -j "$(nproc)" devel/lib/python3/dist-packages
+    fi
 }
 
 # --- main -------------------------------------------------------------------------------------------------------------
 
 case $LAB_ROOT in
     *[[:space:]]*)
-        echo "Set-up cannot go on: catkin does not build in a folder whose path has spaces: '$LAB_ROOT'." >&2
+        echo "Set-up cannot continue: catkin does not build in a folder whose path has spaces: '$LAB_ROOT'." >&2
         echo "Move the workspace, for example to ~/ros_ws, and try again." >&2
         exit 1
         ;;
@@ -328,7 +333,7 @@ for index in "${!STEPS[@]}"; do
     printf '[%d/%d] %s: %s (%d s)\n' $((index + 1)) ${#STEPS[@]} "${TITLES[$step_name]}" "${note:-done}" \
         $((SECONDS - step_started))
 done
-# A run of only some steps is no complete set-up.
+# A run of only some steps is not a complete set-up.
 if [[ ${#chosen[@]} -eq 0 ]]; then
     cut_off_step=""
     write "$STATE/done" "$fingerprint_at_start"

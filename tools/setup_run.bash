@@ -3,10 +3,10 @@
 # interrupted run left incomplete. Sourced by setup.bash; LAB_ROOT, STATE and TITLES are its.
 
 LOGS=$STATE/logs
-# Less than this is free [kB]: the disk counts as full.
+# Below this free space [kB] the disk counts as full.
 FULL_BELOW_KB=4096
 step_name="" step_log="" note="" watcher=""
-# The step in which the run before this one was killed or ran out of disk; "?" if even that could not be written down.
+# The step in which the run before this one was killed or ran out of disk; "?" if that could not be recorded.
 cut_off_step=""
 
 # start_run: one set-up at a time; find out whether the previous one was completed.
@@ -16,7 +16,7 @@ start_run() {
         exit 1
     fi
     # A launch and a node started together on a fresh clone must not both build. The commands of the steps inherit the
-    # lock: set-up waits for commands that go on after a killed set-up.
+    # lock: set-up waits for commands that outlive a killed set-up.
     if ! flock -n 9; then
         echo "another set-up is running in this workspace; waiting for it to finish"
         flock 9
@@ -25,8 +25,8 @@ start_run() {
     if [[ -f $STATE/at_work ]]; then
         cut_off_step=$(<"$STATE/at_work")
         [[ -n ${TITLES[${cut_off_step:-none}]:-} ]] || cut_off_step="?"
-        echo "The set-up before this one was cut off in step '${TITLES[$cut_off_step]:-unknown}'; what it may have left" \
-             "half done is done again."
+        echo "The set-up before this one was cut off in step '${TITLES[$cut_off_step]:-unknown}'; this step is" \
+             "repeated."
     fi
     trap interrupted INT
 }
@@ -42,10 +42,10 @@ start_step() {
     write "$step_log" "# ${TITLES[$step_name]}, $(date)"
 }
 
-end_step() { mended "$step_name"; }
+end_step() { repaired "$step_name"; }
 
-# mended STEP: its left-overs are repaired; from here on only this run's own step may be interrupted
-mended() {
+# repaired STEP: its left-overs are repaired; from here on only this run's own step may be interrupted
+repaired() {
     if [[ $cut_off_step == "$1" ]]; then
         cut_off_step=""
         write "$STATE/at_work" "$step_name"
@@ -107,7 +107,7 @@ fail() {
         echo "  log:     $step_log"
         echo "The log ends with:"
         tail -n 20 "$step_log" | sed 's/^/  | /'
-        echo "Mend the cause and run ./baxter.sh setup again; what is done is not done again."
+        echo "Fix the cause and run ./baxter.sh setup again; finished steps are skipped."
     } >&2
     # A command that ended by itself has cleaned up; a killed one, or one without disk space, may not have.
     if [[ $1 -le 128 && $cause != "the disk is full"* ]]; then nothing_half_done; fi
@@ -118,7 +118,7 @@ fail() {
 refuse() {
     {
         echo
-        echo "Set-up cannot go on in step '${TITLES[$step_name]}': $1"
+        echo "Set-up cannot continue in step '${TITLES[$step_name]}': $1"
         echo "  log:     $step_log"
     } >&2
     echo "$1" 2>/dev/null >>"$step_log"
@@ -135,7 +135,7 @@ interrupted() {
     stop_watching
     echo >&2
     echo "Set-up was interrupted in step '${TITLES[${step_name:-none}]:-start}' (log: ${step_log:-none});" \
-         "./baxter.sh setup goes on from there." >&2
+         "./baxter.sh setup continues from there." >&2
     exit 130
 }
 
@@ -148,7 +148,7 @@ full_disks() {
     done
 }
 
-# disk_note ELSE: that the disk is full, if one is
+# disk_note ELSE: a sentence that the disk is full, or ELSE
 disk_note() {
     local full
     full=$(full_disks | paste -sd ' ')
@@ -171,16 +171,16 @@ cause_of() {
     elif [[ -n $(full_disks) ]]; then
         disk_note
     elif [[ $1 -eq 137 || $1 -eq 143 ]]; then
-        echo "it was killed, by somebody or for lack of memory (free -h)"
+        echo "it was killed, by a user or for lack of memory (free -h)"
     elif line=$(first_line 'certificate.?verif|self.signed certificate|unable to get local issuer') && [[ -n $line ]]; then
         echo "a certificate that is not trusted here (a company's proxy? PIP_CERT, update-ca-certificates): $line"
     elif line=$(first_line 'temporary failure|could not resolve|name or service not known|network is unreachable|no route to host|failed to establish a new connection|connection (timed out|refused|failed)|could not connect|read timed out') &&
         [[ -n $line ]]; then
-        echo "no way to the network (cable, Wi-Fi, proxy?): $line"
+        echo "the network cannot be reached (cable, Wi-Fi, proxy?): $line"
     elif line=$(first_line 'unable to locate package|no installation candidate') && [[ -n $line ]]; then
-        echo "this system's package sources lack something (docs/platforms.md says which systems have it all): $line"
+        echo "a package is missing in the system's sources (docs/platforms.md lists suitable systems): $line"
     elif line=$(first_line 'permission denied|read-only file system') && [[ -n $line ]]; then
-        echo "files that may not be written (did somebody run set-up with sudo?): $line"
+        echo "no permission to write files (was set-up run with sudo before?): $line"
     else
         line=$(grep -aiE '(^E:|error|fatal|refused|failed)' "$step_log" 2>/dev/null | tail -n 1 | cut -c 1-200)
         echo "${line:-see the log}"

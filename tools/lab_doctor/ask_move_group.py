@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""ask_move_group.py NODE NAMESPACE: print as one line of JSON what there is to know of a move_group. A process of its
-own: it needs ROS and the workspace's packages, which the doctor must do without."""
+"""ask_move_group.py NODE NAMESPACE: print facts about a move_group as one line of JSON. It is a separate process: it
+needs ROS and the workspace's packages, and the doctor must work without them."""
 
 import json
 import sys
@@ -68,7 +68,8 @@ def joint_topic_of(node, master, subscribers):
 
 
 def listen(joint_topic, joints, sensors):
-    """({joint: its value}, topics of sensors) of what comes in within LISTEN_S, or until all of it has."""
+    """Return ({joint: position}, topics of sensors) of the messages within LISTEN_S; returns early once all have
+    arrived."""
     names, heard = {}, set()
     kept = [rospy.Subscriber(joint_topic, JointState, lambda message: names.update(
         zip(message.name, message.position, strict=False)))]

@@ -32,8 +32,8 @@ def _entry(facts: Facts) -> str:
 
 
 def _busy(topic, what):
-    """A question without an answer in time gives no finding."""
-    return Finding(topic, Level.BUSY, f"not checked: {what}", "the machine is busy; try again when it has come to rest")
+    """A question without an answer in time gives no other finding."""
+    return Finding(topic, Level.BUSY, f"not checked: {what}", "the machine is busy; try again when it is idle")
 
 
 def check_build(facts):
@@ -51,7 +51,7 @@ def check_build(facts):
 def check_python(facts):
     python = facts.python
     if facts.users_python:
-        what = (f"outside ./baxter.sh, python3 is {facts.users_python}: programs that are started there find no rospy")
+        what = (f"outside ./baxter.sh, python3 is {facts.users_python}: programs started there find no rospy")
         yield Finding("python", Level.NOTE, what, f"start them with {_entry(facts)}, or source devel/setup.bash first")
     if "python" in facts.timed_out:
         yield _busy("python", "python3 has not finished importing what nodes import")
@@ -109,7 +109,7 @@ def check_network(facts):
         what = f"{variable}={announced} does not resolve to an address: messages will not arrive"
         yield Finding("network", Level.WRONG, what, f"unset {variable}, then {_entry(facts)}")
     elif not is_ours:
-        what = f"{variable}={announced} is {address}, which is no address of this machine: messages will not arrive"
+        what = f"{variable}={announced} is {address}, which is not an address of this machine: messages will not arrive"
         yield Finding("network", Level.WRONG, what, f"unset {variable}, then {_entry(facts)}")
     else:
         yield Finding("network", Level.OK, f"{variable}={announced} is this machine")
@@ -120,7 +120,7 @@ def check_master(facts):
     if not master_host(facts):
         return  # check_network says so
     if "master" in facts.timed_out and is_loopback(master_host(facts)):
-        what = f"somebody listens at {uri} and has not answered"
+        what = f"a program listens at {uri} and has not answered"
         yield Finding("master", Level.BUSY, what, "a stopped or hung master, or a busy machine: try again")
     elif facts.master is None:
         yield Finding("master", Level.WRONG, f"{uri} did not answer in time", _master_fix(facts))
@@ -157,7 +157,7 @@ def check_clock(facts):
     if offset is not None and abs(offset) > MAX_CLOCK_OFFSET_S:
         ahead = "ahead of" if offset > 0 else "behind"
         what = f"the clock of {master_host(facts)} is {abs(offset):.1f} s {ahead} this one's: tf will refuse its data"
-        fix = "let both follow one time server: sudo timedatectl set-ntp true, or chrony"
+        fix = "let both use one time server: sudo timedatectl set-ntp true, or chrony"
         yield Finding("clock", Level.WRONG, what, fix)
     topics = facts.topics
     if topics is None or topics.error:
@@ -209,7 +209,7 @@ def check_robot(facts):
     if not _master_answers(facts):
         return
     if "topics" in facts.timed_out:
-        yield _busy("robot", "the program that listens to /clock and /robot/state has not started in time")
+        yield _busy("robot", "the program that reads /clock and /robot/state has not started in time")
     if facts.topics is None:
         return
     state = facts.topics.robot_state
@@ -219,7 +219,7 @@ def check_robot(facts):
         return  # another robot, which has no such topic
     elif state is None:
         what = "nothing arrives on /robot/state: no robot and no simulator, or none that can call this machine"
-        yield Finding("robot", Level.WRONG, what, f"mend what is wrong above, or start the lab: {START_LINE}")
+        yield Finding("robot", Level.WRONG, what, f"fix the problems above, or start the lab: {START_LINE}")
     elif state["stopped"] and state["error"]:
         what = "the robot has failed and is stopped: its own program, or a motor board"
         yield Finding("robot", Level.WRONG, what, "rosrun baxter_tools enable_robot.py -r, then -e")

@@ -11,9 +11,9 @@ class Master:
     error: str = ""
     use_sim_time: bool = False
     publishers: dict[str, list[str]] = field(default_factory=dict)  # topic -> nodes
-    # Of the nodes that run a simulator: those that are registered and do not answer.
+    # Simulator nodes that are registered and do not answer.
     dead_nodes: list[str] = field(default_factory=list)
-    # Those that are there and have not answered in time.
+    # Nodes that accept connections and have not answered in time.
     slow_nodes: list[str] = field(default_factory=list)
     clock_offset_s: float | None = None  # the master's host minus this machine
 
@@ -25,14 +25,14 @@ class Topics:
     clock_messages: int = 0
     clock_advanced: bool = False
     robot_state: dict[str, bool | int] | None = None  # fields of baxter_core_msgs/AssemblyState
-    # What the simulator says on /diagnostics that is not right: (name, level, message).
+    # Problems that the simulator reports on /diagnostics: (name, level, message).
     troubles: list[tuple[str, int, str]] = field(default_factory=list)
     error: str = ""
 
 
 @dataclass(frozen=True)
 class Controller:
-    """An entry of move_group's controller_list: its action, the joints that it moves; is the action served?"""
+    """An entry of move_group's controller_list: its action, its joints, and whether the action has a server."""
 
     action: str
     joints: list[str]
@@ -41,7 +41,7 @@ class Controller:
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor that move_group makes its octomap from: its topic, who publishes it, did something come in?"""
+    """A sensor for move_group's octomap: its topic, its publishers, and whether a message has arrived."""
 
     topic: str
     publishers: list[str]
@@ -50,7 +50,7 @@ class Sensor:
 
 @dataclass(frozen=True)
 class MoveGroup:
-    """What a running move_group, and its parameters, say. error: why it could not be asked, empty where it answered."""
+    """Facts from a running move_group and its parameters. error: why it did not answer, empty if it did."""
 
     node: str
     error: str = ""
@@ -59,9 +59,9 @@ class MoveGroup:
     groups: dict[str, list[str]] = field(default_factory=dict)  # joints that move, without those that mimic others
     controllers: list[Controller] = field(default_factory=list)
     joint_topic: str = ""
-    silent_joints: list[str] = field(default_factory=list)  # of the robot's, those that no message on joint_topic has
+    silent_joints: list[str] = field(default_factory=list)  # the robot's joints that no message on joint_topic has
     joints_out_of_bounds: list[str] = field(default_factory=list)  # sentences
-    contacts: list[tuple[str, str]] = field(default_factory=list)  # what touches at the robot's present posture
+    contacts: list[tuple[str, str]] = field(default_factory=list)  # bodies in contact at the present posture
     sensors: list[Sensor] = field(default_factory=list)
 
 
@@ -100,7 +100,7 @@ class Facts:
     addresses: dict[str, tuple[str | None, bool]] = field(default_factory=dict)
     master: Master | None = None
     topics: Topics | None = None
-    move_group: MoveGroup | None = None  # None too where none runs
+    move_group: MoveGroup | None = None  # also None if no move_group runs
     is_built: bool = False
     is_fresh: bool | None = None
     python: PythonFacts | None = None

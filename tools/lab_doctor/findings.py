@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the doctor says of one thing."""
+"""One finding of the doctor."""
 
 from dataclasses import dataclass
 from enum import Enum

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Print one line of JSON with the messages of /clock, /robot/state and the simulator's /diagnostics within two seconds.
-A separate process, because it needs ROS and the doctor must work without."""
+It is a separate process, because it needs ROS and the doctor must work without it."""
 
 import json
 import threading

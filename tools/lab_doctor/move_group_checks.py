@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What keeps a running move_group from planning or moving. Pure, like the other checks."""
+"""Problems that keep a running move_group from planning or moving. Pure, like the other checks."""
 
 from lab_doctor.facts import MoveGroup
 from lab_doctor.findings import Finding, Level
 
 TOPIC = "move_group"
-# So many names are listed in a line.
+# Number of names that a line lists.
 SHOWN = 6
 
 
 def examine(move_group: MoveGroup) -> list[Finding]:
     if move_group.error:
         what = f"{move_group.node} does not answer: {move_group.error}"
-        return [Finding(TOPIC, Level.WRONG, what, f"rosnode ping {move_group.node}; start it again if it is silent")]
+        return [Finding(TOPIC, Level.WRONG, what, f"rosnode ping {move_group.node}; restart it if it does not answer")]
     wrong = [finding for check in (_controllers, _joint_states, _start_state, _octomap)
              for finding in check(move_group)]
     if wrong:
@@ -29,8 +29,8 @@ def _controllers(move_group):
         return
     for controller in move_group.controllers:
         if not controller.answers:
-            what = f"no controller serves {controller.action}, which is to move {_listed(controller.joints)}"
-            fix = ("start the controller; or, where it has another name (rostopic list | grep goal), correct name and "
+            what = f"no controller serves {controller.action}, which should move {_listed(controller.joints)}"
+            fix = ("start the controller; or, if it has another name (rostopic list | grep goal), correct name and "
                    "action_ns in controller_list")
             yield Finding(TOPIC, Level.WRONG, what, fix)
     moved = {joint for controller in move_group.controllers for joint in controller.joints}
@@ -48,8 +48,8 @@ def _controllers(move_group):
 def _joint_states(move_group):
     silent = move_group.silent_joints
     if silent:
-        what = f"no message on {move_group.joint_topic} has {_listed(silent)}: where the robot is remains unknown"
-        fix = "start what publishes joint states, or remap joint_states of move_group to its topic"
+        what = f"no message on {move_group.joint_topic} has {_listed(silent)}: the robot's posture is unknown"
+        fix = "start a publisher of joint states, or remap joint_states of move_group to its topic"
         yield Finding(TOPIC, Level.WRONG, what, fix)
 
 
@@ -68,11 +68,11 @@ def _start_state(move_group):
 def _octomap(move_group):
     for sensor in move_group.sensors:
         if not sensor.publishers:
-            yield Finding(TOPIC, Level.WRONG, f"the octomap is not fed: nobody publishes {sensor.topic}",
+            yield Finding(TOPIC, Level.WRONG, f"the octomap gets no data: no node publishes {sensor.topic}",
                           "start the camera, or correct the topic in sensors_3d.yaml")
         elif not sensor.heard:
-            yield Finding(TOPIC, Level.WRONG, f"the octomap is not fed: nothing arrives on {sensor.topic} of "
-                          f"{_listed(sensor.publishers)}", f"rostopic hz {sensor.topic}; look at the camera's node")
+            yield Finding(TOPIC, Level.WRONG, f"the octomap gets no data: nothing arrives on {sensor.topic} of "
+                          f"{_listed(sensor.publishers)}", f"rostopic hz {sensor.topic}; check the camera's node")
 
 
 def _listed(names):

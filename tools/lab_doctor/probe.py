@@ -34,7 +34,7 @@ CALL_TIMEOUT_S = 1.0
 CALLER_ID = "/lab_doctor"
 # Debian's roscpp nodes, and rospy nodes, carry their node name on the command line when roslaunch starts them.
 ROS_PROCESS = re.compile(r"__name:=|rosmaster|roscore|roslaunch|rosrun|/lib/(tf2?|rviz|robot_state_publisher|rosout)")
-# By this service a move_group is known.
+# A node with this service is a move_group.
 SCENE_SERVICE = "get_planning_scene"
 MODULES = ("rospy", "pybullet", "numpy", "transforms3d", "tf2_ros")
 
@@ -176,7 +176,7 @@ def _proxy(uri):
 
 
 def ask_master(uri: str) -> Master:
-    """What the master at uri says. Raises TimeoutError if it accepts connections and does not answer."""
+    """Facts from the master at uri. Raises TimeoutError if it accepts connections and does not answer."""
     master = _proxy(uri)
     try:
         _, _, (publishers, _, _) = master.getSystemState(CALLER_ID)
@@ -252,7 +252,7 @@ def listen(root: Path, uri: str) -> Topics:
 
 
 def ask_move_group(root: Path, uri: str) -> MoveGroup | None:
-    """What a move_group says, asked by a process that has ROS; None where none runs. Raises TimeoutError, OSError."""
+    """Facts from a move_group, gathered by a process that has ROS; None if none runs. Raises TimeoutError, OSError."""
     services = dict(_proxy(uri).getSystemState(CALLER_ID)[2][2])
     name, nodes = next(((name, nodes) for name, nodes in sorted(services.items()) if name.endswith("/" + SCENE_SERVICE)
                         and nodes), ("", []))

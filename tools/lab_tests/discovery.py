@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 LINTERS = ("ruff", "catkin_lint")
-# pytest options that take a value, which is no test's name.
+# pytest options that take a value, which is not a test's name.
 _OPTIONS_WITH_VALUE = set("-k -m -p -o -c -W -r --maxfail --deselect --ignore --tb --durations".split())
 
 
@@ -153,7 +153,7 @@ def _add_named(selection, inventory, long, name):
     ros = [test for test in inventory.rostests if _means(file_name, test.path, ".test")]
     if not unit and not ros:
         raise SelectionError(
-            f"'{name}' is no package, no test file and no pytest option. "
+            f"'{name}' is not a package, a test file or a pytest option. "
             f"Packages: {', '.join(sorted(inventory.packages))}"
         )
     selection.unit_targets += [f"{path}::{test_id}" if test_id else str(path) for path in unit]

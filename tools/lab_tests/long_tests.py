@@ -11,7 +11,7 @@ import pytest
 
 
 def pytest_addoption(parser):
-    parser.addoption("--leave-out-long", metavar="FILE", help="run no long test; FILE gets their names, one a line")
+    parser.addoption("--leave-out-long", metavar="FILE", help="run no long test; FILE gets their names, one per line")
     parser.addoption("--in-the-other-run", metavar="MARK", help="run no test with this mark, unless it is long")
 
 

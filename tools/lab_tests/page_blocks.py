@@ -96,6 +96,6 @@ def run(block, folder, limit_s, **variables):
                               text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     except subprocess.TimeoutExpired as error:
         said = (error.output or b"").decode(errors="replace")
-        raise AssertionError(f"{place} is not through after {limit_s} s:\n{block.text}{said}") from None
+        raise AssertionError(f"{place} has not ended after {limit_s} s:\n{block.text}{said}") from None
     if done.returncode != 0:
         raise AssertionError(f"{place} ends with {done.returncode}:\n{block.text}{done.stdout}")

@@ -29,7 +29,7 @@ class Quota:
         """
         most = 100 * (os.cpu_count() or 1)
         if not 1 <= percent <= most:
-            raise ValueError(f"a share of {percent:g} % of one core; it has to be between 1 and {most} %")
+            raise ValueError(f"the share is {percent:g} % of one core; it must be between 1 and {most} %")
         self._percent, self._mount, self._own = percent, mount, own
         self._groups = self._own_groups()
         self._group: Path | None = None

@@ -8,18 +8,24 @@ from xml.etree import ElementTree
 
 # pytest's text for a skip without a reason.
 BARE = ("", "unconditional skip")
+# The failures are told once more at the end, where often only the end of a long log is kept: so many, each
+# with so many characters of its beginning.
+TOLD_FAILURES = 20
+TOLD_CHARACTERS = 1200
 
 
 @dataclass
 class Tally:
     """Tests passed and failed, and those that did not run.
 
-    details: one text for each failure; skips: (test, reason) of what was skipped; long: the long tests left out.
+    details: one text per failure, its first line the test's name; is_told: they have been printed already;
+    skips: (test, reason) of skipped tests; long: the long tests left out.
     """
 
     passed: int = 0
     failed: int = 0
     details: list[str] = field(default_factory=list)
+    is_told: bool = False
     skips: list[tuple[str, str]] = field(default_factory=list)
     long: list[str] = field(default_factory=list)
 
@@ -34,7 +40,7 @@ class Tally:
         """Count skips without a reason as failures."""
         for name, reason in self.skips:
             if reason in BARE:
-                self.add(failure(f"{name}: skipped without a reason; say what this machine lacks"))
+                self.add(failure(f"{name}: skipped without a reason; name what this machine lacks"))
         self.skips = [skip for skip in self.skips if skip[1] not in BARE]
 
     @property
@@ -49,7 +55,17 @@ class Tally:
 def summary(tally: Tally) -> str:
     """The last printed line. The text up to `failed` must not change: continuous integration parses it."""
     counts = f"{tally.passed} passed, {tally.failed} failed, {tally.skipped} skipped, {len(tally.long)} long not run"
-    return "\n".join([*_not_run(tally), counts])
+    return "\n".join([*_not_run(tally), *_failures(tally), counts])
+
+
+def _failures(tally):
+    if tally.details:
+        yield "failed:"
+    for detail in tally.details[:TOLD_FAILURES]:
+        told = detail if len(detail) <= TOLD_CHARACTERS else f"{detail[:TOLD_CHARACTERS]} ..."
+        yield from (f"    {line}" for line in told.splitlines())
+    if len(tally.details) > TOLD_FAILURES:
+        yield f"    and {len(tally.details) - TOLD_FAILURES} more"
 
 
 def _not_run(tally):
@@ -97,7 +113,7 @@ def read_rostest_results(folder: Path) -> Tally:
 
     rostest writes a file of its own, `rostest-*.xml`, in which a case says whether a test node ran to its end, and each
     test node writes its own cases. Only the latter count as tests; the former count where they failed (a crash).
-    rosunit knows no skips: to it a skipped test has passed. `lab_testing.skipping` writes a `skipped-*.xml` beside it.
+    rosunit has no skips: it counts a skipped test as passed. `lab_testing.skipping` writes a `skipped-*.xml` beside it.
     No test at all is a failure.
     """
     tally = Tally()
