@@ -12,11 +12,25 @@ STANDS_RAD_S = 0.02
 MOVES_RAD_S = 0.06
 # No joint of the robot turns faster than 4 rad/s: a larger step between two records [rad] is not a motion.
 JUMP_RAD = 0.15
+# Up to this distance from its goal a joint gets all points, from the second on none [rad].
+AT_GOAL_RAD, OFF_GOAL_RAD = 0.02, 0.25
 
 
 def ramp(value, full, none):
     """1 up to `full`, 0 from `none` on, linear between; either may be the larger one."""
     return float(np.clip((none - value) / (none - full), 0.0, 1.0))
+
+
+def distance_from_goal(names, angles, goal):
+    """(share of the points, largest distance [rad], that in words). names, angles [rad] and goal [rad]: (n,).
+
+    No joint is named where all are at their goals: the farthest one would be another in each run.
+    """
+    off = np.abs(np.asarray(angles) - np.asarray(goal))
+    share = float(np.mean([ramp(value, AT_GOAL_RAD, OFF_GOAL_RAD) for value in off]))
+    if off.max() <= AT_GOAL_RAD:
+        return share, off.max(), "all joints are within %g rad of their goals" % AT_GOAL_RAD
+    return share, off.max(), "farthest off is %s, by %.3f rad" % (names[int(off.argmax())], off.max())
 
 
 def pose_error(pose, target):

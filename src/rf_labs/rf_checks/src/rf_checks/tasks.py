@@ -183,10 +183,8 @@ class JointCommand:
         share, found = 0.0, "the arm did not move"
         recording = run.recording
         if recording.records and measures.path_length(recording.arm("right")) > 0.1:
-            off = np.abs(recording.arm("right")[-1] - np.array(call.expected))
-            share = float(np.mean([ramp(value, 0.02, 0.25) for value in off]))
-            found = "farthest off is %s, by %.3f rad" % (joint_names("right")[int(off.argmax())], off.max())
-            share = share if off.max() < 0.25 else 0.6 * share
+            share, off, found = measures.distance_from_goal(joint_names("right"), recording.arm("right")[-1], call.expected)
+            share = share if off < measures.OFF_GOAL_RAD else 0.6 * share
         return [Criterion("joint angles", share, 55.0, found),
                 *motion_criteria(run, ("right",), share, call, (15.0, 15.0, 15.0), 1)]
 
@@ -194,7 +192,7 @@ class JointCommand:
         recording = run.recording
         if recording.records and measures.path_length(recording.arm("right")) > 0.1:
             off = np.abs(recording.arm("right")[-1] - np.array(call.expected))
-            if off.max() > 0.02 and run.exit_code == 0:
+            if off.max() > measures.AT_GOAL_RAD and run.exit_code == 0:
                 return Fault("far_off", "%s ended %.2f rad from its goal: go on sending the goal until "
                              "/robot/joint_states says that the arm is there"
                              % (joint_names("right")[int(off.argmax())], off.max()))

@@ -81,9 +81,8 @@ class PlanAround:
         recording = run.recording
         share, found = 0.0, "the arm did not move"
         if _has_moved(recording):
-            off = np.abs(recording.arm(ARM)[-1] - np.array(call.expected))
-            share = float(np.mean([ramp(value, 0.02, 0.25) for value in off])) if off.max() < 0.25 else 0.0
-            found = "farthest off is %s, by %.3f rad" % (joint_names(ARM)[int(off.argmax())], off.max())
+            share, off, found = measures.distance_from_goal(joint_names(ARM), recording.arm(ARM)[-1], call.expected)
+            share = share if off < measures.OFF_GOAL_RAD else 0.0
         known = any(call.obstacle.is_covered(pose, edges) for _, pose, edges in _told(recording))
         return [Criterion(STATE, share, 40.0, found),
                 Criterion("the pillar in the scene", 1.0 if known else 0.0, 20.0,
@@ -101,7 +100,7 @@ class PlanAround:
                           "a way; go() takes it, or execute() with the second of what plan() returns")
         if fault is None and _has_moved(recording):
             off = np.abs(recording.arm(ARM)[-1] - np.array(call.expected))
-            if off.max() > 0.02:
+            if off.max() > measures.AT_GOAL_RAD:
                 fault = Fault("far_off", "%s ended %.2f rad from `%s`, a state of the group `%s_arm`: "
                               "set_named_target(\"%s\") before go()"
                               % (joint_names(ARM)[int(off.argmax())], off.max(), STATE, ARM, STATE))

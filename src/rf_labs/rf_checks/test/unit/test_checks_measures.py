@@ -20,6 +20,18 @@ def test_ramp_may_rise():
     assert measures.ramp(0.03, 0.05, 0.01) == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("off", [(0.0, 0.0), (1e-4, 2e-4), (2e-4, 1e-4)])
+def test_joints_at_their_goals_have_one_report_whichever_is_farther(off):
+    share, farthest, words = measures.distance_from_goal(("s0", "s1"), (1.0 + off[0], -1.0 - off[1]), (1.0, -1.0))
+    assert (share, words) == (1.0, "all joints are within 0.02 rad of their goals")
+    assert farthest == pytest.approx(max(off))
+
+
+def test_the_joint_that_is_off_its_goal_is_named():
+    share, farthest, words = measures.distance_from_goal(("s0", "s1"), (0.0, 0.3), (0.0, 0.0))
+    assert (share, farthest, words) == (0.5, 0.3, "farthest off is s1, by 0.300 rad")
+
+
 @pytest.mark.parametrize("axis", "xyz")
 @pytest.mark.parametrize("angle", [0.0, 0.3, -1.2, math.pi / 2, 3.0, -math.pi])
 def test_rotations_and_quaternions_agree(axis, angle):
