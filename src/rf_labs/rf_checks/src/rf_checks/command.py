@@ -10,10 +10,10 @@ from pathlib import Path
 
 import rospkg
 
+from lab_environment.isolation import NotIsolated
 from rf_checks import report, submission
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
 from rf_checks.graph import LabFailed
-from rf_checks.isolation import NotIsolated
 from rf_checks.judge import WALL_LIMIT_S, Judge
 from rf_checks.lab import WhichRobot
 

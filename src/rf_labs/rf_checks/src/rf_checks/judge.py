@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rf_checks import diagnosis, isolation, submission
+from lab_environment import isolation
+from rf_checks import diagnosis, submission
 from rf_checks.graph import LabFailed, MasterSilent
 from rf_checks.lab import Lab, TooSlow, WhichRobot, robot_description, student_folder
 from rf_checks.observing import Observer
@@ -90,7 +91,8 @@ class Judge:
         self._wall_limit_s = wall_limit_s
         self.has_walls = not isolation.problem()
         if not (self.has_walls or trusted):
-            raise isolation.NotIsolated(isolation.problem())
+            raise isolation.NotIsolated("%s. Your own program: add --trusted, and it runs without walls"
+                                        % isolation.problem())
         self._which, self._hidden = which, tuple(map(str, hidden))
         self._description = robot_description(which.serial)
         self.robot = Robot(self._description)

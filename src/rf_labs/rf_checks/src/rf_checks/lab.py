@@ -23,10 +23,12 @@ import rospkg
 from roslib.packages import find_node
 
 from baxter_model import SIDES
+from lab_environment import isolation
+from lab_environment.family import children_of, direct_children, is_running
 from lab_environment.ports import free_port
-from rf_checks import isolation
+from rf_checks import hidden
 from rf_checks.graph import Graph, LabFailed
-from rf_checks.pacing import OwnTime, Watch, children_of, direct_children, is_running
+from rf_checks.pacing import OwnTime, Watch
 from rf_checks.recorder_names import PLUGIN_ELEMENT, RECORDS, SERVED, SILENCED, SOCKETS_VARIABLE
 
 #: Time limits for the lab to start, and to reset the robot [s, of OwnTime].
@@ -262,7 +264,7 @@ class Lab:
         if self._walls:
             binds = isolation.caches(os.environ, self._folder / "caches")
             command = [*isolation.command(os.environ, [(self._folder, self._folder, True), *binds],
-                                          own_network=not isolation.has_own_network()), *command]
+                                          hidden.SOLVED, not isolation.has_own_network()), *command]
         with open(self._folder / "output.txt", "ab") as output:
             # It ends with the judge in any case.
             command = ["setpriv", "--pdeathsig", "INT", "--", *command]

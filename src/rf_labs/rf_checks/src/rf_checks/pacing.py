@@ -9,44 +9,13 @@ import contextlib
 import os
 import time
 
+from lab_environment.family import children_of
+
 #: Processor time per record [s] for which a busy program, and its helpers, delay the world.
 PROGRAM_ALLOWANCE_S = 0.04
 HELPERS_ALLOWANCE_S = 0.4
 _LOOK_AGAIN_S, _LOOK_AGAIN_AT_MOST_S = 0.0002, 0.004
 _LOADAVG = "/proc/loadavg"
-
-
-def direct_children(pid):
-    """Process ids of the children of one process."""
-    found = set()
-    with contextlib.suppress(OSError):
-        for thread in os.listdir("/proc/%d/task" % pid):
-            with contextlib.suppress(OSError), open("/proc/%d/task/%s/children" % (pid, thread), "rb") as file:
-                found.update(map(int, file.read().split()))
-    return found
-
-
-def children_of(parents):
-    """All living descendants of the process ids `parents`, with these."""
-    found, to_visit = set(), list(parents)
-    while to_visit:
-        pid = to_visit.pop()
-        if pid in found:
-            continue
-        if os.path.exists("/proc/%d" % pid):
-            found.add(pid)
-            to_visit.extend(direct_children(pid))
-    return found
-
-
-def is_running(pid):
-    """Whether a process is running; a zombie is not."""
-    try:
-        with open("/proc/%d/stat" % pid, "rb") as file:
-            text = file.read()
-    except OSError:
-        return False
-    return text[text.rfind(b")") + 2:][:1] not in (b"Z", b"X")
 
 
 def cpu_time_s(pids):

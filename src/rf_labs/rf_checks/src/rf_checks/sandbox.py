@@ -18,8 +18,9 @@ import time
 from pathlib import Path
 
 import lab_environment
-from rf_checks import isolation, submission, system_calls
-from rf_checks.pacing import children_of, direct_children, is_running
+from lab_environment import isolation, system_calls
+from lab_environment.family import children_of, direct_children, is_running
+from rf_checks import hidden, submission
 
 CPU_S = 120
 #: Limit of address space for each process; numpy alone reserves much.
@@ -100,8 +101,8 @@ class Student:
             binds = [(Path(self.folder) / top, "%s/%s" % (home, top), False) for top in tops]
             if startup is not None:
                 binds.append((startup.folder, _STARTUP_FOLDER, False))
-            hidden = (*isolation.SOLVED, *isolation.JUDGE, *(startup.hidden if startup else ()))
-            enter = isolation.command(environment, binds, hidden, not isolation.has_own_network(), options)
+            unseen = (*hidden.SOLVED, *hidden.JUDGE, *(startup.hidden if startup else ()))
+            enter = isolation.command(environment, binds, unseen, not isolation.has_own_network(), options)
             own.update(isolation.environment_of(environment))
         else:
             enter = []

@@ -5,8 +5,9 @@ import subprocess
 
 import pytest
 
+from lab_environment import family, isolation
 from lab_testing.waiting import wait_until
-from rf_checks import isolation, pacing, sandbox
+from rf_checks import hidden, pacing, sandbox
 from rf_checks.sandbox import KEPT_BYTES, OUTPUT_BYTES, Startup, Student, adopt_orphans
 
 pytestmark = pytest.mark.once
@@ -18,7 +19,7 @@ WALLS = pytest.param(True, marks=pytest.mark.skipif(bool(isolation.problem()), r
 def starter(tmp_path, monkeypatch):
     """A function that starts a program (text), with walls if its `has_walls` is set to True; ended afterwards."""
     workspace = tmp_path / "workspace"
-    for name in (*isolation.SOLVED, *isolation.JUDGE):
+    for name in (*hidden.SOLVED, *hidden.JUDGE):
         path = workspace / name
         if path.suffix == ".py":
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -75,11 +76,11 @@ def test_what_outlives_the_program_is_found_and_ended(start):
     # A separate session, and no environment that could give it away.
     child = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import signal; signal.pause()'], " \
             "env={}, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)"
-    before = pacing.children_of([os.getpid()])
+    before = family.children_of([os.getpid()])
     student = finished(start(child))
     # In a sandbox the child dies with its parent.
     assert student.survivors == (0 if start.has_walls else 1)
-    wait_until(lambda: pacing.children_of([os.getpid()]) - before == set(), "the end of what it left behind")
+    wait_until(lambda: family.children_of([os.getpid()]) - before == set(), "the end of what it left behind")
 
 
 def test_endless_output_neither_fills_memory_nor_stops_the_judge(start):
@@ -137,11 +138,11 @@ def test_no_namespace_in_which_it_may_mount(walled):
 
 def test_processes_have_a_limit(start, monkeypatch):
     monkeypatch.setattr(sandbox, "PROCESSES", 10)
-    before = pacing.children_of([os.getpid()])
+    before = family.children_of([os.getpid()])
     student = start("import os, signal\nfor _ in range(12):\n    if os.fork() == 0: signal.pause()\nsignal.pause()")
     wait_until(lambda: student.excess() == "processes", "the thirteenth process")
     student.end()
-    wait_until(lambda: pacing.children_of([os.getpid()]) - before == set(), "the end of all of them")
+    wait_until(lambda: family.children_of([os.getpid()]) - before == set(), "the end of all of them")
 
 
 def test_a_program_that_loops_says_where_it_is(start):
@@ -256,12 +257,12 @@ def test_no_capability_and_no_way_to_more(walled):
 
 
 def test_a_program_that_stops_its_own_sandbox_is_ended(walled):
-    before = pacing.children_of([os.getpid()])
+    before = family.children_of([os.getpid()])
     student = walled("import ctypes\nctypes.CDLL(None).ptrace(16, 1, 0, 0)\nprint('attached', flush=True)\n"
                      "import signal\nsignal.pause()")
     wait_until(lambda: student.output, "the first process of the sandbox to be stopped")
     student.end()
-    wait_until(lambda: pacing.children_of([os.getpid()]) - before == set(), "the end of the sandbox")
+    wait_until(lambda: family.children_of([os.getpid()]) - before == set(), "the end of the sandbox")
 
 
 def test_its_network_ends_at_the_loopback(walled):
@@ -307,11 +308,11 @@ def test_a_walled_program_does_not_outlive_a_judge_that_is_killed(walled):
     program.write_text("import signal\nsignal.pause()")
     with subprocess.Popen([sandbox.python(), "-c", code, str(program)], stdout=subprocess.PIPE, text=True) as judge:
         root = int(judge.stdout.readline())
-        wait_until(lambda: any(_command(pid).startswith("python") for pid in pacing.children_of([root])),
+        wait_until(lambda: any(_command(pid).startswith("python") for pid in family.children_of([root])),
                    "the program to run")
-        family = pacing.children_of([root])
+        processes = family.children_of([root])
         judge.kill()
-    wait_until(lambda: not any(_lives(pid) for pid in family), "the end of %s" % family)
+    wait_until(lambda: not any(_lives(pid) for pid in processes), "the end of %s" % processes)
 
 
 def _command(pid):
@@ -338,12 +339,12 @@ def test_a_refusal_says_why_and_what_to_do(monkeypatch):
         reason = isolation._reason("Operation not permitted")
         assert words in reason
         assert "Operation not permitted" in reason
-        assert "--trusted" in reason
+        assert "seccomp=unconfined" in reason
 
 
 def test_a_machine_without_walls_is_asked_for_trust(monkeypatch, tmp_path):
     from rf_checks.judge import Judge
 
-    monkeypatch.setattr(isolation, "problem", lambda: "this kernel refuses. Add --trusted")
+    monkeypatch.setattr(isolation, "problem", lambda: "this kernel refuses")
     with pytest.raises(isolation.NotIsolated, match="--trusted"):
         Judge()

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from lab_batch import JobError, Spec
 from lab_batch.processes import Limits, map_seeds
-from rf_checks import isolation, similarity
+from lab_environment import isolation
+from rf_checks import similarity
 from rf_checks.command import write_report
 from rf_checks.exercises import LABS, UnknownExercise
 from rf_checks.judge import WALL_LIMIT_S

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The filter of system calls, run by an interpreter for its few instructions; the sandbox's tests try it on the
+kernel.
+"""
+import errno
+import struct
+
+import pytest
+
+from lab_environment import system_calls
+
+ALLOW, REFUSE = 0x7FFF0000, 0x00050000 | errno.ENOSYS
+# Numbers of linux/audit.h, and of read(2) and clone(2).
+MACHINES = {"x86_64": (0xC000003E, 0, 56), "aarch64": (0xC00000B7, 63, 220)}
+NEW_USER, NEW_THREAD = 0x10000000, 0x3D0F00
+
+
+def outcome(program, number, architecture, argument=0):
+    steps = [struct.unpack_from("=HBBI", program, place) for place in range(0, len(program), 8)]
+    place, word = 0, None
+    while True:
+        code, if_so, if_not, value = steps[place]
+        place += 1
+        if code == 0x06:
+            return value
+        if code == 0x20:
+            word = {0: number, 4: architecture, 16: argument & 0xFFFFFFFF}[value]
+        else:
+            place += if_so if {0x15: word == value, 0x35: word >= value, 0x45: word & value}[code] else if_not
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_calls_that_hide_memory_are_refused_and_others_allowed(machine):
+    architecture, read, clone = MACHINES[machine]
+    program = system_calls.filter_program(machine)
+    numbers = system_calls._MACHINES[machine][1]
+    for name in ("memfd_create", "memfd_secret", "shmget", "io_uring_setup", "clone3", "setns"):
+        assert outcome(program, numbers[name], architecture) == REFUSE, name
+    assert outcome(program, read, architecture) == ALLOW
+    for name in ("clone", "unshare"):
+        assert outcome(program, numbers[name], architecture, NEW_THREAD) == ALLOW
+        assert outcome(program, numbers[name], architecture, NEW_USER | NEW_THREAD) == REFUSE
+    assert numbers["clone"] == clone
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_calls_of_other_tables_are_refused(machine):
+    architecture, read, _ = MACHINES[machine]
+    program = system_calls.filter_program(machine)
+    assert outcome(program, read, 0x40000003) == REFUSE
+    assert outcome(program, 0x40000000 + read, architecture) == REFUSE
+
+
+def test_a_machine_without_numbers_has_no_filter(monkeypatch):
+    assert system_calls.filter_program("riscv64") == b""
+    monkeypatch.setattr(system_calls.platform, "machine", lambda: "riscv64")
+    with system_calls.refused() as refused:
+        assert refused == ([], ())
