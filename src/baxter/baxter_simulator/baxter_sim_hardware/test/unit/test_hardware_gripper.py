@@ -94,6 +94,16 @@ def test_moving_while_it_moves_and_stop_in_between(lab):
     assert state(lab).position == pytest.approx(stopped.position, abs=0.5)
 
 
+def test_a_stop_that_a_client_repeats_until_the_fingers_stand(lab):
+    tell(lab, "go", '{"position": 0}', seconds=0.2)
+    for _ in range(30):
+        stopped = tell(lab, "stop", sender="me_stop", sequence=3, seconds=0.01)
+    assert stopped.moving == 0
+    assert 20.0 < stopped.position < 90.0
+    for _ in range(10):
+        assert tell(lab, "stop", sender="me_stop", sequence=3, seconds=0.01).moving == 0
+
+
 def test_velocity_parameter(lab):
     tell(lab, "configure", '{"velocity": 10.0}')
     assert tell(lab, "go", '{"position": 0}', seconds=1.0).position == pytest.approx(52.0, abs=4.0)

@@ -75,8 +75,13 @@ class ElectricGripper(Gripper):
         """
         if self._phase is Phase.HOLDING:
             self._stays = True
-        else:
-            self._stand_at(position)
+            return
+        was_resting, still = self.resting, (self._here, self._still_s)
+        self._stand_at(position)
+        # No motion follows, so the time at rest so far counts: clients repeat a stop until the fingers stand.
+        self._here, self._still_s = still
+        if was_resting:
+            self._come_to_rest()
 
     @property
     def flags(self):
