@@ -25,7 +25,7 @@ def pose_from_quaternion(position, quaternion_xyzw):
     try:
         x, y, z = position
         numbers = [float(number) for number in (x, y, z, *quaternion_xyzw)]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = []
     if len(numbers) != 7 or not all(map(math.isfinite, numbers)):
         raise InvalidTarget("position and orientation must be seven finite numbers, got position %s and quaternion "

@@ -84,6 +84,7 @@ def test_what_is_no_pose_is_refused(left, change):
     ((0, 0), (0, 0, 0, 1)), ((0, 0, 0), (0, 0, 1)), ((0, 0, 0, 0), (0, 0, 1)), ((0, 0, 0), (0, 0, 0, None)),
     ((0, 0, 0), "none"), ((0, "x", 0), (0, 0, 0, 1)), ((0, 0, math.nan), (0, 0, 0, 1)), (None, (0, 0, 0, 1)),
     ((0, 0, 0), (0, 0, 0, 2)), ((0, 0, 0), (0, 0, 0, 0)),
+    ((10 ** 400, 0, 0), (0, 0, 0, 1)), ((0, 0, 0), (0, 0, 0, 10 ** 400)),
 ])
 def test_what_is_no_quaternion_is_refused(position, turn):
     with pytest.raises(InvalidTarget):
