@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The node tf2_web_republisher: an action and a service that send transforms to web pages."""
 import itertools
-import time
 
 import actionlib
 import rospy
@@ -11,7 +10,12 @@ from rospy_limits.node import limit_ports
 from rospy_start import end_on_signals
 from tf2_web_republisher.msg import TFArray, TFSubscriptionAction, TFSubscriptionFeedback
 from tf2_web_republisher.srv import RepublishTFs
-from tf2_web_republisher.watch import FrameWatch, Schedule, period_of
+from tf2_web_republisher.watch import Audience, FrameWatch, Schedule, period_of
+
+# A goal ends when nobody has listened to the feedback for this long [s]: pages go without cancelling theirs.
+GONE_S = 10.0
+# Goals at a time; then the oldest ends. Pages that come and go while another one listens leave theirs behind.
+MOST_GOALS = 500
 
 
 class Republisher:
@@ -21,7 +25,7 @@ class Republisher:
         self._buffer = tf2_ros.Buffer()
         self._schedule = Schedule()
         self._numbers = itertools.count()
-        self._goals = {}  # goal id -> function of the schedule
+        self._goals = {}  # goal id -> (handle, function of the schedule)
         self._server = actionlib.ActionServer("tf2_web_republisher", TFSubscriptionAction, self._begin, self._cancel,
                                               auto_start=False)
         self._kept = [tf2_ros.TransformListener(self._buffer),
@@ -44,15 +48,27 @@ class Republisher:
         goal, name = handle.get_goal(), handle.get_goal_id().id
         watch = FrameWatch(goal.target_frame, goal.source_frames, goal.angular_thres, goal.trans_thres)
 
+        audience = Audience(GONE_S)
+
         def send():
-            if transforms := self._changes(watch):
+            if audience.is_gone(self._server.feedback_pub.get_num_connections()):
+                self._end(name, "nobody has listened to the feedback for %g s" % GONE_S)
+            elif transforms := self._changes(watch):
                 handle.publish_feedback(TFSubscriptionFeedback(transforms))
-        self._goals[name] = send
+        self._goals[name] = handle, send
         handle.set_accepted()
         self._schedule.add(send, period_of(goal.rate))
+        if len(self._goals) > MOST_GOALS:
+            self._end(list(self._goals)[0], "there are more than %d goals; this was the oldest" % MOST_GOALS)
+
+    def _end(self, name, why):
+        handle, send = self._goals.pop(name, (None, None))
+        if send is not None:
+            self._schedule.remove(send)
+            handle.set_aborted(text=why)
 
     def _cancel(self, handle):
-        send = self._goals.pop(handle.get_goal_id().id, None)
+        _, send = self._goals.pop(handle.get_goal_id().id, (None, None))
         if send is not None:
             self._schedule.remove(send)
             handle.set_canceled()
@@ -62,17 +78,15 @@ class Republisher:
         name = "tf_repub_%d" % next(self._numbers)
         publisher = rospy.Publisher(name, TFArray, queue_size=10)
         watch = FrameWatch(request.target_frame, request.source_frames, request.angular_thres, request.trans_thres)
-        heard = [time.monotonic()]
+        audience = Audience(request.timeout.to_sec())
 
         def send():
-            now = time.monotonic()
-            if publisher.get_num_connections():
-                heard[0] = now
-                if transforms := self._changes(watch):
-                    publisher.publish(transforms)
-            elif now - heard[0] > request.timeout.to_sec():
+            listeners = publisher.get_num_connections()
+            if audience.is_gone(listeners):
                 publisher.unregister()
                 return False
+            if listeners and (transforms := self._changes(watch)):
+                publisher.publish(transforms)
             return True
         self._schedule.add(send, period_of(request.rate))
         return publisher.resolved_name

@@ -38,6 +38,22 @@ class FrameWatch:
         return found
 
 
+class Audience:
+    """Tells when nobody has listened to a topic for a while: its pages have gone without a word. ``clock()`` [s]."""
+
+    def __init__(self, timeout_s, clock=time.monotonic):
+        self._timeout_s = timeout_s
+        self._clock = clock
+        self._heard_s = clock()
+
+    def is_gone(self, listeners):
+        """Whether there have been no ``listeners`` (their number now) for longer than the timeout."""
+        now_s = self._clock()
+        if listeners:
+            self._heard_s = now_s
+        return now_s - self._heard_s > self._timeout_s
+
+
 def clean(frame):
     """A frame's name as tf2 has it, without a leading slash."""
     return frame.lstrip("/")

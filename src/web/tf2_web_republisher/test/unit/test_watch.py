@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from tf2_web_republisher.watch import FrameWatch, Schedule, angle_between, period_of
+from tf2_web_republisher.watch import Audience, FrameWatch, Schedule, angle_between, period_of
 
 STRAIGHT = (0.0, 0.0, 0.0, 1.0)
 
@@ -30,6 +30,14 @@ def test_a_transform_is_sent_first_and_when_it_has_moved():
     assert watch.changed(lookup) == []
     poses["hand"] = ((0.011, 0.0, 0.0), turned(0.11), "e")
     assert watch.changed(lookup)[0][2] == "e"
+
+
+def test_an_audience_is_gone_after_a_while_without_listeners():
+    now = [100.0]
+    audience = Audience(10.0, lambda: now[0])
+    for now_s, listeners, is_gone in ((105.0, 0, False), (110.0, 2, False), (119.0, 0, False), (120.5, 0, True)):
+        now[0] = now_s
+        assert audience.is_gone(listeners) is is_gone
 
 
 def test_the_angle_is_the_same_for_both_signs_of_a_quaternion():
