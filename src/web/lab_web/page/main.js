@@ -45,6 +45,13 @@ function note(code, detail) {
   byId("told").textContent = noted ? text(noted.code, {text: noted.detail ?? ""}) : "";
 }
 
+// What a hint asked for has been done.
+function settle(...codes) {
+  if (!codes.includes(noted?.code)) return;
+  noted = null;
+  note();
+}
+
 function stop() {
   panel.settle();
   send({op: "stop"});
@@ -88,6 +95,7 @@ const served = {
   },
   control({mine, free}) {
     if (!mine) panel.settle();
+    if (mine) settle("not_in_control");
     Object.assign(state, {mine, free});
     refresh();
   },
@@ -172,6 +180,7 @@ function startTopics() {
   topics.subscribe("/robot/state", "baxter_core_msgs/AssemblyState", 100, 1, (message) => {
     const was = state.robot;
     state.robot = message;
+    if (message.enabled && !was?.enabled) settle("not_ready", "stopped");
     if (was?.enabled !== message.enabled || was?.stopped !== message.stopped) refresh();
   });
   topics.subscribe("/robot/joint_states", "sensor_msgs/JointState", 60, 1, (message) => {

@@ -7,14 +7,18 @@ from lab_web.lab import RobotError
 
 class Buttons:
     """``switch(action, name, steps)``: "press", "release" or "turn"; it may wait, and raises RobotError. ``errands``:
-    :class:`lab_web.errands.Errands` for these alone.
+    :class:`lab_web.errands.Errands` for these alone. ``pressed(names)`` is told which buttons the robot has pressed:
+    before a press, and after a release.
     """
 
-    def __init__(self, switch, errands):
+    def __init__(self, switch, errands, pressed=lambda names: None):
         self._switch = switch
         self._errands = errands
         self._lock = threading.Lock()
         self._held = set()
+        # Of the errands' thread alone.
+        self._pressed = set()
+        self._tell_pressed = pressed
 
     def press(self, client, operation):
         """An operation "press" of a page: ``name``, and whether it is ``pressed`` now. Raises RobotError."""
@@ -23,7 +27,7 @@ class Buttons:
             raise RobotError("\"pressed\" is %r; true or false is expected" % (pressed,))
         with self._lock:
             (self._held.add if pressed else self._held.discard)(name)
-            self._errands.add(client, self._switch, "press" if pressed else "release", name, 0)
+            self._errands.add(client, self._switch_button, "press" if pressed else "release", name)
 
     def turn(self, client, operation):
         """An operation "turn" of a page: ``name`` of a wheel, ``steps``. Raises RobotError."""
@@ -36,8 +40,24 @@ class Buttons:
         """Release what is held: its page has stopped the robot, fallen silent, gone, or lost the control."""
         with self._lock:
             for name in self._held:
-                self._errands.add(None, self._switch, "release", name, 0)
+                self._errands.add(None, self._switch_button, "release", name)
             self._held.clear()
+
+    def _switch_button(self, action, name):
+        if action == "press":
+            self._pressed.add(name)
+            self._tell_pressed(self._pressed)
+        try:
+            self._switch(action, name, 0)
+        except RobotError:
+            self._not_pressed(name)
+            raise
+        if action == "release":
+            self._not_pressed(name)
+
+    def _not_pressed(self, name):
+        self._pressed.discard(name)
+        self._tell_pressed(self._pressed)
 
 
 def _name(operation):

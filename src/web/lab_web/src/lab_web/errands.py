@@ -3,13 +3,15 @@
 import queue
 
 from lab_web.lab import RobotError
+from loop_ros.faults import SURVIVED, described
 
 
 class Errands:
-    """``told(client, code, text)``."""
+    """``told(client, code, text)``; ``faults`` (:class:`loop_ros.faults.Faults`) notes errors that nobody foresaw."""
 
-    def __init__(self, told):
+    def __init__(self, told, faults):
         self._told = told
+        self._faults = faults
         self._queue = queue.SimpleQueue()
 
     def add(self, client, work, *arguments):
@@ -32,7 +34,10 @@ class Errands:
             return False
         try:
             work(*arguments)
-        except RobotError as error:
+        except SURVIVED as error:
+            is_known = isinstance(error, RobotError)
+            if not is_known:
+                self._faults.note("a page's errand", error)
             if client is not None:
-                self._told(client, "refused", str(error))
+                self._told(client, "refused", str(error) if is_known else described(error))
         return True

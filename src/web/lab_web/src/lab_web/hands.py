@@ -8,6 +8,7 @@ from urdf_model.transforms import inverse, quaternion_from_matrix
 
 # The nearest of 16 postures: 1 ms, and a hand that is dragged steadily does not make the elbow jump.
 _BUDGET = Budget(candidates=16)
+_LONGEST_REASON = 300
 
 
 class Hands:
@@ -80,8 +81,9 @@ class Hands:
                 q, pose = seed, chain.fk(seed)
         except NoSolution as error:
             q, why, text = error.best, error.reason.name.lower(), error.detail
-        except (KinematicsError, TypeError) as error:
-            return {"why": "invalid", "text": str(error)}
+        except (KinematicsError, TypeError, ValueError, OverflowError) as error:
+            # The error quotes the page's numbers, however many there are.
+            return {"why": "invalid", "text": str(error)[:_LONGEST_REASON]}
         joints = dict(zip(chain.joint_names, q.tolist(), strict=True))
         return {"why": why, "text": text, "joints": joints, "position": pose[:3, 3].tolist(),
                 "orientation": quaternion_from_matrix(pose[:3, :3]).tolist(), "ghost": self._ghost(chain, joints)}

@@ -7,8 +7,11 @@ import secrets
 import socket
 import threading
 import time
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
+from urllib.parse import quote
 
 import rosgraph
 import rospkg
@@ -20,18 +23,22 @@ from lab_web.errands import Errands
 from lab_web.hands import Hands, ghost
 from lab_web.lab import Lab
 from lab_web.libraries import LibrariesError, fetched
+from lab_web.loops import lasting
 from lab_web.parts import SCREEN_TOPIC, Parts
 from lab_web.playback import Recorder, play
+from lab_web.release_guard import ReleaseGuard
 from lab_web.robot import ARM_LINKS, Baxter
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, routes, upload_routes
 from lab_web.simulation import Simulation
+from loop_ros.faults import Faults
 from rospy_limits.node import limit_ports
 from rospy_start import end_on_signals
 from web_bridge import ros_graph
 from web_bridge.access import Access
 from web_bridge.cameras import Cameras
 from web_bridge.codec import Codec
+from web_bridge.errors import shown
 from web_bridge.loop_thread import LoopThread
 from web_bridge.serving import Serving
 from web_bridge.session import Bridge
@@ -40,8 +47,12 @@ from web_bridge.websocket import Clients, SocketOptions
 from world_picture.snapshot import SnapshotError
 
 FIRST_PORT = 8090
+_LARGEST_PORT = 65535
 #: Period of poses to the pages [s]; of looks at what changes rarely [s].
 _POSES_S, _LOOK_S = 0.05, 1.0
+# Between warnings of the same [s].
+_COMPLAIN_S = 60.0
+_SNAPSHOT = "/gazebo/snapshot"
 _COMPRESSED = "sensor_msgs/CompressedImage"
 
 
@@ -65,11 +76,24 @@ def main():
 def _parser():
     parser = argparse.ArgumentParser(prog="./baxter.sh web", description="The lab's page in a browser, beside a "
                                      "running lab, until Ctrl-C or until the lab ends.")
-    parser.add_argument("--port", type=int, help="the port; default: the first free one from %d" % FIRST_PORT)
+    parser.add_argument("--port", type=_port_number, help="the port; default: the first free one from %d" % FIRST_PORT)
     parser.add_argument("--public", action="store_true", help="open the page to other machines; see docs/web.md")
-    parser.add_argument("--token", help="the operator's token; default: a new one")
-    parser.add_argument("--view-token", help="the token of those that only watch and stop; default: a new one")
+    parser.add_argument("--token", type=_token, help="the operator's token; default: a new one")
+    parser.add_argument("--view-token", type=_token,
+                        help="the token of those that only watch and stop; default: a new one")
     return parser
+
+
+def _port_number(text):
+    if not (text.isdecimal() and int(text) <= _LARGEST_PORT):
+        raise argparse.ArgumentTypeError("%r is no port; 0 (any free one) to %d are" % (text, _LARGEST_PORT))
+    return int(text)
+
+
+def _token(text):
+    if not text.isprintable() or not text:
+        raise argparse.ArgumentTypeError("%r is no token; letters, digits and signs are expected" % text)
+    return text
 
 
 def _require_lab():
@@ -91,7 +115,8 @@ def serve(options, page, libraries):
     pages = Pages(access, loop_thread)
     robot = Baxter(lambda text: pages.tell(None, "refused", text))
     pages.lab = Lab(robot, pages.control_changed, pages.tell)
-    equipment = _equip(pages, robot)
+    faults = Faults(SimpleNamespace(error=rospy.logerr))
+    equipment = _equip(pages, robot, faults)
     graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, ros_graph.now)
     bridge = Bridge(graph, codec, loop_thread.later)
     video = VideoServer(Cameras(graph, codec, loop_thread), VideoOptions(access))
@@ -102,17 +127,18 @@ def serve(options, page, libraries):
         serving = Serving(loop_thread, application, _port(options), "" if options.public else "127.0.0.1")
     except OSError as error:
         raise Failure("port %s cannot be opened: %s; name another one by --port" % (options.port, error)) from None
-    threads = [threading.Thread(target=loop, args=(rospy.is_shutdown,)) for loop in (
-        pages.lab.run, *equipment.loops)] + [threading.Thread(target=_follow, args=(pages,))]
+    threads = [threading.Thread(target=lasting(faults, place, loop), args=(rospy.is_shutdown,)) for place, loop in (
+        ("the arms", pages.lab.run), *equipment.loops.items(), ("the 3D view", partial(_follow, pages)))]
     for thread in threads:
         thread.start()
     try:
         _announce(serving.port, tokens, options.public)
-        _watch(robot, equipment, pages)
+        lasting(faults, "the robot's parts", partial(_watch, robot, equipment, pages))(rospy.is_shutdown)
     finally:
         rospy.signal_shutdown("the end")
         for thread in threads:
             thread.join()
+        equipment.guard.close()
         clients.shut_down()
         serving.close()
         video.cameras.shut_down()
@@ -120,22 +146,24 @@ def serve(options, page, libraries):
 
 
 class _Equipment(NamedTuple):
-    """What pages use beside the arms; ``loops``: functions of ``ends``, for a thread each."""
+    """What pages use beside the arms; ``loops``: {name: function of ``ends``}, for a thread each."""
 
     hands: Hands
     simulation: Simulation
     recorder: Recorder
-    loops: tuple
+    guard: ReleaseGuard
+    loops: dict
 
 
-def _equip(pages, robot):
+def _equip(pages, robot, faults):
     """Add the operations of all parts to the lab."""
     lab = pages.lab
     hands = Hands(robot.measured, lambda chain, joints: ghost(pages.picture, chain, joints), pages.answer)
     lab.add("reach", hands.ask, needs_control=False)
     parts = Parts()
-    errands, switches = Errands(pages.tell), Errands(pages.tell)
-    buttons = Buttons(parts.switch, switches)
+    errands, switches = Errands(pages.tell, faults), Errands(pages.tell, faults)
+    guard = ReleaseGuard()
+    buttons = Buttons(parts.switch, switches, guard.pressed)
     simulation = Simulation(errands, lambda: bodies_of(pages.picture, robot.limits), pages.answer,
                             lambda state: pages.share("simulation", state))
     lab.when_lost(buttons.release_all)
@@ -147,8 +175,9 @@ def _equip(pages, robot):
     for name, serve in {"press": buttons.press, "turn": buttons.turn, **parts.operations(),
                         **simulation.operations()}.items():
         lab.add(name, serve)
-    return _Equipment(hands, simulation, recorder, (
-        hands.run, errands.run, lambda ends: switches.run(ends, buttons.release_all)))
+    return _Equipment(hands, simulation, recorder, guard, {
+        "the hands": hands.run, "errands": errands.run,
+        "buttons": lambda ends: switches.run(ends, buttons.release_all)})
 
 
 def _port(options):
@@ -162,6 +191,8 @@ def _port(options):
 
 def _announce(port, tokens, public):
     host = os.environ.get("ROS_IP") or socket.gethostname() if public else "localhost"
+    # A token of the user may hold signs that mean something else in an address.
+    tokens = [quote(token, safe="") for token in tokens]
     rospy.set_param("~address", "http://%s:%d/" % (host, port))
     print("Open in a browser:\n\n    http://%s:%d/?token=%s\n\n"
           "To watch, and to stop the robot:\n\n    http://%s:%d/?token=%s\n"
@@ -172,10 +203,10 @@ def _announce(port, tokens, public):
     print("Ctrl-C here ends the page; the lab goes on.", flush=True)
 
 
-def _watch(robot, equipment, pages):
+def _watch(robot, equipment, pages, ends):
     """Look after what changes rarely, until the node or the lab ends."""
-    shown = None
-    while not rospy.is_shutdown():
+    told = None
+    while not ends():
         if not rosgraph.is_master_online():
             print("The lab has ended, and the page with it.", flush=True)
             return
@@ -188,9 +219,9 @@ def _watch(robot, equipment, pages):
             now = _described(robot, equipment)
             if now["has_scene"] and len(pages):
                 equipment.simulation.look()
-            if now != shown:
+            if now != told:
                 pages.share("robot", now)
-                shown = now
+                told = now
         rospy.rostime.wallsleep(_LOOK_S)
 
 
@@ -202,23 +233,34 @@ def _described(robot, equipment):
             "poses": list(robot.poses), "hands": equipment.hands.sides, "grippers": robot.grippers,
             "cameras": sorted(topic for topic, kind in published.items() if kind == _COMPRESSED),
             "can_press": Parts.can_press(), "has_screen": SCREEN_TOPIC in published,
-            "has_scene": rospy.has_param("/gazebo/snapshot"), "things": equipment.simulation.things}
+            "has_scene": isinstance(rospy.get_param(_SNAPSHOT, None), str), "things": equipment.simulation.things}
 
 
-def _follow(pages):
+def _snapshot_folder():
+    """The folder of the simulator's state. Raises SnapshotError where there is none."""
+    folder = rospy.get_param(_SNAPSHOT, None)
+    if folder is not None and not isinstance(folder, str):
+        rospy.logwarn_throttle(_COMPLAIN_S, "no 3D view: the parameter %s is %s; the text of a folder's path is "
+                               "expected" % (_SNAPSHOT, shown(folder)))
+    if not isinstance(folder, str):
+        raise SnapshotError("there is no simulator")
+    return folder
+
+
+def _follow(pages, ends):
     """Send poses while there are pages; across restarts of the simulator."""
     follower, picture = None, None
-    while not rospy.is_shutdown():
+    while not ends():
         began = time.monotonic()
         if len(pages):
             try:
                 if follower is None or not follower.is_alive:
-                    follower, picture = SceneFollower(rospy.get_param("/gazebo/snapshot"), rospy.logwarn), None
+                    follower, picture = SceneFollower(_snapshot_folder(), rospy.logwarn), None
                 if follower.follow() or follower.picture is not picture:
                     picture = follower.picture
                     pages.show_poses(picture, follower.poses())
             # No simulator, or it is just starting or ending.
-            except (KeyError, SnapshotError, OSError, rosgraph.MasterException):
+            except (SnapshotError, OSError, rosgraph.MasterException):
                 follower = None
                 rospy.rostime.wallsleep(_LOOK_S)
         rospy.rostime.wallsleep(max(0.0, _POSES_S - (time.monotonic() - began)))

@@ -3,11 +3,13 @@
 import math
 
 from lab_web.lab import RobotError
+from web_bridge.errors import shown
 
 #: Where a new object stands or begins to fall (x, y, z) in the world [m]; None: the others, above a table.
 NEW_PLACES = {"cafe_table": (1.0, 0.0, 0.0), "table": (1.2, 0.0, 0.0), None: (0.75, 0.0, 1.1)}
 #: Objects are put this far from the world's origin at most [m].
 FARTHEST_M = 20.0
+_LARGEST = 1e9
 
 
 def free_name(thing, taken):
@@ -23,10 +25,11 @@ def pose_of(operation):
     numbers = []
     for key, count in (("position", 3), ("orientation", 4)):
         values = operation.get(key)
+        # Comparisons also hold for whole numbers that no float can hold, and for NaN.
         is_fine = isinstance(values, list) and len(values) == count and all(
-            isinstance(value, int | float) and math.isfinite(value) for value in values)
+            isinstance(value, int | float) and abs(value) <= _LARGEST for value in values)
         if not is_fine:
-            raise RobotError("\"%s\" is %r; %d numbers are expected" % (key, values, count))
+            raise RobotError("\"%s\" is %s; %d numbers are expected" % (key, shown(values), count))
         numbers.append(values)
     position, orientation = numbers
     if max(map(abs, position)) > FARTHEST_M:

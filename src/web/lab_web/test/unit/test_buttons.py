@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Buttons that pages hold: in order, each refusal to its page, nothing stays pressed behind a page that is lost."""
 import threading
+from types import SimpleNamespace
 
 import pytest
 
@@ -8,6 +9,7 @@ from lab_testing.waiting import wait_until
 from lab_web.buttons import Buttons
 from lab_web.errands import Errands
 from lab_web.lab import RobotError
+from loop_ros.faults import Faults
 
 
 class Robot:
@@ -18,6 +20,8 @@ class Robot:
         self.done.append((action, name, steps))
         if name == "ghost":
             raise RobotError("there is no ghost")
+        if name == "broken":
+            raise ZeroDivisionError("of its own")
 
 
 class Served:
@@ -25,8 +29,10 @@ class Served:
 
     def __init__(self):
         self.robot, self.told, self._ended = Robot(), [], threading.Event()
-        errands = Errands(lambda *told: self.told.append(told))
-        self.buttons = Buttons(self.robot.switch, errands)
+        self.log = []
+        errands = Errands(lambda *told: self.told.append(told), Faults(SimpleNamespace(error=self.log.append)))
+        self.pressed = []
+        self.buttons = Buttons(self.robot.switch, errands, lambda names: self.pressed.append(sorted(names)))
         self._thread = threading.Thread(target=errands.run, args=(self._ended.is_set, self.buttons.release_all))
         self._thread.start()
 
@@ -57,6 +63,17 @@ def test_presses_and_turns_come_in_order(served):
     assert len(served.robot.done) == 3
 
 
+def test_what_the_robot_has_pressed_is_told_before_a_press_and_after_a_release(served):
+    press(served, "cuff")
+    press(served, "ghost")
+    press(served, "ok")
+    press(served, "cuff", False)
+    wait_until(lambda: served.robot.done[-1:] == [("release", "cuff", 0)], "the last switch")
+    served.end()
+    assert served.pressed[:5] == [["cuff"], ["cuff", "ghost"], ["cuff"], ["cuff", "ok"], ["ok"]]
+    assert served.pressed[-1] == []
+
+
 def test_what_is_held_is_released_once_where_its_page_is_lost(served):
     press(served, "cuff")
     press(served, "ok")
@@ -79,6 +96,20 @@ def test_a_refusal_of_the_robot_goes_to_the_page_and_the_next_press_works(served
     press(served, "cuff")
     wait_until(lambda: len(served.robot.done) == 2, "two switches")
     assert served.told == [(1, "refused", "there is no ghost")]
+
+
+def test_an_error_that_nobody_foresaw_is_told_and_logged_and_the_next_press_works(served):
+    press(served, "broken")
+    press(served, "cuff")
+    wait_until(lambda: len(served.robot.done) == 2, "two switches")
+    ((client, code, text),) = served.told
+    assert (client, code) == (1, "refused") and "ZeroDivisionError: of its own" in text
+    assert len(served.log) == 1 and "of its own" in served.log[0]
+    # Also those at the end.
+    press(served, "broken")
+    served.end()
+    assert served.robot.done[-2:] in ([("release", "broken", 0), ("release", "cuff", 0)],
+                                      [("release", "cuff", 0), ("release", "broken", 0)])
 
 
 @pytest.mark.parametrize(("method", "operation"), [

@@ -11,6 +11,7 @@ import urllib.request
 from pathlib import Path
 
 import lab_arms
+import numpy as np
 import pytest
 import rosgraph
 import websocket
@@ -20,6 +21,7 @@ from lab_testing.waiting import stretched, wait_until
 from lab_web.control import HEARTBEAT_S
 from lab_web.libraries import LibrariesError, fetched
 from lab_web.serving import SCREEN
+from world_picture.snapshot import SnapshotWriter
 
 pytestmark = pytest.mark.once
 HERE = Path(__file__).resolve().parent
@@ -63,6 +65,7 @@ class Page:
         self._socket = websocket.create_connection("ws://127.0.0.1:%d/lab?token=%s" % (port, token),
                                                    timeout=stretched(60))
         self.heard = []
+        self.poses = 0
         self._ended = threading.Event()
         self._threads = [threading.Thread(target=target) for target in (self._beat, self._read)]
         for thread in self._threads:
@@ -100,6 +103,7 @@ class Page:
                 return
             if isinstance(frame, str) and frame:
                 self.heard.append(json.loads(frame))
+            self.poses += isinstance(frame, bytes)
 
 
 class Hall:
@@ -115,10 +119,10 @@ class Hall:
         self._processes = []
         try:
             self._start("rosmaster", "--core", "-p", str(port))
-            master = rosgraph.Master("/test", self._environment["ROS_MASTER_URI"])
-            wait_until(master.is_online, "the master", START_S)
+            self.master = rosgraph.Master("/test", self._environment["ROS_MASTER_URI"])
+            wait_until(self.master.is_online, "the master", START_S)
             self.robot = self._start(sys.executable, str(HERE / "fake_baxter.py"), *map(str, world))
-            wait_until(lambda: master.hasParam("/robot_description"), "the robot", START_S)
+            wait_until(lambda: self.master.hasParam("/robot_description"), "the robot", START_S)
             self.server = self._start(sys.executable, str(PACKAGE / "nodes" / "lab_web"), "--token", "drive",
                                       "--view-token", "look")
             self.port = int(wait_until(lambda: self.server.found(r"localhost:(\d+)/\?token=drive"), "the address",
@@ -232,7 +236,27 @@ def test_arms_move_and_parts_follow_and_what_is_missing_is_told(hall):
         page.close()
 
 
-def test_a_server_that_is_killed_commands_nothing_more(hall):
+def test_threads_outlive_what_nobody_foresaw(hall, tmp_path):
+    page = hall.drive()
+    writer = SnapshotWriter(tmp_path)
+    try:
+        hall.master.setParam("/gazebo/snapshot", 5)
+        wait_until(lambda: hall.server.found("/gazebo/snapshot is 5"), "a warning")
+        assert page.last("robot")["has_scene"] is False
+        for number, position in enumerate(([10 ** 400, 0, 0], [0.5, [0.0], 0]), 1):
+            page.send(op="reach", side="left", number=number, position=position, orientation=[0, 0, 0, 1])
+            wait_until(lambda number=number: (page.last("reach") or {}).get("number") == number, "an answer", START_S)
+            assert page.last("reach")["why"] == "invalid"
+        writer.write_scene([{"name": "robot", "urdf": lab_arms.URDF, "joints": lab_arms.JOINTS}])
+        writer.write(1, 0.0, [np.array([0.0, 0.0, 0.9, 0.0, 0.0, 0.0, 1.0, *lab_arms.posture().values()])])
+        hall.master.setParam("/gazebo/snapshot", str(writer.folder))
+        wait_until(lambda: page.poses and page.last("robot")["has_scene"], "poses of the world", START_S)
+    finally:
+        page.close()
+        writer.close()
+
+
+def test_a_server_that_is_killed_commands_nothing_more_and_holds_no_button(hall):
     page = hall.drive()
     try:
         before = lab_arms.posture()["left_s0"]
@@ -241,12 +265,15 @@ def test_a_server_that_is_killed_commands_nothing_more(hall):
             page.send(op="move", joints={"left_s0": before + 2.4})
             return len(hall.said("joints")) > 20
         wait_until(moves, "a motion", 60.0, interval_s=0.3)
+        page.send(op="press", name="left_lower_cuff", pressed=True)
+        wait_until(lambda: ["press", "left_lower_cuff", 0] in hall.said("press"), "a squeezed cuff")
         hall.server.process.send_signal(signal.SIGKILL)
         hall.server.process.wait()
     finally:
         page.close()
     last = hall.said("joints")[-1][0]["left_s0"]
     assert before < last < before + 2.3
+    wait_until(lambda: ["release", "left_lower_cuff", 0] in hall.said("press"), "the cuff's release", START_S)
 
 
 def test_the_simulation_is_paused_and_its_objects_are_added_moved_and_deleted(world):

@@ -18,6 +18,8 @@ def test_an_orientation_is_normalised():
 @pytest.mark.parametrize("operation", [
     {}, {"position": [1, 2, 3]}, {"position": [1, 2], "orientation": [0, 0, 0, 1]},
     {"position": [1, 2, float("nan")], "orientation": [0, 0, 0, 1]}, {"position": "here", "orientation": [0, 0, 0, 1]},
+    {"position": [1, 2, 10 ** 400], "orientation": [0, 0, 0, 1]},
+    {"position": [1, 2, 3], "orientation": [0, 0, -10 ** 400, 1]},
     {"position": [1, 2, 3], "orientation": [0, 0, 0, 0]},
     {"position": [1, 2, 2.0 * FARTHEST_M], "orientation": [0, 0, 0, 1]}])
 def test_what_is_no_place_is_refused(operation):

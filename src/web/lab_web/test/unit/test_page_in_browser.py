@@ -5,6 +5,7 @@ import json
 import math
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 
 import lab_arms
 import numpy as np
@@ -24,6 +25,7 @@ from lab_web.motion import Limits
 from lab_web.playback import Recorder, play
 from lab_web.scene import SceneFollower
 from lab_web.serving import Pages, routes, upload_routes
+from loop_ros.faults import Faults
 from urdf_model import parse_urdf
 from web_bridge.access import Access
 from web_bridge.loop_thread import LoopThread
@@ -114,7 +116,7 @@ class Server:
                       self.pages.answer)
         description = parse_urdf(URDF, source="robot")
         hands.know(description, {side: ("base", side + "_gripper") for side in SIDES}, pytest.fail)
-        errands = Errands(self.pages.tell)
+        errands = Errands(self.pages.tell, Faults(SimpleNamespace(error=pytest.fail)))
         buttons = Buttons(self.robot.switch, errands)
         self.lab.when_lost(buttons.release_all)
         recorder = Recorder(lambda state: self.pages.share("recording", state))
@@ -278,6 +280,19 @@ def test_a_hand_out_of_reach_says_so_and_does_not_go(lab, browser):
     # Back to where the hand is.
     browser.evaluate("lab.hands.hands.get('left').ask({})")
     assert hand(browser, "left")[0] and browser.evaluate("!document.getElementById('reach-go').disabled")
+
+
+def test_a_hint_goes_when_it_has_been_followed(lab, browser):
+    browser.click("#stop")
+    browser.wait("lab.state.robot.stopped && document.getElementById('told').textContent.includes('Enable the robot')")
+    click_until(browser, "#enable", lambda: lab.robot.enabled)
+    browser.wait("document.getElementById('told').textContent === ''", timeout_s=10.0)
+    browser.click("#control")
+    browser.wait("!lab.state.mine")
+    browser.evaluate("lab.send({op: 'pose', name: 'neutral'})")
+    browser.wait("document.getElementById('told').textContent.includes('Take control')")
+    browser.click("#control")
+    browser.wait("lab.state.mine && document.getElementById('told').textContent === ''", timeout_s=10.0)
 
 
 def test_a_second_page_asks_for_itself_and_moves_nothing(lab, browser):

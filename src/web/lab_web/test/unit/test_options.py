@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Options of ./baxter.sh web, and the addresses that it prints."""
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+
+from lab_web import node
+
+
+@pytest.mark.parametrize(("words", "text"), [
+    (["--port", "99999"], "0 (any free one) to 65535"), (["--port", "-1"], "is no port"),
+    (["--port", "http"], "is no port"), (["--token", ""], "is no token"), (["--view-token", "a\nb"], "is no token")])
+def test_an_impossible_option_is_refused_with_what_is_possible(capsys, words, text):
+    with pytest.raises(SystemExit):
+        node._parser().parse_args(words)
+    assert text in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("token", ["two words", "a&b=c#d", "50%+1", "\u5b9e\u9a8c", "plain-token_1"])
+def test_an_address_holds_its_token_whatever_its_signs(capsys, monkeypatch, token):
+    monkeypatch.setattr(node.rospy, "set_param", lambda *_: None)
+    node._announce(8090, (token, "look"), False)
+    address = capsys.readouterr().out.split()[4]
+    assert parse_qs(urlsplit(address).query) == {"token": [token]}
