@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The lab's page in a real browser beside Baxter's lab, for the tests of this folder."""
+import unittest
+from pathlib import Path
+
+import rospkg
+import rospy
+from baxter_core_msgs.msg import AssemblyState
+from sensor_msgs.msg import JointState
+
+from baxter_model import poses
+from lab_testing.browser import Browser, why_not
+from lab_testing.skipping import skip
+from lab_testing.waiting import wait_for_message, wait_until
+from lab_web.libraries import LibrariesError, fetched
+
+SIDE = "left"
+NEAR_RAD = 0.03
+
+
+class Joints:
+    """The newest joint states; ``time_s`` is their stamp."""
+
+    def __init__(self):
+        self.angles, self.time_s = {}, -1.0
+
+    def listen(self):
+        """Subscribe."""
+        rospy.Subscriber("/robot/joint_states", JointState, self._keep, queue_size=1)
+
+    def _keep(self, message):
+        self.angles.update(zip(message.name, message.position, strict=True))
+        self.time_s = message.header.stamp.to_sec()
+
+
+JOINTS = Joints()
+
+
+def angles():
+    """{joint: [rad]} of now."""
+    return dict(JOINTS.angles)
+
+
+def away(pose):
+    """How far the arm is from a pose: the largest angle [rad]."""
+    now = angles()
+    return max(abs(now[joint] - angle) for joint, angle in poses().angles(pose, SIDE).items())
+
+
+def wait_for_rest():
+    """Wait until the arm has not moved for 0.3 s of simulated time."""
+    def rests():
+        before, begin_s = angles(), JOINTS.time_s
+        wait_until(lambda: JOINTS.time_s > begin_s + 0.3, "joint states", 60.0)
+        now = angles()
+        return max(abs(now[joint] - before[joint]) for joint in poses().angles("neutral", SIDE)) < 1e-3
+    wait_until(rests, "an arm at rest", 60.0)
+
+
+def wait_briefly(condition, timeout_s=1.0):
+    """Whether the condition becomes true soon."""
+    try:
+        return wait_until(condition, timeout_s=timeout_s)
+    except AssertionError:
+        return False
+
+
+def wait_for_state(**wanted):
+    wait_for_message("/robot/state", AssemblyState,
+                     lambda state: all(getattr(state, name) == value for name, value in wanted.items()))
+
+
+class PageTest(unittest.TestCase):
+    """A test with an open page, whose console must say no error."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.reason = why_not()
+        try:
+            fetched(Path(rospkg.RosPack().get_path("lab_web")) / "page")
+        except LibrariesError as error:
+            cls.reason = cls.reason or str(error)
+        if cls.reason:
+            return
+        JOINTS.listen()
+        wait_for_message("/robot/state", AssemblyState)
+        wait_until(lambda: SIDE + "_s0" in JOINTS.angles, "joint states", 60.0)
+        wait_until(lambda: rospy.has_param("/lab_web/address"), "the page's address", 60.0)
+        cls.address = rospy.get_param("/lab_web/address")
+        cls.browser = Browser()
+
+    @classmethod
+    def tearDownClass(cls):
+        if not cls.reason:
+            cls.browser.close()
+
+    def setUp(self):
+        if self.reason:
+            skip(self, self.reason)
+        self.browser.errors.clear()
+        self.open("drive")
+
+    def tearDown(self):
+        if not self.reason:
+            self.assertEqual(self.browser.errors, [])
+
+    def open(self, token, width=1280, height=800):
+        self.browser.resize(width, height)
+        self.browser.call("Page.navigate", url="about:blank")
+        self.browser.open(self.address + "?token=" + token)
+        self.browser.wait("globalThis.lab?.state.connected && lab.state.robot")
+        self.browser.wait("lab.view && lab.view.revision !== null && lab.view.pictures > 0")
+
+    def take_control(self):
+        self.browser.wait("!document.getElementById('control').disabled")
+        self.browser.click("#control")
+        self.browser.wait("lab.state.mine")
+
+    def enable(self):
+        if not self.browser.evaluate("lab.state.robot.enabled"):
+            self.browser.wait("!document.getElementById('enable').disabled")
+            self.browser.click("#enable")
+        wait_for_state(enabled=True)
+        self.browser.wait("lab.state.robot.enabled")
+
+    def go_to(self, pose):
+        """Press the pose's button; again where a busy machine was too slow for the heartbeat."""
+        def arrived():
+            if away(pose) < NEAR_RAD:
+                return True
+            before = away(pose)
+            self.browser.click("#pose-" + pose)
+            wait_until(lambda: away(pose) < NEAR_RAD or self.says_silent() or abs(away(pose) - before) > 0.05,
+                       "a motion to " + pose, interval_s=0.1)
+            wait_for_rest()
+            return away(pose) < NEAR_RAD
+        wait_until(arrived, lambda: "%s, %.2f rad away" % (pose, away(pose)), 90.0)
+
+    def start_for(self, pose):
+        """Press a pose's button and wait until the arm is under way."""
+        before = away(pose)
+        self.assertGreater(before, 0.5)
+
+        def moves():
+            if self.says_silent() or abs(away(pose) - before) < 0.01:
+                self.browser.click("#pose-" + pose)
+            return wait_briefly(lambda: before - away(pose) > 0.1)
+        wait_until(moves, "a motion to " + pose, 60.0)
+
+    def says_silent(self):
+        return self.browser.evaluate("document.getElementById('told').textContent.includes('in time')")
