@@ -183,7 +183,8 @@ class JointCommand:
         share, found = 0.0, "the arm did not move"
         recording = run.recording
         if recording.records and measures.path_length(recording.arm("right")) > 0.1:
-            share, off, found = measures.distance_from_goal(joint_names("right"), recording.arm("right")[-1], call.expected)
+            share, off, found = measures.distance_from_goal(joint_names("right"), recording.arm("right")[-1],
+                                                            call.expected)
             share = share if off < measures.OFF_GOAL_RAD else 0.6 * share
         return [Criterion("joint angles", share, 55.0, found),
                 *motion_criteria(run, ("right",), share, call, (15.0, 15.0, 15.0), 1)]

@@ -10,7 +10,6 @@ import numpy as np
 
 from baxter_model import joint_names, poses
 from rf_checks import measures
-from rf_checks.measures import ramp
 from rf_checks.recording import Criterion, Fault
 from rf_checks.tasks import Call, motion_criteria, postures
 

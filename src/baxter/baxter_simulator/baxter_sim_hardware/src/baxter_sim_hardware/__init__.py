@@ -1,16 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The behaviour of the simulated Baxter, without ROS: the state table, command modes and time-outs, end-point forces.
+"""The behaviour of the simulated Baxter: the state table, command modes and time-outs, end-point forces.
 
-`plugin.BaxterPlugin` runs it in a world; it is not imported here, because it needs ROS.
+`plugin.BaxterPlugin` runs it in a world. Nothing is imported here: the cameras' process and `spawn_baxter` use modules
+of this package too, and need neither the arms nor their compiled code, which takes 23 MB.
 """
-from .arms.control import Arms
-from .arms.drives import Drives
-from .arms.joint_command import JointLimits, Mode
-from .errors import CommandRefused, HardwareError
-from .robot import Baxter
-from .robot_state import Event, RobotState, State
-
-__all__ = [
-    "Arms", "Baxter", "CommandRefused", "Drives", "Event", "HardwareError", "JointLimits", "Mode", "RobotState",
-    "State",
-]

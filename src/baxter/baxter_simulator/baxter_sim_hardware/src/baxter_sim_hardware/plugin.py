@@ -12,7 +12,7 @@ from baxter_model.self_collision import spawn_options
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 
-from . import effects, individual
+from . import compiled, effects, individual
 from .arms.actuators import Actuators
 from .arms.external_load import ExternalLoad
 from .arms.hand_load import HandLoads
@@ -54,6 +54,8 @@ class BaxterPlugin(ModelPlugin):
 
     @classmethod
     def spawn_options(cls, robot, element):
+        # This is called outside the loop, which would stand still for the second that it takes.
+        compiled.load()
         # The pedestal stands on the floor and stays there.
         return {"static": True, **spawn_options(robot.links)}
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baxter_model import JOINTS
-from baxter_sim_hardware import CommandRefused, JointLimits, Mode
-from baxter_sim_hardware.arms.joint_command import CommandParser
+from baxter_sim_hardware.arms.joint_command import CommandParser, JointLimits, Mode
+from baxter_sim_hardware.errors import CommandRefused
 
 SIDES = ("left", "right")
 NAMES = tuple("%s_%s" % (side, joint) for side in SIDES for joint in JOINTS)

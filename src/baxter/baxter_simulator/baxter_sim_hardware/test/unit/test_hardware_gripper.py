@@ -7,7 +7,7 @@ import pytest
 from baxter_core_msgs.msg import EndEffectorCommand, EndEffectorProperties, EndEffectorState
 
 import xacro
-from baxter_sim_hardware import CommandRefused
+from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.grippers.commands import CustomGripper
 from baxter_sim_hardware.grippers.electric import ElectricGripper
 from bullet_sim import Pose

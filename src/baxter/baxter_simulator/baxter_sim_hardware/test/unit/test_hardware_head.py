@@ -7,7 +7,7 @@ import pytest
 from baxter_core_msgs.msg import HeadPanCommand
 from std_msgs.msg import Bool
 
-from baxter_sim_hardware import CommandRefused
+from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.head import ACCELERATION, FULL_SPEED, NOD_S, Head
 
 pytestmark = pytest.mark.tree

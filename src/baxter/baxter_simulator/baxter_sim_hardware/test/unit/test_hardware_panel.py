@@ -7,7 +7,7 @@ from baxter_core_msgs.msg import AnalogOutputCommand, DigitalOutputCommand
 from bullet_sim_msgs.srv import PressRequest
 from std_msgs.msg import Empty
 
-from baxter_sim_hardware import CommandRefused
+from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.sensing.panel import ANALOG, BLOWERS, DIGITAL, LIGHTS, NAVIGATORS, PUMPS, Panel
 
 

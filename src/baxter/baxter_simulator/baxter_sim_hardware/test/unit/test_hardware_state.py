@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from baxter_sim_hardware import CommandRefused, Event, RobotState, State
+from baxter_sim_hardware.errors import CommandRefused
+from baxter_sim_hardware.robot_state import Event, RobotState, State
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "baxter_sim_hardware"
 # Written out independently of the code: (state, event, state after, is a refusal).

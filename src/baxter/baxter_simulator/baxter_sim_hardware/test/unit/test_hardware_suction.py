@@ -9,7 +9,7 @@ from baxter_core_msgs.msg import DigitalOutputCommand, EndEffectorCommand
 import xacro
 from baxter_model import ModelMismatch
 from baxter_model.description import cup_of
-from baxter_sim_hardware import CommandRefused
+from baxter_sim_hardware.errors import CommandRefused
 from baxter_sim_hardware.grippers.suction import SuctionGripper
 from bullet_sim import Pose
 from urdf_model import parse_urdf

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The compiled functions of a tick: read from the cache, or compiled, before the first tick needs them."""
+import numpy as np
+
+from baxter_sim_hardware.arms import avoidance
+from baxter_sim_hardware.arms.actuators import Actuators, Wanted
+from baxter_sim_hardware.arms.joint_sensors import JointSensors
+from baxter_sim_hardware.arms.safety import blocks_of
+from baxter_sim_hardware.arms.setpoint import SetPoints, any_beyond, approach, approach_rates, follow
+
+
+def load():
+    """Those of every robot. In a new process this takes a second: numba prepares itself with the first of them."""
+    here, at_rest, bound = np.zeros(1), np.zeros(1), np.ones(1)
+    approach(here, at_rest, here, bound, bound, 1.0)
+    points = SetPoints(1)
+    follow(points.numbers, points.flags, np.zeros((1, 1)), 0, here, 1.0, 1.0)
+    any_beyond(1.0, here, at_rest, here, 1.0)
+    approach_rates(np.zeros(1, dtype=int), here, here, bound, bound, bound > 0.0)
+    avoidance.field(avoidance.Guards(("guard",), np.zeros((1, 3)), bound), *_arm())
+
+
+def load_of_effects(numbers):
+    """Those of a robot with every effect of the physical one; numbers: what ``effects.read`` returns."""
+    here, at_rest, bound = np.zeros(1), np.zeros(1), np.ones(1)
+    sensors = JointSensors(numbers["noise"], ["left_s0"], 0, 0)
+    sensors.reached(sensors.felt(here), np.arange(1))
+    actuators = Actuators(numbers["lag"], ["left_s0"])
+    actuators.torques(Wanted(bound > 0.0, here, at_rest, bound > 0.0, here, bound), np.ones((3, 1)), 1.0)
+    rotations, origins, rates = _arm()
+    frames = rotations, origins
+    avoidance.between(frames, frames, rates, 1.0, 1.0)
+    avoidance.around(blocks_of(numbers["body"]), frames, rates, 1.0, 1.0)
+
+
+def _arm():
+    """(rotations, origins, rates) of an arm whose frames all coincide."""
+    return np.zeros((8, 3, 3)), np.zeros((8, 3)), np.zeros(7)
