@@ -12,9 +12,10 @@ const degrees = (angle) => angle * 180 / Math.PI;
 const radians = (angle) => angle * Math.PI / 180;
 
 export class Hands {
-  // send(operation); view: () => the 3D view or null.
-  constructor(send, view) {
+  // send(operation); view: () => the 3D view or null; plans: turns a motion into one that is planned.
+  constructor(send, view, plans) {
     this.send = send;
+    this.plans = plans;
     this.view = view;
     this.hands = new Map();
     this.mode = "translate";
@@ -59,7 +60,7 @@ export class Hands {
   // All hands that are shown, together.
   go() {
     const shown = [...this.hands.values()].filter((hand) => hand.shown && hand.reaches);
-    this.send({op: "move", joints: Object.assign({}, ...shown.map((hand) => hand.joints))});
+    this.send(this.plans.choose({op: "move", joints: Object.assign({}, ...shown.map((hand) => hand.joints))}));
   }
 
   answered(answer) {

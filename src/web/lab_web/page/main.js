@@ -3,6 +3,7 @@
 import {Controls} from "./controls.js";
 import {Hands} from "./hands.js";
 import {element, Panel} from "./panel.js";
+import {Plans} from "./plans.js";
 import {Plots} from "./plots.js";
 import {Recordings} from "./recordings.js";
 import {Simulation} from "./simulation.js";
@@ -23,10 +24,11 @@ const host = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host
 
 const worker = new Worker("/page/worker.js");
 const send = (operation) => worker.postMessage(operation);
-const panel = new Panel(send);
+const plans = new Plans();
+const panel = new Panel(send, plans);
 const state = {connected: null, number: 0, may_act: false, mine: false, free: true, robot: null, scene: null, factor: null};
 let view = null;
-const hands = new Hands(send, () => view);
+const hands = new Hands(send, () => view, plans);
 const controls = new Controls(send, query, () => state.number, note);
 const recordings = new Recordings(send, query, () => state.number, note);
 const plots = new Plots();
@@ -122,6 +124,9 @@ const served = {
   reach(answer) {
     hands.answered(answer);
   },
+  plan(answer) {
+    plans.answered(answer);
+  },
   poses({data}) {
     if (!view || view.setPoses(data)) return;
     loadScene(data);
@@ -160,6 +165,7 @@ function sayOfView() {
 
 function buildPanels() {
   panel.build(robot);
+  plans.build(robot);
   hands.build(robot.hands ?? []);
   controls.build(robot);
   plots.build(robot.joints ?? []);

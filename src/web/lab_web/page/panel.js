@@ -14,8 +14,10 @@ export function element(name, properties = {}, ...children) {
 }
 
 export class Panel {
-  constructor(send) {
+  // send(operation); plans: turns a motion into one that is planned, where that is wanted.
+  constructor(send, plans) {
     this.send = send;
+    this.plans = plans;
     this.sliders = new Map();
     this.wanted = new Map();
     this.unsent = {};
@@ -34,7 +36,7 @@ export class Panel {
     document.getElementById("sliders").replaceChildren(...groups.values());
     document.getElementById("poses").replaceChildren(...poses.map((name) => element("button", {
       id: `pose-${name}`, className: "plain", textContent: has(`pose_${name}`) ? text(`pose_${name}`) : name,
-      onclick: () => this.act({op: "pose", name})})));
+      onclick: () => this.act(this.plans.choose({op: "pose", name}))})));
     const hands = grippers.map((side) => element("p", {className: "row"}, element("span", {textContent: text(`gripper_${side}`)}),
       ...["open", "close", "calibrate"].map((action) => element("button", {
         id: `${side}-${action}`, className: "plain small", textContent: text(action),

@@ -39,6 +39,7 @@ class Lab:
         self._moving = threading.Event()
         self._served = dict(_OPERATIONS)
         self._releases = []
+        self._releases_of_silent = []
 
     def add(self, name, serve, needs_control=True):
         """An operation beside those of this module: ``serve(client, operation)`` does not wait, and raises RobotError;
@@ -50,11 +51,13 @@ class Lab:
             serve(client, operation)
         self._served[name] = checked
 
-    def when_lost(self, release):
-        """``release()`` is called when the robot is stopped, and when a page loses the control, goes or falls silent:
-        it ends what the page holds. It does not wait, and may have nothing to end.
+    def when_lost(self, release, when_silent=True):
+        """``release()`` is called when the robot is stopped, and when a page loses the control, goes or (with
+        ``when_silent``) falls silent: it ends what the page holds. It does not wait, and may have nothing to end.
         """
         self._releases.append(release)
+        if when_silent:
+            self._releases_of_silent.append(release)
 
     @property
     def holder(self):
@@ -112,7 +115,8 @@ class Lab:
             if not self._motion.is_moving:
                 self._moving.clear()
                 if not self._control.is_alive(self._clock()):
-                    self._release_held()
+                    for release in self._releases_of_silent:
+                        release()
                 return
             client, why, lost = self._control.holder, self._robot.why_not_ready(), None
             if self._control.is_alive(self._clock()) and not why:
@@ -152,9 +156,6 @@ class Lab:
             if not self._robot.why_not_ready():
                 self._robot.command({joint: measured[joint] for joint in self._motion.limits if joint in measured})
         self._moving.clear()
-        self._release_held()
-
-    def _release_held(self):
         for release in self._releases:
             release()
 

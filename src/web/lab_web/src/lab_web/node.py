@@ -24,7 +24,9 @@ from lab_web.hands import Hands, ghost
 from lab_web.lab import Lab
 from lab_web.libraries import LibrariesError, fetched
 from lab_web.loops import lasting
+from lab_web.move_group import RESULT_TOPIC, RESULT_TYPE, MoveGroup
 from lab_web.parts import SCREEN_TOPIC, Parts
+from lab_web.planning import Planning
 from lab_web.playback import Recorder, play
 from lab_web.release_guard import ReleaseGuard
 from lab_web.robot import ARM_LINKS, Baxter
@@ -161,12 +163,16 @@ def _equip(pages, robot, faults):
     hands = Hands(robot.measured, lambda chain, joints: ghost(pages.picture, chain, joints), pages.answer)
     lab.add("reach", hands.ask, needs_control=False)
     parts = Parts()
-    errands, switches = Errands(pages.tell, faults), Errands(pages.tell, faults)
+    errands, switches, plans = (Errands(pages.tell, faults) for _ in range(3))
     guard = ReleaseGuard()
     buttons = Buttons(parts.switch, switches, guard.pressed)
     simulation = Simulation(errands, lambda: bodies_of(pages.picture, robot.limits), pages.answer,
                             lambda state: pages.share("simulation", state))
     lab.when_lost(buttons.release_all)
+    planning = Planning(lab, robot, MoveGroup(), plans, pages.answer)
+    lab.add("plan", planning.plan)
+    # A page that is silent for a moment still gets its plan; to move, it must be there.
+    lab.when_lost(planning.cancel, when_silent=False)
     recorder = Recorder(lambda recording: pages.share("recording", recording))
     robot.heard = recorder.take
     lab.add("record", recorder.record, needs_control=False)
@@ -176,7 +182,7 @@ def _equip(pages, robot, faults):
                         **simulation.operations()}.items():
         lab.add(name, serve)
     return _Equipment(hands, simulation, recorder, guard, {
-        "the hands": hands.run, "errands": errands.run,
+        "the hands": hands.run, "errands": errands.run, "plans": plans.run,
         "buttons": lambda ends: switches.run(ends, buttons.release_all)})
 
 
@@ -232,6 +238,7 @@ def _described(robot, equipment):
                        for name, limits in robot.limits.items()],
             "poses": list(robot.poses), "hands": equipment.hands.sides, "grippers": robot.grippers,
             "cameras": sorted(topic for topic, kind in published.items() if kind == _COMPRESSED),
+            "can_plan": published.get(RESULT_TOPIC) == RESULT_TYPE,
             "can_press": Parts.can_press(), "has_screen": SCREEN_TOPIC in published,
             "has_scene": isinstance(rospy.get_param(_SNAPSHOT, None), str), "things": equipment.simulation.things}
 

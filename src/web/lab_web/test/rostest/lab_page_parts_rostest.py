@@ -11,7 +11,7 @@ import numpy as np
 import rospy
 from baxter_core_msgs.msg import DigitalIOState
 from gazebo_msgs.srv import GetModelState
-from lab_window import NEAR_RAD, SIDE, PageTest, angles, wait_briefly, wait_for_rest
+from lab_window import NEAR_RAD, SIDE, PageTest, angles, wait_for_rest
 from sensor_msgs.msg import Image
 
 from lab_testing.waiting import wait_for_message, wait_until
@@ -34,40 +34,12 @@ class LabPageParts(PageTest):
         self.enable()
         self.go_to("untucked")
 
-    def press_until(self, selector, condition):
-        """Press an element until the condition is true: a busy machine may be too slow for the heartbeat."""
-        def done():
-            self.browser.wait("!document.querySelector('%s').disabled" % selector)
-            self.browser.click(selector)
-            return wait_briefly(condition, 5.0)
-        wait_until(done, selector, 120.0)
-
-    def drag_handle(self, name, across, down):
-        """Drag a handle of the 3D view by pixels."""
-        self.browser.evaluate("scrollTo(0, 0)")
-        column, row = self.browser.evaluate("""(() => {
-            const {camera, canvas, ghosts} = lab.view;
-            const place = ghosts.get("%s").hand.getWorldPosition(camera.position.clone()).project(camera);
-            const {left, top, width, height} = canvas.getBoundingClientRect();
-            return [left + (place.x + 1) / 2 * width, top + (1 - place.y) / 2 * height];
-        })()""" % name)
-        self.browser.drag((column, row), (column + across, row + down))
-
     def check_hand_goes(self, across, down):
         """Drag the hand, and press "Go"."""
         self.browser.click("#reach-" + SIDE)
         self.browser.wait("lab.view.ghosts.has('%s')" % SIDE)
         self.drag_handle(SIDE, across, down)
-        self.browser.wait("(({asked, wanted}) => asked === null && !wanted)(lab.hands.hands.get('%s'))" % SIDE)
-        reaches, said, joints = self.browser.evaluate(
-            "(({reaches, said, joints}) => [reaches, said.textContent, joints])(lab.hands.hands.get('%s'))" % SIDE)
-        self.assertTrue(reaches, said)
-
-        def away():
-            now = angles()
-            return max(abs(now[name] - angle) for name, angle in joints.items())
-        self.assertGreater(away(), NEAR_RAD)
-        self.press_until("#reach-go", lambda: away() < NEAR_RAD)
+        self.check_hand_goes_to_its_ghost(SIDE)
         self.browser.click("#reach-" + SIDE)
 
     def test_a_hand_is_dragged_and_the_arm_goes_there(self):

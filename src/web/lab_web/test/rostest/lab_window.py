@@ -147,5 +147,37 @@ class PageTest(unittest.TestCase):
             return wait_briefly(lambda: before - away(pose) > 0.1)
         wait_until(moves, "a motion to " + pose, 60.0)
 
+    def press_until(self, selector, condition):
+        """Press an element until the condition is true: a busy machine may be too slow for the heartbeat."""
+        def done():
+            self.browser.wait("!document.querySelector('%s').disabled" % selector)
+            self.browser.click(selector)
+            return wait_briefly(condition, 5.0)
+        wait_until(done, selector, 120.0)
+
+    def drag_handle(self, name, across, down):
+        """Drag a handle of the 3D view by pixels."""
+        self.browser.evaluate("scrollTo(0, 0)")
+        column, row = self.browser.evaluate("""(() => {
+            const {camera, canvas, ghosts} = lab.view;
+            const place = ghosts.get("%s").hand.getWorldPosition(camera.position.clone()).project(camera);
+            const {left, top, width, height} = canvas.getBoundingClientRect();
+            return [left + (place.x + 1) / 2 * width, top + (1 - place.y) / 2 * height];
+        })()""" % name)
+        self.browser.drag((column, row), (column + across, row + down))
+
+    def check_hand_goes_to_its_ghost(self, side):
+        """Press "Go" until the arm is where its ghost is."""
+        self.browser.wait("(({asked, wanted}) => asked === null && !wanted)(lab.hands.hands.get('%s'))" % side)
+        reaches, said, joints = self.browser.evaluate(
+            "(({reaches, said, joints}) => [reaches, said.textContent, joints])(lab.hands.hands.get('%s'))" % side)
+        self.assertTrue(reaches, said)
+
+        def away():
+            now = angles()
+            return max(abs(now[name] - angle) for name, angle in joints.items())
+        self.assertGreater(away(), NEAR_RAD)
+        self.press_until("#reach-go", lambda: away() < NEAR_RAD)
+
     def says_silent(self):
         return self.browser.evaluate("document.getElementById('told').textContent.includes('in time')")

@@ -12,6 +12,7 @@ import numpy as np
 import rospy
 from baxter_core_msgs.msg import AnalogOutputCommand, AssemblyState, DigitalOutputCommand, JointCommand
 from bullet_sim_msgs.srv import AdvanceTicks, AdvanceTicksResponse, Press, PressResponse
+from fake_move_group import FakeMoveGroup
 from gazebo_msgs.msg import ModelState
 from gazebo_msgs.srv import (
     DeleteModel,
@@ -73,6 +74,8 @@ class FakeBaxter:
             pose=Pose(Point(1.0, 2.0, 3.0), Quaternion(0.0, 0.0, 0.0, 1.0)), success=True))
         rospy.Subscriber("/gazebo/set_model_state", ModelState, lambda message: self._say(
             "put", message.model_name, message.pose.position.x, message.pose.orientation.w, message.reference_frame))
+
+        FakeMoveGroup(lambda: dict(self._positions), self._say)
 
     def run(self):
         rate, number = rospy.Rate(RATE_HZ), 0

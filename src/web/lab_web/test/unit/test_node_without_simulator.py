@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import rosgraph
 import websocket
+from fake_move_group import BLOCKED_RAD, ENDLESS_RAD, IN_COLLISION
 
 from lab_environment.ports import free_port
 from lab_testing.waiting import stretched, wait_until
@@ -232,6 +233,35 @@ def test_arms_move_and_parts_follow_and_what_is_missing_is_told(hall):
         wait_until(lambda: len(page.told()) >= before + 3, "three reasons")
         page.send(op="release")
         wait_until(lambda: ["release", "left_lower_cuff", 0] in hall.said("press"), "the cuff's release")
+    finally:
+        page.close()
+
+
+def test_the_arms_follow_a_plan_and_the_planners_reasons_are_told(hall):
+    page = hall.drive()
+    try:
+        wait_until(lambda: page.last("robot")["can_plan"], "a planner")
+
+        def planned(joint, angle):
+            page.heard[:] = [row for row in page.heard if row["op"] != "plan"]
+            page.send(op="plan", joints={joint: angle})
+            wait_until(lambda: (page.last("plan") or {}).get("why", "busy") != "busy", "an answer", START_S)
+            return page.last("plan")
+        assert planned("right_s0", 0.4)["why"] == "found"
+        wait_until(lambda: any(row.get("right_s0") == pytest.approx(0.4, abs=1e-6) for (row,) in hall.said("joints")),
+                   "the arm at its goal")
+        assert hall.said("plan") == [["right_arm", {"right_s0": 0.4}, True, True]]
+        blocked = planned("left_s0", BLOCKED_RAD)
+        assert (blocked["why"], blocked["text"]) == ("goal_in_collision",
+                                                     "the goal is in collision: " + IN_COLLISION)
+        # Planning that goes on until it is stopped.
+        page.heard[:] = [row for row in page.heard if row["op"] != "plan"]
+        page.send(op="plan", joints={"left_s0": ENDLESS_RAD})
+        wait_until(lambda: len(hall.said("plan")) == 3, "a goal at the planner")
+        page.send(op="stop")
+        wait_until(lambda: page.last("plan")["why"] == "preempted" and hall.said("preempted"),
+                   "the end of the planning")
+        assert not any("left_s0" in row for (row,) in hall.said("joints"))
     finally:
         page.close()
 

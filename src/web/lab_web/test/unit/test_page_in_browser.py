@@ -120,9 +120,10 @@ class Server:
         buttons = Buttons(self.robot.switch, errands)
         self.lab.when_lost(buttons.release_all)
         recorder = Recorder(lambda state: self.pages.share("recording", state))
-        self.shown = []
+        self.shown, self.planned = [], []
         for name, serve in {"press": buttons.press, "turn": buttons.turn,
                             "screen": lambda client, operation: self.shown.append(operation["content"]),
+                            "plan": self.plan,
                             "play": lambda client, operation: play(self.lab, client, recorder)}.items():
             self.lab.add(name, serve)
         for name, serve in {"reach": hands.ask, "record": recorder.record, "load": recorder.load}.items():
@@ -138,7 +139,7 @@ class Server:
             "joints": [{"name": name, "lower": row.lower, "upper": row.upper} for name, row in
                        self.robot.limits.items()],
             "poses": ["neutral"], "hands": hands.sides, "grippers": [], "cameras": [], "has_scene": True,
-            "can_press": True, "things": ["block"]})
+            "can_plan": True, "can_press": True, "things": ["block"]})
         application = web.Application([*routes(self.pages, PAGE, libraries), *upload_routes(self.pages, recorder),
                                        (r"/rosbridge", Rosbridge, {"sockets": self._sockets})])
         self._serving = Serving(self.loop, application, 0, "127.0.0.1")
@@ -147,6 +148,10 @@ class Server:
                          for target in (self.lab.run, hands.run, errands.run, self._run)]
         for thread in self._threads:
             thread.start()
+
+    def plan(self, client, operation):
+        self.planned.append(operation)
+        self.pages.answer(client, {"op": "plan", "why": "goal_in_collision", "text": "the crate is there"})
 
     def _write(self):
         self.ticks += 1
@@ -326,6 +331,26 @@ def test_a_button_is_held_as_long_as_the_pointer_and_no_longer_than_the_control(
     click_until(browser, "#press-right_lower_cuff", lambda: ("press", "right_lower_cuff", 0) in lab.robot.switched)
     browser.click("#control")
     wait_until(lambda: last("right_lower_cuff") == "release", "the release of the cuff")
+
+
+def test_poses_and_hands_are_planned_where_the_page_wants_it(lab, browser):
+    said = "document.getElementById('plan-said').textContent"
+    browser.click("#plan-first")
+    click_until(browser, "#pose-neutral", lambda: lab.planned)
+    browser.wait(said + " === 'The arms would touch something there: the crate is there'")
+    assert lab.planned[-1] == {"op": "plan", "name": "neutral"} and lab.lab.is_moving is False
+    browser.evaluate("(() => { const list = document.getElementById('language'); list.value = 'zh';"
+                     "return list.onchange(); })()")
+    browser.wait(said + " === '手臂在目标处会发生碰撞：the crate is there'")
+    browser.evaluate("(() => { const list = document.getElementById('language'); list.value = 'en';"
+                     "return list.onchange(); })()")
+    browser.click("#reach-left")
+    browser.wait("lab.view.ghosts.size === 1")
+    _, _, joints, _ = hand(browser, "left")
+    click_until(browser, "#reach-go", lambda: "joints" in lab.planned[-1])
+    assert lab.planned[-1]["joints"] == pytest.approx(joints)
+    browser.click("#plan-first")
+    browser.evaluate("localStorage.clear()")
 
 
 def test_a_picture_fills_the_screen_as_far_as_its_shape_lets_it(lab, browser, tmp_path):
