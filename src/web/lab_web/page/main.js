@@ -110,6 +110,7 @@ const served = {
   },
   told({code, text: detail}) {
     panel.settle();
+    plans.answered(null);
     note(code, detail);
   },
   simulation(is) {

@@ -22,6 +22,7 @@ export class Plans {
     return this.canPlan && byId("plan-first").checked ? {...motion, op: "plan"} : motion;
   }
 
+  // What the server says of the planning; null: something else has ended it, or the motion.
   answered(answer) {
     this.last = answer;
     this.refresh();

@@ -11,6 +11,9 @@ import numpy as np
 
 from sensor_renderer.following import WorldFollower
 
+# A part whose longest side exceeds this [m] has its fine triangles: without them the pedestal's feet are in pieces.
+_LARGE_M = 0.8
+
 
 class Picture:
     """One scene. ``text``: JSON with ``revision``, ``bodies`` [{name, links: [[{shape, colour}]]}], ``light``;
@@ -63,7 +66,7 @@ def picture_of(mirror, revision):
                 if part.is_floor:
                     continue
                 if part.key not in names:
-                    content = part.triangles.astype("<f4").tobytes()
+                    content = _triangles_of(part).astype("<f4").tobytes()
                     names[part.key] = hashlib.sha256(content).hexdigest()[:24]
                     shapes[names[part.key]] = content
                 shown.append({"shape": names[part.key], "colour": [float(value) for value in part.colour]})
@@ -72,6 +75,11 @@ def picture_of(mirror, revision):
     light = {key: [float(value) for value in getattr(mirror.light, key)] for key in ("ambient", "to_sun", "sun")}
     return Picture(revision, json.dumps({"revision": revision, "bodies": bodies, "light": light}), shapes,
                    dict(mirror.bodies))
+
+
+def _triangles_of(part):
+    is_large = len(part.triangles) and np.ptp(part.triangles[:, :3], axis=0).max() > _LARGE_M
+    return part.fine() if is_large and part.fine is not None else part.triangles
 
 
 def bodies_of(picture, joints):

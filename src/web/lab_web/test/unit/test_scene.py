@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The world for a browser, from a snapshot that the test writes."""
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from lab_web.scene import SceneFollower
+from lab_web.scene import SceneFollower, picture_of
+from sensor_renderer.mirror import Part
 from world_picture.snapshot import SnapshotError, SnapshotWriter
 
 BOX = """<robot name="box"><link name="box"><visual><geometry><box size="0.2 0.2 0.2"/></geometry>
@@ -58,6 +60,19 @@ def test_a_new_body_makes_a_new_picture(writer):
     writer.write_scene([body("a"), body("b", BOX.replace("0.2 0.2 0.2", "0.4 0.2 0.2"))])
     writer.write(2, 0.1, [np.array(pose(0.0) + pose(1.0))])
     assert follower.follow() and follower.picture.revision > first.revision and len(follower.picture.shapes) == 2
+
+
+@pytest.mark.parametrize(("side_m", "is_fine"), [(0.2, False), (2.0, True)])
+def test_large_parts_have_their_fine_triangles(side_m, is_fine):
+    coarse, fine = (np.zeros((3 * count, 6), np.float32) for count in (1, 4))
+    coarse[1, 2] = side_m
+    part = Part("shape", coarse, (1.0, 0.0, 0.0, 1.0), fine=lambda: fine)
+    body = SimpleNamespace(parts=[[part, Part("box", coarse, (1.0, 0.0, 0.0, 1.0))]], joint_names=[])
+    light = SimpleNamespace(ambient=[0.5], to_sun=[0.0, 0.0, 1.0], sun=[0.5])
+    picture = picture_of(SimpleNamespace(bodies={"a": body}, light=light), 1)
+    (first, second), = json.loads(picture.text)["bodies"][0]["links"]
+    assert len(picture.shapes[first["shape"]]) == (fine if is_fine else coarse).nbytes
+    assert len(picture.shapes[second["shape"]]) == coarse.nbytes
 
 
 def test_without_a_simulator_there_is_no_scene(tmp_path):
