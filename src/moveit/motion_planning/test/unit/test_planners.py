@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Paths: free by geometry that shares nothing with the planner, from start to goal, the same for the same seed."""
 import itertools
+import math
 import subprocess
 import sys
 import time
@@ -11,10 +12,10 @@ import pytest
 
 from motion_planning.exact import ExactChecker
 from motion_planning.model import PlanningModel
-from motion_planning.planners import NoPath, Run, Search, plan_path, rrt_connect, shorten
+from motion_planning.planners import NoPath, Run, Search, parts, plan_path, rrt_connect, shorten
 from motion_planning.planners.parts import _at_once
-from motion_planning.planners.parts import apart as planned_apart
 from motion_planning.planners.planning import sphere_model_of
+from motion_planning.planners.trees import growing
 from motion_planning.scene import Scene, WorldObject
 from motion_planning.spheres import SphereChecker, SphereModel
 from urdf_model import Box, Cylinder
@@ -315,9 +316,9 @@ def test_two_arms_get_past_each_other_each_planned_for_alone(pair):
         if not checker.valid([start, goal]).all():
             continue
         run = Run(seed, time.monotonic() + PATIENCE_S, time.monotonic)
-        path = planned_apart(checker, model.bounds[group.indices], start, goal, run, 0.5)
-        if path is None:
-            continue
+        path = parts.two_parts(checker, model.bounds[group.indices], start, goal[None], run, 0.5)
+        if "shorten" not in path.times:
+            continue  # of both arms together
         found += 1
         assert np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
         states = states_on(path.points, 0.011)
@@ -326,6 +327,37 @@ def test_two_arms_get_past_each_other_each_planned_for_alone(pair):
         moves = np.abs(np.diff(path.points, axis=0)) > 1e-6
         waited += not (moves[:, :2].any(axis=1) & moves[:, 2:].any(axis=1)).all()
     assert found >= 20 and waited >= 2
+
+
+def test_both_arms_together_and_further_pairs_of_paths_take_turns(pair, monkeypatch):
+    model, _ = pair
+    group = model.groups["both"]
+    checker = SphereChecker(SphereModel.of(model, None), group, Scene(model))
+    start, goal, bounds = np.array([0.3, 0.0, -0.3, 0.0]), np.array([-0.3, 2.0, 0.3, 2.0]), model.bounds[group.indices]
+    passing, tried = parts._one_by_one, []
+
+    def planned(useless_pairs, together):
+        def one_by_one(*arguments):
+            tried.append(arguments)
+            points, samples, seconds = passing(*arguments)
+            return None if len(tried) <= useless_pairs else points, samples, seconds
+
+        tried.clear()
+        monkeypatch.setattr(parts, "_one_by_one", one_by_one)
+        monkeypatch.setattr(parts, "growing", together)
+        run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
+        return parts.two_parts(checker, bounds, start, goal[None], run, 0.5)
+
+    def endless(*_):
+        while True:
+            yield None
+
+    path = planned(20, endless)
+    assert len(tried) == 21 and np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
+    path = planned(math.inf, growing)
+    assert 3 <= len(tried) < 100 and np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
+    # The same seed gives the same path.
+    assert np.array_equal(planned(math.inf, growing).points, path.points)
 
 
 def test_two_ways_at_once_begin_and_end_together_and_pieces_of_no_length_do_no_harm():

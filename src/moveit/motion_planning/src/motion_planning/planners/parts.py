@@ -3,14 +3,15 @@
 
 Two arms collide with each other in few of their postures. One arm has half the joints, so its path is found much
 faster. A path of both needs a path of each alone: if one arm has none, the search in the space of all joints is not
-needed.
+needed. If the arms cannot pass each other on several pairs of paths, that search and further pairs take turns: either
+alone may take a hundred times as long as usual, both hardly ever do.
 """
 import itertools
 
 import numpy as np
 
 from motion_planning.planners import kernels
-from motion_planning.planners.trees import Path, rrt_connect, shorten
+from motion_planning.planners.trees import SAMPLES, Path, growing, rrt_connect, shorten
 
 # Distance [rad] of postures on the path of one arm that are combined with those of the other.
 _SPACING = 0.15
@@ -18,29 +19,44 @@ _SPACING = 0.15
 _TURNS = 4
 # Tries and misses of shortcuts, see ``shorten``: of the path of one arm, and afterwards of the path of both.
 _ALONE, TOGETHER = (80, 10), (50, 8)
-# Number of pairs of paths to try: another pair may leave more room.
+# Number of pairs of paths to try before both arms are searched together, too: another pair may leave more room.
 _PAIRS = 3
+# Least number of samples for both arms together in a turn: about as much work as one pair of paths.
+_IN_A_TURN = 2 * SAMPLES
 
 
-def apart(checker, bounds, start, goal, run, reach):
-    """Return a Path from ``start`` (k,) to ``goal`` (k,) with the two parts of ``checker`` planned one by one; None if
-    they cannot pass each other. Its times are of "shorten". Arguments and errors as in ``rrt_connect``."""
-    samples, shortening = 0, 0.0
-    for turn in range(_PAIRS):
-        run, ways = run._replace(seed=run.seed + turn), []
-        for indices, alone in checker.parts:
-            found = rrt_connect(alone, bounds[indices], start[indices], goal[indices], run, reach)
-            samples += found.samples
-            begin = run.clock()
-            ways.append(shorten(found, alone, run, *_ALONE).points)
-            shortening += run.clock() - begin
-        points = _at_once(checker.parts, ways)
-        if checker.between_parts.edges(points).all():
-            return Path(points, samples, {"shorten": shortening})
-        points = _past_each_other(checker, ways)
+def two_parts(checker, bounds, start, goals, run, reach):
+    """Return a Path from ``start`` (k,) to one of ``goals`` (g, k) for a ``checker`` of two parts, which are planned
+    one by one where they get past each other so; its times are then of "shorten". Arguments and errors as in
+    ``rrt_connect``."""
+    nearest = goals[np.linalg.norm(goals - start, axis=1).argmin()]
+    together, samples, shortening = growing(checker, bounds, start, goals, run, reach), 0, 0.0
+    for turn in itertools.count():
+        points, drawn, seconds = _one_by_one(checker, bounds, start, nearest, run._replace(seed=run.seed + turn), reach)
+        samples, shortening = samples + drawn, shortening + seconds
         if points is not None:
             return Path(points, samples, {"shorten": shortening})
-    return None
+        if turn + 1 < _PAIRS:
+            continue
+        for found in itertools.islice(together, max(drawn, _IN_A_TURN) // SAMPLES):
+            if found is not None:
+                return found._replace(samples=samples + found.samples)
+
+
+def _one_by_one(checker, bounds, start, goal, run, reach):
+    """(points (m, k), samples, seconds for shortcuts) of one path of each part, brought together; points are None where
+    the parts cannot pass each other on these."""
+    samples, shortening, ways = 0, 0.0, []
+    for indices, alone in checker.parts:
+        found = rrt_connect(alone, bounds[indices], start[indices], goal[indices], run, reach)
+        samples += found.samples
+        begin = run.clock()
+        ways.append(shorten(found, alone, run, *_ALONE).points)
+        shortening += run.clock() - begin
+    points = _at_once(checker.parts, ways)
+    if not checker.between_parts.edges(points).all():
+        points = _past_each_other(checker, ways)
+    return points, samples, shortening
 
 
 def _at_once(parts, ways):

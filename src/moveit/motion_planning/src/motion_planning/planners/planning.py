@@ -10,7 +10,7 @@ import numpy as np
 
 from motion_planning.planners.constrained import ConstrainedPlanning
 from motion_planning.planners.errors import NoPath
-from motion_planning.planners.parts import TOGETHER, apart
+from motion_planning.planners.parts import TOGETHER, two_parts
 from motion_planning.planners.trees import REACH, Path, Run, rrt_connect, shorten
 from motion_planning.planners.warming import warm_up
 from motion_planning.scene import Scene
@@ -196,10 +196,7 @@ class _Planning:
     def _found(self, checker, start, goals, run):
         """A Path by spheres to one of ``goals``."""
         if self.search.planner is rrt_connect and len(checker.parts) == 2:
-            nearest = goals[np.linalg.norm(goals - start, axis=1).argmin()]
-            found = apart(checker, self.bounds, start, nearest, run, REACH)
-            if found is not None:
-                return found
+            return two_parts(checker, self.bounds, start, goals, run, REACH)
         return self.search.planner(checker, self.bounds, start, goals, run)
 
     def _way_out(self, q, run):

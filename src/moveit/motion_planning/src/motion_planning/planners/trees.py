@@ -11,8 +11,8 @@ from motion_planning.planners.errors import NoPath
 
 #: The longest edge of a tree [rad, Euclidean distance of joint values]. Longer ones find fewer narrow passages.
 REACH = 0.5
-# Number of samples between two checks of the clock: about 2 ms.
-_SAMPLES = 1000
+#: Number of samples between two checks of the clock: about 2 ms.
+SAMPLES = 1000
 _LEAST_ROOM, _MOST_ROOM = 4096, 1 << 20
 _ALL = (1 << 64) - 1
 # Shortcuts: total tries, failed tries in a row.
@@ -56,21 +56,29 @@ def rrt_connect(checker, bounds, start, goals, run, reach=REACH):
     Two trees grow towards each other, the smaller one first. bounds (k, 2): of the samples; start and goals must be
     free. Raises NoPath if the deadline has passed or ``run.stop`` is true.
     """
+    return next(path for path in growing(checker, bounds, start, goals, run, reach) if path is not None)
+
+
+def growing(checker, bounds, start, goals, run, reach=REACH):
+    """``rrt_connect`` in parts of ``SAMPLES`` samples: yields None after each one, and at last the Path."""
     start, goals = np.asarray(start, dtype=np.float32), np.atleast_2d(np.asarray(goals, dtype=np.float32))
     for goal in goals[np.argsort(np.linalg.norm(goals - start, axis=1), kind="stable")]:
         if checker.edge(start, goal):
-            return Path(np.array([start, goal], dtype=float))
+            yield Path(np.array([start, goal], dtype=float))
+            return
     bounds = np.ascontiguousarray(np.asarray(bounds).T, dtype=np.float32)
     trees = _seeds(start, goals, run.seed)
     while True:
         result = kernels.grow(checker.tables, trees, (bounds[0], bounds[1]), np.float32(reach),
-                              np.float32(checker.resolution), _SAMPLES)
+                              np.float32(checker.resolution), SAMPLES)
         if result == kernels.MET:
-            return Path(_traced(trees), int(trees[2][6]))
+            yield Path(_traced(trees), int(trees[2][6]))
+            return
         run.check("a path was looked for: %d samples were drawn, the trees from start and goal have %d and %d postures"
                   % (trees[2][6], trees[2][0], trees[2][1]))
         if result == kernels.FULL:
             trees = _roomier(trees)
+        yield None
 
 
 def shorten(path, checker, run, tries=_TRIES, misses=_MISSES):
