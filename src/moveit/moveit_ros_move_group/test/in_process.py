@@ -52,16 +52,16 @@ class Server:
 
 class Node:
     """The node of some parameters (a tree, the private ones in its "~"), with what it says kept: published [(topic,
-    message)], logged [line]."""
+    message)], logged [line]. on_service(name) is called when a service is offered."""
 
-    def __init__(self, monkeypatch, parameters):
+    def __init__(self, monkeypatch, parameters, on_service=lambda name: None):
         self.services, self.topics, self.servers = {}, {}, {}
         self.published, self.logged = [], []
-        self._parameters = parameters
+        self._parameters, self._on_service = parameters, on_service
         rospy.rostime.set_rostime_initialized(True)
         monkeypatch.setattr(rospy, "get_param", self._get_param)
         monkeypatch.setattr(rospy, "has_param", lambda name: self._get_param(name, None) is not None)
-        monkeypatch.setattr(rospy, "Service", lambda name, _type, serve, **_: self.services.setdefault(name, serve))
+        monkeypatch.setattr(rospy, "Service", self._service)
         monkeypatch.setattr(rospy, "Subscriber", self._subscriber)
         monkeypatch.setattr(rospy, "Publisher", self._publisher)
         monkeypatch.setattr(actionlib, "SimpleActionServer", self._server)
@@ -117,6 +117,10 @@ class Node:
             if name == "~fake_controller_joint_states":
                 self.topics["joint_states"](message)
         return SimpleNamespace(publish=publish, get_num_connections=lambda: 0)
+
+    def _service(self, name, _type, serve, **_):
+        self._on_service(name)
+        self.services[name] = serve
 
     def _server(self, *arguments, **options):
         server = Server(*arguments, **options)

@@ -10,13 +10,14 @@ from dynamic_reconfigure.srv import ReconfigureRequest
 from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import ExecuteKnownTrajectoryRequest
 
+from motion_planning.spheres import checker, sphere_model
 from moveit_ros_move_group import settings
 from moveit_ros_move_group.capabilities.motion import MoveAction
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bad_requests import outcome  # noqa: E402
 from good_requests import good_requests  # noqa: E402
-from in_process import Node  # noqa: E402
+from in_process import Node, Server  # noqa: E402
 from small_arm import SIX, joint_state, parameters  # noqa: E402
 
 
@@ -37,6 +38,31 @@ def test_without_execution_nothing_is_executed_and_the_reason_is_said(monkeypatc
         answer = node.ask("execute_kinematic_path", ExecuteKnownTrajectoryRequest(goal.trajectory, waits))
         assert answer.error_code.val == MoveItErrorCodes.CONTROL_FAILED
     assert all("allow_trajectory_execution is false" in one.text for one in node.told("~failures"))
+
+
+def test_nothing_is_served_before_spheres_and_scene_are_ready(monkeypatch):
+    """A request must not wait for them, nor be answered without what the parameters say of the scene."""
+    events = []
+
+    def noted(event, function):
+        def call(*arguments, **options):
+            result = function(*arguments, **options)
+            events.append(event)
+            return result
+        return call
+
+    monkeypatch.setattr(sphere_model, "cached", noted("spheres", sphere_model.cached))
+    monkeypatch.setattr(checker, "bake", noted("tables", checker.bake))
+    monkeypatch.setattr(settings, "described_scene", noted("scene", settings.described_scene))
+    monkeypatch.setattr(Server, "start", noted("served", Server.start))
+    node = Node(monkeypatch, parameters(), noted("served", lambda name: None))
+    served = events.index("served")
+    assert {"spheres", "tables", "scene"} <= set(events[:served]) and set(events[served:]) == {"served"}
+    assert events.count("served") == len(node.services) + len(node.servers) > 15
+    node.topics["joint_states"](joint_state())
+    code, text = outcome(node.ask("plan_kinematic_path", good_requests(SIX)["plan_kinematic_path"]))
+    assert code == MoveItErrorCodes.SUCCESS, text
+    assert "spheres" not in events[served:]
 
 
 def test_a_capability_that_is_not_served_is_named_in_the_log(monkeypatch):
