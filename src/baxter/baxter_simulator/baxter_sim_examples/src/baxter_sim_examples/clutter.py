@@ -2,7 +2,7 @@
 """A block among other things on the table: what a seed decides, and how the block can be grasped and put down.
 Free of ROS."""
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,9 +16,12 @@ _WIDTHS_M, _HEIGHTS_M, _MASSES_KG = (0.04, 0.08), (0.06, 0.22), (0.1, 0.4)
 # Free between a thing and whatever stands beside it; the fingers reach in there.
 _GAP_M = 0.02
 # How far the hand may lean [rad] while its fingers stay along faces of the block.
-_LEANS_RAD = (0.0, 0.2, -0.2, 0.35, -0.35, 0.5, -0.5)
+_LEANS_RAD = (0.0, *(sign * lean for lean in (0.1, 0.2, 0.35, 0.5, 0.65) for sign in (1, -1)))
+# What the planner is told of is larger by this to all sides [m]: its paths lead past things at next to no distance
+# (0.2 mm and more), and joints that move leave their path by up to 10 mrad when a command comes late.
+_MARGIN_M = 0.005
 # Leans that differ by less are the same [rad].
-_SAME_LEAN_RAD = 0.1
+_SAME_LEAN_RAD = 0.05
 # A grasp or place loses this much quality for each radian it leans or turns away from where the arm is at ease.
 _PER_LEAN, _PER_TURN = 0.5, 0.1
 # The block is let go from so high above the table [m].
@@ -55,6 +58,10 @@ class Thing:
     def radius(self):
         """Of the circle that it stands in [m]."""
         return 0.5 * self.width * (1.0 if self.is_round else math.sqrt(2.0))
+
+    def with_margin(self):
+        """The Thing as a planner should know it: larger to all sides."""
+        return replace(self, width=self.width + 2.0 * _MARGIN_M, height=self.height + 2.0 * _MARGIN_M)
 
     def urdf(self):
         """Its description, URDF text."""

@@ -102,7 +102,7 @@ class MoveItTrials:
         self._scene.add_box(TABLE, _pose((*TABLE_XY_M, TABLE_TOP_M - BASE_HEIGHT_M - 0.5 * thickness), 0.0),
                             (TABLE_SIZE_M, TABLE_SIZE_M, thickness))
         self._scene.add_box(BLOCK, _at(trial.source), (BLOCK_SIZE_M,) * 3)
-        for thing in things:
+        for thing in (thing.with_margin() for thing in things):
             if thing.is_round:
                 self._scene.add_cylinder(thing.name, _at(thing.spot), thing.height, 0.5 * thing.width)
             else:
