@@ -11,7 +11,9 @@ _WITHOUT_EFFECT = (
 
 
 class CommandLine:
-    """The parsed command line: ``world_name`` and ``seed`` or None, ``paused``, and ``ignored``, a list of words."""
+    """The parsed command line: ``world_name`` and ``seed`` or None, ``paused``, ``starts_renderer`` (whether this
+    process sees to it that cameras are drawn), and ``ignored``, a list of words.
+    """
 
     def __init__(self, arguments):
         """``arguments``: list of words without the program's name and without ROS's remappings.
@@ -23,12 +25,16 @@ class CommandLine:
         parser.add_argument("-u", "--pause", action="store_true")
         parser.add_argument("--seed", type=int)
         parser.add_argument("--verbose", action="store_true")
+        # Of empty_world.launch, which starts the renderer as a node, or not at all. No parameter: that would stay on
+        # the master.
+        parser.add_argument("--no-renderer", action="store_true")
         for names, takes_value in _WITHOUT_EFFECT:
             parser.add_argument(*names, dest=names[-1], action="append" if takes_value else "store_true")
         options, unknown = parser.parse_known_args(arguments)
         self.world_name = options.world_name
         self.paused = options.pause
         self.seed = options.seed
+        self.starts_renderer = not options.no_renderer
         self.ignored = [names[-1] for names, _ in _WITHOUT_EFFECT if getattr(options, names[-1])] + unknown
 
 

@@ -10,6 +10,7 @@ import threading
 import time
 
 import rosgraph
+import roslib.packages
 import rospkg
 import rospy
 
@@ -19,6 +20,7 @@ from gazebo_ros.diagnostics import Diagnostics
 from gazebo_ros.gazebo_services import GazeboServices
 from gazebo_ros.model_plugin import PluginError
 from gazebo_ros.pacing import wake_on_time
+from gazebo_ros.picture_process import PictureProcess
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.publications import Publications
 from gazebo_ros.simulation import Simulation
@@ -131,7 +133,12 @@ def _build(log, cleanup, line):
                                 clock_rate=float(rospy.get_param("~clock_rate", 1.0 / description.time_step_s)))
     lights = WorldLights(description.lights, description.scene)
 
+    pictures = _picture_process(line, log)
+    cleanup.callback(pictures.close)
+
     def tell_viewers():
+        if any(spawner.sensors.values()):
+            pictures.want()
         try:
             writer.write_scene(spawner.listed(), lights.listed())
         except SnapshotError as error:
@@ -173,6 +180,21 @@ def _build(log, cleanup, line):
     simulation.on_time_reset = publications.time_was_reset
     cleanup.callback(simulation.unhost)
     return simulation
+
+
+def _picture_process(line, log):
+    """The process that draws cameras, where the launch file does not start it (``line.starts_renderer``)."""
+    def runs_already():
+        if not line.starts_renderer:
+            return True
+        try:
+            return running_instance("/sensor_renderer") is not None
+        except OSError:
+            return False
+
+    nodes = roslib.packages.find_node("sensor_renderer", "sensor_renderer")
+    return PictureProcess([sys.executable, *nodes[:1], "--end-with-input", "__ns:=/"],
+                          runs_already, log)
 
 
 def _snapshot_writer(log):

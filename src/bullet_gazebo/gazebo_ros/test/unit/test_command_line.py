@@ -28,3 +28,9 @@ def test_what_is_wrong_is_said_in_one_line(words):
     with pytest.raises(ValueError, match="command line of the simulator: .*expected .WORLD_FILE") as raised:
         said(*words)
     assert "\n" not in str(raised.value)
+
+
+def test_the_launch_file_that_has_a_renderer_says_so():
+    assert CommandLine([]).starts_renderer
+    line = CommandLine(["--no-renderer", "lab.world"])
+    assert (line.starts_renderer, line.world_name, line.ignored) == (False, "lab.world", [])

@@ -186,6 +186,13 @@ def make_renderer():
     return renderer
 
 
+def _wait_for_end_of_input(ending):
+    """Set ``ending`` when the process that started this one has ended, whatever ended it."""
+    while sys.stdin.buffer.read(1024):
+        pass
+    ending.set()
+
+
 def main():
     """Draw until a signal or a shutdown request; returns the exit code."""
     # Physics comes first: drawing runs at the lowest priority.
@@ -193,6 +200,8 @@ def main():
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
+    if "--end-with-input" in rospy.myargv()[1:]:
+        threading.Thread(target=_wait_for_end_of_input, args=(ending,), daemon=True).start()
     limit_ports()
     rospy.init_node("sensor_renderer", disable_rostime=True, disable_signals=True)
     path = os.path.join(rospkg.RosPack().get_path("sensor_renderer"), "config", "camera_drivers.yaml")
