@@ -5,11 +5,12 @@ A body is made with ``createMultiBody`` instead of ``loadURDF``: no temporary fi
 copies, the inertia exactly as merged, and 10 ms where loading the same robot from a file takes 60.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from urdf_model import MergedRobot, Robot, Surface, bounds
+from urdf_model import Cylinder, MergedRobot, Robot, Sphere, Surface, bounds
 from urdf_model.transforms import quaternion_from_matrix, rigid
 
 from .parts import Parts, limbs
@@ -29,6 +30,13 @@ _DEFAULT_FRICTION = 1.0
 # Largest friction of a wheel, a link on a continuous joint. Bullet takes no more than this.
 _WHEEL_FRICTION = 10.0
 _DEFAULT_DAMPING = 1.0
+# Casters, spheres beside the wheels, and the edges of wheels are smaller by this [m], and by at most this part. Where
+# all touch the floor at the same height, the shares of the load are undetermined. Bullet gave casters up to 0.6 of it
+# at steps of 10 ms, and with a friction of 1 they held the vehicle; and it put all wheels of a vehicle on the same
+# edge, so that it turned about a point beside its middle.
+_GAP_M, _GAP_PART = 1e-4, 0.01
+# The part of a wheel's width that touches the floor, and the cosine that an axis along a cylinder has at least.
+_TREAD_PART, _ALONG = 0.05, 0.9999
 # Stiffer contacts than this are left rigid; 1 kg then sinks in by 0.1 um.
 _RIGID_N_PER_M = 1e8
 
@@ -74,7 +82,8 @@ def build(client, blueprint, pose, shapes, warn):
         | (0 if static else pybullet.URDF_ENABLE_SLEEPING),
     }
     # The first has the root's shape.
-    root_shapes = [shapes.compound(root.collisions, static, blueprint.mesh_cuts)] + [NO_SHAPE] * (len(joints) - 1)
+    root_shape = shapes.compound(link_collisions(merged, merged.root, static), static, blueprint.mesh_cuts)
+    root_shapes = [root_shape] + [NO_SHAPE] * (len(joints) - 1)
     bodies = [_build_limb(client, blueprint, numbers, {**base, "baseCollisionShapeIndex": shape}, shapes, warn)
               for numbers, shape in zip(joints, root_shapes, strict=True)]
     if not static:
@@ -99,7 +108,8 @@ def _build_limb(client, blueprint, numbers, base, shapes, warn):
         moments.append(principal)
         columns["linkMasses"].append(mass)
         columns["linkCollisionShapeIndices"].append(
-            shapes.compound(link.collisions, False, blueprint.mesh_cuts, exact=is_wheel(joint)))
+            shapes.compound(link_collisions(merged, joint.child, static=False), False, blueprint.mesh_cuts,
+                            exact=is_wheel(joint)))
         columns["linkVisualShapeIndices"].append(NO_SHAPE)
         columns["linkPositions"].append(joint.origin[:3, 3].tolist())
         columns["linkOrientations"].append(quaternion_from_matrix(joint.origin).tolist())
@@ -131,6 +141,35 @@ def _build_limb(client, blueprint, numbers, base, shapes, warn):
         pybullet.changeDynamics(body, local, **_contact(merged.links[joint.child].surface, most),
                                 physicsClientId=client)
     return body
+
+
+def link_collisions(merged, name, static):
+    """Return the collision shapes (urdf_model.Shape) of a link of ``merged`` as they are built: the places where
+    wheels and casters touch the floor are determined. ``static``: whether the root is fixed.
+    """
+    shapes = merged.links[name].collisions
+    if name == merged.root:
+        wheels = [joint for joint in merged.joints.values() if joint.parent == name and is_wheel(joint)]
+        return shapes if static or len(wheels) < 2 else [_as_caster(shape) for shape in shapes]
+    axes = [joint.axis for joint in merged.joints.values() if joint.child == name and is_wheel(joint)]
+    return [part for shape in shapes for part in (_as_wheel(shape, axes[0]) if axes else [shape])]
+
+
+def _as_caster(shape):
+    if not isinstance(shape.geometry, Sphere):
+        return shape
+    radius = shape.geometry.radius
+    return replace(shape, geometry=Sphere(radius - min(_GAP_M, _GAP_PART * radius)))
+
+
+def _as_wheel(shape, axis):
+    """A cylinder around ``axis`` (3,) as two: one of its radius, but narrow, and one of its width."""
+    if not isinstance(shape.geometry, Cylinder) or abs(shape.origin[:3, 2] @ axis) < _ALONG * np.linalg.norm(axis):
+        return [shape]
+    radius, length = shape.geometry.radius, shape.geometry.length
+    narrow = Cylinder(radius, _TREAD_PART * length)
+    return [replace(shape, geometry=narrow),
+            replace(shape, geometry=Cylinder(radius - min(_GAP_M, _GAP_PART * radius), length))]
 
 
 def is_wheel(joint):

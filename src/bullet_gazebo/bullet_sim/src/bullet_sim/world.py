@@ -7,7 +7,7 @@ import numpy as np
 
 from urdf_model import Link, Mesh, OutOfBounds, Plane, Robot, Shape, bounds, check_robot, merge_fixed
 
-from .builder import Blueprint, build, is_wheel
+from .builder import Blueprint, build, is_wheel, link_collisions
 from .errors import BulletSimError, within
 from .model import Contact, Model
 from .overlaps import come_out
@@ -194,7 +194,7 @@ class World:
         """
         static = is_fixed(merged.root, static)
         exact = any(joint.child == link and is_wheel(joint) for joint in merged.joints.values())
-        self._shapes.compound(merged.links[link].collisions, static and link == merged.root, mesh_cuts, exact)
+        self._shapes.compound(link_collisions(merged, link, static), static and link == merged.root, mesh_cuts, exact)
 
     def add_ground_plane(self, name="ground_plane"):
         """Add the half space below z = 0; return its Model (one link, "link", as Gazebo's has)."""
