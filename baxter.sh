@@ -27,6 +27,8 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
   check LAB PROGRAM     run a student's program in a separate lab and judge the result; --list, --help
   grade FOLDER [LAB [EXERCISE…]]
                         judge the submissions of a class, several at a time, and write results and pages; --help
+  labs up N | list | start | pause | stop | down | logs
+                        labs for a class on this machine, behind one front door; --help
   handout FOLDER        make the students' copy of this workspace: without solutions, and without what reveals them
   batch JOB --seeds A:B run a job once for each seed on all processors; --list names the jobs, --help the options
   bench [NAMES]         run the benchmarks, beside other libraries; --list shows the suites
@@ -104,6 +106,12 @@ main() {
             use_build || exit
             # -P: no module is taken from the current folder, which may hold submissions.
             exec python3 -P -m rf_grading "$@"
+            ;;
+        labs)
+            bring_up_to_date || exit
+            use_loopback
+            use_build || exit
+            exec python3 -P -m lab_class "$@"
             ;;
         handout)
             PYTHONPATH=$LAB_ROOT/src/rf_labs/rf_checks/src exec python3 -m rf_checks.handout "$@"

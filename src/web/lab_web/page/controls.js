@@ -148,7 +148,7 @@ export class Controls {
       return;
     }
     const look = () => {
-      picture.src = `/snapshot${this.query}&topic=${SCREEN}&width=512&height=300&at=${Date.now()}`;
+      picture.src = `snapshot${this.query}&topic=${SCREEN}&width=512&height=300&at=${Date.now()}`;
     };
     picture.onload = () => { picture.hidden = false; };
     picture.onerror = () => { picture.hidden = true; };
@@ -186,7 +186,7 @@ export class Controls {
       rows[to + 1] = data[from + 1];
       rows[to + 2] = data[from + 2];
     }
-    const answer = await fetch(`/screen${this.query}&page=${this.page()}`, {method: "POST", body: rows});
+    const answer = await fetch(`screen${this.query}&page=${this.page()}`, {method: "POST", body: rows});
     if (!answer.ok) this.note("refused", `${answer.status}`);
   }
 }

@@ -20,9 +20,10 @@ const NOTE_MS = 15000;
 const byId = (name) => document.getElementById(name);
 const token = new URLSearchParams(location.search).get("token") ?? "";
 const query = `?token=${encodeURIComponent(token)}`;
-const host = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}`;
+// The page may be served below any path, by a front door for many labs.
+const sockets = new URL(".", location.href).href.replace(/^http/, "ws");
 
-const worker = new Worker("/page/worker.js");
+const worker = new Worker("page/worker.js");
 const send = (operation) => worker.postMessage(operation);
 const plans = new Plans();
 const panel = new Panel(send, plans);
@@ -139,11 +140,11 @@ async function loadScene(poses) {
   if (loading) return;
   loading = new DataView(poses).getUint32(0, true);
   try {
-    const answer = await fetch(`/scene${query}`);
+    const answer = await fetch(`scene${query}`);
     if (!answer.ok) return;
     const scene = await answer.json();
     await view.setScene(scene, async (name) => {
-      const shape = await fetch(`/scene/${name}${query}`);
+      const shape = await fetch(`scene/${name}${query}`);
       if (!shape.ok) throw new Error(`shape ${name}: ${shape.status}`);
       return new Float32Array(await shape.arrayBuffer());
     });
@@ -183,7 +184,7 @@ function buildCameras() {
 }
 
 function startTopics() {
-  const topics = new Topics(`${host}/rosbridge${query}`);
+  const topics = new Topics(`${sockets}rosbridge${query}`);
   topics.subscribe("/robot/state", "baxter_core_msgs/AssemblyState", 100, 1, (message) => {
     const was = state.robot;
     state.robot = message;
@@ -282,7 +283,7 @@ startButtons();
 sayOfView();
 refresh();
 worker.onmessage = ({data}) => served[data.op]?.(data);
-send({address: `${host}/lab${query}`});
+send({address: `${sockets}lab${query}`});
 setInterval(() => send({}), ALIVE_MS);
 startTopics();
 // For the console, and for tests.

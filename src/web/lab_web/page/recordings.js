@@ -11,12 +11,12 @@ export class Recordings {
     this.acting = this.driving = false;
     byId("record").onclick = () => send({op: "record", on: !this.state.running});
     byId("play").onclick = () => send({op: "play"});
-    byId("recording-save").href = `/recording.csv${query}`;
+    byId("recording-save").href = `recording.csv${query}`;
     const file = byId("recording-file");
     byId("recording-load").onclick = () => file.click();
     file.onchange = async () => {
       if (!file.files.length) return;
-      const answer = await fetch(`/recording${query}&page=${page()}`, {method: "POST", body: file.files[0]});
+      const answer = await fetch(`recording${query}&page=${page()}`, {method: "POST", body: file.files[0]});
       if (!answer.ok) note("refused", `${answer.status}`);
       file.value = "";
     };

@@ -4,7 +4,7 @@ export const LANGUAGES = {en: "English", zh: "中文"};
 let texts = {};
 
 export async function load(language) {
-  const answer = await fetch(`/page/texts/${language}.json`);
+  const answer = await fetch(`page/texts/${language}.json`);
   texts = await answer.json();
   document.documentElement.lang = language;
   document.title = texts.title;

@@ -33,6 +33,7 @@ from lab_web.robot import ARM_LINKS, Baxter
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, routes, upload_routes
 from lab_web.simulation import Simulation
+from lab_web.tokens import TOKEN, VIEW_TOKEN
 from loop_ros.faults import Faults
 from rospy_limits.node import limit_ports
 from rospy_start import end_on_signals
@@ -80,9 +81,11 @@ def _parser():
                                      "running lab, until Ctrl-C or until the lab ends.")
     parser.add_argument("--port", type=_port_number, help="the port; default: the first free one from %d" % FIRST_PORT)
     parser.add_argument("--public", action="store_true", help="open the page to other machines; see docs/web.md")
-    parser.add_argument("--token", type=_token, help="the operator's token; default: a new one")
-    parser.add_argument("--view-token", type=_token,
-                        help="the token of those that only watch and stop; default: a new one")
+    parser.add_argument("--token", type=_token, default=os.environ.get(TOKEN),
+                        help="the operator's token; default: the variable %s, else a new one" % TOKEN)
+    parser.add_argument("--view-token", type=_token, default=os.environ.get(VIEW_TOKEN),
+                        help="the token of those that only watch and stop; default: the variable %s, else a new one"
+                        % VIEW_TOKEN)
     return parser
 
 

@@ -35,7 +35,7 @@ def listen(loop_thread, application, endpoint, wait, complain):
                 return None
 
 
-class _LimitedServer(httpserver.HTTPServer):
+class LimitedServer(httpserver.HTTPServer):
     """Beyond MOST_CONNECTIONS a new one closes the oldest: without descriptors, tornado's loop would try to accept
     without a pause, and connections that say nothing must not keep others out.
     """
@@ -69,7 +69,7 @@ class Serving:
         loop_thread.run(self._start(application, tls, idle_s))
 
     async def _start(self, application, tls, idle_s):
-        self._server = _LimitedServer(application, ssl_options=tls, idle_connection_timeout=idle_s, body_timeout=idle_s,
+        self._server = LimitedServer(application, ssl_options=tls, idle_connection_timeout=idle_s, body_timeout=idle_s,
                                       max_body_size=LARGEST_BODY)
         self._server.add_sockets(self._sockets)
 

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The instructor's page. Its token goes into a header of each request and is kept nowhere: no page of a lab, which has the
+// same origin, can send it.
+const PERIOD_MS = 2000;
+// Below this a lab is slower than it should be.
+const SLOW = 0.98;
+const token = new URLSearchParams(location.search).get("token") ?? "";
+const byId = (name) => document.getElementById(name);
+
+async function ask(path, method = "GET") {
+  const answer = await fetch(path, {method, headers: {Authorization: `Bearer ${token}`}});
+  if (!answer.ok) throw new Error(await answer.text());
+  return answer.status === 204 ? null : answer.json();
+}
+
+function cell(text, kind) {
+  const made = document.createElement("td");
+  made.textContent = text;
+  if (kind) made.className = kind;
+  return made;
+}
+
+function link(text, address) {
+  // Without a way back from the lab's page to this one.
+  return Object.assign(document.createElement("a"), {textContent: text, href: address, target: "_blank",
+                                                     rel: "noopener noreferrer"});
+}
+
+function button(lab, verb) {
+  const made = document.createElement("button");
+  made.textContent = verb;
+  made.onclick = async () => {
+    try {
+      await ask(`labs/${lab.name}/${verb}`, "POST");
+      await refresh();
+    } catch (error) {
+      byId("told").textContent = error.message;
+    }
+  };
+  return made;
+}
+
+const VERBS = {running: ["pause", "stop"], paused: ["start", "stop"], starting: ["stop"], waiting: ["stop"],
+               stopped: ["start"], failed: ["start"]};
+
+function row(lab) {
+  const made = document.createElement("tr");
+  made.dataset.state = lab.state;
+  made.dataset.slow = lab.factor !== null && lab.factor < SLOW;
+  const actions = document.createElement("td");
+  actions.append(link("look in", `../${lab.name}/?token=${encodeURIComponent(lab.view_token)}`),
+                 ...VERBS[lab.state].map((verb) => button(lab, verb)));
+  made.append(cell(lab.full_name), cell(lab.reason ? `${lab.state}: ${lab.reason}` : lab.state, "state"),
+              cell(lab.pages, "number"), cell(lab.factor?.toFixed(2) ?? "", "number factor"),
+              cell(lab.memory_bytes === null ? "" : `${Math.round(lab.memory_bytes / 2 ** 20)} MB`, "number"),
+              cell(lab.unused_s === null ? "" : `${Math.round(lab.unused_s / 60)} min`, "number"), actions);
+  return made;
+}
+
+async function refresh() {
+  const {labs} = await ask("labs");
+  byId("labs").replaceChildren(...labs.map(row));
+  byId("told").textContent = `${labs.filter((lab) => lab.pages).length} of ${labs.length} have a page open`;
+}
+
+async function keepOn() {
+  try {
+    await refresh();
+  } catch (error) {
+    byId("told").textContent = error.message;
+  }
+  setTimeout(keepOn, PERIOD_MS);
+}
+
+keepOn();

@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`./baxter.sh labs up N | list | start | pause | stop | down | logs`: the command line."""
+import argparse
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import rospkg
+
+from lab_class import control, roster
+from lab_class.labs import ClassError, State
+from lab_class.roster import RosterError
+from lab_class.store import ClassRecord, Options, Store, StoreError
+from lab_environment import isolation
+from lab_environment.family import is_running
+from lab_web.libraries import LibrariesError, fetched
+
+#: Time for the supervisor to open the front door, and to end all labs [s].
+OPEN_S, DOWN_S = 30.0, 60.0
+_LOOK_S = 0.2
+_DONE, _FAILED, _WRONG_WORDS, _INTERRUPTED = 0, 1, 2, 130
+_COLUMNS = "%-20s %-9s %5s %6s %8s %8s  %s"
+
+
+def main(arguments=None):
+    """Returns the exit code: 0, 1 for what failed, 2 for wrong words."""
+    options = _parser().parse_args(arguments)
+    store = Store(options.folder)
+    try:
+        return options.run(options, store)
+    except (RosterError, StoreError, ClassError, LibrariesError, OSError) as error:
+        print("labs: %s" % error, file=sys.stderr)
+        return _WRONG_WORDS if isinstance(error, RosterError) else _FAILED
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+
+
+def default_folder():
+    """Where a class is kept: $XDG_STATE_HOME/baxter_labs, by default ~/.local/state/baxter_labs."""
+    base = os.environ.get("XDG_STATE_HOME") or os.path.join(os.path.expanduser("~"), ".local", "state")
+    return os.path.join(base, "baxter_labs")
+
+
+def _parser():
+    defaults = Options()
+    parser = argparse.ArgumentParser(prog="./baxter.sh labs", description="Labs for a class on this machine, each "
+                                     "behind walls, with one address for each student; docs/class.md.")
+    parser.add_argument("--folder", default=default_folder(), help="of the class: roster, tokens, students' files "
+                        "(default: %(default)s)")
+    commands = parser.add_subparsers(required=True, metavar="up|list|start|pause|stop|down|logs")
+    up = commands.add_parser("up", help="start a class, and print the addresses")
+    up.add_argument("who", nargs="?", help="a number of students, or a CSV file with their names; without it the class "
+                    "of last time")
+    up.add_argument("--launch", help="what runs in a lab (default: \"%s\")" % " ".join(defaults.launch))
+    up.add_argument("--port", type=int, help="of the front door (default: %d)" % defaults.port)
+    up.add_argument("--public", action="store_true", default=None, help="open the front door to other machines")
+    up.add_argument("--idle", type=_minutes, metavar="MINUTES", help="a lab that nobody uses for so long is paused; 0: "
+                    "never (default: %g)" % (defaults.idle_s / 60.0))
+    up.add_argument("--memory", type=_gigabytes, metavar="GB", help="limit of each lab (default: %g)"
+                    % (defaults.memory_bytes / 2**30))
+    up.add_argument("--disk", type=_gigabytes, metavar="GB", help="limit of each student's files (default: %g)"
+                    % (defaults.disk_bytes / 2**30))
+    up.add_argument("--at-once", type=_positive, metavar="N", help="labs that start at a time (default: half of the "
+                    "cores)")
+    up.add_argument("--trusted", action="store_true", default=None, help="without walls, where this machine allows "
+                    "none: every student can then do what you can")
+    up.add_argument("--no-wait", action="store_true", help="do not wait until the labs run")
+    up.set_defaults(run=_up)
+    commands.add_parser("list", help="the labs, and what they use").set_defaults(run=_list)
+    for verb, help_text in (("start", "start stopped or failed labs, wake paused ones"),
+                            ("pause", "pause labs; a click on its page wakes one"), ("stop", "end labs")):
+        one = commands.add_parser(verb, help=help_text)
+        one.add_argument("names", nargs="+", help="names of labs, or: all")
+        one.set_defaults(run=_change, verb=verb)
+    down = commands.add_parser("down", help="end the class; the students' files, addresses and roster stay")
+    down.add_argument("--delete", action="store_true", help="delete these, too")
+    down.set_defaults(run=_down)
+    logs = commands.add_parser("logs", help="what a lab has written, or the supervisor")
+    logs.add_argument("name", nargs="?")
+    logs.set_defaults(run=_logs)
+    return parser
+
+
+def _number(text, words, least=0.0):
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not least < value < 1e6:
+        raise argparse.ArgumentTypeError("%r; expected %s" % (text, words))
+    return value
+
+
+def _minutes(text):
+    return 60.0 * _number(text, "minutes, 0 or more", -1e-9)
+
+
+def _gigabytes(text):
+    return int(_number(text, "a number of GB above 0") * 2**30)
+
+
+def _positive(text):
+    return int(_number(text, "a whole number from 1", 0.5))
+
+
+def _students(who):
+    if who.isdecimal():
+        return roster.numbered(int(who))
+    try:
+        return roster.read(Path(who).read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        raise RosterError("%s is not UTF-8 (%s)" % (who, error.reason)) from error
+    except OSError as error:
+        raise RosterError("%s is neither a number of students nor a file that can be read: %s"
+                          % (who, error.strerror)) from error
+
+
+def _record(options, store):
+    """The ClassRecord of this `up`. Raises RosterError, StoreError."""
+    earlier = store.read()
+    if options.who is None and earlier is None:
+        raise RosterError("there is no class of last time in %s; say how many students: ./baxter.sh labs up N, or a "
+                          "CSV file with their names" % store.folder)
+    given = {"launch": tuple(options.launch.split()) if options.launch else None, "port": options.port,
+             "public": options.public, "trusted": options.trusted, "memory_bytes": options.memory,
+             "disk_bytes": options.disk, "at_once": options.at_once}
+    values = {name: value for name, value in given.items() if value is not None}
+    if options.idle is not None:
+        values["idle_s"] = options.idle or None
+    if options.who is None:
+        kept = {**vars(earlier.options), **values}
+        return ClassRecord.made(Options(**kept), earlier.students, earlier)
+    values.setdefault("at_once", max(1, (os.cpu_count() or 1) // 2))
+    return ClassRecord.made(Options(**values), _students(options.who), earlier)
+
+
+def _is_up(store):
+    try:
+        control.call(store, "GET", "/labs")
+    except control.NoClass:
+        return False
+    return True
+
+
+def _up(options, store):
+    if _is_up(store):
+        raise ClassError("a class runs in %s already; ./baxter.sh labs down ends it" % store.folder)
+    store.make()
+    _remove_left_over(store)
+    record = _record(options, store)
+    if not record.options.trusted and isolation.problem():
+        raise ClassError("students are not let into labs without walls around them, and this machine allows none: %s. "
+                         "A class whose students may do all that you can needs no walls: add --trusted"
+                         % isolation.problem())
+    packages = rospkg.RosPack()
+    libraries = fetched(Path(packages.get_path("lab_web")) / "page").parents[1]
+    store.write(record)
+    log = store.folder / "supervisor.log"
+    with open(log, "wb") as output:
+        supervisor = subprocess.Popen(
+            [sys.executable, "-P", "-m", "lab_class.supervisor", str(store.folder), str(libraries),
+             str(Path(packages.get_path("lab_class")) / "page")],
+            stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, start_new_session=True, cwd="/")
+    deadline = time.monotonic() + OPEN_S
+    while not _is_up(store):
+        if supervisor.poll() is not None or time.monotonic() > deadline:
+            last = log.read_text(errors="replace").strip().rpartition("\n")[2]
+            raise ClassError("the class did not start: %s" % (last or "its log is empty, %s" % log))
+        time.sleep(_LOOK_S)
+    _print_addresses(record, store)
+    return _DONE if options.no_wait else _await_labs(store)
+
+
+def _print_addresses(record, store):
+    port = store.running()["port"]
+    host = os.environ.get("ROS_IP") or socket.gethostname() if record.options.public else "localhost"
+    print("The instructor's page:\n\n    http://%s:%d/instructor/?token=%s\n\nThe students' addresses:\n"
+          % (host, port, record.instructor))
+    for student in record.students:
+        print("    %-24s http://%s:%d/%s/?token=%s"
+              % (student.full_name, host, port, student.name, record.tokens[student.name].act))
+    if record.options.public:
+        print("\nPort %d is open to every machine of the network. The connection is not encrypted (docs/security.md)."
+              % port)
+    if record.options.trusted:
+        print("\nThere are no walls: every student can do what you can on this machine.")
+    print("\n./baxter.sh labs down ends the class.\n", flush=True)
+
+
+def _await_labs(store):
+    """Print each lab that has started; Ctrl-C only ends the watching. Returns the exit code."""
+    shown = set()
+    try:
+        while True:
+            labs = control.call(store, "GET", "/labs")["labs"]
+            for lab in labs:
+                if lab["name"] not in shown and lab["state"] not in (State.WAITING.value, State.STARTING.value):
+                    shown.add(lab["name"])
+                    print("%s is %s%s" % (lab["name"], lab["state"], ": " + lab["reason"] if lab["reason"] else ""),
+                          flush=True)
+            if len(shown) == len(labs):
+                return _FAILED if any(lab["state"] == State.FAILED.value for lab in labs) else _DONE
+            time.sleep(_LOOK_S)
+    except KeyboardInterrupt:
+        print("\nThe class goes on; ./baxter.sh labs list shows it.")
+        return _DONE
+
+
+def _list(_options, store):
+    overview = control.call(store, "GET", "/labs")
+    print(_COLUMNS % ("LAB", "STATE", "PAGES", "FACTOR", "MEMORY", "UNUSED", "NAME"))
+    for lab in overview["labs"]:
+        print((_COLUMNS % (lab["name"], lab["state"], lab["pages"], _shown(lab["factor"], "%.2f"),
+                           _shown(lab["memory_bytes"], "%.0f MB", 2**20), _shown(lab["unused_s"], "%.0f min", 60.0),
+                           lab["full_name"] + (": " + lab["reason"] if lab["reason"] else ""))).rstrip())
+    return _DONE
+
+
+def _shown(value, form, unit=1.0):
+    return "-" if value is None else form % (value / unit)
+
+
+def _change(options, store):
+    names = options.names
+    if names == ["all"]:
+        wanted = {"pause": (State.RUNNING.value,)}.get(options.verb)
+        names = [lab["name"] for lab in control.call(store, "GET", "/labs")["labs"]
+                 if wanted is None or lab["state"] in wanted]
+    for name in names:
+        if roster.slug(name) != name:
+            raise ClassError("%r is no name of a lab; ./baxter.sh labs list shows them" % name)
+        control.call(store, "POST", "/labs/%s/%s" % (name, options.verb))
+    return _DONE
+
+
+def _down(options, store):
+    try:
+        supervisor = store.running().get("pid", 0)
+        control.call(store, "POST", "/down")
+        deadline = time.monotonic() + DOWN_S
+        while store.running() or is_running(supervisor):
+            if time.monotonic() > deadline:
+                raise ClassError("the class did not end within %d s; its log: %s"
+                                 % (DOWN_S, store.folder / "supervisor.log"))
+            time.sleep(_LOOK_S)
+    except control.NoClass as error:
+        _remove_left_over(store)
+        if not options.delete:
+            print(error)
+    if options.delete:
+        # Nothing is removed under a supervisor that is just starting.
+        with store.locked():
+            shutil.rmtree(store.folder)
+    return _DONE
+
+
+def _remove_left_over(store):
+    """The files of a supervisor that was killed, or whose host lost power."""
+    if store.running():
+        with store.locked():
+            shutil.rmtree(store.running().get("runtime", ""), ignore_errors=True)
+            store.remove_run()
+
+
+def _logs(options, store):
+    if options.name is None:
+        path = store.folder / "supervisor.log"
+    elif roster.slug(options.name) == options.name:
+        path = store.folder / "labs" / options.name / "output.txt"
+    else:
+        raise ClassError("%r is no name of a lab; ./baxter.sh labs list shows them" % options.name)
+    if not path.exists():
+        raise ClassError("there is no %s; only a class that runs has logs" % path)
+    with open(path, "rb") as stream:
+        shutil.copyfileobj(stream, sys.stdout.buffer)
+    return _DONE

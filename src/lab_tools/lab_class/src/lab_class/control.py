@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Requests to the supervisor at its control socket."""
+import http.client
+import json
+import socket
+
+from lab_class.labs import ClassError
+
+_TIMEOUT_S = 20.0
+
+
+class NoClass(ClassError):
+    """No class runs in this folder."""
+
+
+class _Connection(http.client.HTTPConnection):
+    def __init__(self, path):
+        super().__init__("localhost", timeout=_TIMEOUT_S)
+        self._path = path
+
+    def connect(self):
+        self.sock = socket.socket(socket.AF_UNIX)
+        self.sock.settimeout(self.timeout)
+        self.sock.connect(self._path)
+
+
+def call(store, method, path):
+    """The answer of the supervisor of this store.Store, as data (None for an empty one).
+
+    Raises NoClass, and ClassError with the supervisor's words where it refuses.
+    """
+    running = store.running()
+    if "control" not in running:
+        raise NoClass("no class runs in %s; ./baxter.sh labs up N starts one" % store.folder)
+    connection = _Connection(running["control"])
+    try:
+        connection.request(method, path)
+        answer = connection.getresponse()
+        text = answer.read().decode()
+    except OSError as error:
+        raise NoClass("no class runs in %s any more (%s); ./baxter.sh labs up starts it again"
+                      % (store.folder, error)) from error
+    finally:
+        connection.close()
+    if answer.status >= 400:
+        raise ClassError(text.strip() or "the supervisor answered %d" % answer.status)
+    return json.loads(text) if text else None

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The processes of one lab, seen from outside of its walls: started, paused, woken, measured, ended."""
+import contextlib
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+from lab_environment.family import children_of, is_running
+
+#: Time for a lab to end by itself [s]; a little more than inside.END_S.
+END_S = 12.0
+_ROUNDS = 50
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+#: How low the priority of a lab's processes is, where no control group divides the processors.
+NICENESS = 1
+
+
+class LabProcess:
+    """Runs from the constructor on. The supervisor is its parent, and must start it in its main thread: bubblewrap ends
+    with the thread that has started it."""
+
+    def __init__(self, command, environment, descriptors, output, groups=()):
+        """output: file of all that it writes [Path]; groups: files cgroup.procs that it enters. Raises OSError."""
+        enter = ["sh", "-c", 'while [ "$1" != -- ]; do echo 0 >"$1"; shift; done; shift; exec "$@"', "lab",
+                 *map(str, groups), "--", "nice", "-n", str(0 if groups else NICENESS), *command]
+        with open(output, "wb") as stream:
+            self._process = subprocess.Popen(enter, env=environment, stdin=subprocess.PIPE, stdout=stream,
+                                             stderr=subprocess.STDOUT, pass_fds=descriptors, start_new_session=True,
+                                             cwd="/")
+
+    @property
+    def pid(self):
+        return self._process.pid
+
+    @property
+    def has_ended(self):
+        return self._process.poll() is not None
+
+    def family(self):
+        """The process ids of the lab; orphans stay below it."""
+        return set() if self.has_ended else children_of([self.pid])
+
+    def pause(self):
+        """Stop all processes. They are stopped where they are, and use no processor until `wake`."""
+        stopped = set()
+        # A process may start another one before it is stopped.
+        for _ in range(_ROUNDS):
+            new = self.family() - stopped
+            if not new:
+                return
+            for pid in new:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGSTOP)
+            stopped |= new
+
+    def wake(self):
+        """Let all processes go on."""
+        for pid in self.family():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGCONT)
+
+    def ask_to_end(self):
+        """Its first program ends the others and itself."""
+        self.wake()
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+
+    def kill(self):
+        """End all of its processes for good, and wait for that."""
+        for _ in range(_ROUNDS):
+            family = {pid for pid in self.family() if is_running(pid)}
+            for pid in family:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+            if not family:
+                break
+            time.sleep(0.01)
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+        self._process.wait()
+
+    def memory_bytes(self):
+        """Memory of all processes, shared pages divided among their users."""
+        return sum(map(_share_of_memory, self.family()))
+
+
+def _share_of_memory(pid):
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/%d/smaps_rollup" % pid).read_text(encoding="ascii").splitlines():
+            if line.startswith("Pss:"):
+                return int(line.split()[1]) << 10
+    # Of a process in a user namespace that this user may not look into.
+    with contextlib.suppress(OSError, IndexError, ValueError):
+        words = Path("/proc/%d/statm" % pid).read_text(encoding="ascii").split()
+        return (int(words[1]) - int(words[2])) * _PAGE_BYTES
+    return 0
+
+
+def disk_bytes(folder):
+    """What the files below a folder occupy; links are followed nowhere."""
+    total = 0
+    for path, names, files in os.walk(folder):
+        for name in (*names, *files):
+            with contextlib.suppress(OSError):
+                total += os.lstat(os.path.join(path, name)).st_blocks * 512
+    return total

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The labs of a class: their states, and what to do next. Time comes in as an argument; no ROS, no processes."""
+import enum
+from dataclasses import dataclass, field
+
+#: A lab that has not answered after this time has failed [s].
+START_LIMIT_S = 180.0
+#: A lab that fails this often, each time within STEADY_S of its start, waits for the instructor.
+MOST_FAILURES = 3
+STEADY_S = 60.0
+
+
+class State(enum.Enum):
+    """Of a lab. The value is the word that people see."""
+
+    STOPPED = "stopped"
+    WAITING = "waiting"
+    STARTING = "starting"
+    RUNNING = "running"
+    PAUSED = "paused"
+    FAILED = "failed"
+
+
+class Role(enum.Enum):
+    """Of a client at the front door."""
+
+    INSTRUCTOR = "instructor"
+    STUDENT = "student"
+    VIEWER = "viewer"
+
+
+class Action(enum.Enum):
+    """What the supervisor is to do with a lab."""
+
+    START = "start"
+    PAUSE = "pause"
+    WAKE = "wake"
+    END = "end"
+
+
+class ClassError(Exception):
+    """Something that cannot be done; the text says why."""
+
+
+@dataclass
+class Lab:
+    """One lab; times are of the clock that the caller passes in [s]. ``busy``: answers that are under way; ``pages``:
+    open WebSockets."""
+
+    name: str
+    state: State = State.STOPPED
+    since: float = 0.0
+    used: float = 0.0
+    busy: int = 0
+    pages: int = 0
+    reason: str = ""
+    failures: int = 0
+    asked: bool = field(default=False, repr=False)
+
+    @property
+    def has_processes(self):
+        return self.state in (State.STARTING, State.RUNNING, State.PAUSED)
+
+
+class Labs:
+    """All labs of a class. Methods return the actions to take now: a list of (Action, name)."""
+
+    def __init__(self, names, at_once, idle_s):
+        """names: in the order of the roster; at_once: labs that may start at a time; idle_s: a lab without a client for
+        so long is paused [s], or None."""
+        self._labs = {name: Lab(name) for name in names}
+        self._at_once, self._idle_s = at_once, idle_s
+
+    def __iter__(self):
+        return iter(self._labs.values())
+
+    def __getitem__(self, name):
+        if name not in self._labs:
+            raise ClassError("there is no lab %s; there are: %s" % (name, ", ".join(self._labs)))
+        return self._labs[name]
+
+    def __contains__(self, name):
+        return name in self._labs
+
+    def place_in_line(self, name):
+        """How many labs start before this one, which is waiting."""
+        return [lab.name for lab in self._line()].index(name)
+
+    def start(self, name, now):
+        """The instructor, or the beginning of the class, wants this lab."""
+        lab = self[name]
+        if lab.state is State.PAUSED:
+            return self._wake(lab, now)
+        if lab.state in (State.STOPPED, State.FAILED):
+            lab.failures = 0
+            self._set(lab, State.WAITING, now)
+        return []
+
+    def stop(self, name, now):
+        """The instructor ends this lab."""
+        lab = self[name]
+        had_processes = lab.has_processes
+        self._set(lab, State.STOPPED, now)
+        return [(Action.END, name)] if had_processes else []
+
+    def pause(self, name, now):
+        """Raises ClassError unless the lab is running."""
+        lab = self[name]
+        if lab.state is State.PAUSED:
+            return []
+        if lab.state is not State.RUNNING:
+            raise ClassError("the lab %s is %s; only a running lab can be paused" % (name, lab.state.value))
+        self._set(lab, State.PAUSED, now)
+        return [(Action.PAUSE, name)]
+
+    def request(self, name, now):
+        """A client with a token asks this lab for something."""
+        lab = self[name]
+        lab.used = now
+        if lab.state is State.PAUSED:
+            return self._wake(lab, now)
+        if lab.state is State.FAILED and lab.failures < MOST_FAILURES:
+            self._set(lab, State.WAITING, now)
+        lab.asked = lab.state is State.WAITING
+        return []
+
+    def answering(self, name, by, now):
+        """The number of answers under way changes ``by`` 1 or -1. An open page alone does not keep a lab awake."""
+        lab = self[name]
+        lab.busy += by
+        lab.used = now
+
+    def answered(self, name, now):
+        """A lab that was starting answers requests."""
+        lab = self[name]
+        if lab.state is State.STARTING:
+            self._set(lab, State.RUNNING, now)
+            lab.used = now
+
+    def ended(self, name, reason, now):
+        """The processes of a lab have ended by themselves; those of a stopped lab are expected to."""
+        lab = self[name]
+        return self._fail(lab, reason, now) if lab.has_processes else []
+
+    def exceeded(self, name, reason, now):
+        """A lab is over one of its limits: it is ended, and the instructor decides."""
+        actions = self._fail(self[name], reason, now)
+        self[name].failures = MOST_FAILURES
+        return actions
+
+    def due(self, now):
+        """Whatever time brings: the next starts, labs to be paused, starts that take too long."""
+        actions = []
+        for lab in self:
+            if lab.state is State.STARTING and now - lab.since > START_LIMIT_S:
+                actions += self._fail(lab, "it did not answer within %d s" % START_LIMIT_S, now)
+            elif (lab.state is State.RUNNING and self._idle_s is not None and not lab.busy
+                  and now - lab.used > self._idle_s):
+                actions += self.pause(lab.name, now)
+        starting = sum(lab.state is State.STARTING for lab in self)
+        for lab in self._line()[:max(0, self._at_once - starting)]:
+            self._set(lab, State.STARTING, now)
+            actions.append((Action.START, lab.name))
+        return actions
+
+    def _line(self):
+        """Waiting labs: those with a waiting client first, then in the order of the roster."""
+        return sorted((lab for lab in self if lab.state is State.WAITING), key=lambda lab: not lab.asked)
+
+    def _wake(self, lab, now):
+        self._set(lab, State.RUNNING, now)
+        lab.used = now
+        return [(Action.WAKE, lab.name)]
+
+    def _fail(self, lab, reason, now):
+        lab.failures = 1 if lab.state is State.RUNNING and now - lab.since > STEADY_S else lab.failures + 1
+        self._set(lab, State.FAILED, now, reason)
+        return [(Action.END, lab.name)]
+
+    @staticmethod
+    def _set(lab, state, now, reason=""):
+        lab.state, lab.since, lab.reason, lab.asked = state, now, reason, False
+
+
+#: What each role may do at the front door: "use" a lab that is its own, "watch" one, "see" and "change" the class.
+RIGHTS = {Role.INSTRUCTOR: ("see", "change"), Role.STUDENT: ("use", "watch"), Role.VIEWER: ("watch",)}
+
+
+def may(role, right):
+    """Whether a role (None: no valid token) has a right."""
+    return right in RIGHTS.get(role, ())

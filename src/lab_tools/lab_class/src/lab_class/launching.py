@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command that starts one lab: in a sandbox with a separate network, or, without walls, on free ports."""
+import contextlib
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from lab_class.store import HOME
+from lab_environment import isolation, ports, system_calls
+from lab_web.tokens import TOKEN, VIEW_TOKEN
+
+#: Ports inside of a lab's separate network, as on any lab's machine.
+MASTER_PORT, PAGE_PORT = 11311, 8090
+#: Size of /tmp and of /dev/shm in a lab [bytes]; both count towards its memory.
+SCRATCH_BYTES = 512 << 20
+#: Paths below the workspace that no lab shows: the judge's solutions, the history, other people's notebooks and logs.
+HIDDEN = (".git", "src/rf_labs/rf_checks/exercises/solutions", "src/rf_labs/rf_checks/test", "src/rf_labs/rf_lab2/test",
+          "share/rf_checks/exercises/solutions", "install/share/rf_checks/exercises/solutions", ".baxter/jupyter",
+          ".baxter/logs", ".baxter/labs")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a lab runs. ``folder``: of its files [Path]; ``state_folder``: of the class, which no lab shows;
+    ``libraries``: of the page's libraries [Path]; ``walls``: in a sandbox."""
+
+    folder: Path
+    state_folder: Path
+    libraries: Path
+    walls: bool
+
+
+def prepared(place, options, tokens, listener, refused):
+    """(command, environment, descriptors to inherit) of one lab.
+
+    options, tokens: store.Options, store.Tokens; listener: descriptor of the socket that the front door connects to;
+    refused: what `system_calls.refused` yields. Raises isolation.NotIsolated, OSError without a free port.
+    """
+    if place.walls:
+        home, master, page = isolation.HOME, MASTER_PORT, PAGE_PORT
+    else:
+        home, master, page = str(place.folder / HOME), ports.free_port(), ports.free_port()
+    command = [sys.executable, "-P", "-m", "lab_class.inside", "--listener", str(listener), "--master", str(master),
+               "--page", str(page), "--", *options.launch]
+    limits = ["prlimit", "--core=0", "--fsize=%d" % options.disk_bytes, "--"]
+    environment = {**isolation.environment_of(os.environ), TOKEN: tokens.act, VIEW_TOKEN: tokens.view,
+                   "ROS_MASTER_URI": "http://localhost:%d" % master, "ROS_HOSTNAME": "localhost", "HOME": home,
+                   "ROS_HOME": home + "/.ros", "ROS_LOG_DIR": home + "/.ros/log"}
+    environment.pop("ROS_IP", None)
+    if not place.walls:
+        environment.update({name: os.environ[name] for name in ("USER", "LOGNAME", "TMPDIR") if name in os.environ},
+                           XDG_CACHE_HOME=str(place.libraries.parent))
+        environment.pop("XDG_RUNTIME_DIR", None)
+        return [*limits, *command], environment, (listener,)
+    options_of_calls, descriptors = refused
+    binds = [(place.folder / HOME, home, True), (place.libraries, home + "/.cache/lab_web", False),
+             *isolation.caches(os.environ, place.folder / "caches")]
+    scratch = [word for path in ("/tmp", "/dev/shm") for word in ("--size", str(SCRATCH_BYTES), "--perms", "0700",
+                                                                  "--tmpfs", path)]
+    enter = isolation.command(os.environ, binds, (*HIDDEN, str(place.state_folder)), True,
+                              [*scratch, *options_of_calls])
+    return [*enter, *limits, *command], environment, (listener, *descriptors)
+
+
+def refused(walls):
+    """The filter of system calls for one start; a context manager for `prepared`."""
+    return system_calls.refused() if walls else contextlib.nullcontext(([], ()))

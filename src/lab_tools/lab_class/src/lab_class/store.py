@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The class on disk: a folder with class.json, running.json while a supervisor runs, and a folder for each lab.
+
+Students' files and tokens survive restarts of the host; the rest is of one run.
+"""
+import contextlib
+import fcntl
+import json
+import os
+import secrets
+import shutil
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from lab_class.roster import Student
+
+_CLASS, _RUNNING, _LOCK = "class.json", "running.json", "lock"
+#: The files of one run in a lab's folder, and the folder of the student's files.
+RUN_FILES, HOME = ("output.txt", "caches"), "home"
+
+
+class StoreError(Exception):
+    """The folder of the class cannot be used; the text says why."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a class runs. ``launch``: the words after roslaunch; ``idle_s``: None means never; ``memory_bytes``,
+    ``disk_bytes``: of each lab; ``at_once``: labs that start at a time."""
+
+    launch: tuple = ("baxter_gazebo", "baxter_world.launch", "gui:=false")
+    port: int = 8100
+    public: bool = False
+    trusted: bool = False
+    idle_s: float | None = 900.0
+    memory_bytes: int = 2 << 30
+    disk_bytes: int = 1 << 30
+    at_once: int = 1
+
+
+@dataclass(frozen=True)
+class Tokens:
+    """Of one lab: for its student, and for those that watch."""
+
+    act: str
+    view: str
+
+
+@dataclass(frozen=True)
+class ClassRecord:
+    """What class.json holds: options, students, tokens by name, the instructor's token."""
+
+    options: Options
+    students: tuple
+    tokens: dict
+    instructor: str
+
+    @staticmethod
+    def made(options, students, earlier=None):
+        """A record for these students; those of an ``earlier`` one keep their tokens."""
+        known = earlier.tokens if earlier else {}
+        tokens = {student.name: known.get(student.name) or Tokens(_token(), _token()) for student in students}
+        return ClassRecord(options, tuple(students), tokens, earlier.instructor if earlier else _token())
+
+
+def _token():
+    return secrets.token_urlsafe(18)
+
+
+class Store:
+    """The folder of a class; readable by its owner alone."""
+
+    def __init__(self, folder):
+        self.folder = Path(folder).absolute()
+
+    def make(self):
+        """Make the folder. Raises StoreError."""
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self.folder.chmod(0o700)
+        except OSError as error:
+            raise StoreError("%s cannot be the folder of the class: %s" % (self.folder, error.strerror)) from error
+
+    @contextlib.contextmanager
+    def locked(self):
+        """Held by the one supervisor of this folder. Raises StoreError where another one runs."""
+        with open(self.folder / _LOCK, "w", encoding="ascii") as stream:
+            try:
+                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise StoreError("a class runs in %s already; ./baxter.sh labs down ends it" % self.folder) from None
+            yield
+
+    def read(self):
+        """The ClassRecord, or None where there is none. Raises StoreError for a broken file."""
+        try:
+            text = (self.folder / _CLASS).read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return None
+        try:
+            found = json.loads(text)
+            names = {one.name for one in fields(Options)}
+            options = {name: value for name, value in found["options"].items() if name in names}
+            options["launch"] = tuple(options["launch"])
+            return ClassRecord(Options(**options), tuple(Student(*row) for row in found["students"]),
+                               {name: Tokens(*pair) for name, pair in found["tokens"].items()}, found["instructor"])
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise StoreError("%s is not the record of a class (%s: %s); remove it to begin again, which gives the "
+                             "students new addresses" % (self.folder / _CLASS, type(error).__name__, error)) from error
+
+    def write(self, record):
+        """Keep a ClassRecord."""
+        self._write(_CLASS, {"options": asdict(record.options), "students": [list(row) for row in record.students],
+                             "tokens": {name: [pair.act, pair.view] for name, pair in record.tokens.items()},
+                             "instructor": record.instructor})
+
+    def running(self):
+        """What the supervisor has written by `write_running`, or {}."""
+        try:
+            return json.loads((self.folder / _RUNNING).read_text(encoding="utf-8"))
+        except (FileNotFoundError, ValueError):
+            return {}
+
+    def write_running(self, values):
+        self._write(_RUNNING, values)
+
+    def _write(self, name, values):
+        # Whole or not at all, also where the host loses power.
+        temporary = self.folder / (name + ".new")
+        with open(temporary, "w", encoding="utf-8") as stream:
+            os.fchmod(stream.fileno(), 0o600)
+            json.dump(values, stream, indent=1)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(self.folder / name)
+
+    def lab(self, name):
+        """The folder of one lab; made where it is missing."""
+        folder = self.folder / "labs" / name
+        (folder / HOME).mkdir(parents=True, exist_ok=True)
+        return folder
+
+    def remove_run(self):
+        """Remove what one run leaves; the students' files, the roster and the tokens stay."""
+        for name in (_RUNNING, _LOCK):
+            (self.folder / name).unlink(missing_ok=True)
+        for folder in self.folder.glob("labs/*"):
+            for name in RUN_FILES:
+                path = folder / name
+                if path.is_dir() and not path.is_symlink():
+                    shutil.rmtree(path, ignore_errors=True)
+                else:
+                    path.unlink(missing_ok=True)

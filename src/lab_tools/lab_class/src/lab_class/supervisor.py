@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The process of a class: starts, pauses, wakes and ends the labs, and keeps the front door. An ordinary user's
+program; no ROS here.
+"""
+import argparse
+import asyncio
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from tornado import netutil
+from tornado.httpserver import HTTPServer
+
+from lab_class import front_door, launching
+from lab_class.factors import Factors
+from lab_class.lab_process import END_S, LabProcess, disk_bytes
+from lab_class.labs import Action, ClassError, Labs, State
+from lab_class.store import Store, StoreError
+from lab_environment.isolation import NotIsolated
+from web_bridge.serving import IDLE_S, LARGEST_BODY, LimitedServer
+
+_TICK_S, _MEMORY_S, _DISK_S = 0.2, 5.0, 30.0
+_PROBE = b"GET /?token=%s HTTP/1.0\r\nHost: localhost\r\n\r\n"
+_PROBE_S = 5.0
+_LAST_BYTES = 4000
+
+
+class Supervisor:
+    """One class. ``now``: a clock [s]."""
+
+    def __init__(self, store, record, libraries, page, now=time.monotonic):
+        """store, record: store.Store, store.ClassRecord; libraries: folder of the page's libraries, page: of the
+        instructor's page [Path]."""
+        self._store, self._record, self._libraries, self._now = store, record, libraries, now
+        names = [student.name for student in record.students]
+        options = record.options
+        self.labs = Labs(names, options.at_once, options.idle_s)
+        self.door = front_door.Door(record, self)
+        self._page = page
+        self._processes, self._listeners, self._tasks, self._memory = {}, {}, {}, {}
+        self._end = asyncio.Event()
+        # Short: the address of a socket has 107 bytes at most.
+        self._runtime = Path(tempfile.mkdtemp(prefix="lab-class-"))
+        self._factors = Factors(self.socket_of, record.tokens)
+
+    # For the front door.
+
+    def socket_of(self, name):
+        """The socket on which a lab answers [Path]."""
+        return self._runtime / name
+
+    def request(self, name):
+        """A client asks this lab for something: wake it. Returns its labs.Lab."""
+        self._do(self.labs.request(name, self._now()))
+        return self.labs[name]
+
+    def is_awake(self, name):
+        return self.labs[name].state is State.RUNNING
+
+    def serving(self, name, is_page, by):
+        """The number of a lab's open pages, or of its answers under way, changes ``by`` 1 or -1."""
+        if is_page:
+            self.labs[name].pages += by
+        else:
+            self.labs.answering(name, by, self._now())
+
+    def change(self, name, verb):
+        """Start, stop or pause one lab. Raises ClassError."""
+        verbs = {"start": self.labs.start, "stop": self.labs.stop, "pause": self.labs.pause}
+        if verb not in verbs:
+            raise ClassError("%s is nothing that can be done with a lab; expected %s" % (verb, ", ".join(verbs)))
+        self._do(verbs[verb](name, self._now()))
+
+    def overview(self):
+        """The class as plain data, with the addresses' tokens: for the instructor alone."""
+        now = self._now()
+        labs = []
+        for student in self._record.students:
+            lab, tokens = self.labs[student.name], self._record.tokens[student.name]
+            labs.append({
+                "name": lab.name, "full_name": student.full_name, "state": lab.state.value, "reason": lab.reason,
+                "since_s": round(now - lab.since, 1), "unused_s": round(now - lab.used, 1) if lab.used else None,
+                "pages": lab.pages, "factor": self._factors.of(lab.name) if lab.state is State.RUNNING else None,
+                "memory_bytes": self._memory.get(lab.name) if lab.has_processes else None,
+                "token": tokens.act, "view_token": tokens.view})
+        return {"labs": labs, "idle_s": self._record.options.idle_s}
+
+    def end(self):
+        """End the class; `run` returns when all is gone."""
+        self._end.set()
+
+    # The class.
+
+    async def run(self):
+        """Until `end`, or a signal. Raises OSError where the port is taken."""
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, self.end)
+        servers = []
+        try:
+            servers = self._open()
+            for lab in self.labs:
+                self._listen(lab.name)
+                self._do(self.labs.start(lab.name, self._now()))
+            watches = [asyncio.ensure_future(watch) for watch in (
+                self._every(_TICK_S, self._tick), self._every(_MEMORY_S, self._look_at_memory),
+                self._every(_DISK_S, self._look_at_disk))]
+            await self._end.wait()
+            for watch in watches:
+                watch.cancel()
+        finally:
+            for server in servers:
+                server.stop()
+            await self._end_all()
+            for server in servers:
+                await server.close_all_connections()
+            shutil.rmtree(self._runtime, ignore_errors=True)
+
+    def _open(self):
+        options = self._record.options
+        door = netutil.bind_sockets(options.port, "" if options.public else "127.0.0.1")
+        server = LimitedServer(front_door.application(self.door, self._page), idle_connection_timeout=IDLE_S,
+                               body_timeout=IDLE_S, max_body_size=LARGEST_BODY)
+        server.add_sockets(door)
+        control = HTTPServer(front_door.control(self.door))
+        path = self._runtime / "control"
+        control.add_socket(netutil.bind_unix_socket(str(path), mode=0o600))
+        self._store.write_running({"pid": os.getpid(), "port": door[0].getsockname()[1], "control": str(path),
+                                   "runtime": str(self._runtime)})
+        return [server, control]
+
+    def _listen(self, name):
+        # The supervisor opens it and the lab inherits it, so no lab can put anything else into its place.
+        listener = socket.socket(socket.AF_UNIX)
+        listener.bind(str(self.socket_of(name)))
+        listener.listen(128)
+        self._listeners[name] = listener
+
+    async def _every(self, period_s, function):
+        while True:
+            await function()
+            await asyncio.sleep(period_s)
+
+    async def _tick(self):
+        for name, process in list(self._processes.items()):
+            # A task of this lab that runs is ending these processes, or is about to start others.
+            if process.has_ended and (name not in self._tasks or self._tasks[name].done()):
+                self._do(self.labs.ended(name, self._last_words(name), self._now()))
+        self._do(self.labs.due(self._now()))
+
+    def _do(self, actions):
+        for action, name in actions:
+            process = self._processes.get(name)
+            if action is Action.START:
+                self._go(name, self._start(name))
+            elif action is Action.END:
+                self._go(name, self._finish(name))
+            elif process is not None:
+                process.pause() if action is Action.PAUSE else process.wake()
+
+    def _go(self, name, coroutine):
+        """Run one after the other for each lab: a start waits for the end before it."""
+        before = self._tasks.get(name)
+
+        async def next_one():
+            if before is not None:
+                await asyncio.wait([before])
+            await coroutine
+
+        self._tasks[name] = asyncio.ensure_future(next_one())
+
+    async def _start(self, name):
+        if self.labs[name].state is not State.STARTING:
+            return
+        try:
+            place = launching.Place(self._store.lab(name), self._store.folder, self._libraries,
+                                    not self._record.options.trusted)
+            with launching.refused(place.walls) as refused:
+                started = await asyncio.get_running_loop().run_in_executor(
+                    None, launching.prepared, place, self._record.options, self._record.tokens[name],
+                    self._listeners[name].fileno(), refused)
+                self._processes[name] = LabProcess(*started, place.folder / "output.txt")
+        except (NotIsolated, OSError) as error:
+            self._do(self.labs.ended(name, str(error), self._now()))
+            return
+        asyncio.ensure_future(self._await_answer(name, self._processes[name]))
+
+    async def _await_answer(self, name, process):
+        while self._processes.get(name) is process and self.labs[name].state is State.STARTING:
+            if await self._answers(name):
+                self.labs.answered(name, self._now())
+                self._factors.follow(name)
+                return
+            await asyncio.sleep(_TICK_S)
+
+    async def _answers(self, name):
+        with contextlib.suppress(OSError, TimeoutError):
+            async with asyncio.timeout(_PROBE_S):
+                reader, writer = await asyncio.open_unix_connection(str(self.socket_of(name)))
+                try:
+                    writer.write(_PROBE % self._record.tokens[name].view.encode())
+                    return b" 200 " in await reader.readline()
+                finally:
+                    writer.close()
+        return False
+
+    async def _finish(self, name):
+        process = self._processes.get(name)
+        if process is None:
+            return
+        self._factors.leave(name)
+        process.ask_to_end()
+        deadline = time.monotonic() + END_S
+        while not process.has_ended and time.monotonic() < deadline:
+            await asyncio.sleep(_TICK_S)
+        await asyncio.get_running_loop().run_in_executor(None, process.kill)
+        del self._processes[name]
+        shutil.rmtree(self._store.lab(name) / "caches", ignore_errors=True)
+
+    async def _end_all(self):
+        for lab in self.labs:
+            self._do(self.labs.stop(lab.name, self._now()))
+        if self._tasks:
+            await asyncio.wait(self._tasks.values())
+        # Labs that were being ended when a start failed.
+        for process in self._processes.values():
+            process.kill()
+        for listener in self._listeners.values():
+            listener.close()
+
+    def _last_words(self, name):
+        """The last line of a lab's output, which inside.py writes."""
+        with contextlib.suppress(OSError):
+            data = (self._store.lab(name) / "output.txt").read_bytes()[-_LAST_BYTES:]
+            lines = [line for line in data.decode(errors="replace").splitlines() if line.strip()]
+            if lines:
+                return lines[-1].removeprefix("the lab ended: ")[:300]
+        return "its processes ended"
+
+    async def _look_at_memory(self):
+        most = self._record.options.memory_bytes
+        for name, process in list(self._processes.items()):
+            if self.labs[name].state is State.PAUSED:
+                continue
+            used = await asyncio.get_running_loop().run_in_executor(None, process.memory_bytes)
+            self._memory[name] = used
+            if used > most and self.labs[name].has_processes:
+                self._do(self.labs.exceeded(name, "it used %.1f GB of memory; its limit is %.1f GB"
+                                            % (used / 2**30, most / 2**30), self._now()))
+
+    async def _look_at_disk(self):
+        most = self._record.options.disk_bytes
+        for name in list(self._processes):
+            used = await asyncio.get_running_loop().run_in_executor(None, disk_bytes, self._store.lab(name))
+            if used > most and self.labs[name].has_processes:
+                self._do(self.labs.exceeded(name, "its files have %.1f GB; its limit is %.1f GB"
+                                            % (used / 2**30, most / 2**30), self._now()))
+
+
+def main():
+    """Run the class of a folder until it is ended; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="lab_class.supervisor")
+    parser.add_argument("folder")
+    parser.add_argument("libraries", type=Path)
+    parser.add_argument("page", type=Path)
+    options = parser.parse_args()
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    store = Store(options.folder)
+    try:
+        with store.locked():
+            record = store.read()
+            if record is None:
+                raise StoreError("%s has no class" % store.folder)
+            try:
+                asyncio.run(_run(store, record, options))
+            finally:
+                store.remove_run()
+    except (StoreError, OSError) as error:
+        print("labs: %s" % error, flush=True)
+        return 2
+    return 0
+
+
+async def _run(store, record, options):
+    await Supervisor(store, record, options.libraries, options.page).run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""States of labs, and what comes next; time is a number."""
+import pytest
+
+from lab_class.labs import MOST_FAILURES, START_LIMIT_S, Action, ClassError, Labs, Role, State, may
+
+IDLE_S = 900.0
+
+
+@pytest.fixture
+def labs():
+    made = Labs(["anna", "ben", "cleo"], at_once=1, idle_s=IDLE_S)
+    for lab in made:
+        made.start(lab.name, 0.0)
+    return made
+
+
+def run(labs, name, now=0.0):
+    while labs[name].state is not State.RUNNING:
+        (_, started), = labs.due(now)
+        labs.answered(started, now)
+
+
+def test_labs_start_one_after_the_other(labs):
+    assert labs.due(0.0) == [(Action.START, "anna")]
+    assert labs.due(1.0) == []
+    labs.answered("anna", 5.0)
+    assert labs.due(5.0) == [(Action.START, "ben")]
+
+
+def test_a_lab_with_a_client_that_waits_starts_first(labs):
+    labs.request("cleo", 0.0)
+    assert labs.place_in_line("ben") == 2
+    assert labs.due(0.0) == [(Action.START, "cleo")]
+
+
+def test_an_unused_lab_is_paused_and_woken_by_a_request(labs):
+    run(labs, "anna")
+    labs.request("anna", 10.0)
+    assert (Action.PAUSE, "anna") not in labs.due(10.0 + IDLE_S)
+    assert (Action.PAUSE, "anna") in labs.due(11.0 + IDLE_S)
+    assert labs.request("anna", 5000.0) == [(Action.WAKE, "anna")]
+    assert labs["anna"].state is State.RUNNING
+    assert (Action.PAUSE, "anna") not in labs.due(5001.0)
+
+
+def test_a_lab_is_not_paused_while_it_answers(labs):
+    run(labs, "anna")
+    labs.answering("anna", 1, 0.0)
+    assert (Action.PAUSE, "anna") not in labs.due(9000.0)
+    labs.answering("anna", -1, 9000.0)
+    assert (Action.PAUSE, "anna") in labs.due(9001.0 + IDLE_S)
+
+
+def test_no_lab_is_paused_without_a_limit():
+    labs = Labs(["anna"], 1, None)
+    labs.start("anna", 0.0)
+    run(labs, "anna")
+    assert labs.due(1e9) == []
+
+
+def test_a_lab_that_ends_starts_again_at_the_next_request_three_times_at_most(labs):
+    for failures in range(1, MOST_FAILURES + 1):
+        run(labs, "anna")
+        assert labs.ended("anna", "roslaunch has ended", 1.0) == [(Action.END, "anna")]
+        assert (labs["anna"].state, labs["anna"].failures) == (State.FAILED, failures)
+        labs.request("anna", 1.0)
+    assert labs["anna"].state is State.FAILED
+    labs.start("anna", 2.0)
+    assert (labs["anna"].state, labs["anna"].failures) == (State.WAITING, 0)
+
+
+def test_a_lab_that_has_run_for_long_may_fail_again(labs):
+    for now in (100.0, 300.0, 500.0, 700.0):
+        run(labs, "anna", now)
+        labs.ended("anna", "x", now + 100.0)
+        labs.request("anna", now + 100.0)
+        assert labs["anna"].state is State.WAITING
+
+
+def test_a_lab_that_does_not_answer_fails_and_the_next_one_starts(labs):
+    labs.due(0.0)
+    assert labs.due(START_LIMIT_S + 1.0) == [(Action.END, "anna"), (Action.START, "ben")]
+    assert "180 s" in labs["anna"].reason
+
+
+def test_a_lab_over_its_limits_waits_for_the_instructor(labs):
+    run(labs, "anna")
+    assert labs.exceeded("anna", "it used 3 GB", 1.0) == [(Action.END, "anna")]
+    labs.request("anna", 2.0)
+    assert (labs["anna"].state, labs["anna"].reason) == (State.FAILED, "it used 3 GB")
+
+
+def test_a_stopped_lab_stays_stopped_and_its_end_is_no_failure(labs):
+    run(labs, "anna")
+    assert labs.stop("anna", 1.0) == [(Action.END, "anna")]
+    assert labs.ended("anna", "x", 1.1) == []
+    labs.request("anna", 2.0)
+    assert labs["anna"].state is State.STOPPED
+    assert labs.stop("anna", 3.0) == []
+
+
+def test_what_cannot_be_done_is_said(labs):
+    with pytest.raises(ClassError, match="ben is waiting; only a running lab"):
+        labs.pause("ben", 0.0)
+    with pytest.raises(ClassError, match="there is no lab dora; there are: anna, ben, cleo"):
+        labs.stop("dora", 0.0)
+
+
+def test_who_may_do_what():
+    assert [may(role, "watch") for role in (Role.STUDENT, Role.VIEWER, None)] == [True, True, False]
+    assert [may(role, "use") for role in (Role.STUDENT, Role.VIEWER)] == [True, False]
+    assert [role for role in Role if may(role, "change")] == [Role.INSTRUCTOR]

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The class on disk."""
+import pytest
+
+from lab_class import roster
+from lab_class.store import ClassRecord, Options, Store, StoreError
+
+
+@pytest.fixture
+def store(tmp_path):
+    made = Store(tmp_path / "class")
+    made.make()
+    return made
+
+
+def test_a_class_comes_back_as_it_was(store):
+    record = ClassRecord.made(Options(port=9000, idle_s=None), roster.numbered(2))
+    store.write(record)
+    assert store.read() == record
+    assert (store.folder / "class.json").stat().st_mode & 0o077 == 0
+    assert store.folder.stat().st_mode & 0o077 == 0
+
+
+def test_students_that_stay_keep_their_addresses():
+    first = ClassRecord.made(Options(), roster.numbered(2))
+    second = ClassRecord.made(Options(), roster.numbered(3), first)
+    assert second.instructor == first.instructor
+    assert second.tokens["student-01"] == first.tokens["student-01"]
+    tokens = [token for pair in second.tokens.values() for token in (pair.act, pair.view)] + [second.instructor]
+    assert len(set(tokens)) == 7 and min(map(len, tokens)) > 20
+
+
+def test_no_class_and_broken_ones(store):
+    assert store.read() is None
+    for text in ("", "[]", "{}", '{"options": {"launch": 3}}', '{"options": [], "students": [], "tokens": {}}'):
+        (store.folder / "class.json").write_text(text)
+        with pytest.raises(StoreError, match="class.json is not the record of a class"):
+            store.read()
+
+
+def test_one_supervisor_at_a_time(store):
+    with store.locked():
+        with pytest.raises(StoreError, match="labs down"), store.locked():
+            pass
+
+
+def test_the_end_of_a_run_leaves_the_students_files(store):
+    work = store.lab("anna") / "home" / "work.py"
+    work.write_text("print()")
+    (store.lab("anna") / "output.txt").write_text("x")
+    (store.lab("anna") / "caches").mkdir()
+    store.write_running({"pid": 1})
+    store.remove_run()
+    assert [path.name for path in store.lab("anna").iterdir()] == ["home"] and work.exists()
+    assert store.running() == {}
+
+
+def test_a_folder_that_cannot_be(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError, match="cannot be the folder of the class"):
+        Store(tmp_path / "file" / "class").make()
