@@ -21,6 +21,7 @@ from moveit_ros_move_group.industrial import IndustrialPlanner
 from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_ros_move_group.planning import Planner
 from moveit_ros_move_group.sensors import Sensors
+from numba_cache import compiler_pages
 from rospy_limits.node import limit_ports
 from rospy_start import MissingParameter, end_on_signals, wait_for_param
 
@@ -111,6 +112,7 @@ def main():
         if not rospy.is_shutdown():
             sys.exit("move_group: %s" % error)
         return
+    compiler_pages.release()
     # Scripts wait for this line.
     print("\nYou can start planning now!\n", flush=True)
     rospy.spin()
