@@ -43,8 +43,11 @@ class LabProcess:
         return set() if self.has_ended else children_of([self.pid])
 
     def pause(self):
-        """Stop all processes. They are stopped where they are, and use no processor until `wake`."""
-        stopped = set()
+        """Stop all processes where they are; they use no processor until `wake`.
+
+        The first one goes on: it waits, and without walls it ends the others where the supervisor is killed meanwhile.
+        """
+        stopped = {self.pid}
         # A process may start another one before it is stopped.
         for _ in range(_ROUNDS):
             new = self.family() - stopped
