@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The lab's page: connects what the server sends to what is on the screen.
 import {Controls} from "./controls.js";
+import {Exercises} from "./exercises.js";
 import {Hands} from "./hands.js";
 import {element, Panel} from "./panel.js";
 import {Plans} from "./plans.js";
@@ -33,6 +34,7 @@ const hands = new Hands(send, () => view, plans);
 const controls = new Controls(send, query, () => state.number, note);
 const recordings = new Recordings(send, query, () => state.number, note);
 const plots = new Plots();
+const exercises = new Exercises();
 const simulation = new Simulation(send, () => view);
 let robot = {};
 let noteTimer = 0;
@@ -122,6 +124,9 @@ const served = {
   },
   recording(kept) {
     recordings.show(kept);
+  },
+  result(result) {
+    exercises.show(result);
   },
   reach(answer) {
     hands.answered(answer);
@@ -236,6 +241,7 @@ function startChoices(language) {
     await load(byId("language").value);
     buildPanels();
     buildCameras();
+    exercises.refresh();
     sayOfView();
     note();
     refresh();

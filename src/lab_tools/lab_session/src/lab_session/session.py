@@ -6,6 +6,7 @@ import fcntl
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from urllib.parse import urlparse
 
@@ -15,6 +16,7 @@ import rospy
 
 from baxter_interface import startup
 from baxter_interface.patience import Condition, wait_in_order
+from lab_environment import page_files
 from lab_environment.ports import free_port
 
 from . import keeper
@@ -27,6 +29,9 @@ START_TIMEOUT_S = 120.0
 # Ports of further labs beside the first one.
 FURTHER_PORTS = range(11411, 11500)
 LOG_LINES_SHOWN = 12
+# The server of the lab's page; its first start downloads a library [s].
+PAGE = ("rosrun", "lab_web", "lab_web")
+PAGE_TIMEOUT_S = 300.0
 
 
 class LabError(Exception):
@@ -73,6 +78,22 @@ class Lab:
             self._programs[command] = _keep(log.with_suffix(".state"), list(command), output)
         print("started: %s (its output: %s)" % (" ".join(command), log))
         return log
+
+    def page(self):
+        """The address of the lab's page in a browser, with its token; starts the page's server where none runs.
+
+        Raises LabError where it does not start.
+        """
+        found = page_files.address(rosgraph.get_master_uri())
+        if found is None:
+            log = self.run(*PAGE)
+            deadline = time.monotonic() + PAGE_TIMEOUT_S
+            while found is None:
+                if self._programs[PAGE].poll() is not None or time.monotonic() > deadline:
+                    raise LabError("the page did not start. Its output (%s) ends with:\n%s" % (log, _last_lines(log)))
+                time.sleep(0.2)
+                found = page_files.address(rosgraph.get_master_uri())
+        return found
 
     def stop(self):
         """End the programs and the simulator that this process has started. The master stays until this process
@@ -141,10 +162,10 @@ class Lab:
         # The keeper knows whether our own simulator is still starting.
         wait_in_order([met], timeout_s, startup.LINE, (lambda: False) if ours else startup.simulator_is_coming())
         if ours and ours.poll() is not None:
-            lines = Path(self._log).read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:]
+            lines = _last_lines(self._log)
             self.close()
             raise LabError("roslaunch %s has ended. Its output (%s) ends with:\n%s"
-                           % (" ".join(self._command), self._log, "\n".join("  | " + line for line in lines)))
+                           % (" ".join(self._command), self._log, lines))
 
 
 _labs = {}
@@ -268,6 +289,11 @@ def _master_port():
     if port is None:
         raise LabError("ROS_MASTER_URI is %r; it should look like http://localhost:11311" % uri)
     return port
+
+
+def _last_lines(log):
+    lines = Path(log).read_text(errors="replace").splitlines()[-LOG_LINES_SHOWN:]
+    return "\n".join("  | " + line for line in lines)
 
 
 def _say(text):

@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from lab_web.exercises import shown_of
 from rf_checks import command
 from rf_checks.exercises import EXERCISES
+from rf_checks.judge import Result, RunResult
+from rf_checks.recording import Criterion, Fault
 
 EXERCISE_FOLDERS = Path(__file__).resolve().parents[2] / "exercises"
 NAMES = [exercise.name for exercise in EXERCISES]
@@ -95,3 +98,34 @@ def test_every_exercise_has_both_programs(kind):
     for name, text in files.items():
         ast.parse(text)
         assert ("TODO" in text) == (kind == "skeletons"), name
+
+
+class CalmJudge:
+    """A judge that has seen one run of half the points."""
+
+    def __init__(self, *_):
+        pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def check(self, exercise, program, seed):
+        run = RunResult((), (Criterion("path", 0.5, 40.0, "1.5 periods"),), Fault("short", "the sine is too short"))
+        return Result(exercise, str(program), seed, (run,), "none", 3.0)
+
+
+def test_the_labs_page_finds_the_result(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "home"))
+    monkeypatch.setattr(command, "Judge", CalmJudge)
+    assert command.main(["lab2", "wave", "my_node.py"]) == command.NOT_PASSED
+    assert "50 of 100 points" in capsys.readouterr().out
+    shown = shown_of(command.page_files.result_file().read_text())
+    assert (shown["exercise"], shown["passed"], shown["points"]) == ("wave", False, 50.0)
+    assert shown["hint"] == "the sine is too short" and shown["runs"][0]["criteria"][0]["found"] == "1.5 periods"
+    # A folder that cannot be written costs only that.
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "file"))
+    assert command.main(["lab2", "wave", "my_node.py"]) == command.NOT_PASSED

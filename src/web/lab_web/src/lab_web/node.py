@@ -17,9 +17,10 @@ import rosgraph
 import rospkg
 import rospy
 
-from lab_environment import ports
+from lab_environment import page_files, ports
 from lab_web.buttons import Buttons
 from lab_web.errands import Errands
+from lab_web.exercises import Results
 from lab_web.hands import Hands, ghost
 from lab_web.lab import Lab
 from lab_web.libraries import LibrariesError, fetched
@@ -136,10 +137,12 @@ def serve(options, page, libraries):
         ("the arms", pages.lab.run), *equipment.loops.items(), ("the 3D view", partial(_follow, pages)))]
     for thread in threads:
         thread.start()
+    address = ""
     try:
-        _announce(serving.port, tokens, options.public)
+        address = _announce(serving.port, tokens, options.public)
         lasting(faults, "the robot's parts", partial(_watch, robot, equipment, pages))(rospy.is_shutdown)
     finally:
+        page_files.remove_address(rosgraph.get_master_uri(), address)
         rospy.signal_shutdown("the end")
         for thread in threads:
             thread.join()
@@ -199,22 +202,27 @@ def _port(options):
 
 
 def _announce(port, tokens, public):
+    """Print the addresses; returns the operator's."""
     host = os.environ.get("ROS_IP") or socket.gethostname() if public else "localhost"
+    address = "http://%s:%d/" % (host, port)
     # A token of the user may hold signs that mean something else in an address.
-    tokens = [quote(token, safe="") for token in tokens]
-    rospy.set_param("~address", "http://%s:%d/" % (host, port))
-    print("Open in a browser:\n\n    http://%s:%d/?token=%s\n\n"
-          "To watch, and to stop the robot:\n\n    http://%s:%d/?token=%s\n"
-          % (host, port, tokens[0], host, port, tokens[1]), flush=True)
+    operators, viewers = ("%s?token=%s" % (address, quote(token, safe="")) for token in tokens)
+    rospy.set_param("~address", address)
+    # Notebooks of this user find it there; a folder that cannot be written costs only that.
+    with contextlib.suppress(OSError):
+        page_files.write_address(rosgraph.get_master_uri(), operators)
+    print("Open in a browser:\n\n    %s\n\nTo watch, and to stop the robot:\n\n    %s\n" % (operators, viewers),
+          flush=True)
     if public:
         print("Port %d is open to every machine of the network: who has the first address moves the robot. The "
               "connection is not encrypted.\n" % port, flush=True)
     print("Ctrl-C here ends the page; the lab goes on.", flush=True)
+    return operators
 
 
 def _watch(robot, equipment, pages, ends):
     """Look after what changes rarely, until the node or the lab ends."""
-    told = None
+    told, results = None, Results(page_files.result_file())
     while not ends():
         if not rosgraph.is_master_online():
             print("The lab has ended, and the page with it.", flush=True)
@@ -228,6 +236,8 @@ def _watch(robot, equipment, pages, ends):
             now = _described(robot, equipment)
             if now["has_scene"] and len(pages):
                 equipment.simulation.look()
+            if (result := results.newest()) is not None:
+                pages.share("result", result)
             if now != told:
                 pages.share("robot", now)
                 told = now

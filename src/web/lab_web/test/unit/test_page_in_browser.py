@@ -353,6 +353,18 @@ def test_poses_and_hands_are_planned_where_the_page_wants_it(lab, browser):
     browser.evaluate("localStorage.clear()")
 
 
+def test_an_exercises_verdict_is_beside_the_robot(lab, browser):
+    assert browser.evaluate("document.getElementById('exercise').hidden")
+    lab.pages.share("result", {
+        "exercise": "wave", "passed": False, "points": 62.5, "due": 80.0, "why": "", "hint": "the sine is too short",
+        "runs": [{"call": "", "criteria": [{"name": "path", "points": 20.0, "of": 40.0, "found": "1.5 periods"}]}]})
+    browser.wait("document.getElementById('exercise-verdict').textContent"
+                 " === 'wave: not passed, 62.5 of 100 points; 80 are due'")
+    assert browser.evaluate("document.getElementById('exercise-hint').textContent") == "Hint: the sine is too short"
+    assert browser.evaluate("[...document.querySelectorAll('#exercise-runs td')].map((cell) => cell.textContent)") == [
+        "path", "20 / 40", "1.5 periods"]
+
+
 def test_a_picture_fills_the_screen_as_far_as_its_shape_lets_it(lab, browser, tmp_path):
     path = tmp_path / "red.svg"
     path.write_text('<svg xmlns="http://www.w3.org/2000/svg" width="100" height="100">'

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files by which the lab's page and other programs of the same user meet: the page's address, an exercise's result.
+
+Files, and not topics: the address holds a token, which only this user may read, and an exercise is checked in a
+separate network, from which no master of the user is reached.
+"""
+import contextlib
+import os
+import re
+import socket
+import tempfile
+from pathlib import Path
+from urllib.parse import urlsplit
+
+_CONNECT_S = 1.0
+
+
+def folder():
+    """The folder of these files, below ROS's own; only its user can enter it."""
+    path = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros") / "lab_page"
+    path.mkdir(mode=0o700, parents=True, exist_ok=True)
+    return path
+
+
+def write_address(master_uri, address):
+    """The page of this master's lab is at ``address``, which holds a token. Raises OSError."""
+    _replace(_address_file(master_uri), address)
+
+
+def remove_address(master_uri, address):
+    """The page at ``address`` has ended; that of another one, which has taken its place, stays."""
+    with contextlib.suppress(OSError):
+        file = _address_file(master_uri)
+        if file.read_text(encoding="utf-8") == address:
+            file.unlink()
+
+
+def address(master_uri):
+    """The address of the page of this master's lab, or None where no page answers."""
+    try:
+        found = _address_file(master_uri).read_text(encoding="utf-8")
+        parts = urlsplit(found)
+        socket.create_connection((parts.hostname, parts.port), _CONNECT_S).close()
+    # No file, another text in it, or a page that was killed.
+    except (OSError, ValueError, TypeError):
+        return None
+    return found
+
+
+def result_file():
+    """Where the result of the last checked exercise is, as the JSON of ``./baxter.sh check --json``."""
+    return folder() / "exercise.json"
+
+
+def write_result(text):
+    """An exercise has been checked. Raises OSError."""
+    _replace(result_file(), text)
+
+
+def _address_file(master_uri):
+    return folder() / ("address-" + re.sub(r"[^\w.-]+", "_", master_uri))
+
+
+def _replace(path, text):
+    """Write a file that only the user can read; nobody finds half of it."""
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as draft:
+        draft.write(text)
+    os.replace(draft.name, path)

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The result of an exercise for pages, from the file that ``./baxter.sh check`` writes. No ROS."""
+import json
+
+_LARGEST_BYTES = 1 << 20
+
+
+class Results:
+    """``path``: the file. What is there at first belongs to an earlier lab and is not shown."""
+
+    def __init__(self, path):
+        self._path = path
+        self._seen = self._version()
+
+    def newest(self):
+        """What pages show of a result that has come since the last call, or None."""
+        version = self._version()
+        if version == self._seen:
+            return None
+        self._seen = version
+        try:
+            if self._path.stat().st_size > _LARGEST_BYTES:
+                return None
+            return shown_of(self._path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+
+    def _version(self):
+        try:
+            found = self._path.stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_ino, found.st_size
+
+
+def shown_of(text):
+    """What pages show of a result's JSON text: ``exercise``, ``passed``, ``points`` (None: not graded), ``due``,
+    ``why`` (of what is not graded), ``hint``, ``runs`` [{call, criteria [{name, points, of, found}]}]. Raises
+    ValueError.
+    """
+    try:
+        result = json.loads(text)
+        return {"exercise": str(result["exercise"]), "passed": result["passed"] is True,
+                "points": None if result["points"] is None else float(result["points"]),
+                "due": float(result["pass_mark"]), "why": str(result["not_graded"] or ""),
+                "hint": str(result["hint"] or ""),
+                "runs": [{"call": " ".join(map(str, run["arguments"])),
+                          "criteria": [{"name": str(one["name"]), "points": float(one["points"]),
+                                        "of": float(one["of"]), "found": str(one["found"])}
+                                       for one in run["criteria"]]} for run in result["runs"]]}
+    except (KeyError, TypeError, OverflowError) as error:
+        raise ValueError("no result of an exercise: %s" % error) from None
