@@ -25,6 +25,11 @@ def new_namespace():
         raise OSError(ctypes.get_errno(), "unshare")
 
 
+def write_and_remove(path):
+    path.write_text("x")
+    path.unlink()
+
+
 def find_process(word):
     for entry in Path("/proc").glob("[0-9]*/cmdline"):
         try:
@@ -43,7 +48,7 @@ def attempts(targets):
                   for port in targets["ports"]})
     return {**found, "another network": lambda: connect(socket.AF_INET, ("192.0.2.1", 80)),
             "abstract socket": lambda: connect(socket.AF_UNIX, "\0" + targets["abstract"]),
-            "workspace": lambda: Path(targets["workspace"], "intruder").write_text("x"),
+            "workspace": lambda: write_and_remove(Path(targets["workspace"], "intruder")),
             "supervisor": lambda: find_process("lab_class.supervisor"), "namespace": new_namespace}
 
 
