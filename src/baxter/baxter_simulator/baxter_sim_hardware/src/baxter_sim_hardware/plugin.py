@@ -11,6 +11,7 @@ from baxter_model.description import arm_radius, finger_openings, limbs_of
 from baxter_model.self_collision import spawn_options
 from baxter_sim_kinematics import Chain
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
+from numba_cache import compiler_pages
 
 from . import compiled, effects, individual
 from .arms.actuators import Actuators
@@ -243,6 +244,7 @@ class BaxterPlugin(ModelPlugin):
         if self._publishing.publish(time_s) and not self._has_started:
             self._robot.announce_start()
             self._has_started = True
+            compiler_pages.release()
 
     def _feel_torques(self, side):
         return self._arms.feel(side, self._snapshot())[0]
