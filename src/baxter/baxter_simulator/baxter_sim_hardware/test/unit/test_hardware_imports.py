@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from numba.core.dispatcher import Dispatcher
 
 HEARD = ("*",)
 LOADED = """
@@ -30,7 +31,6 @@ def test_cameras_and_spawning_load_no_compiled_code(module):
 
 
 def test_the_first_tick_finds_its_functions_loaded(make_lab, monkeypatch):
-    numba = pytest.importorskip("numba")
     called = set()
 
     def recorded(function):
@@ -41,7 +41,7 @@ def test_the_first_tick_finds_its_functions_loaded(make_lab, monkeypatch):
 
     for module in [module for name, module in sys.modules.items() if name.startswith("baxter_sim_hardware")]:
         for name, found in list(vars(module).items()):
-            if isinstance(found, numba.core.dispatcher.Dispatcher):
+            if isinstance(found, Dispatcher):
                 monkeypatch.setattr(module, name, recorded(found))
     lab = make_lab()
     lab.enable()
