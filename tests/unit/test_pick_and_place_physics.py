@@ -52,6 +52,7 @@ def test_a_block_that_is_too_heavy_slips_out(carry):
         carry(dataclasses.replace(Trial.from_seed(SEED), mass_kg=2.0, friction=0.5))
 
 
+@pytest.mark.long
 def test_a_physical_robot_brings_it_by_looking_and_feeling(carry):
     """It is told the area, and the table's height within 2 cm."""
     _, miss_m = carry(Trial.from_seed(LOOKED_SEED), serial=LOOKED_SERIAL)

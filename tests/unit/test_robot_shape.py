@@ -70,6 +70,7 @@ def views(random):
         yield towards @ pose_matrix((-away, 0.0, 0.0), (0.0, 0.0, 0.0)) @ OPTICAL
 
 
+@pytest.mark.long
 def test_silhouette_and_depth_from_forty_views():
     path = rospkg.RosPack().get_path("baxter_description") + "/urdf/baxter.urdf.xacro"
     xml = xacro.process_file(path).toxml()
