@@ -10,6 +10,7 @@ import sys
 AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_environment.last_messages",
            "rospy.impl.tcpros_base": "lab_environment.refused_connections",
            "rospy.impl.masterslave": "lab_environment.one_connection",
+           "actionlib.simple_action_client": "lab_environment.goal_tracking",
            "roslaunch.parent": "lab_environment.launch_guard"}
 
 
