@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """actionlib's own client, as programs in the lab import it, with a server that answers before the goal was noted."""
+import sys
 import threading
+import traceback
 from types import SimpleNamespace
 
 import pytest
 from actionlib import CommState, SimpleActionClient, SimpleGoalState
 from actionlib_msgs.msg import GoalStatus
 
+from lab_testing.waiting import wait_until
+
 DEADLINE_S = 60.0
-#: Time in which an answer that is not held back would have been handled [s].
-HANDLED_S = 1.0
+
+
+def is_held_back(thread):
+    """Whether the thread has come to the amended handler, which waits while the goal is being sent."""
+    frame = sys._current_frames().get(thread.ident)
+    return any(frame.f_code.co_name == "handle_news" for frame, _ in traceback.walk_stack(frame))
 
 
 class QuickServer:
@@ -23,10 +31,10 @@ class QuickServer:
     def send_goal(self, goal, transition_cb, feedback_cb):
         handle = SimpleNamespace(get_comm_state=lambda: CommState.DONE, get_goal_status=lambda: GoalStatus.REJECTED,
                                  get_result=lambda: "refused")
-        self.threads.append(threading.Thread(target=self._answer, args=(transition_cb, feedback_cb, handle),
-                                             daemon=True))
-        self.threads[-1].start()
-        self.threads[-1].join(HANDLED_S)
+        thread = threading.Thread(target=self._answer, args=(transition_cb, feedback_cb, handle), daemon=True)
+        self.threads.append(thread)
+        thread.start()
+        wait_until(lambda: not thread.is_alive() or is_held_back(thread), "the answer to be handled, or held back")
         return handle
 
 

@@ -5,6 +5,8 @@ import rospy
 from moveit_msgs.msg import MoveGroupAction, MoveGroupResult, MoveItErrorCodes
 from trajectory_msgs.msg import JointTrajectoryPoint
 
+from lab_testing.waiting import wait_until
+
 # Goals of the first joint [rad] that are not reached: something is there; the planner looks until it is stopped.
 BLOCKED_RAD, ENDLESS_RAD = 1.1, 1.2
 DURATION_S = 2.0
@@ -29,8 +31,7 @@ class FakeMoveGroup:
             self._server.set_aborted(result_of(codes.GOAL_IN_COLLISION), "GOAL_IN_COLLISION: the goal is in "
                                      "collision: " + IN_COLLISION)
         elif first == ENDLESS_RAD:
-            while not self._server.is_preempt_requested() and not rospy.is_shutdown():
-                rospy.rostime.wallsleep(0.01)
+            wait_until(lambda: self._server.is_preempt_requested() or rospy.is_shutdown(), "the goal to be cancelled")
             self._say("preempted")
             self._server.set_preempted(result_of(codes.PREEMPTED), "PREEMPTED")
         else:
