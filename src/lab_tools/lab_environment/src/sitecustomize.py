@@ -11,6 +11,7 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "rospy.impl.tcpros_base": "lab_environment.refused_connections",
            "rospy.impl.masterslave": "lab_environment.one_connection",
            "actionlib.simple_action_client": "lab_environment.goal_tracking",
+           "actionlib.action_client": "lab_environment.lost_goals",
            "roslaunch.parent": "lab_environment.launch_guard"}
 
 
