@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """actionlib's own record of a goal, as programs in the lab import it: cancelled before a list has named it."""
 import pytest
-from actionlib.action_client import ClientGoalHandle, CommState, CommStateMachine
 from actionlib import msg
+from actionlib.action_client import ClientGoalHandle, CommState, CommStateMachine
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
 from lab_environment import lost_goals
