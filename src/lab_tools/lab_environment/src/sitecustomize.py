@@ -10,6 +10,8 @@ import sys
 AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_environment.last_messages",
            "rospy.impl.tcpros_base": "lab_environment.refused_connections",
            "rospy.impl.masterslave": "lab_environment.one_connection",
+           "rospy.impl.tcpros_pubsub": "lab_environment.late_subscribers",
+           "rospy.topics": "lab_environment.signals",
            "actionlib.simple_action_client": "lab_environment.goal_tracking",
            "actionlib.action_client": "lab_environment.lost_goals",
            "roslaunch.parent": "lab_environment.launch_guard"}
