@@ -20,6 +20,8 @@ STAND_INS=(
     src/compat/rqt_plot
     src/compat/joy
     src/compat/joint_state_controller
+    src/compat/imu_sensor_controller
+    src/compat/force_torque_sensor_controller
     src/compat/media_export
 )
 
