@@ -58,8 +58,8 @@ class Executor:
     """One execution at a time. settings: ExecutionSettings, which may be changed."""
 
     def __init__(self, controllers, settings, monitor, handle_of):
-        """controllers: list of controllers.Controller. handle_of(controller): how it is spoken to, as
-        handles.Handles.of."""
+        """controllers(): list of controllers.Controller at present; may raise ControllerError. handle_of(controller):
+        how it is spoken to, as handles.Handles.of."""
         self._controllers, self.settings, self._monitor = controllers, settings, monitor
         self._handle_of = handle_of
         self._busy = threading.Lock()
@@ -99,7 +99,7 @@ class Executor:
     def why_not(self, joints):
         """None where there are controllers for all ``joints``, else the sentence that names what is missing."""
         try:
-            choose(self._controllers, joints)
+            choose(self._controllers(), joints)
         except ControllerError as error:
             return str(error)
         return None
@@ -108,7 +108,7 @@ class Executor:
         def given_up():
             return self._stop.is_set() or preempted()
 
-        chosen = choose(self._controllers, trajectory.joint_names, self._is_alive)
+        chosen = choose(self._controllers(), trajectory.joint_names, self._is_alive)
         flaw = None if from_anywhere else self._flaw_of_start(trajectory, given_up)
         if flaw is not None:
             return flaw

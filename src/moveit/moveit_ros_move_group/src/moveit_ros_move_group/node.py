@@ -20,6 +20,7 @@ from moveit_ros_move_group.handles import Handles
 from moveit_ros_move_group.industrial import IndustrialPlanner
 from moveit_ros_move_group.monitor import SceneMonitor
 from moveit_ros_move_group.planning import Planner
+from moveit_ros_move_group.ros_control import RosControl
 from moveit_ros_move_group.sensors import Sensors
 from numba_cache import compiler_pages
 from rospy_limits.node import limit_ports
@@ -60,11 +61,15 @@ def _executor(monitor):
     controllers, complaints = settings.controllers()
     for text in complaints:
         rospy.logwarn("%s", text)
-    rospy.loginfo("controllers: %s", ", ".join(map(str, controllers)) or "none; plans cannot be executed")
+    present = settings.controllers_at_present(controllers)
+    if isinstance(present, RosControl):
+        rospy.loginfo("controllers: asked for at the controller managers when a motion is executed")
+    else:
+        rospy.loginfo("controllers: %s", ", ".join(map(str, controllers)) or "none; plans cannot be executed")
     model = monitor.model
     limits = dict(zip(model.variables, model.bounds.tolist(), strict=True))
     handles = Handles(controllers, settings.initial_positions(model), limits)
-    return Executor(controllers, settings.execution_settings(), monitor, handles.of)
+    return Executor(present, settings.execution_settings(), monitor, handles.of)
 
 
 def _capabilities(context, wanted, description, may_execute):

@@ -10,6 +10,7 @@ from motion_planning.errors import PlanningError
 from motion_planning.industrial import PLANNERS as INDUSTRIAL_PLANNERS
 from moveit_ros_move_group.controllers import read_list
 from moveit_ros_move_group.execution import ExecutionSettings
+from moveit_ros_move_group.ros_control import PLUGINS, RosControl
 
 DEFAULT_CAPABILITIES = (
     "move_group/MoveGroupCartesianPathService", "move_group/MoveGroupKinematicsService",
@@ -164,6 +165,15 @@ def controllers():
     fake = rospy.get_param("~moveit_controller_manager", "") == _FAKE
     entries = rospy.get_param("~controller_list", [])
     return read_list(entries, fake)
+
+
+def controllers_at_present(listed):
+    """Return a function that returns the list of Controllers: ``listed``, or what controller managers have by then."""
+    manager = rospy.get_param("~moveit_controller_manager", "")
+    if manager not in PLUGINS:
+        return lambda: listed
+    namespace = None if PLUGINS[manager] else str(rospy.get_param("~ros_control_namespace", "/"))
+    return RosControl(namespace, listed)
 
 
 def initial_positions(model):

@@ -90,7 +90,7 @@ class Lab:
                    for joint in JOINTS]
         controllers, _ = read_list(entries)
         self.handles = {joint: Handle() for joint in JOINTS}
-        self.executor = Executor(controllers, ExecutionSettings(**settings), joints or Joints(),
+        self.executor = Executor(lambda: controllers, ExecutionSettings(**settings), joints or Joints(),
                                  lambda controller: self.handles[controller.name])
 
     def start(self, seconds=LONG_S, **hooks):

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the parameter server says is understood; what cannot be is said."""
-from moveit_ros_move_group.settings import described_scene
+import pytest
+
+from moveit_ros_move_group import ros_control, settings
+from moveit_ros_move_group.settings import controllers_at_present, described_scene
 
 
 def test_a_robot_that_nothing_is_said_of_is_as_it_is(scene):
@@ -34,3 +37,17 @@ def test_what_is_not_understood_is_said(scene):
     assert len(complaints) == 6
     for part in ("no such link", "of link 'arm' is -1.0", "of link 'hand' is nan", "'off' is left out", "maybe"):
         assert part in text
+
+
+@pytest.mark.parametrize("manager, asked", [
+    ("moveit_simple_controller_manager/MoveItSimpleControllerManager", None),
+    ("moveit_ros_control_interface::MoveItControllerManager", ["/robot/controller_manager/list_controllers"]),
+    ("moveit_ros_control_interface::MoveItMultiControllerManager", ["/x/controller_manager/list_controllers"])])
+def test_the_controller_manager_says_where_controllers_come_from(monkeypatch, manager, asked):
+    given = {"~moveit_controller_manager": manager, "~ros_control_namespace": "/robot"}
+    services = []
+    monkeypatch.setattr(settings.rospy, "get_param", lambda name, usual=None: given.get(name, usual))
+    monkeypatch.setattr(ros_control, "_list_controllers", lambda service: services.append(service) or [])
+    monkeypatch.setattr(ros_control, "_service_names", lambda: ["/x/controller_manager/list_controllers", "/y"])
+    assert controllers_at_present([])() == []
+    assert services == (asked or [])

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Controllers that controller managers list, in the place of a controller_list."""
+import rosgraph
+import rospy
+from controller_manager_msgs.srv import ListControllers
+
+from moveit_ros_move_group.controllers import FOLLOW, GRIPPER, Controller, ControllerError
+
+# Value of ~moveit_controller_manager: whether all controller managers count, or the one in ~ros_control_namespace.
+PLUGINS = {"moveit_ros_control_interface::MoveItControllerManager": False,
+           "moveit_ros_control_interface::MoveItMultiControllerManager": True}
+_SERVICE = "controller_manager/list_controllers"
+# Class name in a controller's type: how it is spoken to, and its action.
+_KINDS = {"JointTrajectoryController": (FOLLOW, "follow_joint_trajectory"),
+          "GripperActionController": (GRIPPER, "gripper_cmd")}
+
+
+def running(namespace, states):
+    """Return the Controllers of those controller_manager_msgs/ControllerState that run and serve a known action.
+
+    namespace: that of their controller manager, with a slash at its end.
+    """
+    found = []
+    for state in states:
+        kind, action = _KINDS.get(state.type.rpartition("/")[2], (None, None))
+        if kind is None or state.state != "running":
+            continue
+        joints = tuple(joint for claim in state.claimed_resources for joint in claim.resources)
+        name = namespace + state.name
+        found.append(Controller(name, kind, joints, "%s/%s" % (name, action)))
+    return found
+
+
+class RosControl:
+    """Asks controller managers each time for what they have: controllers come and go."""
+
+    def __init__(self, namespace, listed=(), list_controllers=None, service_names=None):
+        """namespace: of one controller manager, or None for all; listed: Controllers of the controller_list, taken
+        where no manager has one of that action. list_controllers(service): states; service_names(): those of
+        the master."""
+        self._namespace, self._listed = namespace, list(listed)
+        self._list_controllers = list_controllers or _list_controllers
+        self._service_names = service_names or _service_names
+
+    def __call__(self):
+        """Return the present Controllers; raise ControllerError, which names the service that does not answer."""
+        found = []
+        for service in self._services():
+            try:
+                states = self._list_controllers(service)
+            except (rospy.ServiceException, rospy.ROSException) as error:
+                raise ControllerError("the controllers are not known: service %s: %s" % (service, error)) from error
+            found += running(service[:-len(_SERVICE)], states)
+        actions = {controller.action for controller in found}
+        return found + [controller for controller in self._listed if _absolute(controller.action) not in actions]
+
+    def _services(self):
+        if self._namespace is not None:
+            return [_absolute(self._namespace.rstrip("/") + "/" + _SERVICE)]
+        return sorted(name for name in self._service_names() if name.endswith("/" + _SERVICE))
+
+
+def _absolute(name):
+    return name if name.startswith("/") else "/" + name
+
+
+def _list_controllers(service):
+    return rospy.ServiceProxy(service, ListControllers)().controller
+
+
+def _service_names():
+    return [name for name, _ in rosgraph.Master(rospy.get_name()).getSystemState()[2]]
