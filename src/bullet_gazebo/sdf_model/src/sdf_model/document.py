@@ -127,10 +127,10 @@ class Document:
             raise self.error(element.find(tag), "<%s> is '%s', expected true or false" % (tag, text))
         return text in _TRUE
 
-    def number(self, element, tag, default=None):
+    def number(self, element, tag, default=None, may_be_infinite=False):
         """Return the number in a child, or ``default``."""
         child = element.find(tag)
-        return default if child is None else self.numbers(child, 1)[0]
+        return default if child is None else self.numbers(child, 1, may_be_infinite)[0]
 
     def vector(self, element, tag, default):
         """Return the numbers (tuple) in a child, as many as ``default`` has."""
@@ -147,14 +147,15 @@ class Document:
             raise self.error(child, "<%s> is '%s', expected positive numbers" % (tag, child.text.strip()))
         return values
 
-    def numbers(self, element, count):
-        """Return the ``count`` finite numbers in the element itself."""
+    def numbers(self, element, count, may_be_infinite=False):
+        """Return the ``count`` finite numbers in the element itself; infinite ones where they mean something."""
         text = (element.text or "").strip()
         try:
             values = tuple(float(word) for word in text.split())
         except ValueError:
             values = ()
-        if len(values) != count or not all(math.isfinite(value) for value in values):
+        known = all(math.isfinite(value) or may_be_infinite and math.isinf(value) for value in values)
+        if len(values) != count or not known:
             raise self.error(
                 element, "<%s> is '%s', expected %d number%s" % (element.tag, text, count, "s" * (count > 1))
             )

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The content of a <link>: inertia, shapes, surfaces, materials."""
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from urdf_model import Box, Cylinder, Inertial, Link, Mesh, Plane, Shape, Sphere, Surface
 from urdf_model.materials import MATERIALS
+from urdf_model.model import MAY_BE_INFINITE
 from urdf_model.transforms import pose_matrix
 
 from .lights import colour
@@ -131,10 +133,12 @@ def _surface(document, collision):
     ):
         part = element.find(path)
         for tag, name in field:
-            value = None if part is None else document.number(part, tag)
+            value = None if part is None else document.number(part, tag, may_be_infinite=name in MAY_BE_INFINITE)
             if value is None:
                 continue
-            if value < 0.0:
+            if value < 0.0 and name == "friction":
+                value = math.inf  # as Gazebo takes it
+            elif value < 0.0:
                 raise document.error(part, "<%s> is %g, expected 0 or more" % (tag, value))
             found[name] = value
     return Surface(**found) if found else None

@@ -71,6 +71,15 @@ def test_a_link_has_its_shapes_inertia_surface_and_colours():
     assert [shape.colour for shape in link.visuals] == [(0.9, 0.1, 0.1, 1.0), (0, 1, 0, 0.75), None]
 
 
+@pytest.mark.parametrize("mu", ["inf", "Inf", "-1"])
+def test_a_friction_without_a_bound_is_infinite(mu):
+    model = read("""<link name="l"><collision name="c"><geometry><sphere><radius>1</radius></sphere></geometry>
+        <surface><friction><ode><mu>%s</mu></ode></friction><contact><ode><kp>inf</kp></ode></contact></surface>
+        </collision></link>""" % mu)
+    surface = model.robot.links["l"].surface
+    assert (surface.friction, surface.stiffness) == (math.inf, math.inf)
+
+
 @pytest.mark.parametrize(("physics", "implicit"), [
     ("<implicit_spring_damper>1</implicit_spring_damper>", True), ("<cfm_damping>true</cfm_damping>", True),
     ("<implicit_spring_damper>0</implicit_spring_damper>", False), ("", False)])

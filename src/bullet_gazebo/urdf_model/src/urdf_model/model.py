@@ -82,12 +82,16 @@ class Mimic:
     offset: float = 0.0
 
 
+#: Fields of Surface that may be infinite: a contact that never slides, and a rigid one.
+MAY_BE_INFINITE = ("friction", "stiffness")
+
+
 @dataclass(frozen=True)
 class Surface:
     """Contact properties of a link. None: not given."""
 
-    friction: float | None = None  # Coulomb's mu
-    stiffness: float | None = None  # N/m
+    friction: float | None = None  # Coulomb's mu, may be infinite
+    stiffness: float | None = None  # N/m, may be infinite
     damping: float | None = None  # N s/m
     restitution: float | None = None  # 0 to 1
 

@@ -9,6 +9,7 @@ from . import bounds
 from .errors import UrdfError
 from .materials import MATERIALS
 from .model import (
+    MAY_BE_INFINITE,
     MOVABLE_TYPES,
     Box,
     Cylinder,
@@ -305,8 +306,11 @@ class _Reader:
             # Both spellings of the first one are in use.
             part = element.find(tag) if tag != "mu1" or element.find(tag) is not None else element.find("mu")
             if part is not None:
-                found[name] = self.parse_float((part.text or "").strip() or part.get("value", ""), part, part.tag)
-                if found[name] < 0.0:
+                text = (part.text or "").strip() or part.get("value", "")
+                found[name] = self.parse_float(text, part, part.tag, may_be_infinite=name in MAY_BE_INFINITE)
+                if found[name] < 0.0 and name == "friction":
+                    found[name] = math.inf  # as Gazebo takes it
+                elif found[name] < 0.0:
                     raise self.error(part, "%s of link '%s' is %g; expected 0 or more" % (tag, link.name, found[name]))
         if found:
             link.surface = Surface(**found)
@@ -389,12 +393,12 @@ class _Reader:
             return default
         return self.parse_float(text, element, key)
 
-    def parse_float(self, text, element, key):
+    def parse_float(self, text, element, key, may_be_infinite=False):
         try:
             value = float(text)
         except ValueError:
             raise self.error(element, "%s='%s' is not a number" % (key, text)) from None
-        if not math.isfinite(value):
+        if not math.isfinite(value) and not (may_be_infinite and math.isinf(value)):
             raise self.error(element, "%s='%s' is not finite" % (key, text))
         return value
 

@@ -251,3 +251,21 @@ def test_damping_may_be_implicit(flag, implicit):
     </robot>""" % flag)
     assert robot.joints["j"].implicit_damping is implicit
     assert merge_fixed(robot).joints["j"].implicit_damping is implicit
+
+
+@pytest.mark.parametrize("mu", ["inf", "Inf", "-1"])
+def test_a_friction_without_a_bound_is_infinite(mu):
+    robot = parse_urdf('<robot name="r"><link name="l"/><gazebo reference="l"><mu1>%s</mu1></gazebo></robot>' % mu)
+    assert robot.links["l"].surface.friction == math.inf
+
+
+def test_a_contact_may_be_rigid():
+    robot = parse_urdf('<robot name="r"><link name="l"/><gazebo reference="l"><kp>Inf</kp></gazebo></robot>')
+    assert robot.links["l"].surface.stiffness == math.inf
+
+
+@pytest.mark.parametrize("tag, text", [("mu1", "nan"), ("kp", "-1"), ("kd", "inf")])
+def test_a_surface_that_means_nothing_is_refused(tag, text):
+    with pytest.raises(UrdfError, match=tag):
+        parse_urdf('<robot name="r"><link name="l"/><gazebo reference="l"><%s>%s</%s></gazebo></robot>'
+                   % (tag, text, tag))
