@@ -43,11 +43,11 @@ def compressed_image(picture, quality=JPEG_QUALITY):
     return CompressedImage(format="rgb8; jpeg compressed bgr8", data=data.tobytes())
 
 
-def camera_info(pinhole, baseline_m=0.0):
-    """sensor_msgs/CameraInfo of an ideal camera; ``baseline_m`` as stereo's second camera has it."""
+def camera_info(pinhole, baseline_m=0.0, distortion=(0.0,) * 5):
+    """sensor_msgs/CameraInfo; ``baseline_m`` as stereo's second camera has it; ``distortion``: k1, k2, p1, p2, k3."""
     fx, fy, cx, cy = pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy
     return CameraInfo(
-        height=pinhole.height, width=pinhole.width, distortion_model="plumb_bob", D=[0.0] * 5,
+        height=pinhole.height, width=pinhole.width, distortion_model="plumb_bob", D=list(distortion),
         K=[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0], R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         P=[fx, 0.0, cx, -fx * baseline_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0])
 

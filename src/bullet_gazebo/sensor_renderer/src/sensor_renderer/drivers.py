@@ -191,7 +191,7 @@ class Camera(Driver):
             topics = ColourTopics(self.under_camera(entry.text("imageTopicName", "image_raw"), folder),
                                   [self.under_camera(entry.text("cameraInfoTopicName", "camera_info"), folder)])
             self._cameras.append((camera, topics, Noise(camera.noise) if camera.noise else None,
-                                  convert.camera_info(camera.pinhole, baseline)))
+                                  convert.camera_info(camera.pinhole, baseline, camera.distortion)))
             self.topics += topics.all
         self.topics.append(self.rate_setting(base))
 
@@ -199,7 +199,7 @@ class Camera(Driver):
         for camera, topics, noise, info in self._cameras:
             picture = None
             if topics.want_picture:
-                picture, _ = draw(camera.pinhole, link_pose @ camera.offset, True, False)
+                picture, _ = camera.view(link_pose, draw, True, False)
                 picture = noise.add(picture) if noise else picture
             topics.publish(time_s, self._frame, picture, camera.encoding, info)
 
@@ -227,17 +227,18 @@ class DepthCamera(Driver):
         self._depth_info = topic("depthImageCameraInfoTopicName", "depth/camera_info", CameraInfo)
         self._points = topic("pointCloudTopicName", "depth/points", PointCloud2)
         self.topics = [*self._colour.all, self._depth, self._depth_info, self._points, self.rate_setting(base)]
-        self._cloud = Cloud(pinhole)
+        self._cloud = Cloud(pinhole, self._camera.lens and self._camera.lens.rays)
         self._noise = Noise(self._camera.noise) if self._camera.noise else None
-        self._info = convert.camera_info(pinhole, entry.number(entry.plugin, "hackBaseline", 0.0))
-        self._plain_info = convert.camera_info(pinhole)
+        distortion = self._camera.distortion
+        self._info = convert.camera_info(pinhole, entry.number(entry.plugin, "hackBaseline", 0.0), distortion)
+        self._plain_info = convert.camera_info(pinhole, 0.0, distortion)
 
     def publish(self, time_s, link_pose, draw):
         points = self._points.has_listeners
         want_colour, want_depth = points or self._colour.want_picture, points or self._depth.has_listeners
         picture = depth = None
         if want_colour or want_depth:
-            picture, depth = draw(self._camera.pinhole, link_pose @ self._camera.offset, want_colour, want_depth)
+            picture, depth = self._camera.view(link_pose, draw, want_colour, want_depth)
         if want_colour and self._noise:
             picture = self._noise.add(picture)
         if want_depth:

@@ -53,7 +53,11 @@ class Cloud:
 
     POINT_BYTES = 16
 
-    def __init__(self, pinhole):
+    def __init__(self, pinhole, rays=None):
+        """``rays``: x / z and y / z (height, width) of the pixels of a lens that distorts; without, the pinhole's."""
+        if rays is not None:
+            self._columns, self._rows = rays
+            return
         columns = (np.arange(pinhole.width, dtype=np.float32) - pinhole.cx) / pinhole.fx
         rows = (np.arange(pinhole.height, dtype=np.float32) - pinhole.cy) / pinhole.fy
         self._columns, self._rows = columns.astype(np.float32)[None, :], rows.astype(np.float32)[:, None]

@@ -6,6 +6,7 @@ import numpy as np
 from lxml import etree
 
 from sensor_renderer.errors import SensorError
+from sensor_renderer.lens import Distortion, Lens
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from urdf_model.transforms import pose_matrix
 
@@ -20,7 +21,8 @@ class CameraElement(NamedTuple):
     """One camera of a ``<sensor>``.
 
     ``offset`` (4, 4): its optical frame in the frame of the link; ``encoding`` of its images as ROS names it;
-    ``noise`` [of 1.0 for full brightness] is the standard deviation of each pixel.
+    ``noise`` [of 1.0 for full brightness] is the standard deviation of each pixel; ``lens``: a
+    :class:`sensor_renderer.lens.Lens` if it distorts, with these coefficients, else None.
     """
 
     name: str
@@ -28,6 +30,18 @@ class CameraElement(NamedTuple):
     offset: np.ndarray
     encoding: str
     noise: float
+    distortion: Distortion = Distortion()
+    lens: Lens | None = None
+
+    def view(self, link_pose, draw, colour, depth):
+        """(picture, depth) as this camera sees them from a link at ``link_pose`` (4, 4); None if not requested.
+        ``draw(pinhole, pose, colour, depth)`` does so for an ideal camera."""
+        pose = link_pose @ self.offset
+        if self.lens is None:
+            return draw(self.pinhole, pose, colour, depth)
+        picture, distance = draw(self.lens.ideal, pose, colour, depth)
+        return (None if picture is None else self.lens.picture(picture),
+                None if distance is None else self.lens.nearest(distance))
 
 
 class SensorEntry:
@@ -90,9 +104,25 @@ class SensorEntry:
         if written not in _FORMATS:
             raise SensorError("%s: image format '%s' is not known; expected one of %s"
                               % (self, written, ", ".join(_FORMATS)))
+        distortion = self._distortion(camera)
+        try:
+            lens = Lens(pinhole, distortion) if any(distortion) else None
+        except SensorError as error:
+            raise SensorError("%s: %s" % (self, error)) from error
         offset = self.offset @ self._pose(self.element) @ self._pose(camera) @ OPTICAL
         return CameraElement(camera.get("name") or "camera%d" % number, pinhole, offset, _FORMATS[written],
-                             max(self.number(camera, "noise/stddev", 0.0), 0.0))
+                             max(self.number(camera, "noise/stddev", 0.0), 0.0), distortion, lens)
+
+    def _distortion(self, camera):
+        """Of the camera's <distortion>; where there is none, of the plugin's, as older descriptions have it."""
+        if camera.find("distortion") is not None:
+            centre = (camera.findtext("distortion/center") or "0.5 0.5").split()
+            if centre != ["0.5", "0.5"]:
+                raise SensorError("%s: the <center> of its <distortion> is '%s', expected '0.5 0.5'"
+                                  % (self, " ".join(centre)))
+            return Distortion(*(self.number(camera, "distortion/" + name, 0.0) for name in Distortion._fields))
+        return Distortion(*(self.number(self.plugin, "distortion" + name.upper(), 0.0)
+                            for name in ("k1", "k2", "t1", "t2", "k3")))
 
     def _pose(self, element):
         words = (element.findtext("pose") or "").split()
