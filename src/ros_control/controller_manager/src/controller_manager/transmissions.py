@@ -136,9 +136,10 @@ def _interface(joint, actuator, where, warnings):
             warnings.add(where, "left out, since its joint lacks <hardwareInterface>")
             return None
         warnings.add(where, "<hardwareInterface> belongs into <joint>, not into <actuator>")
+    # An interface that is read only, such as JointStateInterface, may come first.
+    name = next((name for name in names if _DEPRECATED.get(name, name) in _INTERFACES), names[0])
     if len(names) > 1:
-        warnings.add(where, "only the first of the hardware interfaces %s is used" % ", ".join(names))
-    name = names[0]
+        warnings.add(where, "of the hardware interfaces %s only %s is used" % (", ".join(names), name))
     if name in _DEPRECATED:
         warnings.add(where, "hardware interface '%s' is an old name; write '%s'" % (name, _DEPRECATED[name]))
         name = _DEPRECATED[name]
