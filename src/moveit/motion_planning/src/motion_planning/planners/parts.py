@@ -4,7 +4,8 @@
 Two arms collide with each other in few of their postures. One arm has half the joints, so its path is found much
 faster. A path of both needs a path of each alone: if one arm has none, the search in the space of all joints is not
 needed. If the arms cannot pass each other on several pairs of paths, that search and further pairs take turns: either
-alone may take a hundred times as long as usual, both hardly ever do.
+alone may take a hundred times as long as usual, both hardly ever do. Further pairs have one arm move aside first: the
+short paths of one arm are all alike.
 """
 import itertools
 
@@ -32,7 +33,8 @@ def two_parts(checker, bounds, start, goals, run, reach):
     nearest = goals[np.linalg.norm(goals - start, axis=1).argmin()]
     together, samples, shortening = growing(checker, bounds, start, goals, run, reach), 0, 0.0
     for turn in itertools.count():
-        points, drawn, seconds = _one_by_one(checker, bounds, start, nearest, run._replace(seed=run.seed + turn), reach)
+        points, drawn, seconds = _one_by_one(checker, bounds, start, nearest, run._replace(seed=run.seed + turn), reach,
+                                             turn)
         samples, shortening = samples + drawn, shortening + seconds
         if points is not None:
             return Path(points, samples, {"shorten": shortening})
@@ -43,20 +45,40 @@ def two_parts(checker, bounds, start, goals, run, reach):
                 return found._replace(samples=samples + found.samples)
 
 
-def _one_by_one(checker, bounds, start, goal, run, reach):
+def _one_by_one(checker, bounds, start, goal, run, reach, turn):
     """(points (m, k), samples, seconds for shortcuts) of one path of each part, brought together; points are None where
-    the parts cannot pass each other on these."""
+    the parts cannot pass each other on these.
+
+    After _PAIRS turns, one of the parts moves to a random posture on its way, where it may be aside of the other.
+    """
     samples, shortening, ways = 0, 0.0, []
-    for indices, alone in checker.parts:
-        found = rrt_connect(alone, bounds[indices], start[indices], goal[indices], run, reach)
-        samples += found.samples
-        begin = run.clock()
-        ways.append(shorten(found, alone, run, *_ALONE).points)
-        shortening += run.clock() - begin
+    for number, (indices, alone) in enumerate(checker.parts):
+        ends, within = [start[indices], goal[indices]], bounds[indices]
+        if turn >= _PAIRS and turn % 2 == number:
+            ends.insert(1, _aside(alone, within, run))
+        way = [ends[:1]]
+        for begin, end in itertools.pairwise(ends):
+            found = rrt_connect(alone, within, begin, end, run, reach)
+            samples += found.samples
+            since = run.clock()
+            way.append(shorten(found, alone, run, *_ALONE).points[1:])
+            shortening += run.clock() - since
+        ways.append(np.concatenate(way))
     points = _at_once(checker.parts, ways)
     if not checker.between_parts.edges(points).all():
         points = _past_each_other(checker, ways)
     return points, samples, shortening
+
+
+def _aside(alone, bounds, run):
+    """A random posture (j,) that is free for one part."""
+    random = np.random.default_rng(run.seed)
+    while True:
+        some = random.uniform(*bounds.T, (16, len(bounds)))
+        free = np.flatnonzero(alone.valid(some))
+        if len(free):
+            return some[free[0]]
+        run.check("a posture was looked for where one arm is out of the other's way")
 
 
 def _at_once(parts, ways):
