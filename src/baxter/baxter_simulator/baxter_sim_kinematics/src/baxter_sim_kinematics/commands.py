@@ -195,6 +195,8 @@ def reach():
     parser.add_argument("--tool", type=float, nargs=3, metavar=("X", "Y", "Z"),
                         help="the tip's z axis points there, and only turns about it are tried; 0 0 -1 is down")
     parser.add_argument("--starts", type=int, default=40, help="random starts before a pose counts as out of reach")
+    parser.add_argument("--self-collision", action="store_true",
+                        help="only postures count in which the robot does not touch itself")
     parser.add_argument("--out", type=Path, default=Path("reach"), help="folder (default: reach)")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
     return _run_command(lambda: _reach(parser.parse_args()))
@@ -203,17 +205,19 @@ def reach():
 def _reach(options):
     from baxter_sim_kinematics.reach_picture import draw
 
-    _, chain = _chain(options)
+    robot, chain = _chain(options)
     volume = options.volume
     geometry = [*np.concatenate([part.ravel() for part in (*chain.arrays[:2], *chain.limit_arrays)]).round(6).tolist()]
     settings = MapSettings(tuple(volume[0::2]), tuple(volume[1::2]), options.cell, options.orientations,
                         None if options.tool is None else tuple(options.tool), options.starts,
-                        "%s to %s, %s" % (chain.base, chain.tip, geometry))
+                        "%s to %s, %s" % (chain.base, chain.tip, geometry), options.self_collision)
     if options.jobs < 1:
         raise ValueError("--jobs must be at least 1, got %d" % options.jobs)
-    share, manipulability = compute(chain, settings, options.out, options.jobs, _Bar())
+    share, manipulability = compute(chain, settings, options.out, options.jobs, _Bar(),
+                                    lambda: _self_checker(robot))
     np.savez_compressed(options.out / "reach.npz", share=share, manipulability=manipulability, lower=settings.lower,
-                        upper=settings.upper, cell_m=settings.cell_m, orientations=settings.orientations)
+                        upper=settings.upper, cell_m=settings.cell_m, orientations=settings.orientations,
+                        self_collision=settings.self_collision)
     with open(options.out / "reach.csv", "w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("x_m", "y_m", "z_m", "reached_percent", "mean_manipulability"))

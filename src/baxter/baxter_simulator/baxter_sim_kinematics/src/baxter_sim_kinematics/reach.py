@@ -13,7 +13,8 @@ import numpy as np
 
 from baxter_sim_kinematics.batch import solve_batch
 from baxter_sim_kinematics.budget import Budget
-from baxter_sim_kinematics.errors import KinematicsError
+from baxter_sim_kinematics.errors import KinematicsError, NoSolution
+from baxter_sim_kinematics.ik import solve
 from urdf_model.transforms import matrix_from_quaternion
 
 # Cells that are computed, saved and counted together: about a second of work.
@@ -30,7 +31,8 @@ class ReachError(KinematicsError):
 class MapSettings:
     """The settings that a map depends on. lower, upper: corners (3,) of the volume [m, base frame]; cell_m: edge of a
     cell; orientations: how many are tried in each; tool: (3,) the direction of the tip's z axis [base frame] if only
-    turns about that count, else None; starts: of each search; chain: data that identifies the arm."""
+    turns about that count, else None; starts: of each search; chain: data that identifies the arm; self_collision: a
+    pose counts only if a posture reaches it in which the robot does not touch itself."""
 
     lower: tuple
     upper: tuple
@@ -39,6 +41,7 @@ class MapSettings:
     tool: tuple | None
     starts: int
     chain: str
+    self_collision: bool = False
 
     def __post_init__(self):
         if not all(math.isfinite(v) for v in (*self.lower, *self.upper)) or not np.less(self.lower, self.upper).all():
@@ -60,10 +63,12 @@ class MapSettings:
         return tuple(max(1, int(round((high - low) / self.cell_m)))
                      for low, high in zip(self.lower, self.upper, strict=True))
 
-    def centres(self):
-        """Return the cells' centres (cells, 3) [m], x slowest."""
-        axes = [low + self.cell_m * (0.5 + np.arange(count)) for low, count in zip(self.lower, self.shape, strict=True)]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    def centres(self, first=0, count=None):
+        """Return the centres (cells, 3) [m] of ``count`` cells from number ``first`` on, by default of all; x slowest.
+        """
+        cells = math.prod(self.shape)
+        numbers = np.arange(first, cells if count is None else min(first + count, cells))
+        return np.array(self.lower) + self.cell_m * (0.5 + np.column_stack(np.unravel_index(numbers, self.shape)))
 
     def rotations(self):
         """Return the orientations (orientations, 3, 3) tried in every cell: the same for the same settings."""
@@ -79,35 +84,39 @@ class MapSettings:
                                           math.cos(t) * np.cross(z, x) - math.sin(t) * x, z)) for t in turns])
 
 
-def compute(chain, settings, folder, processes, progress=lambda done, total: None):
+def compute(chain, settings, folder, processes, progress=lambda done, total: None, new_checker=None):
     """Compute a map and return (share (x, y, z) in 0 to 1, mean manipulability (x, y, z), NaN where nothing is
     reached).
 
     Each finished part is kept in ``folder``; existing parts are not computed again. ``progress`` is
-    called with the number of cells done and of all. Raises ReachError where ``folder`` holds parts of another map.
+    called with the number of cells done and of all. ``new_checker()``: a CollisionChecker for each process, which
+    ``self_collision`` needs. Raises ReachError where ``folder`` holds parts of another map.
     """
+    if settings.self_collision and new_checker is None:
+        raise ReachError("a map of postures in which the robot does not touch itself needs a collision checker")
     parts = _Parts(Path(folder), settings)
-    centres = settings.centres()
-    sizes = {first: min(_CHUNK, len(centres) - first) for first in range(0, len(centres), _CHUNK)}
+    cells = math.prod(settings.shape)
+    sizes = {first: min(_CHUNK, cells - first) for first in range(0, cells, _CHUNK)}
     values = parts.load(sizes)
     todo = [first for first in sizes if first not in values]
     done = sum(sizes[first] for first in values)
-    progress(done, len(centres))
+    progress(done, cells)
     if todo:
         context = multiprocessing.get_context("fork")
-        with context.Pool(min(processes, len(todo)), _begin, (chain, settings, parts)) as pool:
+        with context.Pool(min(processes, len(todo)), _begin, (chain, settings, parts, new_checker)) as pool:
             for first in pool.imap_unordered(_work, todo):
                 done += sizes[first]
-                progress(done, len(centres))
+                progress(done, cells)
         values.update(parts.load({first: sizes[first] for first in todo}))
     share, manipulability = zip(*(values[first] for first in sizes), strict=True)
     return np.concatenate(share).reshape(settings.shape), np.concatenate(manipulability).reshape(settings.shape)
 
 
-def cell_values(chain, settings, centres):
+def cell_values(chain, settings, centres, checker=None):
     """Return share and mean manipulability (k,) of the cells at ``centres`` (k, 3).
 
-    Manipulability is Yoshikawa's sqrt(det(J J^T)), the mean over the reached orientations.
+    Manipulability is Yoshikawa's sqrt(det(J J^T)), the mean over the reached orientations. ``checker``: a
+    CollisionChecker; postures with contacts do not count.
     """
     rotations = settings.rotations()
     budget = Budget(candidates=1, max_starts=settings.starts, tolerance_m=1e-5, tolerance_rad=1e-5)
@@ -118,11 +127,37 @@ def cell_values(chain, settings, centres):
             continue
         targets = np.tile(np.eye(4), (len(rotations), 1, 1))
         targets[:, :3, :3], targets[:, :3, 3] = rotations, centre
+        targets = targets[~_beyond_wrist(chain, targets)]
+        if not len(targets):
+            continue
         found = solve_batch(chain, targets, chain.mid_range, budget=budget, threads=1)
-        share[k] = found.solved.mean()
-        if found.solved.any():
-            manipulability[k] = np.mean([yoshikawa(chain.jacobian(q)) for q in found.q[found.solved]])
+        reached = [(target, q) for target, q in zip(targets[found.solved], found.q[found.solved], strict=True)]
+        postures = [q for _, q in reached] if checker is None else _without_contact(chain, reached, budget, checker)
+        share[k] = len(postures) / len(rotations)
+        if postures:
+            manipulability[k] = np.mean([yoshikawa(chain.jacobian(q)) for q in postures])
     return share, manipulability
+
+
+def _beyond_wrist(chain, targets):
+    """Which targets (m, 4, 4) would have the last joint's origin beyond the outstretched arm."""
+    if not chain.wrist_is_fixed:
+        return np.zeros(len(targets), dtype=bool)
+    wrists = targets[:, :3, 3] - targets[:, :3, :3] @ chain.wrist_in_tip
+    return np.linalg.norm(wrists - chain.shoulder, axis=1) > chain.wrist_reach_m
+
+
+def _without_contact(chain, reached, budget, checker):
+    """Postures without contact for the (target, posture) of ``reached``: the same ones, or others where there are."""
+    postures = []
+    for target, q in reached:
+        if checker.contact(chain.joint_names, q) is not None:
+            try:
+                q = solve(chain, target, chain.mid_range, budget=budget, checker=checker).q
+            except NoSolution:
+                continue
+        postures.append(q)
+    return postures
 
 
 def yoshikawa(jacobian):
@@ -178,16 +213,16 @@ class _Parts:
         return self._folder / ("%07d.npz" % first)
 
 
-_task = None  # of a worker process: (chain, settings, parts)
+_task = None  # of a worker process: (chain, settings, parts, checker)
 
 
-def _begin(*task):
+def _begin(chain, settings, parts, new_checker):
     global _task
-    _task = task
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends the workers
+    _task = (chain, settings, parts, new_checker() if settings.self_collision else None)
 
 
 def _work(first):
-    chain, settings, parts = _task
-    parts.save(first, *cell_values(chain, settings, settings.centres()[first:first + _CHUNK]))
+    chain, settings, parts, checker = _task
+    parts.save(first, *cell_values(chain, settings, settings.centres(first, _CHUNK), checker))
     return first

@@ -157,3 +157,48 @@ def test_orientations_are_rotations_and_tools_point_where_they_should():
             assert np.linalg.det(rotation) == pytest.approx(1.0)
             if tool is not None:
                 np.testing.assert_allclose(rotation[:, 2], np.array(tool) / math.dist(tool, (0, 0, 0)), atol=1e-12)
+
+
+class Touches:
+    """A checker of the postures in which the joint s0 is above zero."""
+
+    def contact(self, joint_names, q):
+        return "a touch" if q[0] > 0.0 else None
+
+
+def test_postures_with_contacts_do_not_count(tmp_path, left):
+    """The checker forbids half of the first joint's range, so poses need other postures, or are lost."""
+    settings = reach.MapSettings((0.3, -0.2, 0.0), (1.1, 1.0, 0.2), 0.2, 8, None, 40, "left", True)
+    every, _ = reach.cell_values(left, settings, settings.centres())
+    free, manipulability = reach.cell_values(left, settings, settings.centres(), Touches())
+    assert (free <= every).all() and 0.0 < free.mean() < every.mean()
+    assert (np.isnan(manipulability) == (free == 0.0)).all()
+    share, _ = reach.compute(left, settings, tmp_path, 2, new_checker=Touches)
+    np.testing.assert_array_equal(share.ravel(), free)
+    with pytest.raises(reach.ReachError, match="needs a collision checker"):
+        reach.compute(left, settings, tmp_path, 2)
+
+
+def test_no_reached_pose_counts_as_beyond_the_wrist(left):
+    """Poses of random postures; the same poses, far away, do."""
+    rng = np.random.default_rng(3)
+    poses = np.array([left.fk(q) for q in rng.uniform(left.lower, left.upper, (500, len(left)))])
+    assert not reach._beyond_wrist(left, poses).any()
+    poses[:, :3, 3] += 1.2 * (poses[:, :3, 3] - left.shoulder)
+    assert reach._beyond_wrist(left, poses).mean() > 0.5
+
+
+def test_cells_in_parts_are_the_cells_of_the_whole():
+    settings = reach.MapSettings((-0.4, 0.1, 0.3), (0.5, 1.0, 0.9), 0.13, 4, None, 1, "")
+    whole = settings.centres()
+    parts = [settings.centres(first, 32) for first in range(0, len(whole), 32)]
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
+    assert len(whole) == np.prod(settings.shape) and (whole[1] - whole[0])[2] == pytest.approx(0.13)
+
+
+def test_map_without_self_collisions_by_command(tmp_path):
+    status, _, err = run("reach", "--volume", "0.0", "0.8", "0.0", "0.8", "-0.1", "0.3", "--cell", "0.4",
+                         "--orientations", "6", "--self-collision", "--jobs", "1", "--out", str(tmp_path))
+    assert status == 0, err
+    data = np.load(tmp_path / "reach.npz")
+    assert data["self_collision"] and 0.0 < data["share"].mean() < 0.9
