@@ -49,6 +49,7 @@ SUITES = {
     "start": ("start_bench", "launch to /robot/sim/started; memory of each process"),
     "cameras": ("camera_bench", "pictures beside PyBullet's own; pictures per second, and their cost to physics"),
     "labs": ("labs_bench", "1, 2 and 4 labs side by side: factor and memory of each"),
+    "class": ("class_bench", "6 labs of ./baxter.sh labs, and 16 of which 12 are paused: labs per core and per GB"),
 }
 # Time limit of a round of a suite [s]; after that it counts as hung.
 LIMIT_S = 1200
