@@ -18,6 +18,8 @@ from lab_class.labs import MOST_FAILURES, ClassError, Role, State, may
 _CHUNK = 65536
 #: A request's body; the largest are recordings and notebooks [bytes].
 LARGEST_BODY = 32 << 20
+#: Requests and open pages of one lab at a time; a lab, or a page in a loop, must not take the descriptors of all.
+MOST_AT_ONCE = 64
 #: Time for a lab to begin its answer [s].
 ANSWER_S = 60.0
 #: The waiting page asks again after this time [s].
@@ -104,45 +106,86 @@ class Passed(_Handler):
 
     SUPPORTED_METHODS = _METHODS
 
-    def prepare(self):
-        self._body, self._name = bytearray(), self.path_args[0]
+    async def prepare(self):
+        self._streams, self._name = None, self.path_args[0]
         self._prefix = "/" + self._name
+        path, _, query = self.request.uri.partition("?")
+        self._below = path[len(self._prefix):] + ("?" + query if query else "")
+        self._is_upgrade = http_text.is_upgrade(self.request.headers)
+        length = self.request.headers.get("Content-Length", "")
+        self._length = int(length) if length.isdecimal() else 0  # tornado refuses what is no number
+        if not self._lets_in():
+            return
+        if not self._below.startswith("/"):
+            self.redirect(self._prefix + "/" + self._below)
+            return
+        lab = self.door.supervisor.request(self._name)
+        if lab.state is not State.RUNNING:
+            self._say_wait(lab)
+        elif lab.busy + lab.pages >= MOST_AT_ONCE:
+            self.refuse(429, "this lab has %d requests and open pages already; close some" % MOST_AT_ONCE)
+        else:
+            await self._begin()
+
+    def _lets_in(self):
+        """Whether this request may go on; else it is refused."""
         token, cookie = self.get_query_argument("token", ""), self.get_cookie(http_text.COOKIE, "")
         self._role = self.door.role(self._name, [token] if token else [cookie])
         if not may(self._role, "watch"):
             self.refuse(403, "This address needs the token of this lab: /%s/?token=..." % self._name[:60])
         elif is_foreign(self.request):
             self.refuse(403, "a page of %s may not use this lab" % self.request.headers["Origin"][:200])
+        elif "Transfer-Encoding" in self.request.headers:
+            self.refuse(411, "a request's body needs a length here")
+        elif self._length > LARGEST_BODY:
+            self.refuse(413, "a request may have %d MB, not %d" % (LARGEST_BODY >> 20, self._length >> 20))
         else:
             self.request.connection.set_max_body_size(LARGEST_BODY)
             if token:
                 self.set_cookie(http_text.COOKIE, token, path=self._prefix + "/", httponly=True, samesite="Strict")
+            return True
+        return False
 
-    def data_received(self, chunk):
-        self._body += chunk
+    async def _begin(self):
+        """Connect to the lab, and pass the head of the request on; its body follows as it comes in."""
+        try:
+            self._streams = await asyncio.open_unix_connection(str(self.door.supervisor.socket_of(self._name)),
+                                                               limit=http_text.LARGEST_HEAD)
+        except OSError as error:
+            self._refuse_lab(error)
+            return
+        self._streams[1].write(http_text.request_head(self.request.method, self._below, self.request.headers,
+                                                      self._length, self._is_upgrade))
+
+    async def data_received(self, chunk):
+        if self._streams is None:
+            return
+        # A lab that does not read holds its client up, and not the front door's memory.
+        with contextlib.suppress(OSError):
+            self._streams[1].write(chunk)
+            await self._streams[1].drain()
+
+    def on_connection_close(self):
+        # Also of a client that goes in the middle of its request.
+        if self._streams is not None:
+            self._streams[1].close()
+
+    def _refuse_lab(self, error):
+        self.refuse(502, "the lab does not answer: %s" % (error or type(error).__name__))
 
     async def _pass(self, *_):
-        path, _, query = self.request.uri.partition("?")
-        below = path[len(self._prefix):] + ("?" + query if query else "")
-        if not below.startswith("/"):
-            self.redirect(self._prefix + "/" + below)
-            return
-        lab = self.door.supervisor.request(self._name)
-        if lab.state is not State.RUNNING:
-            self._say_wait(lab)
-            return
-        is_upgrade = http_text.is_upgrade(self.request.headers)
-        self.door.supervisor.serving(self._name, is_upgrade, 1)
+        self.door.supervisor.serving(self._name, self._is_upgrade, 1)
         try:
-            if is_upgrade:
-                await self._tunnel(below)
+            if self._is_upgrade:
+                await self._tunnel()
             else:
-                await self._answer(below)
+                await self._answer()
         except (OSError, EOFError, asyncio.LimitOverrunError, http_text.BadAnswer) as error:
             if not self._finished and not self._headers_written and not self.detached:
-                self.refuse(502, "the lab does not answer: %s" % (error or type(error).__name__))
+                self._refuse_lab(error)
         finally:
-            self.door.supervisor.serving(self._name, is_upgrade, -1)
+            self._streams[1].close()
+            self.door.supervisor.serving(self._name, self._is_upgrade, -1)
 
     get = head = post = put = patch = delete = options = _pass
 
@@ -158,22 +201,13 @@ class Passed(_Handler):
         name = html.escape(self.door.full_names[self._name])
         self.finish(_WAITING % (_AGAIN_S, name, name, html.escape(words)))
 
-    async def _ask(self, below, upgrade):
-        """(reader, writer, status, headers) of the lab's answer."""
-        reader, writer = await asyncio.open_unix_connection(str(self.door.supervisor.socket_of(self._name)),
-                                                            limit=http_text.LARGEST_HEAD)
-        try:
-            writer.write(http_text.request_text(self.request.method, below, self.request.headers, bytes(self._body),
-                                                upgrade))
-            async with asyncio.timeout(ANSWER_S):
-                head = await reader.readuntil(b"\r\n\r\n")
-            return reader, writer, *http_text.answer_head(head)
-        except BaseException:
-            writer.close()
-            raise
+    async def _head(self):
+        """(status, headers) of the lab's answer."""
+        async with asyncio.timeout(ANSWER_S):
+            return http_text.answer_head(await self._streams[0].readuntil(b"\r\n\r\n"))
 
-    async def _answer(self, below):
-        reader, writer, status, headers = await self._ask(below, False)
+    async def _answer(self):
+        status, headers = await self._head()
         try:
             self.set_status(status)
             # The lab says how long its answers may be kept.
@@ -181,33 +215,28 @@ class Passed(_Handler):
             for name, value in http_text.passed_on(headers, self._prefix):
                 (self.add_header if name == "Set-Cookie" else self.set_header)(name, value)
             if self.request.method != "HEAD" and status not in (204, 304):
-                while chunk := await reader.read(_CHUNK):
+                while chunk := await self._streams[0].read(_CHUNK):
                     self.write(chunk)
                     await self.flush()
             await self.finish()
         except (iostream.StreamClosedError, httputil.HTTPOutputError):
             # The client has gone, or the lab's answer has not the length that it announced.
             self.request.connection.stream.close()
-        finally:
-            writer.close()
 
-    async def _tunnel(self, below):
-        reader, writer, status, headers = await self._ask(below, True)
+    async def _tunnel(self):
+        status, headers = await self._head()
+        if status != 101:
+            self.refuse(403 if status == 403 else 502, "the lab refused this connection (%d)" % status)
+            return
+        self.detached = True
+        client = self.detach()
         try:
-            if status != 101:
-                self.refuse(403 if status == 403 else 502, "the lab refused this connection (%d)" % status)
-                return
-            self.detached = True
-            client = self.detach()
-            try:
-                await client.write(http_text.upgrade_text(headers))
-                await self._copy_both(client, reader, writer)
-            except iostream.StreamClosedError:
-                pass
-            finally:
-                client.close()
+            await client.write(http_text.upgrade_text(headers))
+            await self._copy_both(client, *self._streams)
+        except iostream.StreamClosedError:
+            pass
         finally:
-            writer.close()
+            client.close()
 
     async def _copy_both(self, client, reader, writer):
         async def to_client():

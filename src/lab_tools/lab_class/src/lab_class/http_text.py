@@ -35,8 +35,8 @@ def is_upgrade(headers):
     return headers.get("Upgrade", "").lower() == "websocket"
 
 
-def request_text(method, uri, headers, body, upgrade=False):
-    """A request as bytes. uri: path and query below the lab; body: bytes.
+def request_head(method, uri, headers, length, upgrade=False):
+    """The head of a request as bytes. uri: path and query below the lab; length: of the body [bytes].
 
     HTTP/1.0, unless it is an upgrade: the answer then ends with its connection, and is never in pieces.
     """
@@ -50,8 +50,8 @@ def request_text(method, uri, headers, body, upgrade=False):
     if upgrade:
         lines += ["Connection: Upgrade", "Upgrade: websocket", "Origin: http://localhost"]
     else:
-        lines += ["Connection: close", *(["Content-Length: %d" % len(body)] if body else [])]
-    return "\r\n".join([*lines, "", ""]).encode("utf-8", "surrogateescape") + body
+        lines += ["Connection: close", *(["Content-Length: %d" % length] if length else [])]
+    return "\r\n".join([*lines, "", ""]).encode("utf-8", "surrogateescape")
 
 
 def without_own_cookie(text):
