@@ -3,8 +3,6 @@
 import {element} from "./panel.js";
 import {has, text} from "./texts.js";
 
-// Between two questions about a hand that is being dragged.
-const ASK_MS = 40;
 // A question that is not answered: another one may be asked.
 const LOST_MS = 2000;
 const FIELDS = ["x", "y", "z", "roll", "pitch", "yaw"];
@@ -112,34 +110,37 @@ class Hand {
 
   hide() {
     Object.assign(this, {shown: false, reaches: false, asked: null, wanted: null});
+    clearTimeout(this.timer);
     this.number += 1;
     this.fields.hidden = true;
     this.hands.view()?.removeGhost(this.side);
     this.hands.refresh();
   }
 
-  // One question at a time; the newest wish is the next one.
+  // One question at a time; the newest wish is the next one, as soon as there is an answer.
   ask(question) {
     this.wanted = question;
-    if (!this.timer) this.timer = setTimeout(() => this.askNow(), 0);
+    if (this.asked === null) this.askNow();
   }
 
   askNow() {
-    this.timer = 0;
-    const now = performance.now();
-    const waits = this.asked !== null && now - this.asked < LOST_MS;
-    if (this.wanted && !waits) {
-      this.number += 1;
-      this.asked = now;
-      this.hands.send({op: "reach", side: this.side, number: this.number, ...this.wanted});
-      this.wanted = null;
-    }
-    if (this.wanted || this.asked !== null) this.timer = setTimeout(() => this.askNow(), ASK_MS);
+    clearTimeout(this.timer);
+    this.asked = null;
+    if (!this.wanted) return;
+    this.asked = performance.now();
+    this.number += 1;
+    this.hands.send({op: "reach", side: this.side, number: this.number, ...this.wanted});
+    this.wanted = null;
+    this.timer = setTimeout(() => this.askNow(), LOST_MS);
   }
 
-  answered({number, why, text: detail, joints, position, orientation, ghost}) {
-    if (number !== this.number || !this.shown) return;
-    this.asked = null;
+  answered(answer) {
+    if (answer.number !== this.number || !this.shown) return;
+    this.take(answer);
+    this.askNow();
+  }
+
+  take({why, text: detail, joints, position, orientation, ghost}) {
     this.reaches = why === "" && !this.wanted;
     this.said.textContent = why === "" ? text("reach_yes")
       : text(has(`reach_${why}`) ? `reach_${why}` : "refused", {text: detail});
