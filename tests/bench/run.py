@@ -48,6 +48,7 @@ SUITES = {
     "placing": ("placing_bench", "pick and place by friction, twenty seeds a round: 100 in five"),
     "start": ("start_bench", "launch to /robot/sim/started; memory of each process"),
     "cameras": ("camera_bench", "pictures beside PyBullet's own; pictures per second, and their cost to physics"),
+    "web": ("web_bench", "the page: first sight, cost of viewers, delays of cameras, hands, stop and echoes"),
     "labs": ("labs_bench", "1, 2 and 4 labs side by side: factor and memory of each"),
     "class": ("class_bench", "6 labs of ./baxter.sh labs, and 16 of which 12 are paused: labs per core and per GB"),
 }
