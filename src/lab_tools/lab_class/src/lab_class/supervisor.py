@@ -12,6 +12,7 @@ import socket
 import sys
 import tempfile
 import time
+import traceback
 from pathlib import Path
 
 from tornado import netutil
@@ -19,7 +20,7 @@ from tornado.httpserver import HTTPServer
 
 from lab_class import front_door, launching
 from lab_class.factors import Factors
-from lab_class.lab_process import END_S, LabProcess, disk_bytes
+from lab_class.lab_process import END_S, LabProcess, disk_bytes, remove
 from lab_class.labs import Action, ClassError, Labs, State
 from lab_class.store import Store, StoreError
 from lab_environment.isolation import NotIsolated
@@ -142,9 +143,14 @@ class Supervisor:
         listener.listen(128)
         self._listeners[name] = listener
 
-    async def _every(self, period_s, function):
+    @staticmethod
+    async def _every(period_s, function):
         while True:
-            await function()
+            try:
+                await function()
+            except Exception:
+                # One lab, or what a student has put into its folder, must not end the watch of all.
+                traceback.print_exc()
             await asyncio.sleep(period_s)
 
     async def _tick(self):
@@ -221,7 +227,7 @@ class Supervisor:
             await asyncio.sleep(_TICK_S)
         await asyncio.get_running_loop().run_in_executor(None, process.kill)
         del self._processes[name]
-        shutil.rmtree(self._store.lab(name) / "caches", ignore_errors=True)
+        await asyncio.get_running_loop().run_in_executor(None, remove, self._store.lab(name) / "caches")
 
     async def _end_all(self):
         for lab in self.labs:
@@ -237,8 +243,7 @@ class Supervisor:
     def _last_words(self, name):
         """The last line of a lab's output, which inside.py writes."""
         with contextlib.suppress(OSError):
-            data = (self._store.lab(name) / "output.txt").read_bytes()[-_LAST_BYTES:]
-            lines = [line for line in data.decode(errors="replace").splitlines() if line.strip()]
+            lines = [line for line in _end_of(self._store.lab(name) / "output.txt").splitlines() if line.strip()]
             if lines:
                 return lines[-1].removeprefix("the lab ended: ")[:300]
         return "its processes ended"
@@ -261,6 +266,14 @@ class Supervisor:
             if used > most and self.labs[name].has_processes:
                 self._do(self.labs.exceeded(name, "its files have %.1f GB; its limit is %.1f GB"
                                             % (used / 2**30, most / 2**30), self._now()))
+
+
+def _end_of(path):
+    """The last text of a file, which may be large."""
+    with open(path, "rb") as stream:
+        stream.seek(0, os.SEEK_END)
+        stream.seek(max(0, stream.tell() - _LAST_BYTES))
+        return stream.read(_LAST_BYTES).decode(errors="replace")
 
 
 def main():
