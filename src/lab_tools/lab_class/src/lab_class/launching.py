@@ -14,6 +14,8 @@ from lab_web.tokens import TOKEN, VIEW_TOKEN
 MASTER_PORT, PAGE_PORT = 11311, 8090
 #: Size of /tmp and of /dev/shm in a lab [bytes]; both count towards its memory.
 SCRATCH_BYTES = 512 << 20
+#: Most processes and threads of a lab at a time.
+TASKS = 4096
 #: Paths below the workspace that no lab shows: the judge's solutions, the history, other people's notebooks and logs.
 HIDDEN = (".git", "src/rf_labs/rf_checks/exercises/solutions", "src/rf_labs/rf_checks/test", "src/rf_labs/rf_lab2/test",
           "share/rf_checks/exercises/solutions", "install/share/rf_checks/exercises/solutions", ".baxter/jupyter",
@@ -43,7 +45,7 @@ def prepared(place, options, tokens, listener, refused):
         home, master, page = str(place.folder / HOME), ports.free_port(), ports.free_port()
     command = [sys.executable, "-P", "-m", "lab_class.inside", "--listener", str(listener), "--master", str(master),
                "--page", str(page), "--", *options.launch]
-    limits = ["prlimit", "--core=0", "--fsize=%d" % options.disk_bytes, "--"]
+    limits = limited(options.disk_bytes, TASKS if place.walls else None)
     environment = {**isolation.environment_of(os.environ), TOKEN: tokens.act, VIEW_TOKEN: tokens.view,
                    "ROS_MASTER_URI": "http://localhost:%d" % master, "ROS_HOSTNAME": "localhost", "HOME": home,
                    "ROS_HOME": home + "/.ros", "ROS_LOG_DIR": home + "/.ros/log"}
@@ -61,6 +63,16 @@ def prepared(place, options, tokens, listener, refused):
     enter = isolation.command(os.environ, binds, (*HIDDEN, str(place.state_folder)), True,
                               [*scratch, *options_of_calls])
     return [*enter, *limits, *command], environment, (listener, *descriptors)
+
+
+def limited(file_bytes, tasks):
+    """The command prefix that limits the size of each file, and the number of processes and threads.
+
+    ``tasks`` only in a sandbox (None: no limit): in its user namespace Linux counts them by themselves, since 5.14;
+    elsewhere it counts all of the user's. They are not limited for root.
+    """
+    number = [] if tasks is None else ["--nproc=%d" % tasks]
+    return ["prlimit", "--core=0", "--fsize=%d" % file_bytes, *number, "--"]
 
 
 def refused(walls):
