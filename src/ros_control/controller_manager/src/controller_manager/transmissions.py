@@ -15,8 +15,9 @@ _INTERFACES = {
     "hardware_interface/EffortJointInterface": EFFORT,
 }
 _DEPRECATED = {name.split("/")[1]: name for name in _INTERFACES}
-_TYPES = tuple("transmission_interface/" + name for name in (
-    "SimpleTransmission", "DifferentialTransmission", "FourBarLinkageTransmission"))
+_SIMPLE = "transmission_interface/SimpleTransmission"
+# Of two actuators and two joints, both of which take commands.
+_OF_TWO = ("transmission_interface/DifferentialTransmission", "transmission_interface/FourBarLinkageTransmission")
 
 
 @dataclass(frozen=True)
@@ -40,17 +41,15 @@ def read_transmissions(urdf_xml, known_joints):
     joints, warnings = {}, _Warnings()
     for element in _root(urdf_xml).iterchildren("transmission"):
         where = _where(element)
-        found = _transmission(element, where, warnings)
-        if found is None:
-            continue
-        if found.name not in known_joints:
-            warnings.add("%s for joint '%s'" % (where, found.name), "left out, since the model does not have these "
-                         "joints or they do not move; its joints are %s" % ", ".join(known_joints))
-        elif found.name in joints:
-            warnings.add("%s for joint '%s'" % (where, found.name),
-                         "left out, since these joints already have a transmission")
-        else:
-            joints[found.name] = found
+        for found in _transmission(element, where, warnings):
+            if found.name not in known_joints:
+                warnings.add("%s for joint '%s'" % (where, found.name), "left out, since the model does not have these "
+                             "joints or they do not move; its joints are %s" % ", ".join(known_joints))
+            elif found.name in joints:
+                warnings.add("%s for joint '%s'" % (where, found.name),
+                             "left out, since these joints already have a transmission")
+            else:
+                joints[found.name] = found
     return list(joints.values()), warnings.lines()
 
 
@@ -105,6 +104,7 @@ def _where(element):
 
 
 def _transmission(element, where, warnings):
+    """The ControlledJoints of a transmission; none if it is left out."""
     kind = (element.findtext("type") or element.get("type") or "").strip()
     joints, actuators = element.findall("joint"), element.findall("actuator")
     missing = [part for part, there in (
@@ -112,20 +112,30 @@ def _transmission(element, where, warnings):
         ("an <actuator>", actuators)) if not there]
     if missing:
         warnings.add(where, "left out, since it lacks %s" % " and ".join(missing))
-        return None
-    interface = _interface(joints[0], actuators[0], where, warnings)
+        return []
+    if kind not in (_SIMPLE, *_OF_TWO):
+        warnings.add(where, "the type '%s' is not one of %s; it is taken as a SimpleTransmission"
+                     % (kind, ", ".join((_SIMPLE, *_OF_TWO))))
+    if kind in _OF_TWO:
+        used = [joint for joint in joints if joint.get("name")]
+    else:
+        used = joints[:1]
+        if len(joints) > 1:
+            warnings.add(where, "of %d joints only the first one, '%s', is used" % (len(joints), joints[0].get("name")))
+    # A joint has the actuator at its place in the list; more joints than actuators share the last one.
+    pairs = [(joint, actuators[min(number, len(actuators) - 1)]) for number, joint in enumerate(used)]
+    return [found for joint, actuator in pairs
+            if (found := _controlled(joint, actuator, where, warnings)) is not None]
+
+
+def _controlled(joint, actuator, where, warnings):
+    interface = _interface(joint, actuator, where, warnings)
     if interface is None:
         return None
-    if kind not in _TYPES:
-        warnings.add(where, "the type '%s' is not one of %s; it is taken as a SimpleTransmission"
-                     % (kind, ", ".join(_TYPES)))
-    if len(joints) > 1:
-        warnings.add(where, "of %d joints only the first one, '%s', is used" % (len(joints), joints[0].get("name")))
-    reduction = _figure(actuators[0], "mechanicalReduction", 1.0, where, warnings)
+    reduction = _figure(actuator, "mechanicalReduction", 1.0, where, warnings)
     if reduction == 0.0:
         warnings.add(where, "mechanicalReduction is 0, expected another number; it has no effect here")
-    return ControlledJoint(joints[0].get("name"), interface, reduction,
-                           _figure(joints[0], "offset", 0.0, where, warnings))
+    return ControlledJoint(joint.get("name"), interface, reduction, _figure(joint, "offset", 0.0, where, warnings))
 
 
 def _interface(joint, actuator, where, warnings):
