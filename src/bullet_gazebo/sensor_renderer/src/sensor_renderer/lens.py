@@ -11,6 +11,8 @@ from sensor_renderer.pinhole import MAX_PIXELS, Pinhole
 
 # The inverse is found by Newton's method; it is good when a ray hits its pixel within this distance [focal lengths].
 _STEPS, _CLOSE = 30, 1e-9
+# One pixel in so many is tried first.
+_FEW = 101
 # Pixels around the ideal picture, so that interpolation has neighbours everywhere.
 _MARGIN_PX = 2
 
@@ -40,9 +42,12 @@ class Distortion(NamedTuple):
         with np.errstate(all="ignore"):
             for _ in range(_STEPS):
                 off = self.distorted(found) - arrivals
-                found = found - np.einsum("nij,nj->ni", _inverse(self._slope(found)), off)
+                worst = np.abs(off).max(initial=0.0)
+                if worst < _CLOSE or not np.isfinite(worst):
+                    break
+                found -= np.einsum("nij,nj->ni", _inverse(self._slope(found)), off)
             good = np.abs(self.distorted(found) - arrivals).max(initial=0.0) < _CLOSE
-        if not good or any(np.linalg.det(self._slope(part * found)).min(initial=1.0) <= 0.0
+        if not good or any(_determinants(self._slope(part * found)).min(initial=1.0) <= 0.0
                            for part in np.linspace(0.0, 1.0, 11)):
             raise ValueError("no single ray arrives at each pixel")
         return found
@@ -67,6 +72,8 @@ class Lens:
         rows, columns = np.mgrid[0:pinhole.height, 0:pinhole.width].astype(float)
         arrivals = np.stack([(columns.ravel() - pinhole.cx) / pinhole.fx, (rows.ravel() - pinhole.cy) / pinhole.fy], 1)
         try:
+            # A few show sooner than all that there is none.
+            distortion.rays(arrivals[::_FEW])
             rays = distortion.rays(arrivals)
         except ValueError as error:
             raise SensorError("distortion %s is of no use for a picture of %d x %d: %s"
@@ -98,6 +105,11 @@ class Lens:
         return ideal[self._nearest]
 
 
+def _determinants(matrices):
+    (a, b), (c, d) = matrices[:, 0].T, matrices[:, 1].T
+    return a * d - b * c
+
+
 def _inverse(matrices):
     (a, b), (c, d) = matrices[:, 0].T, matrices[:, 1].T
-    return np.stack([d, -b, -c, a], axis=1).reshape(-1, 2, 2) / (a * d - b * c)[:, None, None]
+    return np.stack([d, -b, -c, a], axis=1).reshape(-1, 2, 2) / _determinants(matrices)[:, None, None]
