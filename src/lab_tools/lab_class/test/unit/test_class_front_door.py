@@ -4,12 +4,15 @@ import asyncio
 import json
 from pathlib import Path
 
+import pytest
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
 from lab_class import front_door, http_text, roster
 from lab_class.labs import MOST_FAILURES, Labs, State
 from lab_class.store import ClassRecord, Options
+
+pytestmark = pytest.mark.once
 
 LIMIT_S = 20.0
 PAGE = Path(__file__).resolve().parents[2] / "page"
