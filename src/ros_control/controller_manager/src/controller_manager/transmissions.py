@@ -113,9 +113,6 @@ def _transmission(element, where, warnings):
     if missing:
         warnings.add(where, "left out, since it lacks %s" % " and ".join(missing))
         return []
-    if kind not in (_SIMPLE, *_OF_TWO):
-        warnings.add(where, "the type '%s' is not one of %s; it is taken as a SimpleTransmission"
-                     % (kind, ", ".join((_SIMPLE, *_OF_TWO))))
     if kind in _OF_TWO:
         used = [joint for joint in joints if joint.get("name")]
     else:
@@ -124,8 +121,13 @@ def _transmission(element, where, warnings):
             warnings.add(where, "of %d joints only the first one, '%s', is used" % (len(joints), joints[0].get("name")))
     # A joint has the actuator at its place in the list; more joints than actuators share the last one.
     pairs = [(joint, actuators[min(number, len(actuators) - 1)]) for number, joint in enumerate(used)]
-    return [found for joint, actuator in pairs
-            if (found := _controlled(joint, actuator, where, warnings)) is not None]
+    controlled = [found for joint, actuator in pairs
+                  if (found := _controlled(joint, actuator, where, warnings)) is not None]
+    # One that is left out for its interface has had its line; how its type is taken would say the contrary.
+    if controlled and kind not in (_SIMPLE, *_OF_TWO):
+        warnings.add(where, "the type '%s' is not one of %s; it is taken as a SimpleTransmission"
+                     % (kind, ", ".join((_SIMPLE, *_OF_TWO))))
+    return controlled
 
 
 def _controlled(joint, actuator, where, warnings):
