@@ -125,6 +125,7 @@ class BaxterPlugin(ModelPlugin):
             part.attach_sensors(panel)
         self._collision = CollisionTopics(world, model, baxter, chains, guards_of(robot), self._arms.feel,
                                           panel.cuff_squeezed)
+        self._collision.warn = self._warnings.warn
         if "safety" in self._effects:
             self._make_safe(model, robot, chains)
         if baxter.profile == "robot":
@@ -140,7 +141,6 @@ class BaxterPlugin(ModelPlugin):
         links = {side: [robot.joints[name].child for name in chain.joint_names] for side, chain in chains.items()}
         load = ExternalLoad(model, self._as_known, self._dt)
         self._collision.safety = Safety(self._numbers, load, links, arm_radius(robot))
-        self._collision.warn = self._warnings.warn
         for joint in robot.movable_joints():
             if any(is_part_of_arm(joint.child, side) for side in SIDES):
                 model.soften(joint.child, *surface)

@@ -98,9 +98,13 @@ def test_arms_stop_at_the_field_unless_it_is_suppressed(make_lab, kinds):
     assert touches == set()
     if kinds:
         assert names == set() and np.abs(lab.position - FOLDED).max() < 0.01
+        assert not any("held by" in line for line in lab.log.lines)
         assert min(gaps) < -3e-3  # through the field, which must not block it
         return
     assert names and names <= set(HEAD_GUARDS)
+    for side in SIDES:
+        said, = (line for line in lab.log.lines if line.startswith("%s limb is held by collision avoidance" % side))
+        assert "too near to collision_head_link_" in said
     assert min(gaps) > -2e-3 and np.abs(lab.position - FOLDED).max() > 0.3
     assert np.abs(lab.velocity).max() < 0.02
     # Motion away is free.

@@ -25,6 +25,23 @@ SUPPRESSIONS = {
 # parameters. It has no value for w2; we use that of the other wrist joints.
 SQUISH_NM = dict(zip(JOINTS, (16.0, 24.0, 16.0, 16.0, 7.0, 7.0, 7.0), strict=True))
 HAND_FORCE_N, HAND_TORQUE_NM = 100.0, 30.0
+# An arm is held by avoidance when it may keep less than this share of its speed for so long [simulated s].
+HELD_SHARE, HELD_S = 0.05, 0.5
+
+
+class Held:
+    """Notices that avoidance keeps an arm from going on."""
+
+    def __init__(self):
+        self._since = None
+
+    def look(self, time_s, share):
+        """Whether the arm is held at time_s [s]; share: of its speed that it may keep, 0 to 1."""
+        if share >= HELD_SHARE:
+            self._since = None
+        elif self._since is None or time_s < self._since:
+            self._since = time_s
+        return self._since is not None and time_s - self._since >= HELD_S
 
 
 class Suppressions:

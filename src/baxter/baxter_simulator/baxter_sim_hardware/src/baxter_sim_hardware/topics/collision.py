@@ -23,6 +23,11 @@ def _suppress(kind):
     return handle
 
 
+def _near(field):
+    """Names of the links that one arm is near to; field: `avoidance.Field`."""
+    return sorted({*field.near, *field.other, *field.body})
+
+
 def guards_of(robot):
     """`avoidance.Guards` of an urdf_model.Robot."""
     balls = head_guards(robot)
@@ -46,6 +51,7 @@ class CollisionTopics(Part):
         self.fields = dict.fromkeys(SIDES, avoidance.FREE)
         self._feel, self._is_squeezed = feel, is_squeezed
         self.suppressions = {side: collision.Suppressions() for side in SIDES}
+        self._held = {side: collision.Held() for side in SIDES}
         self._schedule = Schedule(CHECK_RATE_HZ)
         self.safety, self.warn = None, None
 
@@ -73,6 +79,10 @@ class CollisionTopics(Part):
             self._arms.set_yielding(side, bool(contacts and self._touched(contacts, side, time_s)[0]))
             self.fields[side] = self._field(side, time_s)
             self._arms.set_slowing(side, self.fields[side].slowing)
+            if self._held[side].look(time_s, self.fields[side].slowing):
+                self.warn(time_s, (side, "held"), "%s limb is held by collision avoidance: on its way it comes too near "
+                          "to %s. Lead it round, or suppress that by limb/%s/%s" % (
+                              side, ", ".join(_near(self.fields[side])), side, collision.AVOIDANCE))
             self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
             floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
             self._arms.set_floating(side, floats)
@@ -134,7 +144,7 @@ class CollisionTopics(Part):
     def _avoidance(self, time_s, side, snapshot):
         links, other_arm = self._touched(self._contacts(), side, time_s)
         field = self.fields[side]
-        near = sorted({*links, *field.near, *field.other, *field.body})
+        near = sorted({*links, *_near(field)})
         return CollisionAvoidanceState(Header(stamp=stamp(time_s), frame_id=BASE_FRAME),
                                        other_arm or bool(field.other), near)
 
