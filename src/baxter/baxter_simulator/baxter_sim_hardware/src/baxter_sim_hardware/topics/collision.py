@@ -80,8 +80,8 @@ class CollisionTopics(Part):
             self.fields[side] = self._field(side, time_s)
             self._arms.set_slowing(side, self.fields[side].slowing)
             if self._held[side].look(time_s, self.fields[side].slowing):
-                self.warn(time_s, (side, "held"), "%s limb is held by collision avoidance: on its way it comes too near "
-                          "to %s. Lead it round, or suppress that by limb/%s/%s" % (
+                self.warn(time_s, (side, "held"), "%s limb is held by collision avoidance: on its way it comes too "
+                          "near to %s. Lead it round, or suppress that by limb/%s/%s" % (
                               side, ", ".join(_near(self.fields[side])), side, collision.AVOIDANCE))
             self._arms.set_gravity_compensation(side, not suppressions.active(collision.GRAVITY, time_s))
             floats = enabled and self._is_squeezed(side) and not suppressions.active(collision.CUFF, time_s)
