@@ -348,9 +348,8 @@ def test_both_arms_together_and_further_pairs_of_paths_take_turns(pair, monkeypa
         run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
         return parts.two_parts(checker, bounds, start, goal[None], run, 0.5)
 
-    def endless(*_):
-        while True:
-            yield None
+    def endless(searched, *arguments):
+        return itertools.repeat(None) if searched is checker else growing(searched, *arguments)
 
     path = planned(20, endless)
     assert len(tried) == 21 and np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
@@ -358,6 +357,27 @@ def test_both_arms_together_and_further_pairs_of_paths_take_turns(pair, monkeypa
     assert 3 <= len(tried) < 100 and np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
     # The same seed gives the same path.
     assert np.array_equal(planned(math.inf, growing).points, path.points)
+
+
+def test_a_posture_aside_that_cannot_be_reached_costs_one_turn_only(pair, monkeypatch):
+    model, _ = pair
+    group = model.groups["both"]
+    # The first arm cannot leave the angle between two posts, nor enter it.
+    scene = Scene(model)
+    for angle in (1.5, 2.3):
+        place = pose((0.3 * math.cos(angle), 0.4 + 0.3 * math.sin(angle), 0.0))
+        scene = scene.with_object(WorldObject("post at %g" % angle, place, ((Cylinder(0.02, 0.5), np.eye(4)),)))
+    checker = SphereChecker(SphereModel.of(model, None), group, scene)
+    enclosed = np.array([1.9, 0.0])
+    _, alone = checker.parts[0]
+    assert alone.valid(enclosed)[0]
+    start, goal, bounds = np.array([0.3, 0.0, -0.3, 0.0]), np.array([-0.3, 2.0, 0.3, 2.0]), model.bounds[group.indices]
+    asked = []
+    monkeypatch.setattr(parts, "_aside", lambda *arguments: asked.append(arguments) or enclosed)
+    monkeypatch.setattr(parts, "_PAIRS", 0)
+    run = Run(3, time.monotonic() + PATIENCE_S, time.monotonic)
+    path = parts.two_parts(checker, bounds, start, goal[None], run, 0.5)
+    assert asked and np.allclose(path.points[[0, -1]], [start, goal], atol=1e-6)
 
 
 def test_two_ways_at_once_begin_and_end_together_and_pieces_of_no_length_do_no_harm():

@@ -12,7 +12,7 @@ import itertools
 import numpy as np
 
 from motion_planning.planners import kernels
-from motion_planning.planners.trees import SAMPLES, Path, growing, rrt_connect, shorten
+from motion_planning.planners.trees import SAMPLES, Path, growing, shorten
 
 # Distance [rad] of postures on the path of one arm that are combined with those of the other.
 _SPACING = 0.15
@@ -22,7 +22,8 @@ _TURNS = 4
 _ALONE, TOGETHER = (80, 10), (50, 8)
 # Number of pairs of paths to try before both arms are searched together, too: another pair may leave more room.
 _PAIRS = 3
-# Least number of samples for both arms together in a turn: about as much work as one pair of paths.
+# Least number of samples for both arms together in a turn, about as much work as one pair of paths; and the most for
+# the way to or from a random posture.
 _IN_A_TURN = 2 * SAMPLES
 
 
@@ -49,16 +50,21 @@ def _one_by_one(checker, bounds, start, goal, run, reach, turn):
     """(points (m, k), samples, seconds for shortcuts) of one path of each part, brought together; points are None where
     the parts cannot pass each other on these.
 
-    After _PAIRS turns, one of the parts moves to a random posture on its way, where it may be aside of the other.
+    After _PAIRS turns, one of the parts moves to a random posture on its way, where it may be aside of the other. That
+    posture may be out of its reach, so this search is bounded; points are None, too, where it ends.
     """
     samples, shortening, ways = 0, 0.0, []
     for number, (indices, alone) in enumerate(checker.parts):
-        ends, within = [start[indices], goal[indices]], bounds[indices]
+        ends, within, most = [start[indices], goal[indices]], bounds[indices], None
         if turn >= _PAIRS and turn % 2 == number:
             ends.insert(1, _aside(alone, within, run))
+            most = _IN_A_TURN // SAMPLES
         way = [ends[:1]]
         for begin, end in itertools.pairwise(ends):
-            found = rrt_connect(alone, within, begin, end, run, reach)
+            searched = itertools.islice(growing(alone, within, begin, end, run, reach), most)
+            found = next((path for path in searched if path is not None), None)
+            if found is None:
+                return None, samples + _IN_A_TURN, shortening
             samples += found.samples
             since = run.clock()
             way.append(shorten(found, alone, run, *_ALONE).points[1:])
