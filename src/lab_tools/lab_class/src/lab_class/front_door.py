@@ -20,7 +20,7 @@ _CHUNK = 65536
 LARGEST_BODY = 32 << 20
 #: Requests and open pages of one lab at a time; a lab, or a page in a loop, must not take the descriptors of all.
 MOST_AT_ONCE = 64
-#: Time for a lab to begin its answer [s].
+#: Time for a lab to begin its answer, or to read more of a body [s].
 ANSWER_S = 60.0
 #: The waiting page asks again after this time [s].
 _AGAIN_S = 2
@@ -107,7 +107,7 @@ class Passed(_Handler):
     SUPPORTED_METHODS = _METHODS
 
     async def prepare(self):
-        self._streams, self._name = None, self.path_args[0]
+        self._streams, self._counted, self._name = None, False, self.path_args[0]
         self._prefix = "/" + self._name
         path, _, query = self.request.uri.partition("?")
         self._below = path[len(self._prefix):] + ("?" + query if query else "")
@@ -147,11 +147,16 @@ class Passed(_Handler):
         return False
 
     async def _begin(self):
-        """Connect to the lab, and pass the head of the request on; its body follows as it comes in."""
+        """Connect to the lab, and pass the head of the request on; its body follows as it comes in.
+
+        It counts from here on: a body may come in slowly, and a lab that is served must not be paused."""
+        self._counted = True
+        self.door.supervisor.serving(self._name, self._is_upgrade, 1)
         try:
             self._streams = await asyncio.open_unix_connection(str(self.door.supervisor.socket_of(self._name)),
                                                                limit=http_text.LARGEST_HEAD)
         except OSError as error:
+            self._leave()
             self._refuse_lab(error)
             return
         self._streams[1].write(http_text.request_head(self.request.method, self._below, self.request.headers,
@@ -161,20 +166,32 @@ class Passed(_Handler):
         if self._streams is None:
             return
         # A lab that does not read holds its client up, and not the front door's memory.
-        with contextlib.suppress(OSError):
+        try:
             self._streams[1].write(chunk)
-            await self._streams[1].drain()
+            async with asyncio.timeout(ANSWER_S):
+                await self._streams[1].drain()
+        except TimeoutError:
+            # Meanwhile nothing tells whether the client is still there.
+            self.request.connection.stream.close()
+        except OSError:
+            pass  # what the lab has answered before it went is read afterwards
 
     def on_connection_close(self):
         # Also of a client that goes in the middle of its request.
+        super().on_connection_close()
+        self._leave()
+
+    def _leave(self):
         if self._streams is not None:
             self._streams[1].close()
+        if self._counted:
+            self._counted = False
+            self.door.supervisor.serving(self._name, self._is_upgrade, -1)
 
     def _refuse_lab(self, error):
         self.refuse(502, "the lab does not answer: %s" % (error or type(error).__name__))
 
     async def _pass(self, *_):
-        self.door.supervisor.serving(self._name, self._is_upgrade, 1)
         try:
             if self._is_upgrade:
                 await self._tunnel()
@@ -184,8 +201,7 @@ class Passed(_Handler):
             if not self._finished and not self._headers_written and not self.detached:
                 self._refuse_lab(error)
         finally:
-            self._streams[1].close()
-            self.door.supervisor.serving(self._name, self._is_upgrade, -1)
+            self._leave()
 
     get = head = post = put = patch = delete = options = _pass
 

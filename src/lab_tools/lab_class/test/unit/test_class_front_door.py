@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The front door on a real port, with labs that are small servers in this process."""
 import asyncio
+import contextlib
 import json
 from pathlib import Path
 
@@ -256,16 +257,55 @@ def test_a_lab_that_does_not_read_holds_its_client_up(tmp_path, monkeypatch):
     monkeypatch.setattr(front_door, "LARGEST_BODY", 2 * LARGE)
     end = asyncio.Event()
 
+    monkeypatch.setattr(front_door, "ANSWER_S", 2.0)
+
     async def deaf(reader, writer):
         await end.wait()
+        writer.close()
 
     async def check():
         async with House(tmp_path, deaf) as house:
-            _, writer = await house.connect("/anna/upload", "PUT", house.tokens["anna"].act,
-                                            **{"Content-Length": str(2 * LARGE)})
+            reader, writer = await house.connect("/anna/upload", "PUT", house.tokens["anna"].act,
+                                                 **{"Content-Length": str(2 * LARGE)})
             assert await _sent_until_full(writer) < LARGE // 2
+            # In the end the request is given up, and does not count any more.
+            await until(lambda: house.supervisor.labs["anna"].busy == 0)
+            with contextlib.suppress(ConnectionError):
+                assert await reader.read() == b""
             writer.transport.abort()
             end.set()
+
+    run(check())
+
+
+def test_slow_uploads_count_from_their_first_byte_to_their_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(front_door, "MOST_AT_ONCE", 3)
+
+    async def upload(reader, writer):
+        head = await reader.readuntil(b"\r\n\r\n")
+        if b"PUT" in head:
+            await reader.readexactly(4)
+        writer.write(ANSWER)
+        writer.close()
+
+    async def check():
+        async with House(tmp_path, upload) as house:
+            lab, token = house.supervisor.labs["anna"], house.tokens["anna"].act
+            slow = [await house.connect("/anna/upload", "PUT", token, **{"Content-Length": "4", "Connection": "close"})
+                    for _ in range(3)]
+            await until(lambda: lab.busy == 3)
+            assert (await house.ask("/anna/", token=token))[0] == 429
+            slow[0][1].transport.abort()
+            await until(lambda: lab.busy == 2)
+            assert (await house.ask("/anna/", token=token))[0] == 200
+            for reader, writer in slow[1:]:
+                writer.write(b"body")
+                assert (await reader.read()).endswith(b"hello")
+            assert lab.busy == 0
+        (tmp_path / "anna").unlink()
+        async with House(tmp_path) as house:
+            assert (await house.ask("/anna/", token=house.tokens["anna"].act))[0] == 502
+            assert house.supervisor.labs["anna"].busy == 0
 
     run(check())
 
