@@ -262,10 +262,15 @@ class Supervisor:
     async def _look_at_disk(self):
         most = self._record.options.disk_bytes
         for name in list(self._processes):
-            used = await asyncio.get_running_loop().run_in_executor(None, disk_bytes, self._store.lab(name))
-            if used > most and self.labs[name].has_processes:
-                self._do(self.labs.exceeded(name, "its files have %.1f GB; its limit is %.1f GB"
-                                            % (used / 2**30, most / 2**30), self._now()))
+            try:
+                used = await asyncio.get_running_loop().run_in_executor(None, disk_bytes, self._store.lab(name))
+            except OSError as error:
+                # Files that cannot be measured could be of any size.
+                why = "its files could not be measured: %s" % error
+            else:
+                why = used > most and "its files have %.1f GB; its limit is %.1f GB" % (used / 2**30, most / 2**30)
+            if why and self.labs[name].has_processes:
+                self._do(self.labs.exceeded(name, why, self._now()))
 
 
 def _end_of(path):

@@ -2,11 +2,20 @@
 """What the supervisor measures in folders that students write to, and that its loops outlive any error."""
 import asyncio
 import os
+import tempfile
+import traceback
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from lab_class import supervisor
 from lab_class.lab_process import disk_bytes, remove
+from lab_class.labs import Labs, State
+from lab_class.store import Options
 from lab_class.supervisor import Supervisor, _end_of
+
+_NOBODY = 65534
 
 DEPTH = 3000
 
@@ -52,6 +61,64 @@ def test_files_behind_links_do_not_count(tmp_path):
 def test_a_folder_that_is_gone_is_an_error_that_names_it(tmp_path):
     with pytest.raises(OSError, match="gone"):
         disk_bytes(tmp_path / "gone")
+
+
+def _as_a_student(function):
+    """Whether a function of a folder returns true for a user whom permissions bind; the superuser is bound by none."""
+    pid = os.fork()
+    if pid == 0:
+        try:
+            if os.geteuid() == 0:
+                os.setgid(_NOBODY)
+                os.setuid(_NOBODY)
+            with tempfile.TemporaryDirectory(dir="/tmp") as folder:
+                os._exit(0 if function(Path(folder)) else 1)
+        except BaseException:
+            traceback.print_exc()
+            os._exit(2)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+
+
+def _locked(folder):
+    home = folder / "home"
+    (home / "locked").mkdir(parents=True)
+    (home / "locked/large").write_bytes(b"x" * 2**20)
+    (home / "locked").chmod(0)
+    return home
+
+
+def test_files_in_a_locked_folder_count():
+    assert _as_a_student(lambda folder: disk_bytes(_locked(folder)) > 2**20)
+
+
+def test_a_locked_folder_is_removed():
+    def gone(folder):
+        home = _locked(folder)
+        remove(home)
+        return not home.exists()
+
+    assert _as_a_student(gone)
+
+
+def test_a_folder_that_cannot_be_measured_ends_its_lab_and_the_others_are_looked_at(tmp_path, monkeypatch):
+    monkeypatch.setattr(supervisor, "disk_bytes", _either)
+    labs = Labs(["anna", "ben", "cleo"], 3, None)
+    watcher = SimpleNamespace(labs=labs, done=[])
+    watcher._record = SimpleNamespace(options=Options(disk_bytes=2**20))
+    watcher._processes, watcher._store = dict.fromkeys(["anna", "ben", "cleo"]), SimpleNamespace(lab=str)
+    watcher._now, watcher._do = lambda: 0.0, watcher.done.append
+    for lab in labs:
+        lab.state = State.RUNNING
+    asyncio.run(Supervisor._look_at_disk(watcher))
+    assert [lab.state for lab in labs] == [State.FAILED, State.RUNNING, State.FAILED] and len(watcher.done) == 2
+    assert labs["anna"].reason == "its files could not be measured: du cannot read anna"
+    assert labs["cleo"].reason.startswith("its files have 0.0 GB")
+
+
+def _either(name):
+    if name == "anna":
+        raise OSError("du cannot read anna")
+    return 2**21 if name == "cleo" else 1
 
 
 def test_a_loop_outlives_an_error():
