@@ -3,6 +3,7 @@
 import base64
 import bisect
 import contextlib
+import itertools
 import json
 import statistics
 import threading
@@ -110,27 +111,31 @@ def viewers_cost(report, lab, web, seconds):
 
 
 def echo(report, web, times):
-    came, delays = threading.Event(), []
+    came, times_s = threading.Condition(), {}
 
     def heard(operation, time_s):
         if operation.get("op") == "publish":
-            delays.append(time_s - begin)
-            came.set()
+            with came:
+                times_s[operation["msg"]["data"]] = time_s
+                came.notify_all()
     socket = Socket(web.rosbridge, heard)
     topic = {"topic": "/bench_echo", "type": "std_msgs/String"}
     socket.send(op="advertise", **topic)
     socket.send(op="subscribe", **topic)
-    begin = time.monotonic()
-    # The first ones come before the server's publisher and subscriber know each other.
-    wait_until(lambda: socket.send(op="publish", topic=topic["topic"], msg={"data": ""}) or came.wait(0.2), "an echo",
-               TIMEOUT_S)
-    time.sleep(1.0)
-    delays.clear()
-    for word in range(times):
-        came.clear()
+
+    def delay_s(word, timeout_s):
         begin = time.monotonic()
-        socket.send(op="publish", topic=topic["topic"], msg={"data": str(word)})
-        came.wait(TIMEOUT_S)
+        socket.send(op="publish", topic=topic["topic"], msg={"data": word})
+        with came:
+            return times_s[word] - begin if came.wait_for(lambda: word in times_s, timeout_s) else None
+    # The first ones come before the server's publisher and subscriber know each other. Each has its own text: an old
+    # one that arrives late is not taken for a new one.
+    tries = itertools.count()
+    wait_until(lambda: delay_s("try %d" % next(tries), 0.2) is not None, "an echo", TIMEOUT_S)
+    delays = [delay_s("word %d" % number, TIMEOUT_S) for number in range(times)]
+    lost = delays.count(None)
+    if lost:
+        raise SystemExit("%d of %d echoes did not come within %g s" % (lost, times, TIMEOUT_S))
     socket.close()
     report.add("echo over rosbridge, median", 1000.0 * statistics.median(delays), "ms", samples=times, most=5.0)
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that controller managers list, in the place of a controller_list."""
+import threading
+import time
+
 import rosgraph
 import rospy
 from controller_manager_msgs.srv import ListControllers
@@ -9,6 +12,8 @@ from moveit_ros_move_group.controllers import FOLLOW, GRIPPER, Controller, Contr
 # Value of ~moveit_controller_manager: whether all controller managers count, or the one in ~ros_control_namespace.
 PLUGINS = {"moveit_ros_control_interface::MoveItControllerManager": False,
            "moveit_ros_control_interface::MoveItMultiControllerManager": True}
+#: Wall time that controller managers have for an answer [s]; those of a simulator answer in its loop.
+ANSWER_S = 5.0
 _SERVICE = "controller_manager/list_controllers"
 # Class name in a controller's type: how it is spoken to, and its action.
 _KINDS = {"JointTrajectoryController": (FOLLOW, "follow_joint_trajectory"),
@@ -34,23 +39,28 @@ def running(namespace, states):
 class RosControl:
     """Asks controller managers each time for what they have: controllers come and go."""
 
-    def __init__(self, namespace, listed=(), list_controllers=None, service_names=None):
+    def __init__(self, namespace, listed=(), list_controllers=None, service_names=None, warn=rospy.logwarn,
+                 answer_s=ANSWER_S):
         """namespace: of one controller manager, or None for all; listed: Controllers of the controller_list, taken
         where no manager has one of that action. list_controllers(service): states; service_names(): those of
-        the master."""
+        the master; warn(format, *values): for managers that do not answer beside others that do."""
         self._namespace, self._listed = namespace, list(listed)
         self._list_controllers = list_controllers or _list_controllers
         self._service_names = service_names or _service_names
+        self._warn, self._answer_s = warn, answer_s
 
     def __call__(self):
-        """Return the present Controllers; raise ControllerError, which names the service that does not answer."""
-        found = []
-        for service in self._services():
-            try:
-                states = self._list_controllers(service)
-            except (rospy.ServiceException, rospy.ROSException) as error:
-                raise ControllerError("the controllers are not known: service %s: %s" % (service, error)) from error
-            found += running(service[:-len(_SERVICE)], states)
+        """Return the present Controllers; raise ControllerError, which names the services, if no manager answers."""
+        services = self._services()
+        answers, failures = self._ask(services)
+        silent = "; ".join("service %s: %s" % (service, failures.get(service, "no answer within %g s" % self._answer_s))
+                           for service in services if service not in answers)
+        if silent and not answers:
+            raise ControllerError("the controllers are not known: " + silent)
+        if silent:
+            self._warn("controllers of these managers are left out: %s", silent)
+        found = [controller for service in services
+                 for controller in running(service[:-len(_SERVICE)], answers.get(service, ()))]
         actions = {controller.action for controller in found}
         return found + [controller for controller in self._listed if _absolute(controller.action) not in actions]
 
@@ -58,6 +68,26 @@ class RosControl:
         if self._namespace is not None:
             return [_absolute(self._namespace.rstrip("/") + "/" + _SERVICE)]
         return sorted(name for name in self._service_names() if name.endswith("/" + _SERVICE))
+
+    def _ask(self, services):
+        """({service: states}, {service: why it failed}); a service that does not answer in time is in neither."""
+        answers, failures = {}, {}
+
+        def ask(service):
+            try:
+                answers[service] = self._list_controllers(service)
+            except (rospy.ServiceException, rospy.ROSException, OSError) as error:
+                failures[service] = error
+
+        # rospy waits without a limit for a process that is stopped.
+        threads = [threading.Thread(target=ask, args=(service,), daemon=True) for service in services]
+        for thread in threads:
+            thread.start()
+        end = time.monotonic() + self._answer_s
+        for thread in threads:
+            thread.join(max(0.0, end - time.monotonic()))
+        # A thread that is still there may answer while the caller reads.
+        return dict(answers), dict(failures)
 
 
 def _absolute(name):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Controllers that controller managers list at the time of a motion."""
+import threading
+
 import pytest
 import rospy
 from controller_manager_msgs.msg import ControllerState, HardwareInterfaceResources
@@ -58,3 +60,33 @@ def test_a_manager_that_does_not_answer_is_named():
 
     with pytest.raises(ControllerError, match="the controllers are not known: service /robot/controller_manager/list"):
         RosControl("/robot", list_controllers=unavailable)()
+
+
+def test_managers_that_do_not_answer_cost_their_own_controllers_only():
+    end, warnings = threading.Event(), []
+
+    def listed(service):
+        if service.startswith("/dead"):
+            raise rospy.ServiceException("service [%s] unavailable" % service)
+        if service.startswith("/stopped"):
+            end.wait()
+        return [ARM]
+
+    services = ["/%s/controller_manager/list_controllers" % name for name in ("alive", "dead", "stopped")]
+    found = RosControl(None, (), listed, lambda: services, lambda text, *values: warnings.append(text % values), 0.5)()
+    end.set()
+    assert [controller.name for controller in found] == ["/alive/arm"]
+    assert warnings == ["controllers of these managers are left out: service %s: service [%s] unavailable; "
+                        "service %s: no answer within 0.5 s" % (services[1], services[1], services[2])]
+
+
+def test_a_stopped_manager_is_an_error_after_its_time():
+    end = threading.Event()
+    with pytest.raises(ControllerError, match="service /controller_manager/list_controllers: no answer within 0.2 s"):
+        RosControl("/", list_controllers=lambda service: end.wait(), answer_s=0.2)()
+    end.set()
+
+
+def test_without_any_manager_the_listed_controllers_count():
+    listed = [Controller("tool", FOLLOW, ("t",), "tool/follow")]
+    assert RosControl(None, listed, service_names=list)() == listed
