@@ -13,18 +13,17 @@ import numpy as np
 from urdf_model import Cylinder, MergedRobot, Robot, Sphere, Surface, bounds
 from urdf_model.transforms import quaternion_from_matrix, rigid
 
+from .mass_matrix import moving_inertial
 from .parts import Parts, limbs
 from .pose import Pose
 from .quiet_pybullet import pybullet
-from .shapes import NO_SHAPE, principal_axes
+from .shapes import NO_SHAPE
 
 _JOINT_TYPES = {
     "revolute": pybullet.JOINT_REVOLUTE,
     "continuous": pybullet.JOINT_REVOLUTE,
     "prismatic": pybullet.JOINT_PRISMATIC,
 }
-# Mass of a moving body whose description gives none: a gram.
-_ASSUMED_MASS_KG = 1e-3
 # Gazebo's defaults of a collision without <surface>: friction, and the damping of a contact [N s/m].
 _DEFAULT_FRICTION = 1.0
 # Largest friction of a wheel, a link on a continuous joint. Bullet takes no more than this.
@@ -208,10 +207,9 @@ _COLUMNS = (
 
 def _inertial(link, warn):
     """Return mass, principal moments (3,) and the inertial frame (4, 4) of a link that moves."""
-    mass = link.inertial.mass
-    if mass < bounds.LEAST_MASS_KG:
+    given = link.inertial.mass
+    mass, moments, axes = moving_inertial(link.inertial)
+    if given < bounds.LEAST_MASS_KG:
         warn("link '%s' moves and has %s mass, so it gets %g kg; give it a positive <mass> in its <inertial>"
-             % (link.name, "hardly any" if mass > 0.0 else "no", _ASSUMED_MASS_KG))
-        mass = _ASSUMED_MASS_KG
-    moments, axes = principal_axes(link.inertial.inertia)
-    return mass, np.maximum(moments, bounds.LEAST_INERTIA_PER_MASS_M2 * mass), rigid(axes, link.inertial.centre)
+             % (link.name, "hardly any" if given > 0.0 else "no", mass))
+    return mass, moments, rigid(axes, link.inertial.centre)

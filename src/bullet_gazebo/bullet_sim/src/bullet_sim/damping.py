@@ -79,7 +79,7 @@ class JointDamping:
                                 physicsClientId=self._client)
 
     def _inertia(self):
-        """(n, n) The joint-space inertia at the present position, with the base held fixed."""
+        """(m, m) The inertia at the present position, that of the joints first."""
         if self._model.static:
             try:
                 return self._model.mass_matrix(self._model.read_joints()[0])
@@ -90,13 +90,7 @@ class JointDamping:
 
     def _stable(self):
         """(n,) The largest damping of each joint that is certainly stable at the position of the first call."""
-        model = self._model
         if self._felt is None:
-            self._felt = np.full(len(self.values), math.inf)
-            if model.static or self._implicit:
-                # The inertia that a joint feels when the others are free to give way is 1 / (M^-1)_ii.
-                self._felt = 1.0 / np.diag(np.linalg.inv(self._inertia()))
-        bounds = _MARGIN * self._felt / self._time_step_s
-        if not model.static:
-            bounds[[index not in self._implicit for index in range(len(bounds))]] = math.inf
-        return bounds
+            # The inertia that a joint feels when the others, and a free root, can give way is 1 / (M^-1)_ii.
+            self._felt = 1.0 / np.diag(np.linalg.inv(self._inertia()))[:len(self.values)]
+        return _MARGIN * self._felt / self._time_step_s

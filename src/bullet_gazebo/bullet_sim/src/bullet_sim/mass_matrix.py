@@ -1,28 +1,41 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The joint-space inertia from the links' masses, for models whose inertias Bullet's own computation refuses."""
+"""The inertia of moving links, and the joint-space inertia from it where Bullet does not compute that."""
 import numpy as np
 
 from urdf_model import bounds
 
 from .shapes import principal_axes
 
+# Mass of a moving body whose description gives none: a gram.
+ASSUMED_MASS_KG = 1e-3
+
+
+def moving_inertial(inertial):
+    """Return mass [kg], principal moments (3,) [kg m^2] and their axes (3, 3) of a moving link as the physics uses it.
+
+    A mass below ``bounds.LEAST_MASS_KG`` becomes ASSUMED_MASS_KG, and a moment is at least
+    ``bounds.LEAST_INERTIA_PER_MASS_M2`` times the mass.
+    """
+    mass = inertial.mass if inertial.mass >= bounds.LEAST_MASS_KG else ASSUMED_MASS_KG
+    moments, axes = principal_axes(inertial.inertia)
+    return mass, np.maximum(moments, bounds.LEAST_INERTIA_PER_MASS_M2 * mass), axes
+
 
 def mass_matrix_of(model):
-    """Return the joint-space inertia (n, n) of a fixed :class:`Model` at its present position.
+    """Return the inertia (m, m) of a :class:`Model` at its present position.
 
-    Moments are those that the physics uses: at least ``bounds.LEAST_INERTIA_PER_MASS_M2`` for the mass.
+    In the order of its n joints; of a free model also of its root's three translations and three rotations, after them.
     """
-    joints = list(model.merged.joints.values())
+    joints, root = list(model.merged.joints.values()), model.merged.root
     index = {joint.child: i for i, joint in enumerate(joints)}
-    frames = {joint.child: model.link_pose(joint.child).matrix() for joint in joints}
+    frames = {link: model.link_pose(link).matrix() for link in ((*index,) if model.static else (*index, root))}
     axes = [frames[joint.child][:3, :3] @ joint.axis for joint in joints]
-    matrix = np.zeros((len(joints), len(joints)))
+    matrix = np.zeros((len(joints) + (0 if model.static else 6),) * 2)
     for child, frame in frames.items():
         inertial, rotation = model.merged.links[child].inertial, frame[:3, :3]
         centre = frame[:3, 3] + rotation @ inertial.centre
-        moments, principal = principal_axes(rotation @ inertial.inertia @ rotation.T)
-        moments = np.maximum(moments, bounds.LEAST_INERTIA_PER_MASS_M2 * inertial.mass)
-        moved, turned = np.zeros((3, len(joints))), np.zeros((3, len(joints)))
+        mass, moments, axes_of_link = moving_inertial(inertial)
+        moved, turned = np.zeros((3, len(matrix))), np.zeros((3, len(matrix)))
         link = child
         while link in index:
             i = index[link]
@@ -31,6 +44,9 @@ def mass_matrix_of(model):
             else:
                 moved[:, i], turned[:, i] = np.cross(axes[i], centre - frames[link][:3, 3]), axes[i]
             link = joints[i].parent
-        turned = principal.T @ turned
-        matrix += inertial.mass * moved.T @ moved + turned.T @ (moments[:, None] * turned)
+        if not model.static:
+            moved[:, -6:-3] = turned[:, -3:] = np.eye(3)
+            moved[:, -3:] = np.cross(np.eye(3), centre - frames[root][:3, 3]).T
+        turned = (rotation @ axes_of_link).T @ turned
+        matrix += mass * moved.T @ moved + turned.T @ (moments[:, None] * turned)
     return matrix

@@ -28,8 +28,8 @@ def chain(world, links=1, implicit=True, static=True):
     return world.spawn(parse_urdf('<robot name="chain">%s</robot>' % (BASE + "".join(parts))), "chain", static=static)
 
 
-def speed_at(world, implicit, effort):
-    finger = chain(world, implicit=implicit)
+def speed_at(world, implicit, effort, static=True):
+    finger = chain(world, implicit=implicit, static=static)
     for _ in range(round(0.5 / world.time_step_s)):
         finger.drive_effort(np.arange(1), np.array([effort]))
         world.step()
@@ -40,9 +40,26 @@ def test_implicit_damping_is_as_it_is_written(world):
     assert speed_at(world, True, 0.05) == pytest.approx(0.05 / DAMPING, rel=0.01)
 
 
-def test_explicit_damping_is_as_large_as_is_stable(world):
+@pytest.mark.parametrize("static", [True, False], ids=["fixed", "free"])
+def test_explicit_damping_is_as_large_as_is_stable(world, static):
     bounded = 0.5 * INERTIA / world.time_step_s
-    assert speed_at(world, False, 0.005) == pytest.approx(0.005 / bounded, rel=0.01)
+    assert speed_at(world, False, 0.005, static) == pytest.approx(0.005 / bounded, rel=0.01)
+
+
+def test_a_light_root_that_is_free_gives_way(world):
+    """About the same axis the root and the link are felt as I1 I2 / (I1 + I2)."""
+    robot = parse_urdf('<robot name="r">%s%s</robot>' % (BASE.replace("0.1", "5e-6"), LINK % {
+        "n": 0, "parent": "base", "inertia": INERTIA, "damping": DAMPING, "implicit": False}))
+    finger = world.spawn(robot, "r")
+    assert finger.damping[0] == pytest.approx(0.5 * 5e-6 * INERTIA / (5e-6 + INERTIA) / world.time_step_s, rel=1e-3)
+
+
+def test_a_free_robots_link_without_a_mass_may_be_damped(world):
+    robot = parse_urdf('<robot name="r">%s<link name="l0"/><joint name="j0" type="continuous"><parent link="base"/>'
+                       '<child link="l0"/><axis xyz="0 1 0"/><dynamics damping="0.1"/></joint></robot>' % BASE)
+    model = world.spawn(robot, "r")
+    world.step()
+    assert 0.0 < model.damping[0] < 0.1
 
 
 def test_a_controller_that_needs_implicit_damping_holds(world):
@@ -56,10 +73,11 @@ def test_a_controller_that_needs_implicit_damping_holds(world):
     assert position[0] == pytest.approx(0.3, abs=0.001) and abs(velocity[0]) < 0.01
 
 
+@pytest.mark.parametrize("implicit", [True, False], ids=["implicit", "bounded"])
 @pytest.mark.parametrize("static", [True, False], ids=["fixed", "free"])
-def test_a_chain_of_light_links_comes_to_rest(world, static):
+def test_a_chain_of_light_links_comes_to_rest(world, static, implicit):
     world.set_gravity((0.0, 0.0, 0.0))
-    fingers = chain(world, 4, static=static)
+    fingers = chain(world, 4, implicit=implicit, static=static)
     for step in range(round(1.0 / world.time_step_s)):
         fingers.drive_effort(np.arange(4), np.array([0.01, -0.01, 0.01, -0.01]) * (step < 10))
         world.step()
