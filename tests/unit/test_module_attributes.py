@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Attributes that a module uses of another module of this workspace exist; a linter checks only one file at a time."""
 import ast
+from collections import defaultdict
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -21,52 +23,66 @@ def module_paths():
     return {(path.parent.name, path.stem): path for path in FILES}
 
 
-@cache
-def tree_of(path):
-    return ast.parse(path.read_text(encoding="utf-8"))
+class Facts(NamedTuple):
+    """What one file defines and uses. Trees are not kept: millions of nodes would slow all later tests down."""
+
+    names: frozenset  # that it defines or imports, at any depth: a superset of its attributes
+    modules: dict  # of this workspace that it imports: {name here: file}
+    taken: frozenset  # names that it assigns
+    attributes: list  # that it uses: (line, name, attribute)
 
 
-@cache
-def names_of(path):
-    """All names that a module defines or imports, at any depth: a superset of its attributes."""
-    names = set(OF_ALL)
-    for node in ast.walk(tree_of(path)):
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
-            names.add(node.name)
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            names.add(node.id)
-        elif isinstance(node, (ast.Import, ast.ImportFrom)):
-            names.update((alias.asname or alias.name).split(".")[0] for alias in node.names)
-    return names
-
-
-def unknown(path, tree):
-    """["line: module.name"] of used attributes that the module does not have."""
-    modules, taken = {}, set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom):
-            package = (node.module or "").split(".")[-1] or path.parent.name
-            for alias in node.names:
-                found = module_paths().get((package, alias.name))
-                if found is not None:
-                    modules[alias.asname or alias.name] = found
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            taken.add(node.id)
+def facts_in(path, text):
+    names, modules, taken, attributes = set(OF_ALL), {}, set(), []
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Attribute):
+            if isinstance(node.value, ast.Name):
+                attributes.append((node.lineno, node.value.id, node.attr))
+        elif isinstance(node, ast.Name):
+            if isinstance(node.ctx, ast.Store):
+                names.add(node.id)
+                taken.add(node.id)
         elif isinstance(node, ast.arg):
             taken.add(node.arg)
-    return ["%d: %s.%s" % (node.lineno, node.value.id, node.attr) for node in ast.walk(tree)
-            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in modules
-            and node.value.id not in taken and node.attr not in names_of(modules[node.value.id])]
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            names.update((alias.asname or alias.name).split(".")[0] for alias in node.names)
+            if isinstance(node, ast.ImportFrom):
+                package = (node.module or "").split(".")[-1] or path.parent.name
+                modules.update((alias.asname or alias.name, module_paths()[package, alias.name])
+                               for alias in node.names if (package, alias.name) in module_paths())
+    return Facts(frozenset(names), modules, frozenset(taken), attributes)
 
 
-@pytest.mark.parametrize("folder", sorted({path.relative_to(ROOT).parts[:3] for path in FILES}), ids="/".join)
+@cache
+def facts_of(path):
+    return facts_in(path, path.read_text(encoding="utf-8"))
+
+
+def unknown(facts):
+    """["line: module.name"] of used attributes that the module does not have."""
+    return ["%d: %s.%s" % (line, name, attribute) for line, name, attribute in facts.attributes
+            if name in facts.modules and name not in facts.taken
+            and attribute not in facts_of(facts.modules[name]).names]
+
+
+@cache
+def by_folder():
+    found = defaultdict(list)
+    for path in FILES:
+        found[path.relative_to(ROOT).parts[:3]].append(path)
+    return found
+
+
+@pytest.mark.parametrize("folder", sorted(by_folder()), ids="/".join)
 def test_modules_have_what_others_ask_of_them(folder):
-    found = ["%s:%s" % (path.relative_to(ROOT), problem) for path in FILES
-             if path.relative_to(ROOT).parts[:3] == folder for problem in unknown(path, tree_of(path))]
+    found = ["%s:%s" % (path.relative_to(ROOT), problem) for path in by_folder()[folder]
+             for problem in unknown(facts_of(path))]
     assert not found, "\n".join(found)
 
 
 def test_what_is_not_there_is_found():
     path = module_paths()["lab_environment", "first_clock"]
-    tree = ast.parse("from lab_environment import first_clock\nfirst_clock.ClockWait\nfirst_clock.nothing_of_it\n")
-    assert unknown(path, tree) == ["3: first_clock.nothing_of_it"]
+    text = "from lab_environment import first_clock\nfirst_clock.ClockWait\nfirst_clock.nothing_of_it\n"
+    assert unknown(facts_in(path, text)) == ["3: first_clock.nothing_of_it"]

@@ -31,7 +31,8 @@ def listed():
 def words_in(text, words):
     """Those of ``words`` in ``text``, alone or as a part of a name: brain in ``robot_brain`` and ``RobotBrain``."""
     split = " ".join(re.sub(r"(?<=[a-z0-9])(?=[A-Z])|_", " ", text).lower().split())
-    return {word for word in words if re.search(r"\b%s\b" % re.escape(word), split)}
+    # A search of a plain text is many times as fast, and nearly all words are in no file.
+    return {word for word in words if word in split and re.search(r"\b%s\b" % re.escape(word), split)}
 
 
 def test_the_tree_uses_the_fields_words():
