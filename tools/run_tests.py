@@ -70,8 +70,8 @@ class UnitRun:
         self._report, self._left_out = WORK / f"{title}.xml", WORK / f"{title}-left-out.txt"
         self._report.unlink(missing_ok=True)
         self._left_out.unlink(missing_ok=True)
-        options = ["-q", "-p", "lab_tests.long_tests", "--continue-on-collection-errors", f"--junitxml={self._report}",
-                   *arguments]
+        options = ["-q", "-p", "lab_tests.long_tests", "-p", "lab_tests.left_threads",
+                   "--continue-on-collection-errors", f"--junitxml={self._report}", *arguments]
         if leaves_out_long:
             options.append(f"--leave-out-long={self._left_out}")
         environment = {**(environment or os.environ)}

@@ -226,3 +226,13 @@ def test_every_test_is_in_one_of_the_two_runs():
              for folder in ("src", "tests") for path in (ROOT / folder).rglob("test_*.py") if path != Path(__file__)}
     assert {mark for found in marks.values() for mark in found} == {"tree", "once", "build"}
     assert not [str(path) for path, found in marks.items() if "tree" in found and len(found) > 1]
+
+
+@pytest.mark.parametrize(("body", "code"), [("time.sleep(1000)", 0), ("while True: pass", 1)])
+def test_a_thread_that_computes_after_the_last_test_fails_the_run(tmp_path, body, code):
+    (tmp_path / "test_one.py").write_text("import threading, time\ndef left():\n    %s\ndef test_one():\n"
+                                          "    threading.Thread(target=left, daemon=True, name='left').start()\n" % body)
+    done = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "lab_tests.left_threads", tmp_path], text=True,
+                          capture_output=True, check=False, env={**os.environ, "PYTHONPATH": str(ROOT / "tools")})
+    assert done.returncode == code, done.stdout
+    assert ("threads of this process still compute; there are: MainThread, left" in done.stdout) == bool(code)
