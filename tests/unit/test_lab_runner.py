@@ -230,8 +230,12 @@ def test_every_test_is_in_one_of_the_two_runs():
 
 @pytest.mark.parametrize(("body", "code"), [("time.sleep(1000)", 0), ("while True: pass", 1)])
 def test_a_thread_that_computes_after_the_last_test_fails_the_run(tmp_path, body, code):
-    (tmp_path / "test_one.py").write_text("import threading, time\ndef left():\n    %s\ndef test_one():\n"
-                                          "    threading.Thread(target=left, daemon=True, name='left').start()\n" % body)
+    (tmp_path / "test_one.py").write_text("""import threading, time
+def left():
+    %s
+def test_one():
+    threading.Thread(target=left, daemon=True, name="left").start()
+""" % body)
     done = subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "lab_tests.left_threads", tmp_path], text=True,
                           capture_output=True, check=False, env={**os.environ, "PYTHONPATH": str(ROOT / "tools")})
     assert done.returncode == code, done.stdout
