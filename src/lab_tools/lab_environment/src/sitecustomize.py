@@ -14,6 +14,7 @@ AMENDED = {"rospy.client": "lab_environment.first_clock", "rospy.core": "lab_env
            "rospy.topics": "lab_environment.signals",
            "actionlib.simple_action_client": "lab_environment.goal_tracking",
            "actionlib.action_client": "lab_environment.lost_goals",
+           "rosgraph.xmlrpc": "lab_environment.ended_servers",
            "roslaunch.parent": "lab_environment.launch_guard"}
 
 

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a program may do at the master of the judge's lab, and what not. The master is a real one."""
-import threading
-
 import pytest
 from rosmaster.master import Master
 
@@ -44,12 +42,8 @@ def uri():
     """Of a ROS master, in threads of this process."""
     master = Master(port=free_port())
     master.start()
-    server = master.master_node.server
     yield master.uri
     master.stop()
-    # rosgraph closes the socket and leaves the server waiting on it: its thread would take a whole core until the end.
-    # It ends within 0.5 s.
-    threading.Thread(target=server.shutdown, daemon=True).start()
 
 
 @pytest.fixture
