@@ -53,6 +53,18 @@ def state_values(message):
     return dict(zip(message.joint_state.name, message.joint_state.position, strict=False))
 
 
+def tells_joints_alone(message):
+    """Whether a PlanningScene diff tells where the joints are and nothing else.
+
+    A diff without anything is the sum of changes that undo each other: what was seen between them is gone.
+    """
+    state, world = message.robot_state, message.world
+    return bool(message.is_diff and (state.joint_state.name or state.multi_dof_joint_state.joint_names) and not (
+        state.attached_collision_objects or world.collision_objects or world.octomap.octomap.data
+        or message.object_colors or message.allowed_collision_matrix.entry_names or message.link_padding
+        or message.link_scale))
+
+
 def goal_constraints(values):
     """Return the Constraints that ask for ``values`` {joint: value}."""
     return Constraints(joint_constraints=[JointConstraint(name, value, JOINT_TOLERANCE, JOINT_TOLERANCE, 1.0)

@@ -18,7 +18,7 @@ from motion_planning.model import PlanningModel
 from motion_planning_rviz import handles, interaction
 from motion_planning_rviz.client import MoveGroupClient
 from motion_planning_rviz.interaction import WHICH, InteractionError
-from motion_planning_rviz.messages import matrix_of, state_values
+from motion_planning_rviz.messages import matrix_of, state_values, tells_joints_alone
 from motion_planning_rviz.panel import Panel
 from motion_planning_rviz.view import View
 from motion_planning_rviz.worker import Worker
@@ -31,6 +31,9 @@ _TF_TIMEOUT_S = 1.0
 #: MoveIt's defaults, if robot_description_planning has no value.
 _SPEED = "default_velocity_scaling_factor"
 _USUAL_SPEED = 0.1
+# Scene messages after a command that are not believed to tell of joints alone: the first may be older than the command,
+# and the next leaves out what the command added where another program has removed it meanwhile.
+_DOUBTED = 2
 # Commands for the marker that was clicked.
 _OF_A_HANDLE = ("add_box", "attach")
 
@@ -47,6 +50,7 @@ class PanelNode:
         self._client = MoveGroupClient(model, float(rospy.get_param("~planning_time", 5.0)))
         self._panel = Panel(model, self._client, self._view, self._worker, np.random.default_rng())
         self._buffer, self._listener = None, None
+        self._doubted = 0
         self._subscribers = []
 
     def begin(self, description):
@@ -101,9 +105,8 @@ class PanelNode:
             rospy.logerr("%s: %s", type(error).__name__, error)
 
     def _on_scene(self, message):
-        # Joint states alone do not change what is drawn.
-        if not message.is_diff or message.world.collision_objects or message.object_colors \
-                or message.robot_state.attached_collision_objects or message.allowed_collision_matrix.entry_names:
+        doubted, self._doubted = self._doubted, max(self._doubted - 1, 0)
+        if doubted or not tells_joints_alone(message):
             self._put(self._panel.refresh, "scene")
 
     # -- markers ------------------------------------------------------------------------------------------------
@@ -135,7 +138,10 @@ class PanelNode:
 
         def choose():
             handle = [self._handle(link)] if what in _OF_A_HANDLE else []
-            getattr(self._panel, "select_group" if what == "group" else what)(*handle, *values)
+            try:
+                getattr(self._panel, "select_group" if what == "group" else what)(*handle, *values)
+            finally:
+                self._doubted = _DOUBTED
 
         self._put(choose)
 

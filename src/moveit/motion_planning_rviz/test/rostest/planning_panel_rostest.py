@@ -179,7 +179,7 @@ class PlanningPanelTest(unittest.TestCase):
         red, orange = (np.round(colour, 3).tolist() for colour in (COLLIDING, GOAL))
         wait_until(lambda: self.rviz.colours("goal_state").get("link_6") == red, "the flange in red", TIMEOUT_S)
         self.assertEqual(self.rviz.colours("goal_state")["link_2"], orange)
-        self.assertTrue(self.rviz.picture("contacts"))
+        wait_until(lambda: self.rviz.picture("contacts"), "the contacts", TIMEOUT_S)
         before = len(self.lines)
         self.rviz.choose("Plan")
         self.assertIn("box_1", self.says("no plan: ", before))
@@ -195,6 +195,14 @@ class PlanningPanelTest(unittest.TestCase):
         self.rviz.choose("Scene", "Detach", "box_1")
         self.rviz.choose("Scene", "Remove", "box_1")
         wait_until(lambda: not self.rviz.picture("planning_scene"), "the box to go", TIMEOUT_S)
+
+    def test_a_box_that_another_program_removes_at_once_goes_from_the_picture(self):
+        self.send_home()
+        for _ in range(3):
+            self.rviz.choose("Scene", "Add a box in front", "5 cm")
+            wait_until(lambda: "box_1" in self.rviz.colours("planning_scene"), "the box", TIMEOUT_S)
+            # Often within one period of move_group's scene, whose next message then has neither.
+            self.clear_scene()
 
     def test_the_topics_of_moveits_panel(self):
         self.send_home()

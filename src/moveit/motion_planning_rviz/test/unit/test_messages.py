@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion
-from moveit_msgs.msg import CollisionObject, DisplayTrajectory
+from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, DisplayTrajectory, ObjectColor, PlanningScene
 from shape_msgs.msg import Mesh, MeshTriangle, Plane, SolidPrimitive
 from visualization_msgs.msg import InteractiveMarkerControl, Marker, MenuEntry
 
@@ -22,6 +22,24 @@ def test_poses_there_and_back():
 
 def test_codes_have_names():
     assert (messages.code_name(-31), messages.code_name(1234)) == ("NO_IK_SOLUTION", "error code 1234")
+
+
+def test_scenes_that_tell_of_joints_alone():
+    def moved():
+        message = PlanningScene(is_diff=True)
+        message.robot_state.joint_state.name = ["turn"]
+        return message
+
+    assert messages.tells_joints_alone(moved())
+    # An object that was added and removed between two messages is in neither, and so is nothing else.
+    assert not messages.tells_joints_alone(PlanningScene(is_diff=True))
+    whole, with_object, with_colour, with_held, with_octomap = (moved() for _ in range(5))
+    whole.is_diff = False
+    with_object.world.collision_objects = [CollisionObject()]
+    with_colour.object_colors = [ObjectColor()]
+    with_held.robot_state.attached_collision_objects = [AttachedCollisionObject()]
+    with_octomap.world.octomap.octomap.data = [1]
+    assert not any(map(messages.tells_joints_alone, (whole, with_object, with_colour, with_held, with_octomap)))
 
 
 def test_a_marker_shows_a_shape():
