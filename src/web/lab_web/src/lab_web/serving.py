@@ -211,6 +211,8 @@ class Upload(_WithToken):
         except MotionError as error:
             self.pages.tell(number, "refused", str(error))
             return
+        # A page that has just sent this is there; its work on a picture may have kept its heartbeats back.
+        self.pages.lab.beat(number)
         self.pages.lab.serve(number, True, {"op": self._operation, "content": content})
 
 

@@ -168,9 +168,13 @@ def upload(server, token, content, origin=None, path="screen"):
 
 
 def test_a_picture_for_the_screen_is_an_operation_of_its_page(server):
-    rows = bytes(3 * 1024 * 600)
+    rows, beats = bytes(3 * 1024 * 600), []
+    lab = server.pages.lab
+    # A page that was busy with its picture has been silent: what it sends is a sign of life, before the operation.
+    lab.beat = lambda client: beats.append((client, list(lab.served)))
     assert upload(server, "drive", rows) == 204
-    assert server.pages.lab.served == [(7, True, {"op": "screen", "content": rows})]
+    assert beats == [(7, [])]
+    assert lab.served == [(7, True, {"op": "screen", "content": rows})]
 
 
 @pytest.mark.parametrize("how", [{"token": "wrong"}, {"token": "look"}, {"token": "drive", "origin": "http://pages.example"}])
