@@ -14,6 +14,7 @@ from world_picture.shared_picture import PictureWriter
 CUBE = """<robot name="cube"><link name="link"><visual><geometry><box size="0.2 0.2 0.2"/></geometry>
 <material name="r"><color rgba="0.9 0.9 0.9 1"/></material></visual></link></robot>"""
 SHEET = CUBE.replace("0.2 0.2 0.2", "1 1 0.002")
+BALL = CUBE.replace('<box size="0.2 0.2 0.2"/>', '<sphere radius="0.4"/>')
 FLOOR = {"name": "floor", "urdf": None, "joints": []}
 UPRIGHT = [0, 0, 0, 1]
 # Straight down on x, y = 0, 0 from a height of 2 m; the picture's right is -y of the world, its upper edge +x.
@@ -59,6 +60,33 @@ def test_shadows_fall_away_from_the_sun_of_the_world(renderer, tmp_path):
         for off in ({"shadows": False}, {"lights": [{**sun, "cast_shadows": False}]}):
             even = seen(renderer, world(tmp_path, {"lights": [sun], **off}, cube))
             assert at(even, 0.0, 0.6) == pytest.approx(at(even, 0.0, -0.6), rel=0.1)  # tiles differ
+
+
+def test_a_shadow_has_a_soft_edge_where_geometry_says(renderer, tmp_path):
+    cube = {"name": "cube", "urdf": CUBE, "joints": []}, [0, 0, 0.6, *UPRIGHT]
+    sun = lamp("directional", direction=(0.0, 1.0, -1.0), cast_shadows=True)
+    fine = Pinhole.from_field_of_view(201, 201, 0.1, 0.05, 20.0)  # 1 mm a pixel
+    for edge, turn in ((0.4, 1), (0.8, -1)):
+        above = pose_matrix((0.05, edge, 2.0), (0.0, np.pi / 2, 0.0)) @ OPTICAL
+        picture, _ = renderer.render(world(tmp_path, {"lights": [sun]}, cube), fine, above)
+        # From the lit side to the shaded one, in tile-free rows of the floor.
+        row = picture[100, :, 0].astype(int)[::-turn]
+        assert (np.diff(row) <= 0).all() and row[0] > 1.4 * row[-1]
+        between = np.flatnonzero((row < row[0] - 5) & (row > row[-1] + 5))
+        assert 5 <= len(between) <= 20, "a ramp of about the 9 mm of a pixel of the shadow map"
+        assert abs(between.mean() - 100) <= 20
+
+
+def test_a_round_body_throws_no_shadow_on_its_lit_side(renderer, tmp_path):
+    ball = {"name": "ball", "urdf": BALL, "joints": []}, [0, 0, 0.6, *UPRIGHT]
+    sun = lamp("directional", direction=(0.3, 1.0, -1.0), cast_shadows=True)
+    with_shadows, without = (seen(renderer, world(tmp_path, {"lights": [sun], "shadows": on}, ball)).sum(axis=2)
+                             for on in (True, False))
+    place = np.linspace(0.995, -0.995, 200)
+    # Nearer to the camera than the floor, so larger in the picture.
+    ball = np.hypot(place[:, None], place) < 0.5
+    lit = ball & (without > 1.3 * without[ball].min())
+    assert lit.sum() > 2000 and (with_shadows[lit] > 0.97 * without[lit]).all()
 
 
 def test_without_a_lamp_there_is_the_ambience_alone(renderer, tmp_path):
