@@ -2,6 +2,8 @@
 """Responses of `./baxter.sh check` to its arguments, before any program runs."""
 import ast
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -129,3 +131,12 @@ def test_the_labs_page_finds_the_result(tmp_path, monkeypatch, capsys):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "file"))
     assert command.main(["lab2", "wave", "my_node.py"]) == command.NOT_PASSED
+
+
+@pytest.mark.parametrize("script", ["check", "check_rostest"])
+def test_the_installed_programs_find_what_they_import(script):
+    # Another process, since a program enters a network of its own as it is loaded.
+    path = EXERCISE_FOLDERS.parent / "scripts" / script
+    loaded = subprocess.run([sys.executable, "-c", "import runpy, sys; runpy.run_path(sys.argv[1])", path],
+                            capture_output=True, text=True, timeout=60.0)
+    assert loaded.returncode == 0, loaded.stderr
