@@ -137,7 +137,7 @@ def test_a_near_mesh_is_drawn_finely_and_a_far_one_coarsely(tmp_path):
         return away.max() - np.sqrt(len(rows) / np.pi)
 
     far = roundness(12.0)
-    link, = renderer._links.values()
+    link, = renderer._links._links.values()
     assert link.fine is None and far < 2.0
     near = roundness(1.0)
     assert link.fine is not None and near < 3.0

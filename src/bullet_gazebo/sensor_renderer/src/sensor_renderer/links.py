@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Links as vertex arrays, in levels of detail, and which of them a camera sees. ROS-free."""
+import weakref
+from dataclasses import dataclass
+
+import numpy as np
+
+# A link of which the radius in the picture is larger than this [pixels] is drawn with its fine meshes: smaller ones
+# would show no difference.
+_FINE_FROM_PX = 40.0
+
+
+@dataclass
+class Link:
+    """The geometry of one draw call: vertex arrays for colour and for depth only, coarse and fine; a bounding sphere;
+    its parts. The fine arrays are made when the link is first seen so near."""
+
+    arrays: tuple
+    centre: np.ndarray
+    radius: float
+    is_floor: bool
+    parts: tuple = ()
+    fine: tuple | None = None
+
+
+class Links:
+    """The vertex arrays of one context, one set for each different link."""
+
+    def __init__(self, context, programs):
+        """``programs``: :class:`sensor_renderer.programs.Programs`."""
+        self._context = context
+        self._programs = programs
+        self._links = {}
+        self._links_of = weakref.WeakKeyDictionary()
+
+    def clear(self):
+        """Release all arrays."""
+        for link in self._links.values():
+            for array in (*link.arrays, *(link.fine or ())):
+                array.release()
+        self._links = {}
+        self._links_of.clear()
+
+    def everything(self, mirror):
+        """The links to draw: (:class:`Link`, matrix, the same as OpenGL reads it), one for each link that has
+        shapes."""
+        found = []
+        for body in mirror.bodies.values():
+            links = self._links_of.get(body)
+            if links is None:
+                links = self._links_of[body] = [self._link(parts) if parts else None for parts in body.parts]
+            packed = np.ascontiguousarray(body.matrices.transpose(0, 2, 1), dtype=np.float32)
+            found += [entry for entry in zip(links, body.matrices, packed, strict=True) if entry[0] is not None]
+        return found
+
+    def arrays(self, link, matrix, pinhole, view):
+        """The vertex arrays of the level of detail that the link's size in the picture asks for."""
+        distance = np.linalg.norm((view @ matrix @ [*link.centre, 1.0])[:3])
+        if link.radius * pinhole.fx <= _FINE_FROM_PX * distance or not any(part.fine for part in link.parts):
+            return link.arrays
+        if link.fine is None:
+            rows = _rows(link.parts, [part.fine() if part.fine else part.triangles for part in link.parts])
+            link.fine = self._arrays_of(rows, link.is_floor)
+        return link.fine
+
+    def _link(self, parts):
+        key = tuple((part.key, part.colour) for part in parts)
+        found = self._links.get(key)
+        if found is None:
+            rows = _rows(parts, [part.triangles for part in parts])
+            is_floor = any(part.is_floor for part in parts)
+            low, high = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
+            centre = (low + high) / 2.0
+            radius = float(np.linalg.norm(rows[:, :3] - centre, axis=1).max())
+            found = self._links[key] = Link(self._arrays_of(rows, is_floor), centre, radius, is_floor, tuple(parts))
+        return found
+
+    def _arrays_of(self, rows, is_floor):
+        program = self._programs.floor if is_floor else self._programs.surface
+        return (self._vertex_array(program, rows, "3f 3f 3f", "position", "normal", "colour"),
+                self._vertex_array(self._programs.shadow, rows[:, :3], "3f", "position"))
+
+    def _vertex_array(self, program, rows, layout, *names):
+        """The GPU processes shared vertices once."""
+        unique, index = np.unique(rows, axis=0, return_inverse=True)
+        context = self._context
+        return context.vertex_array(program, [(context.buffer(np.ascontiguousarray(unique).tobytes()), layout, *names)],
+                                    context.buffer(index.astype(np.int32).tobytes()))
+
+
+def _rows(parts, triangles):
+    """(n, 9) position, normal, colour of the corners of all parts. One call draws a link: in software a call costs as
+    much as some hundred triangles."""
+    return np.concatenate([np.hstack([rows, np.tile(np.float32(part.colour[:3]), (len(rows), 1))])
+                           for part, rows in zip(parts, triangles, strict=True)])
+
+
+def visible(listed, pinhole, view):
+    """The entries of ``listed``, (:class:`Link`, matrix, anything), whose spheres intersect the view frustum, near
+    ones first."""
+    # Outward normals of the four sides, in the optical frame; all go through the eye.
+    left, right = -(pinhole.cx + 0.5) / pinhole.fx, (pinhole.width - 0.5 - pinhole.cx) / pinhole.fx
+    top, bottom = -(pinhole.cy + 0.5) / pinhole.fy, (pinhole.height - 0.5 - pinhole.cy) / pinhole.fy
+    sides = np.array([(-1.0, 0.0, left), (1.0, 0.0, -right), (0.0, -1.0, top), (0.0, 1.0, -bottom)])
+    sides /= np.linalg.norm(sides, axis=1)[:, None]
+    if not listed:
+        return []
+    matrices = np.array([matrix for _, matrix, _ in listed])
+    centres = np.array([link.centre for link, _, _ in listed])
+    radii = np.array([link.radius for link, _, _ in listed])
+    world = np.einsum("nij,nj->ni", matrices[:, :3, :3], centres) + matrices[:, :3, 3]
+    local = world @ view[:3, :3].T + view[:3, 3]
+    inside = (local @ sides.T < radii[:, None]).all(axis=1)
+    inside &= (local[:, 2] > pinhole.near - radii) & (local[:, 2] < pinhole.far + radii)
+    # Near ones first: hidden pixels are not shaded.
+    order = np.argsort(local[:, 2] - radii, kind="stable")
+    return [listed[k] for k in order if inside[k]]

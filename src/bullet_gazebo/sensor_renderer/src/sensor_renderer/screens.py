@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rectangles that show pictures, such as the robot's face. ROS-free."""
+import numpy as np
+
+from sensor_renderer.links import Link, visible
+from sensor_renderer.programs import matrix_bytes
+
+
+class Screens:
+    """The textures of one context."""
+
+    def __init__(self, context, program):
+        """``program``: the one that draws a picture on a rectangle."""
+        self._context = context
+        self._program = program
+        corners = np.array([(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)], dtype=np.float32)
+        self._square = context.vertex_array(program, [(context.buffer(corners.tobytes()), "2f", "corner")])
+        self._program["picture"].value = 1
+        self._pictures = {}
+
+    def draw(self, screens, to_clip):
+        """Draw ``screens``, as :meth:`visible` lists them."""
+        if screens:
+            self._program["to_clip"].write(matrix_bytes(to_clip))
+        for texture, matrix in screens:
+            texture.use(1)
+            self._program["body"].write(matrix_bytes(matrix))
+            self._square.render(self._context.TRIANGLE_STRIP)
+
+    def visible(self, mirror, pinhole, view):
+        """The screens that show their faces: (texture, matrix of a square of 1 m)."""
+        found = []
+        for body in mirror.bodies.values():
+            for screen in body.screens:
+                matrix = body.link_matrix(screen.link) @ screen.offset
+                face = Link((), np.zeros(3), float(np.hypot(*screen.size)) / 2.0, False)
+                local = view @ matrix
+                if local[:3, 2] @ local[:3, 3] < 0.0 and visible([(face, matrix, None)], pinhole, view):
+                    found.append((self._texture(mirror, screen.picture), matrix @ np.diag([*screen.size, 1.0, 1.0])))
+        return found
+
+    def _texture(self, mirror, picture):
+        texture = self._pictures.get(picture)
+        if texture is None:
+            there = {screen.picture for body in mirror.bodies.values() for screen in body.screens}
+            for gone in self._pictures.keys() - there:
+                self._pictures.pop(gone).release()
+            texture = self._pictures[picture] = self._context.texture((picture.width, picture.height), 3, alignment=1)
+            texture.filter = (self._context.LINEAR_MIPMAP_LINEAR, self._context.LINEAR)
+            texture.repeat_x = texture.repeat_y = False
+        pixels = picture.read()
+        if pixels is not None:
+            texture.write(pixels.tobytes(), alignment=1)
+            texture.build_mipmaps()
+        return texture
