@@ -3,28 +3,22 @@
 
 It checks who asks before it wakes a lab or passes anything on.
 """
-import asyncio
-import contextlib
 import hmac
 import html
 import json
-from urllib.parse import urlsplit
 
-from tornado import httputil, iostream, web
+from tornado import web
 
-from lab_class import http_text
 from lab_class.labs import MOST_FAILURES, ClassError, Role, State, may
+from web_bridge import http_text
+from web_bridge.passing import PassingHandler, PlainHandler, is_foreign
 
-_CHUNK = 65536
-#: A request's body; the largest are recordings and notebooks [bytes].
-LARGEST_BODY = 32 << 20
+#: The cookie that opens one lab, for its path alone.
+COOKIE = "lab_token"
 #: Requests and open pages of one lab at a time; a lab, or a page in a loop, must not take the descriptors of all.
 MOST_AT_ONCE = 64
-#: Time for a lab to begin its answer, or to read more of a body [s].
-ANSWER_S = 60.0
 #: The waiting page asks again after this time [s].
 _AGAIN_S = 2
-_METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS")
 _WAITING = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta http-equiv="refresh" content="%d">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>Lab of %s</title></head>
@@ -70,20 +64,9 @@ class Door:
         return "The instructor has stopped this lab."
 
 
-class _Handler(web.RequestHandler):
+class _Handler(PlainHandler):
     def initialize(self, door):
         self.door = door
-
-    def set_default_headers(self):
-        self.set_header("Referrer-Policy", "no-referrer")
-        self.set_header("X-Content-Type-Options", "nosniff")
-        self.set_header("Cache-Control", "no-store")
-        self.clear_header("Server")
-
-    def refuse(self, status, text):
-        self.set_status(status)
-        self.set_header("Content-Type", "text/plain; charset=utf-8")
-        self.finish(text + "\n")
 
 
 class Start(_Handler):
@@ -94,30 +77,24 @@ class Start(_Handler):
                     % self.request.host)
 
 
-def is_foreign(request):
-    """Does a page of another origin make this request?"""
-    origin = request.headers.get("Origin")
-    return origin is not None and urlsplit(origin).netloc != request.host
-
-
-@web.stream_request_body
-class Passed(_Handler):
+class Passed(PassingHandler):
     """A request for a lab: /NAME/..."""
 
-    SUPPORTED_METHODS = _METHODS
+    SERVER, OWN_COOKIE = "the lab", COOKIE
+
+    def initialize(self, door):
+        super().initialize()
+        self.door = door
 
     async def prepare(self):
-        self._streams, self._counted, self._name = None, False, self.path_args[0]
+        self._name = self.path_args[0]
         self._prefix = "/" + self._name
         path, _, query = self.request.uri.partition("?")
-        self._below = path[len(self._prefix):] + ("?" + query if query else "")
-        self._is_upgrade = http_text.is_upgrade(self.request.headers)
-        length = self.request.headers.get("Content-Length", "")
-        self._length = int(length) if length.isdecimal() else 0  # tornado refuses what is no number
+        below = path[len(self._prefix):] + ("?" + query if query else "")
         if not self._lets_in():
             return
-        if not self._below.startswith("/"):
-            self.redirect(self._prefix + "/" + self._below)
+        if not below.startswith("/"):
+            self.redirect(self._prefix + "/" + below)
             return
         lab = self.door.supervisor.request(self._name)
         if lab.state is not State.RUNNING:
@@ -125,87 +102,36 @@ class Passed(_Handler):
         elif lab.busy + lab.pages >= MOST_AT_ONCE:
             self.refuse(429, "this lab has %d requests and open pages already; close some" % MOST_AT_ONCE)
         else:
-            await self._begin()
+            await self.pass_to(self.door.supervisor.socket_of(self._name), below)
 
     def _lets_in(self):
         """Whether this request may go on; else it is refused."""
-        token, cookie = self.get_query_argument("token", ""), self.get_cookie(http_text.COOKIE, "")
+        token, cookie = self.get_query_argument("token", ""), self.get_cookie(COOKIE, "")
         self._role = self.door.role(self._name, [token] if token else [cookie])
         if not may(self._role, "watch"):
             self.refuse(403, "This address needs the token of this lab: /%s/?token=..." % self._name[:60])
-        elif is_foreign(self.request):
-            self.refuse(403, "a page of %s may not use this lab" % self.request.headers["Origin"][:200])
-        elif "Transfer-Encoding" in self.request.headers:
-            self.refuse(411, "a request's body needs a length here")
-        elif self._length > LARGEST_BODY:
-            self.refuse(413, "a request may have %d MB, not %d" % (LARGEST_BODY >> 20, self._length >> 20))
-        else:
-            self.request.connection.set_max_body_size(LARGEST_BODY)
+        elif self.takes_request():
             if token:
-                self.set_cookie(http_text.COOKIE, token, path=self._prefix + "/", httponly=True, samesite="Strict")
+                self.set_cookie(COOKIE, token, path=self._prefix + "/", httponly=True, samesite="Strict")
             return True
         return False
 
-    async def _begin(self):
-        """Connect to the lab, and pass the head of the request on; its body follows as it comes in.
+    def answer_headers(self, headers):
+        return http_text.passed_on(headers, self._prefix, own_cookie=COOKIE)
 
-        It counts from here on: a body may come in slowly, and a lab that is served must not be paused."""
-        self._counted = True
-        self.door.supervisor.serving(self._name, self._is_upgrade, 1)
-        try:
-            self._streams = await asyncio.open_unix_connection(str(self.door.supervisor.socket_of(self._name)),
-                                                               limit=http_text.LARGEST_HEAD)
-        except OSError as error:
-            self._leave()
-            self._refuse_lab(error)
-            return
-        self._streams[1].write(http_text.request_head(self.request.method, self._below, self.request.headers,
-                                                      self._length, self._is_upgrade))
+    def entered(self):
+        # A lab that is served must not be paused.
+        self.door.supervisor.serving(self._name, self.is_upgrade, 1)
 
-    async def data_received(self, chunk):
-        if self._streams is None:
-            return
-        # A lab that does not read holds its client up, and not the front door's memory.
-        try:
-            self._streams[1].write(chunk)
-            async with asyncio.timeout(ANSWER_S):
-                await self._streams[1].drain()
-        except TimeoutError:
-            # Meanwhile nothing tells whether the client is still there.
-            self.request.connection.stream.close()
-        except OSError:
-            pass  # what the lab has answered before it went is read afterwards
+    def left(self):
+        self.door.supervisor.serving(self._name, self.is_upgrade, -1)
 
-    def on_connection_close(self):
-        # Also of a client that goes in the middle of its request.
-        super().on_connection_close()
-        self._leave()
-
-    def _leave(self):
-        if self._streams is not None:
-            self._streams[1].close()
-        if self._counted:
-            self._counted = False
-            self.door.supervisor.serving(self._name, self._is_upgrade, -1)
-
-    def _refuse_lab(self, error):
-        self.refuse(502, "the lab does not answer: %s" % (error or type(error).__name__))
-
-    async def _pass(self, *_):
-        try:
-            if self._is_upgrade:
-                await self._tunnel()
-            else:
-                await self._answer()
-        except (OSError, EOFError, asyncio.LimitOverrunError, http_text.BadAnswer) as error:
-            if not self._finished and not self._headers_written and not self.detached:
-                self._refuse_lab(error)
-        finally:
-            self._leave()
-
-    get = head = post = put = patch = delete = options = _pass
-
-    detached = False
+    def may_pass(self, chunk):
+        if not http_text.is_heartbeat(chunk):
+            self.door.supervisor.request(self._name)
+            return True
+        # A paused lab would find old heartbeats when it wakes, and take them for a page that is there.
+        return self.door.supervisor.is_awake(self._name)
 
     def _say_wait(self, lab):
         words = self.door.words_of(lab)
@@ -216,67 +142,6 @@ class Passed(_Handler):
         self.set_status(503)
         name = html.escape(self.door.full_names[self._name])
         self.finish(_WAITING % (_AGAIN_S, name, name, html.escape(words)))
-
-    async def _head(self):
-        """(status, headers) of the lab's answer."""
-        async with asyncio.timeout(ANSWER_S):
-            return http_text.answer_head(await self._streams[0].readuntil(b"\r\n\r\n"))
-
-    async def _answer(self):
-        status, headers = await self._head()
-        try:
-            self.set_status(status)
-            # The lab says how long its answers may be kept.
-            self.clear_header("Cache-Control")
-            for name, value in http_text.passed_on(headers, self._prefix):
-                (self.add_header if name == "Set-Cookie" else self.set_header)(name, value)
-            if self.request.method != "HEAD" and status not in (204, 304):
-                while chunk := await self._streams[0].read(_CHUNK):
-                    self.write(chunk)
-                    await self.flush()
-            await self.finish()
-        except (iostream.StreamClosedError, httputil.HTTPOutputError):
-            # The client has gone, or the lab's answer has not the length that it announced.
-            self.request.connection.stream.close()
-
-    async def _tunnel(self):
-        status, headers = await self._head()
-        if status != 101:
-            self.refuse(403 if status == 403 else 502, "the lab refused this connection (%d)" % status)
-            return
-        self.detached = True
-        client = self.detach()
-        try:
-            await client.write(http_text.upgrade_text(headers))
-            await self._copy_both(client, *self._streams)
-        except iostream.StreamClosedError:
-            pass
-        finally:
-            client.close()
-
-    async def _copy_both(self, client, reader, writer):
-        async def to_client():
-            while chunk := await reader.read(_CHUNK):
-                await client.write(chunk)
-
-        async def to_lab():
-            while True:
-                chunk = await client.read_bytes(_CHUNK, partial=True)
-                if not http_text.is_heartbeat(chunk):
-                    self.door.supervisor.request(self._name)
-                # A paused lab would find old heartbeats when it wakes, and take them for a page that is there.
-                elif not self.door.supervisor.is_awake(self._name):
-                    continue
-                writer.write(chunk)
-                await writer.drain()
-
-        tasks = [asyncio.ensure_future(copy) for copy in (to_client(), to_lab())]
-        _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        for task in others:
-            task.cancel()
-        for task in tasks:
-            with contextlib.suppress(asyncio.CancelledError, iostream.StreamClosedError, OSError):
-                await task
 
 
 class _ForInstructor(_Handler):

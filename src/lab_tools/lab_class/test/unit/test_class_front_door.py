@@ -9,9 +9,10 @@ import pytest
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
-from lab_class import front_door, http_text, roster
+from lab_class import front_door, roster
 from lab_class.labs import MOST_FAILURES, Labs, State
 from lab_class.store import ClassRecord, Options
+from web_bridge import passing
 
 pytestmark = pytest.mark.once
 
@@ -191,7 +192,7 @@ def test_a_lab_that_does_not_run_says_what_is_to_come(tmp_path):
 
 
 def test_a_dead_lab_costs_its_client_alone(tmp_path, monkeypatch):
-    monkeypatch.setattr(front_door, "ANSWER_S", 0.2)
+    monkeypatch.setattr(passing, "ANSWER_S", 0.2)
 
     async def silent(reader, writer):
         await reader.read()
@@ -232,7 +233,7 @@ def test_a_body_arrives_whole_and_has_a_limit(tmp_path):
             body = b"ab" * (4 << 20)
             assert (await house.ask("/anna/upload", "PUT", token, body))[2] == b"8388608 4194304"
             assert (await house.ask("/anna/upload", "PUT", token, **{
-                "Content-Length": str(front_door.LARGEST_BODY + 1)}))[0] == 413
+                "Content-Length": str(passing.LARGEST_BODY + 1)}))[0] == 413
             assert (await house.ask("/anna/upload", "PUT", token, **{"Transfer-Encoding": "chunked"}))[0] == 411
 
     run(check())
@@ -254,10 +255,10 @@ async def _sent_until_full(writer):
 
 def test_a_lab_that_does_not_read_holds_its_client_up(tmp_path, monkeypatch):
     """And not the front door's memory: 20 students who send 32 MB each would take 640 MB."""
-    monkeypatch.setattr(front_door, "LARGEST_BODY", 2 * LARGE)
+    monkeypatch.setattr(passing, "LARGEST_BODY", 2 * LARGE)
     end = asyncio.Event()
 
-    monkeypatch.setattr(front_door, "ANSWER_S", 2.0)
+    monkeypatch.setattr(passing, "ANSWER_S", 2.0)
 
     async def deaf(reader, writer):
         await end.wait()
@@ -458,7 +459,7 @@ def test_the_cookie_of_the_door_does_not_reach_the_lab(tmp_path):
     async def check():
         async with House(tmp_path, keep) as house:
             token = house.tokens["anna"].act
-            await house.ask("/anna/x", Cookie="a=1; %s=%s" % (http_text.COOKIE, token))
+            await house.ask("/anna/x", Cookie="a=1; %s=%s" % (front_door.COOKIE, token))
             assert token.encode() not in heads[0] and b"Cookie: a=1\r\n" in heads[0]
 
     run(check())

@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Requests to a lab and its answers as text: what the front door passes on, and what not. No sockets.
+"""Requests that are passed on to another HTTP server, and its answers, as text: what is passed on, and what not. No
+sockets.
 
-Labs are not trusted: all students' pages have the same origin, so an answer must not set cookies for other paths, nor
-register workers for them.
+The other server is not trusted: its pages have the same origin as all pages of this one, so an answer must not set
+cookies for other paths, nor register workers for them.
 """
 from http.cookies import CookieError, SimpleCookie
 
 from tornado.httputil import HTTPHeaders, HTTPInputError
 
-#: The cookie that opens one lab, for its path alone.
-COOKIE = "lab_token"
-#: Headers of an answer that are passed on.
-ANSWER = frozenset((
+# Headers of an answer that are passed on.
+_ANSWER = frozenset((
     "Accept-Ranges", "Cache-Control", "Content-Disposition", "Content-Encoding", "Content-Length", "Content-Range",
     "Content-Security-Policy", "Content-Type", "Date", "Etag", "Expires", "Last-Modified", "Referrer-Policy", "Vary",
     "X-Content-Type-Options"))
@@ -27,7 +26,7 @@ LARGEST_HEAD = 65536
 
 
 class BadAnswer(Exception):
-    """A lab's answer that cannot be passed on; the text says why."""
+    """An answer that cannot be passed on; the text says why."""
 
 
 def is_upgrade(headers):
@@ -35,8 +34,9 @@ def is_upgrade(headers):
     return headers.get("Upgrade", "").lower() == "websocket"
 
 
-def request_head(method, uri, headers, length, upgrade=False):
-    """The head of a request as bytes. uri: path and query below the lab; length: of the body [bytes].
+def request_head(method, uri, headers, length, upgrade=False, own_cookie=""):
+    """The head of a request as bytes. uri: path and query; length: of the body [bytes]; own_cookie: name of the cookie
+    that is not passed on.
 
     HTTP/1.0, unless it is an upgrade: the answer then ends with its connection, and is never in pieces.
     """
@@ -44,7 +44,7 @@ def request_head(method, uri, headers, length, upgrade=False):
     for name, value in headers.get_all():
         if name not in _NOT_PASSED and "\r" not in value and "\n" not in value:
             lines.append("%s: %s" % (name, value))
-    cookies = without_own_cookie(headers.get("Cookie", ""))
+    cookies = without_cookie(headers.get("Cookie", ""), own_cookie)
     if cookies:
         lines.append("Cookie: " + cookies)
     if upgrade:
@@ -54,10 +54,10 @@ def request_head(method, uri, headers, length, upgrade=False):
     return "\r\n".join([*lines, "", ""]).encode("utf-8", "surrogateescape")
 
 
-def without_own_cookie(text):
-    """A header "Cookie" without the front door's cookie."""
+def without_cookie(text, name):
+    """A header "Cookie" without the cookie of this name."""
     parts = [part.strip() for part in text.split(";")]
-    return "; ".join(part for part in parts if part and part.partition("=")[0].strip() != COOKIE)
+    return "; ".join(part for part in parts if part and part.partition("=")[0].strip() != name)
 
 
 def answer_head(data):
@@ -75,41 +75,46 @@ def answer_head(data):
     return int(words[1]), headers
 
 
-def passed_on(headers, prefix):
-    """The (name, value) of an answer's headers for the client. prefix: "/anna", the lab's part of the address."""
-    found = [(name, value) for name, value in headers.get_all() if name in ANSWER]
+def passed_on(headers, outside, inside="", own_cookie=""):
+    """The (name, value) of an answer's headers for the client.
+
+    outside, inside: the path of the other server as clients see it, and as it does itself, such as "/anna" and "";
+    own_cookie: name of a cookie that it must not set.
+    """
+    found = [(name, value) for name, value in headers.get_all() if name in _ANSWER]
     location = headers.get("Location")
     if location:
-        found.append(("Location", prefix + location if location.startswith("/") and not location.startswith("//")
-                      else location))
-    narrowed = (_narrow(text, prefix) for text in headers.get_list("Set-Cookie"))
+        is_path = location.startswith(inside + "/") and not location.startswith("//")
+        found.append(("Location", outside + location[len(inside):] if is_path else location))
+    narrowed = (_narrow(text, outside, own_cookie) for text in headers.get_list("Set-Cookie"))
     return found + [("Set-Cookie", cookie) for cookie in narrowed if cookie]
 
 
-def _narrow(text, prefix):
-    """A cookie of a lab, for the lab's own path; "" for one that cannot be read, or would be the front door's."""
+def _narrow(text, outside, own_cookie):
+    """A cookie of the other server, for its own path; "" for one that cannot be read, or of the name own_cookie."""
     try:
         cookies = SimpleCookie(text)
     except CookieError:
         return ""
-    if len(cookies) != 1 or COOKIE in cookies:
+    if len(cookies) != 1 or own_cookie in cookies:
         return ""
     cookie, = cookies.values()
     cookie["domain"] = ""
-    if not cookie["path"].startswith(prefix + "/"):
-        cookie["path"] = prefix + "/"
+    if not cookie["path"].startswith(outside + "/"):
+        cookie["path"] = outside + "/"
     return cookie.OutputString()
 
 
 def upgrade_text(headers):
-    """The head of the answer that makes a WebSocket of the client's connection, from the lab's headers."""
+    """The head of the answer that makes a WebSocket of the client's connection, from the headers of
+    the answer."""
     lines = ["HTTP/1.1 101 Switching Protocols", "Upgrade: websocket", "Connection: Upgrade"]
     lines += ["%s: %s" % (name, value) for name, value in headers.get_all() if name.startswith("Sec-Websocket-")]
     return "\r\n".join([*lines, "", ""]).encode("latin-1")
 
 
 def is_heartbeat(chunk):
-    """Are these bytes of a WebSocket's client nothing but heartbeats of the page, and pongs? They wake no lab."""
+    """Are these bytes of a WebSocket's client nothing but heartbeats of the page, and pongs?"""
     place = 0
     while place + 2 <= len(chunk):
         kind, length = chunk[place], chunk[place + 1] - _MASKED
