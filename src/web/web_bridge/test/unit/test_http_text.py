@@ -13,7 +13,8 @@ def headers(**values):
 def test_a_request_loses_the_own_cookie_and_what_belongs_to_its_connection():
     text = http_text.request_head("POST", "/screen?token=x", headers(
         Host="lab.example:8100", Origin="http://lab.example:8100", Cookie="a=1; lab_token=secret; b=2",
-        Connection="keep-alive", Transfer_Encoding="chunked", Content_Type="text/csv"), 4, own_cookie="lab_token").decode()
+        Connection="keep-alive", Transfer_Encoding="chunked", Content_Type="text/csv"), 4,
+        own_cookie="lab_token").decode()
     assert text.startswith("POST /screen?token=x HTTP/1.0\r\nHost: localhost\r\n") and text.endswith("\r\n\r\n")
     assert "Cookie: a=1; b=2\r\n" in text and "Content-Type: text/csv" in text and "Content-Length: 4" in text
     assert "secret" not in text and "example" not in text and "chunked" not in text and "keep-alive" not in text
