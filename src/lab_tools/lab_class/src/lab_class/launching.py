@@ -58,10 +58,8 @@ def prepared(place, options, tokens, listener, refused):
     options_of_calls, descriptors = refused
     binds = [(place.folder / HOME, home, True), (place.libraries, home + "/.cache/lab_web", False),
              *isolation.caches(os.environ, place.folder / "caches")]
-    scratch = [word for path in ("/tmp", "/dev/shm") for word in ("--size", str(SCRATCH_BYTES), "--perms", "0700",
-                                                                  "--tmpfs", path)]
-    enter = isolation.command(os.environ, binds, (*HIDDEN, str(place.state_folder)), True,
-                              [*scratch, *options_of_calls])
+    enter = isolation.command(os.environ, binds, (*HIDDEN, str(place.state_folder)), True, options_of_calls,
+                              SCRATCH_BYTES)
     return [*enter, *limits, *command], environment, (listener, *descriptors)
 
 

@@ -25,6 +25,11 @@ def new_namespace():
         raise OSError(ctypes.get_errno(), "unshare")
 
 
+def mount(folder):
+    if ctypes.CDLL(None, use_errno=True).mount(b"none", bytes(folder), b"tmpfs", 0, None) != 0:
+        raise OSError(ctypes.get_errno(), "mount")
+
+
 def write_and_remove(path):
     path.write_text("x")
     path.unlink()
@@ -40,6 +45,40 @@ def find_process(word):
     raise LookupError("no process has %s in its command" % word)
 
 
+def add_key():
+    """To the keys of this user, which all of its processes on the machine share."""
+    numbers = {"x86_64": 248, "aarch64": 217}  # add_key in asm/unistd.h
+    user_keyring = -4  # KEY_SPEC_USER_KEYRING of linux/keyctl.h
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.syscall(numbers[os.uname().machine], b"user", b"intruder", b"x", 1, user_keyring) < 0:
+        raise OSError(ctypes.get_errno(), "add_key")
+
+
+def open_queue(key):
+    """A message queue of System V (sys/msg.h) that another process has made."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.msgget(key, 0) < 0:
+        raise OSError(ctypes.get_errno(), "msgget")
+
+
+def connect_to_any(folder, pattern):
+    found = list(Path(folder).glob(pattern))
+    if not found:
+        raise LookupError("there is no socket %s in %s" % (pattern, folder))
+    connect(socket.AF_UNIX, str(found[0]))
+
+
+def open_another(path):
+    """Whether any open file of a process of this lab lies in this folder of the machine."""
+    for entry in Path("/proc").glob("[0-9]*/fd/*"):
+        try:
+            if os.readlink(entry).startswith(path) and os.listdir(entry):
+                return
+        except OSError:
+            continue
+    raise LookupError("no process has a folder open below " + path)
+
+
 def attempts(targets):
     """name -> function that raises where it does not succeed."""
     found = {"file " + path: lambda path=path: Path(path).read_bytes() for path in targets["files"]}
@@ -49,7 +88,16 @@ def attempts(targets):
     return {**found, "another network": lambda: connect(socket.AF_INET, ("192.0.2.1", 80)),
             "abstract socket": lambda: connect(socket.AF_UNIX, "\0" + targets["abstract"]),
             "workspace": lambda: write_and_remove(Path(targets["workspace"], "intruder")),
-            "supervisor": lambda: find_process("lab_class.supervisor"), "namespace": new_namespace}
+            "supervisor": lambda: find_process("lab_class.supervisor"), "namespace": new_namespace,
+            "the machine's host": lambda: socket.socket(socket.AF_VSOCK).close(), "keys": add_key,
+            "message queue": lambda: open_queue(targets["queue"]),
+            "control socket": lambda: connect_to_any(targets["temporary"], "lab-class-*/control"),
+            "socket of a lab": lambda: connect_to_any(targets["temporary"], "lab-class-*/student-*"),
+            "open folder": lambda: open_another(targets["folders"][0]),
+            "setting of Linux": lambda: Path("/proc/sys/kernel/core_pattern").write_text("core"),
+            "keys of Linux": lambda: Path("/proc/sysrq-trigger").write_text("h"),
+            "control groups": lambda: os.listdir("/sys/fs/cgroup"),
+            "mount": lambda: mount(Path.home())}
 
 
 def main():

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Two small labs of a class, from ./baxter.sh labs up to down."""
 import contextlib
+import ctypes
 import json
 import os
 import shutil
@@ -30,6 +31,7 @@ from lab_web import libraries
 
 NAMES = ("student-01", "student-02")
 ABSTRACT = "lab-class-test-%d" % os.getpid()
+_IPC_CREAT, _IPC_RMID = 0o1000, 0  # sys/ipc.h
 _START_S, _LONG_S = 180.0, 60.0
 
 
@@ -136,9 +138,22 @@ class TwoLabs(unittest.TestCase):
         self.addCleanup(listener.close)
         listener.bind("\0" + ABSTRACT)
         listener.listen()
+        memory = Path("/dev/shm/lab-class-test-%d" % os.getpid())
+        memory.touch()
+        self.addCleanup(memory.unlink)
         master = int(os.environ["ROS_MASTER_URI"].rstrip("/").rpartition(":")[2])
-        return {"files": [str(secret), str(self.store.folder / "class.json")], "folders": [str(self.store.folder)],
-                "ports": [self.port, master], "abstract": ABSTRACT, "workspace": str(share("lab_class"))}
+        return {"files": [str(secret), str(self.store.folder / "class.json"), str(memory)],
+                "folders": [str(self.store.folder)], "ports": [self.port, master], "abstract": ABSTRACT,
+                "workspace": str(share("lab_class")), "queue": self.message_queue(),
+                "temporary": tempfile.gettempdir()}
+
+    def message_queue(self):
+        """The key of a new message queue of System V, which is removed afterwards (sys/msg.h)."""
+        libc, key = ctypes.CDLL(None), os.getpid()
+        queue = libc.msgget(key, 0o600 | _IPC_CREAT)
+        self.assertGreaterEqual(queue, 0)
+        self.addCleanup(libc.msgctl, queue, _IPC_RMID, None)
+        return key
 
     def check_who_gets_in(self):
         first, second = (self.tokens[name] for name in NAMES)
@@ -169,7 +184,7 @@ class TwoLabs(unittest.TestCase):
             report = self.store.lab(name) / "home" / "report.json"
             wait_until(report.exists, "the intruder's report", _LONG_S)
             results = json.loads(report.read_text())
-            self.assertEqual(len(results), 10, results)
+            self.assertEqual(len(results), 21, results)
             self.assertEqual([attempt for attempt, result in results.items() if result == "reached"], [], results)
 
     def family(self):

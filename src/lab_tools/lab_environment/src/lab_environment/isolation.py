@@ -137,7 +137,7 @@ def _folder(path, size):
     return [*(("--size", str(size)) if _can_limit_size() else ()), "--perms", "0700", "--tmpfs", path]
 
 
-def _base():
+def _base(scratch_bytes=FOLDER_BYTES):
     """Options of every sandbox: namespaces, the system read-only, and folders of its own."""
     options = ["--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try", "--die-with-parent",
                "--cap-drop", "ALL", "--ro-bind", "/usr", "/usr"]
@@ -148,9 +148,10 @@ def _base():
             options += ["--ro-bind", path, path]
     for path in ("/opt", *("/etc/" + name for name in _ETC), "/sys/devices/system/cpu", "/var/lib/fonts"):
         options += ["--ro-bind-try", path, path]
-    options += ["--proc", "/proc", "--dev", "/dev"]
+    # The settings of Linux belong to the superuser, who needs no privilege to write them, and may run a class.
+    options += ["--proc", "/proc", "--ro-bind", "/proc/sys", "/proc/sys", "--dev", "/dev"]
     for path in ("/dev/shm", "/tmp", "/var/tmp", "/run", HOME):
-        options += _folder(path, FOLDER_BYTES)
+        options += _folder(path, scratch_bytes if path in ("/dev/shm", "/tmp") else FOLDER_BYTES)
     return options
 
 
@@ -184,7 +185,7 @@ def _hide(roots, names):
     return options
 
 
-def command(environment, binds=(), hidden=(), own_network=False, further=()):
+def command(environment, binds=(), hidden=(), own_network=False, further=(), scratch_bytes=FOLDER_BYTES):
     """The command prefix that starts a command in a separate sandbox.
 
     environment: of the command; it shows which workspace is needed. binds: (source, target, writable) of further files
@@ -194,7 +195,7 @@ def command(environment, binds=(), hidden=(), own_network=False, further=()):
     if problem():
         raise NotIsolated(problem())
     roots = workspaces(environment)
-    options = _base()
+    options = _base(scratch_bytes)
     for root in roots:
         options += ["--ro-bind", root, root]
     options += _hide(roots, hidden)

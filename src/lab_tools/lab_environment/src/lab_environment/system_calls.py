@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """System calls that a student's program does not get: a seccomp filter for bubblewrap. Free of ROS; Linux only.
 
-They hold memory outside of every process, where no limit counts it, or make a user namespace, in which a program may
-mount file systems without a limit of size. They fail with ENOSYS, as on a kernel that does not have them: libraries
-then use other ways.
+They hold memory outside of every process, where no limit counts it; make a user namespace, in which a program may mount
+file systems without a limit of size; reach the keys that Linux keeps for all processes of one user; or open sockets of
+families that no network namespace holds back, such as the one between a virtual machine and its host. They fail with
+ENOSYS, as on a kernel that does not have them: libraries then use other ways.
 """
 import contextlib
 import errno
@@ -14,12 +15,16 @@ import struct
 # Machine -> its number in linux/audit.h, and the numbers of calls in its asm/unistd.h.
 _MACHINES = {
     "x86_64": (0xC000003E, {"memfd_create": 319, "memfd_secret": 447, "shmget": 29, "io_uring_setup": 425,
-                            "clone3": 435, "setns": 308, "unshare": 272, "clone": 56}),
+                            "clone3": 435, "setns": 308, "add_key": 248, "request_key": 249, "keyctl": 250,
+                            "unshare": 272, "clone": 56, "socket": 41}),
     "aarch64": (0xC00000B7, {"memfd_create": 279, "memfd_secret": 447, "shmget": 194, "io_uring_setup": 425,
-                             "clone3": 435, "setns": 268, "unshare": 97, "clone": 220})}
+                             "clone3": 435, "setns": 268, "add_key": 217, "request_key": 218, "keyctl": 219,
+                             "unshare": 97, "clone": 220, "socket": 198})}
 # Refused only where their first argument has this bit; of clone3 a filter cannot see the flags.
 _BY_FLAG = ("unshare", "clone")
 _CLONE_NEWUSER = 0x10000000
+#: The families of sockets that programs get, by their numbers (linux/socket.h): local, IPv4, IPv6, netlink.
+FAMILIES = (1, 2, 10, 16)
 # x86_64 has a second table of calls, for programs with pointers of 32 bits.
 _SECOND_TABLE = 0x40000000
 # Fields of struct seccomp_data (linux/seccomp.h); the lower half of the first argument.
@@ -34,17 +39,24 @@ def filter_program(machine=None):
     if (machine or platform.machine()) not in _MACHINES:
         return b""
     architecture, numbers = _MACHINES[machine or platform.machine()]
-    always = [number for name, number in numbers.items() if name not in _BY_FLAG]
-    tests = [(_NOT_LESS, _SECOND_TABLE), *((_EQUAL, number) for number in always)]
-    # Each jump leads over the tests behind it, and over what stands between them and its end.
-    by_flag = [(_EQUAL, numbers[name]) for name in _BY_FLAG]
-    count = len(tests) + len(by_flag)
-    steps = [(_LOAD, 0, 0, _ARCHITECTURE), (_EQUAL, 0, count + 4, architecture), (_LOAD, 0, 0, _NUMBER)]
-    steps += [(code, count - place + 2, 0, value) for place, (code, value) in enumerate(tests)]
-    steps += [(code, len(by_flag) - place, 0, value) for place, (code, value) in enumerate(by_flag)]
-    steps += [(_RETURN, 0, 0, _ALLOW), (_LOAD, 0, 0, _ARGUMENT), (_BIT, 0, 1, _CLONE_NEWUSER), (_RETURN, 0, 0, _REFUSE),
-              (_RETURN, 0, 0, _ALLOW)]
-    return b"".join(struct.pack("=HBBI", *step) for step in steps)
+    always = [number for name, number in numbers.items() if name not in (*_BY_FLAG, "socket")]
+    # (instruction, place to go to if so, else, value); without a place, the next one.
+    steps = [(_LOAD, None, None, _ARCHITECTURE), (_EQUAL, None, "refuse", architecture), (_LOAD, None, None, _NUMBER),
+             (_NOT_LESS, "refuse", None, _SECOND_TABLE), *((_EQUAL, "refuse", None, number) for number in always),
+             *((_EQUAL, "flag", None, numbers[name]) for name in _BY_FLAG),
+             (_EQUAL, None, "allow", numbers["socket"]), (_LOAD, None, None, _ARGUMENT),
+             *((_EQUAL, "allow", None, family) for family in FAMILIES)]
+    places = {"refuse": len(steps)}
+    steps.append((_RETURN, None, None, _REFUSE))
+    places["flag"] = len(steps)
+    steps += [(_LOAD, None, None, _ARGUMENT), (_BIT, "refuse_flag", None, _CLONE_NEWUSER)]
+    places["allow"] = len(steps)
+    steps.append((_RETURN, None, None, _ALLOW))
+    # Jumps go forward alone.
+    places["refuse_flag"] = len(steps)
+    steps.append((_RETURN, None, None, _REFUSE))
+    jumps = [[0 if to is None else places[to] - place - 1 for to in step[1:3]] for place, step in enumerate(steps)]
+    return b"".join(struct.pack("=HBBI", step[0], *jump, step[3]) for step, jump in zip(steps, jumps, strict=True))
 
 
 @contextlib.contextmanager

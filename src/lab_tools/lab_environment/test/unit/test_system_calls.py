@@ -3,6 +3,7 @@
 kernel.
 """
 import errno
+import socket
 import struct
 
 import pytest
@@ -34,13 +35,24 @@ def test_calls_that_hide_memory_are_refused_and_others_allowed(machine):
     architecture, read, clone = MACHINES[machine]
     program = system_calls.filter_program(machine)
     numbers = system_calls._MACHINES[machine][1]
-    for name in ("memfd_create", "memfd_secret", "shmget", "io_uring_setup", "clone3", "setns"):
+    for name in ("memfd_create", "memfd_secret", "shmget", "io_uring_setup", "clone3", "setns", "add_key",
+                 "request_key", "keyctl"):
         assert outcome(program, numbers[name], architecture) == REFUSE, name
     assert outcome(program, read, architecture) == ALLOW
     for name in ("clone", "unshare"):
         assert outcome(program, numbers[name], architecture, NEW_THREAD) == ALLOW
         assert outcome(program, numbers[name], architecture, NEW_USER | NEW_THREAD) == REFUSE
     assert numbers["clone"] == clone
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_sockets_are_those_that_a_network_namespace_holds_back(machine):
+    architecture, program = MACHINES[machine][0], system_calls.filter_program(machine)
+    number = system_calls._MACHINES[machine][1]["socket"]
+    for family in (socket.AF_UNIX, socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK):
+        assert outcome(program, number, architecture, family) == ALLOW
+    for family in (socket.AF_VSOCK, socket.AF_ALG, socket.AF_BLUETOOTH, socket.AF_PACKET):
+        assert outcome(program, number, architecture, family) == REFUSE
 
 
 @pytest.mark.parametrize("machine", MACHINES)

@@ -256,6 +256,24 @@ def test_no_capability_and_no_way_to_more(walled):
     assert student.output == "0000000000000000 0000000000000000 1\n-1 -1 -1\n", student.errors
 
 
+def test_settings_of_the_kernel_keys_of_the_user_and_the_hosts_sockets_are_out_of_reach(walled):
+    # The superuser needs no capability to write the first one, with which a crash would start a program outside.
+    student = finished(walled(
+        "import ctypes, os, socket\n"
+        "def add_key():\n"
+        "    number = {'x86_64': 248, 'aarch64': 217}[os.uname().machine]\n"
+        "    if ctypes.CDLL(None).syscall(number, b'user', b'name', b'x', 1, -4) < 0:\n"
+        "        raise OSError\n"
+        "for attempt in (lambda: open('/proc/sys/kernel/core_pattern', 'w').write('core'), add_key,\n"
+        "                lambda: socket.socket(socket.AF_VSOCK)):\n"
+        "    try:\n"
+        "        attempt()\n"
+        "        print('reached')\n"
+        "    except OSError:\n"
+        "        print('refused')"))
+    assert student.output == "refused\n" * 3, student.errors
+
+
 def test_a_program_that_stops_its_own_sandbox_is_ended(walled):
     before = family.children_of([os.getpid()])
     student = walled("import ctypes\nctypes.CDLL(None).ptrace(16, 1, 0, 0)\nprint('attached', flush=True)\n"
