@@ -11,7 +11,7 @@ from pathlib import Path
 
 import rospkg
 
-from lab_class import control, roster
+from lab_class import control, control_groups, roster
 from lab_class.labs import ClassError, State
 from lab_class.roster import RosterError
 from lab_class.store import ClassRecord, Options, Store, StoreError
@@ -162,8 +162,8 @@ def _up(options, store):
     log = store.folder / "supervisor.log"
     with open(log, "wb") as output:
         supervisor = subprocess.Popen(
-            [sys.executable, "-P", "-m", "lab_class.supervisor", str(store.folder), str(libraries),
-             str(Path(packages.get_path("lab_class")) / "page")],
+            [*control_groups.way_in(), sys.executable, "-P", "-m", "lab_class.supervisor", str(store.folder),
+             str(libraries), str(Path(packages.get_path("lab_class")) / "page")],
             stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, start_new_session=True, cwd="/")
     deadline = time.monotonic() + OPEN_S
     while not _is_up(store):
@@ -172,6 +172,7 @@ def _up(options, store):
             raise ClassError("the class did not start: %s" % (last or "its log is empty, %s" % log))
         time.sleep(_LOOK_S)
     _print_addresses(record, store)
+    print("Limits: %s.\n" % control.call(store, "GET", "/labs")["limits"], flush=True)
     return _DONE if options.no_wait else _await_labs(store)
 
 
@@ -262,6 +263,8 @@ def _remove_left_over(store):
     """The files of a supervisor that was killed, or whose host lost power."""
     if store.running():
         with store.locked():
+            for folder in store.running().get("groups", ()):
+                control_groups.remove_left_over(folder)
             shutil.rmtree(store.running().get("runtime", ""), ignore_errors=True)
             store.remove_run()
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from tornado import netutil
 from tornado.httpserver import HTTPServer
 
-from lab_class import front_door, launching
+from lab_class import control_groups, front_door, launching
 from lab_class.factors import Factors
 from lab_class.lab_process import END_S, LabProcess, disk_bytes, remove
 from lab_class.labs import Action, ClassError, Labs, State
@@ -44,11 +44,12 @@ class Supervisor:
         self.labs = Labs(names, options.at_once, options.idle_s)
         self.door = front_door.Door(record, self)
         self._page = page
-        self._processes, self._listeners, self._tasks, self._memory = {}, {}, {}, {}
+        self._processes, self._listeners, self._tasks, self._memory, self._groups = {}, {}, {}, {}, {}
         self._end = asyncio.Event()
         # Short: the address of a socket has 107 bytes at most.
         self._runtime = Path(tempfile.mkdtemp(prefix="lab-class-"))
         self._factors = Factors(self.socket_of, record.tokens)
+        self._class_groups = control_groups.found(self._runtime.name, len(names))
 
     # For the front door.
 
@@ -90,7 +91,7 @@ class Supervisor:
                 "pages": lab.pages, "factor": self._factors.of(lab.name) if lab.state is State.RUNNING else None,
                 "memory_bytes": self._memory.get(lab.name) if lab.has_processes else None,
                 "token": tokens.act, "view_token": tokens.view})
-        return {"labs": labs, "idle_s": self._record.options.idle_s}
+        return {"labs": labs, "idle_s": self._record.options.idle_s, "limits": str(self._class_groups)}
 
     def end(self):
         """End the class; `run` returns when all is gone."""
@@ -121,6 +122,7 @@ class Supervisor:
             await self._end_all()
             for server in servers:
                 await server.close_all_connections()
+            self._class_groups.remove()
             shutil.rmtree(self._runtime, ignore_errors=True)
 
     def _open(self):
@@ -133,7 +135,7 @@ class Supervisor:
         path = self._runtime / "control"
         control.add_socket(netutil.bind_unix_socket(str(path), mode=0o600))
         self._store.write_running({"pid": os.getpid(), "port": door[0].getsockname()[1], "control": str(path),
-                                   "runtime": str(self._runtime)})
+                                   "runtime": str(self._runtime), "groups": self._class_groups.folders})
         return [server, control]
 
     def _listen(self, name):
@@ -157,7 +159,10 @@ class Supervisor:
         for name, process in list(self._processes.items()):
             # A task of this lab that runs is ending these processes, or is about to start others.
             if process.has_ended and (name not in self._tasks or self._tasks[name].done()):
-                self._do(self.labs.ended(name, self._last_words(name), self._now()))
+                if self._groups[name].has_run_out():
+                    self._exceed_memory(name)
+                else:
+                    self._do(self.labs.ended(name, self._last_words(name), self._now()))
         self._do(self.labs.due(self._now()))
 
     def _do(self, actions):
@@ -191,7 +196,8 @@ class Supervisor:
                 started = await asyncio.get_running_loop().run_in_executor(
                     None, launching.prepared, place, self._record.options, self._record.tokens[name],
                     self._listeners[name].fileno(), refused)
-                self._processes[name] = LabProcess(*started, place.folder / "output.txt")
+                self._groups[name] = self._class_groups.lab(name, self._record.options.memory_bytes, launching.TASKS)
+                self._processes[name] = LabProcess(*started, place.folder / "output.txt", self._groups[name].entrances)
         except (NotIsolated, OSError) as error:
             self._do(self.labs.ended(name, str(error), self._now()))
             return
@@ -227,6 +233,7 @@ class Supervisor:
             await asyncio.sleep(_TICK_S)
         await asyncio.get_running_loop().run_in_executor(None, process.kill)
         del self._processes[name]
+        await asyncio.get_running_loop().run_in_executor(None, self._groups.pop(name).remove)
         await asyncio.get_running_loop().run_in_executor(None, remove, self._store.lab(name) / "caches")
 
     async def _end_all(self):
@@ -251,13 +258,20 @@ class Supervisor:
     async def _look_at_memory(self):
         most = self._record.options.memory_bytes
         for name, process in list(self._processes.items()):
-            if self.labs[name].state is State.PAUSED:
+            group = self._groups.get(name)
+            if group is None or self.labs[name].state is State.PAUSED:
                 continue
-            used = await asyncio.get_running_loop().run_in_executor(None, process.memory_bytes)
+            used = group.memory_bytes()
+            if used is None:
+                used = await asyncio.get_running_loop().run_in_executor(None, process.memory_bytes)
             self._memory[name] = used
-            if used > most and self.labs[name].has_processes:
-                self._do(self.labs.exceeded(name, "it used %.1f GB of memory; its limit is %.1f GB"
-                                            % (used / 2**30, most / 2**30), self._now()))
+            if used > most or group.has_run_out():
+                self._exceed_memory(name)
+
+    def _exceed_memory(self, name):
+        if self.labs[name].has_processes:
+            self._do(self.labs.exceeded(name, "it used all of its memory, %.1f GB"
+                                        % (self._record.options.memory_bytes / 2**30), self._now()))
 
     async def _look_at_disk(self):
         most = self._record.options.disk_bytes

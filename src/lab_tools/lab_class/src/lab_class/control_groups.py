@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Control groups of a class, versions 1 and 2: processors in equal shares, and limits of memory and processes that
+Linux itself keeps. They are made below this process's own groups, where this user may; no controller is required.
+
+Sources: https://docs.kernel.org/admin-guide/cgroup-v2.html, .../cgroup-v1/memory.html and .../cgroup-v1/cgroups.html
+"""
+import contextlib
+import errno
+import getpass
+import os
+import shutil
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+#: Where control groups are mounted, and the file with the groups of this process (cgroups(7)).
+MOUNT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
+#: Its files name the users whose systemd runs without a session (loginctl enable-linger).
+LINGER = Path("/var/lib/systemd/linger")
+CONTROLLERS = ("cpu", "memory", "pids")
+#: The front door's weight at the processors, in labs.
+DOOR_WEIGHT = 10
+#: Time for a group's last process to go [s].
+REMOVAL_S = 5.0
+_LAB_SHARES_V1, _MOST_SHARES_V1 = 1024, 262144
+_LAB_WEIGHT_V2, _MOST_WEIGHT_V2 = 100, 10000
+_DOOR = "front-door"
+_PROBE_S = 10.0
+
+
+@dataclass(frozen=True)
+class _Home:
+    """Where groups are made: a folder for the groups of one class.
+
+    ``controllers``: those that it has; ``version``; ``is_own``: the folder is this process's own group, version 2."""
+
+    folder: Path
+    controllers: tuple
+    version: int
+    is_own: bool = False
+
+
+class Group:
+    """The groups of one lab: a folder in each _Home."""
+
+    def __init__(self, folders):
+        """folders: [(_Home, Path)]."""
+        self._folders = folders
+        self._kills_before = self._kills()
+
+    @property
+    def entrances(self):
+        """Files to which a process writes 0 to enter [Path]."""
+        return [folder / "cgroup.procs" for _, folder in self._folders]
+
+    def _of(self, controller):
+        return next(((home.version, folder) for home, folder in self._folders if controller in home.controllers),
+                    (0, None))
+
+    def memory_bytes(self):
+        """Memory that its processes have written to, files in memory included; None without the controller."""
+        version, folder = self._of("memory")
+        if folder is None:
+            return None
+        names = ("total_rss", "total_shmem") if version == 1 else ("anon", "shmem")
+        return sum(int(value) for name, _, value in _rows(folder / "memory.stat") if name in names)
+
+    def has_run_out(self):
+        """Whether Linux has ended a process of it that had no memory left within the limit."""
+        return self._kills() > self._kills_before
+
+    def _kills(self):
+        version, folder = self._of("memory")
+        if folder is None:
+            return 0
+        name = "memory.oom_control" if version == 1 else "memory.events"
+        return sum(int(value) for row, _, value in _rows(folder / name) if row == "oom_kill")
+
+    def remove(self):
+        """Remove it, once its processes have gone; they are expected to go at once."""
+        for _, folder in self._folders:
+            _remove(folder)
+
+
+class ControlGroups:
+    """Those of one class. `found` makes them."""
+
+    def __init__(self, homes, problems):
+        self._homes, self._problems = homes, problems
+
+    @property
+    def controllers(self):
+        """The controllers that this class has, of CONTROLLERS."""
+        return tuple(name for name in CONTROLLERS if any(name in home.controllers for home in self._homes))
+
+    @property
+    def folders(self):
+        """The folders to be removed by `removed`, also by another process later [str]."""
+        return [str(home.folder) for home in self._homes if not home.is_own]
+
+    def __str__(self):
+        if len(self.controllers) == len(CONTROLLERS):
+            return "control groups limit each lab's memory and processes, and share the processors out equally"
+        what = "control groups for " + ", ".join(self.controllers) if self.controllers else "no control groups"
+        return "%s (%s); the supervisor looks at each lab's memory" % (what, "; ".join(self._problems))
+
+    def lab(self, name, memory_bytes, tasks):
+        """A Group with its limits. Raises OSError."""
+        made = []
+        for home in self._homes:
+            folder = home.folder / name
+            with contextlib.suppress(FileExistsError):
+                folder.mkdir()
+            made.append((home, folder))
+            for file, value in _limits(home, memory_bytes, tasks):
+                # Swap is not counted on every machine.
+                with contextlib.suppress(FileNotFoundError) if "sw" in file else contextlib.nullcontext():
+                    _write(folder / file, value)
+        return Group(made)
+
+    def remove(self):
+        """Remove all groups of the class."""
+        for home in self._homes:
+            if home.is_own:
+                continue
+            _leave(home)
+            remove_left_over(home.folder)
+
+
+def found(name, labs, mount=MOUNT, own=OWN):
+    """The ControlGroups of a class: folders ``name`` below this process's groups, with weights for ``labs`` labs.
+
+    This process moves to a group beside the labs'. Without groups that this user may make, it has no controllers.
+    """
+    homes, problems = [], []
+    with contextlib.suppress(OSError, ValueError):
+        groups = dict(row.split(":", 2)[1:] for row in own.read_text(encoding="ascii").splitlines())
+        for controller in CONTROLLERS:
+            home = _first_version_home(controller, groups, mount, name, problems)
+            if home is not None:
+                homes.append(home)
+        if "" in groups and (mount / "cgroup.controllers").is_file():
+            home = _second_version_home(mount / groups[""].lstrip("/"), mount, name, problems)
+            if home is not None:
+                homes.append(home)
+    for home in homes:
+        _weigh(home, labs, problems)
+    return ControlGroups(homes, problems or ["none are mounted at %s" % mount])
+
+
+def way_in(user=None, mount=MOUNT):
+    """The command prefix that starts a program in a separate control group of systemd, which it may divide; [] where
+    there is none, or where it would end with the last session of this user.
+
+    user: its name; by default that of this process. See systemd-run(1), loginctl(1).
+    """
+    if not (mount / "cgroup.controllers").is_file() or shutil.which("systemd-run") is None:
+        return []
+    if os.geteuid() == 0:
+        scope = ["systemd-run"]
+    elif (LINGER / (user or getpass.getuser())).exists():
+        # Where cron starts it, nothing else says so.
+        scope = ["env", "XDG_RUNTIME_DIR=/run/user/%d" % os.geteuid(), "systemd-run", "--user"]
+    else:
+        return []
+    scope += ["--scope", "--quiet", "--collect", "--property=Delegate=yes", "--"]
+    with contextlib.suppress(OSError, subprocess.TimeoutExpired):
+        probe = subprocess.run([*scope, "true"], stdin=subprocess.DEVNULL, capture_output=True, timeout=_PROBE_S)
+        return scope if probe.returncode == 0 else []
+    return []
+
+
+def remove_left_over(folder):
+    """Remove a class's folder of groups, of which all processes have ended."""
+    folder = Path(folder)
+    for below in [*(path for path in folder.glob("*") if path.is_dir()), folder]:
+        if (below / "cgroup.procs").exists():
+            _remove(below)
+
+
+def _first_version_home(controller, groups, mount, name, problems):
+    for row, path in groups.items():
+        if controller not in row.split(","):
+            continue
+        for top in dict.fromkeys((mount / row, mount / controller)):
+            for parent in dict.fromkeys((top / path.lstrip("/"), top)):
+                if not (parent / "cgroup.procs").exists():
+                    continue
+                try:
+                    (parent / name).mkdir()
+                    return _Home(parent / name, (controller,), 1)
+                except OSError as error:
+                    problems.append("%s: %s" % (parent, error.strerror))
+    return None
+
+
+def _second_version_home(own, mount, name, problems):
+    """In this process's group, if nobody else is in it; else in one above it that hands controllers on."""
+    try:
+        alone = (own / "cgroup.procs").read_text(encoding="ascii").split() == [str(os.getpid())]
+        if alone and own != mount:
+            (own / _DOOR).mkdir(exist_ok=True)
+            _write(own / _DOOR / "cgroup.procs", os.getpid())
+            return _Home(own, _hand_on(own), 2, True)
+    except OSError as error:
+        problems.append("%s: %s" % (own, error.strerror))
+    for parent in own.parents:
+        if not parent.is_relative_to(mount):
+            break
+        with contextlib.suppress(OSError):
+            if parent == mount:
+                _hand_on(parent)
+            if not {"cpu", "memory"} <= set(_words(parent / "cgroup.subtree_control")):
+                continue
+            (parent / name).mkdir()
+            return _Home(parent / name, _hand_on(parent / name), 2)
+    problems.append("%s is not this user's" % own)
+    return None
+
+
+def _hand_on(folder):
+    """Let a group's children have its controllers; returns those that they have."""
+    for controller in CONTROLLERS:
+        with contextlib.suppress(OSError):
+            _write(folder / "cgroup.subtree_control", "+" + controller)
+    return tuple(name for name in CONTROLLERS if name in _words(folder / "cgroup.subtree_control"))
+
+
+def _weigh(home, labs, problems):
+    """The class weighs as much as its labs do together, and the front door DOOR_WEIGHT labs."""
+    if "cpu" not in home.controllers:
+        return
+    file, lab, most = (("cpu.shares", _LAB_SHARES_V1, _MOST_SHARES_V1) if home.version == 1 else
+                       ("cpu.weight", _LAB_WEIGHT_V2, _MOST_WEIGHT_V2))
+    try:
+        (home.folder / _DOOR).mkdir(exist_ok=True)
+        _write(home.folder / _DOOR / file, min(most, DOOR_WEIGHT * lab))
+        if not home.is_own:
+            _write(home.folder / file, min(most, (labs + DOOR_WEIGHT) * lab))
+            _write(home.folder / _DOOR / "cgroup.procs", os.getpid())
+    except OSError as error:
+        problems.append("%s: %s" % (home.folder, error.strerror))
+
+
+def _limits(home, memory_bytes, tasks):
+    if "memory" in home.controllers:
+        if home.version == 1:
+            yield from (("memory.limit_in_bytes", memory_bytes), ("memory.memsw.limit_in_bytes", memory_bytes))
+        else:
+            yield from (("memory.max", memory_bytes), ("memory.swap.max", 0), ("memory.oom.group", 1))
+    if "pids" in home.controllers:
+        yield "pids.max", tasks
+
+
+def _leave(home):
+    """Back to the group above, so that the front door's can be removed."""
+    with contextlib.suppress(OSError):
+        if str(os.getpid()) in _words(home.folder / _DOOR / "cgroup.procs"):
+            _write(home.folder.parent / "cgroup.procs", os.getpid())
+
+
+def _remove(folder):
+    deadline = time.monotonic() + REMOVAL_S
+    while not _removed(folder) and time.monotonic() < deadline:
+        time.sleep(0.05)
+
+
+def _removed(folder):
+    try:
+        folder.rmdir()
+    except FileNotFoundError:
+        return True
+    except OSError as error:
+        return error.errno not in (errno.EBUSY, errno.ENOTEMPTY)
+    return True
+
+
+def _rows(path):
+    with contextlib.suppress(OSError):
+        return [line.partition(" ") for line in path.read_text(encoding="ascii").splitlines()]
+    return []
+
+
+def _words(path):
+    with contextlib.suppress(OSError):
+        return path.read_text(encoding="ascii").split()
+    return []
+
+
+def _write(path, value):
+    with open(path, "r+", encoding="ascii") as stream:
+        stream.write(str(value))
