@@ -7,9 +7,11 @@ import rosgraph.xmlrpc
 import rospy
 import rospy.impl.tcpros_base as tcpros_base
 import rospy.impl.tcpros_service as tcpros_service
+import rospy.topics
 
 from rospy_limits import limits, messages, services, tcpros_server, xmlrpc_server
 from rospy_limits.event_log import EventLog
+from rospy_limits.topic_poller import TopicPoller
 
 _installed = []
 
@@ -29,6 +31,7 @@ def limit_ports():
     transport.receive_once = messages.reported_receive(transport.receive_once, events)
     tcpros_service.ServiceImpl.handle = services.connection_server(events)
     rosgraph.xmlrpc.ThreadingXMLRPCServer = xmlrpc_server.limited_server(events)
+    rospy.topics.Poller = TopicPoller
 
 
 def _ask_for_files():

@@ -44,6 +44,7 @@ from web_bridge.cameras import Cameras
 from web_bridge.codec import Codec
 from web_bridge.errors import shown
 from web_bridge.loop_thread import LoopThread
+from web_bridge.memory import return_large_blocks
 from web_bridge.serving import Serving
 from web_bridge.session import Bridge
 from web_bridge.video import SnapshotHandler, VideoOptions, VideoServer
@@ -113,6 +114,7 @@ def serve(options, page, libraries):
     tokens = options.token or secrets.token_urlsafe(18), options.view_token or secrets.token_urlsafe(18)
     if tokens[0] == tokens[1]:
         raise Failure("--token and --view-token are the same; pages that only watch need another one")
+    return_large_blocks()
     limit_ports()
     end_on_signals()
     rospy.init_node("lab_web", disable_signals=True)

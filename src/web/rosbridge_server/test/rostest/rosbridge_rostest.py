@@ -11,6 +11,7 @@ import sys
 import threading
 import unittest
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 
 import actionlib
 import rosgraph
@@ -241,6 +242,23 @@ class RosbridgeTest(unittest.TestCase):
         wait_until(lambda: Client().call("/lab/enable", data=True)[0], "an answer to another client")
         release.set()
         service.shutdown()
+
+    def test_subscriptions_of_a_client_that_has_gone_leave_no_descriptor(self):
+        master, client = rosgraph.Master(rospy.get_name()), Client()
+        pid = ServerProxy(master.lookupNode("/rosbridge_websocket")).getPid(rospy.get_name())[2]
+
+        def descriptors():
+            return len(os.listdir("/proc/%d/fd" % pid))
+
+        def heard():
+            return sum(name.startswith("/lab/nobody") for name, _ in master.getSystemState()[1])
+        for number in range(200):
+            client.send("subscribe", topic="/lab/nobody%d" % number, type="std_msgs/String")
+        wait_until(lambda: heard() == 200, lambda: "200 subscriptions, not %d" % heard())
+        most = descriptors()
+        client.socket.close()
+        wait_until(lambda: heard() == 0 and descriptors() < most - 180,
+                   lambda: "%d descriptors, %d before" % (descriptors(), most))
 
     def test_the_clients_are_told(self):
         client = Client()

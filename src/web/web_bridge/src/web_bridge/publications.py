@@ -1,8 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Topics that clients publish: one publisher for all of them, which stays a while after the last has gone. No ROS."""
 import threading
+from collections import deque
 
 from web_bridge.errors import BridgeError, NoSuchTopic
+
+
+class FirstMessages:
+    """The newest messages of a topic, at most ``most`` and ``most_bytes``, but always the newest one. Its user
+    locks.
+    """
+
+    def __init__(self, most, most_bytes):
+        self._limits = most, most_bytes
+        self._kept = deque()  # (message, bytes)
+        self._bytes = 0
+
+    def add(self, message, size):
+        """``size``: of the serialized message [bytes]."""
+        self._kept.append((message, size))
+        self._bytes += size
+        while len(self._kept) > 1 and (len(self._kept) > self._limits[0] or self._bytes > self._limits[1]):
+            self._bytes -= self._kept.popleft()[1]
+
+    def messages(self):
+        """The oldest first."""
+        return [message for message, _ in self._kept]
 
 
 class _Publication:

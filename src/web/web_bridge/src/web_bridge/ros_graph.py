@@ -3,7 +3,6 @@
 import socket
 import threading
 import time
-from collections import deque
 from io import BytesIO
 from urllib.parse import urlsplit
 from xmlrpc.client import Error
@@ -17,10 +16,14 @@ import rosservice
 from web_bridge.codec import serialized
 from web_bridge.errors import BridgeError, ServiceFailed, UnknownType, shown
 from web_bridge.feeds import Arrival
+from web_bridge.publications import FirstMessages
 
 #: What is published within this time after a topic was advertised also reaches subscribers that connect within it [s].
 _FIRST_S = 1.0
-_MOST_FIRST = 100
+_MOST_FIRST, _MOST_FIRST_BYTES = 100, 8 << 20
+#: Age of the master's list of types that a new subscription is compared with [s]: a client with 1,000 subscriptions
+#: does not ask for the whole list 1,000 times.
+_TYPES_S = 0.2
 _QUEUE = 100
 #: A service that is asked what it is, not called; how long its answer may take [s].
 PROBE = {"probe": "1", "md5sum": "*"}
@@ -84,6 +87,7 @@ class RosGraph:
     def __init__(self):
         self._master = rosgraph.Master(rospy.get_name())
         self._lock = threading.Lock()  # xmlrpc's proxies serve one thread
+        self._types, self._types_until = {}, 0.0
 
     def resolve(self, name):
         """Raises BridgeError for a text that is no name."""
@@ -96,8 +100,7 @@ class RosGraph:
         return resolved
 
     def topic_type(self, topic):
-        name = self.resolve(topic)
-        return next((kind for known, kind in self._ask("getTopicTypes") if known == name and kind != "*"), None)
+        return self._newest_types().get(self.resolve(topic))
 
     def published_topics(self):
         """The topics that have a publisher, {name: type}. Raises BridgeError."""
@@ -108,9 +111,19 @@ class RosGraph:
             self.resolve(topic)
             return
         message_class(type_name)
+        types = self._types if time.monotonic() < self._types_until else self._newest_types()
+        if types.get(self.resolve(topic)) in (None, type_name):
+            return
+        # A list that is not the newest refuses nothing.
         established = self.topic_type(topic)
         if established not in (None, type_name):
             raise BridgeError("%s has the type %s, not %s" % (topic, established, type_name))
+
+    def _newest_types(self):
+        """{topic: established type} of now."""
+        types = {name: kind for name, kind in self._ask("getTopicTypes") if kind != "*"}
+        self._types, self._types_until = types, time.monotonic() + _TYPES_S
+        return types
 
     def subscribe(self, topic, arrived):
         self.resolve(topic)
@@ -206,29 +219,33 @@ class _Publisher(rospy.SubscribeListener):
         self.new_message = message_class(type_name)
         self._lock = threading.Lock()
         self._until = time.monotonic() + _FIRST_S
-        self._first = None if latched else deque(maxlen=_MOST_FIRST)
+        self._first = None if latched else FirstMessages(_MOST_FIRST, _MOST_FIRST_BYTES)
         self._publisher = rospy.Publisher(topic, self.new_message, subscriber_listener=self, latch=latched,
                                           queue_size=queue_size, tcp_nodelay=True)
 
     def peer_subscribe(self, _topic, _publish, peer_publish):
         """A subscriber has connected; on rospy's thread."""
         with self._lock:
-            first = list(self._first or ()) if time.monotonic() < self._until else ()
+            if time.monotonic() >= self._until:
+                self._first = None
+            first = self._first.messages() if self._first is not None else ()
         for message in first:
             peer_publish(message)
 
     def publish(self, message):
         """Raises BridgeError where the message cannot be serialized."""
-        with self._lock:
-            if self._first is not None:
-                if time.monotonic() < self._until:
-                    self._first.append(message)
-                else:
-                    self._first = None
         try:
+            self._keep_first(message)
             self._publisher.publish(message)
         except (rospy.ROSException, genpy.MessageException) as error:
             raise BridgeError("%s: %s" % (self._publisher.name, error)) from None
+
+    def _keep_first(self, message):
+        with self._lock:
+            if time.monotonic() >= self._until:
+                self._first = None
+            if self._first is not None:
+                self._first.add(message, len(serialized(message)))
 
     def close(self):
         self._publisher.unregister()

@@ -7,6 +7,7 @@ import rospy
 from rospy_limits.node import limit_ports
 from rospy_start import end_on_signals
 from web_bridge import ros_graph
+from web_bridge.memory import return_large_blocks
 from web_bridge.parameters import ParameterError
 from web_bridge.serving import listen
 
@@ -17,6 +18,7 @@ def run(name, read_parameters, serve):
     ``read_parameters(get)`` returns the parameters; their ``warnings`` go to the log. It and ``serve`` may raise
     ParameterError: the log says why, and the exit code is 1.
     """
+    return_large_blocks()
     limit_ports()
     end_on_signals()
     rospy.init_node(name, disable_signals=True)

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The descriptor that rospy opens for each topic of a node, closed as soon as the topic is."""
+import select
+
+_BROKEN = select.EPOLLHUP | select.EPOLLERR | select.EPOLLRDHUP
+
+
+class TopicPoller:
+    """The replacement of the class ``rospy.topics.Poller``, with its methods: tells which connections have broken.
+
+    rospy's own one keeps its methods as attributes, and so refers to itself: its descriptor stays open
+    until the garbage collector looks for reference cycles, in a large node after many minutes.
+    """
+
+    def __init__(self):
+        self._epoll = select.epoll()
+
+    def add_fd(self, descriptor):
+        """Watch a connection."""
+        self._epoll.register(descriptor, _BROKEN)
+
+    def remove_fd(self, descriptor):
+        """Forget a connection."""
+        self._epoll.unregister(descriptor)
+
+    def error_iter(self):
+        """The descriptors of the connections that have broken."""
+        return [descriptor for descriptor, event in self._epoll.poll(0) if event & _BROKEN]
