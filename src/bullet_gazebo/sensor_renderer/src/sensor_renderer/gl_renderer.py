@@ -4,22 +4,42 @@
 Everything here belongs to the thread that made the renderer.
 """
 import os
+from typing import NamedTuple
 
 import numpy as np
 
 from sensor_renderer.errors import RenderingError
+from sensor_renderer.floor import Floor
 from sensor_renderer.links import Links, visible
 from sensor_renderer.programs import Programs, draw, matrix_bytes
 from sensor_renderer.screens import Screens
 from sensor_renderer.shadows import Shadows
 from sensor_renderer.targets import Targets
 
+# The sky's colours are computed at the corners of so many cells along each side of a picture.
+_SKY_CELLS = 12
+# Names of Mesa's renderers without a graphics card.
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software")
+
+
+class Quality(NamedTuple):
+    """``shadow_pixels``: the side of the sun's map; ``shadow_taps``: comparisons along one side of the square over
+    which the edges of shadows are filtered."""
+
+    shadow_pixels: int
+    shadow_taps: int
+
+
+#: Of cameras, and of single pictures.
+LIVE, STILL = Quality(512, 1), Quality(2048, 5)
+
 
 class GlRenderer:
     """Draws a :class:`sensor_renderer.mirror.Mirror`."""
 
-    def __init__(self):
-        """Raises :class:`RenderingError` if EGL is not available."""
+    def __init__(self, still=False):
+        """``still``: for pictures that may take a second each, with smoother edges and finer shadows. Raises
+        :class:`RenderingError` if EGL is not available."""
         # In software one thread: physics and the user's own programs need the other processors.
         os.environ.setdefault("LP_NUM_THREADS", "1")
         try:
@@ -30,13 +50,21 @@ class GlRenderer:
             raise RenderingError("no OpenGL 3.3 on EGL: %s" % error) from error
         #: Name of the renderer, as the driver gives it.
         self.name = self._context.info["GL_RENDERER"]
-        self._programs = Programs(self._context)
-        self._shadows = Shadows(self._context, self._programs.shadow)
-        self._links = Links(self._context, self._programs)
+        software = any(name in self.name.lower() for name in _SOFTWARE)
+        quality = STILL if still else LIVE
+        self._programs = Programs(self._context, quality.shadow_taps, still)
+        self._shadows = Shadows(self._context, self._programs.shadow, quality.shadow_pixels, quality.shadow_taps)
+        self._links = Links(self._context, self._programs, not still)
         self._screens = Screens(self._context, self._programs.screen)
-        self._targets = Targets(self._context)
+        self._floor = Floor(self._context, self._programs)
+        self._sky = self._context.vertex_array(
+            self._programs.sky, [(self._context.buffer(_grid(_SKY_CELLS).tobytes()), "2f", "corner")])
+        # In software, each sample of a pixel costs as much as a pixel.
+        self._targets = Targets(self._context, 1 if software and not still else min(4, self._context.max_samples))
         self._lit_by = None
         self._context.enable(moderngl.DEPTH_TEST)
+        # The sky is at the largest depth.
+        self._context.depth_func = "<="
 
     def render(self, mirror, pinhole, pose, colour=True, depth=False):
         """Draw the view of a camera whose optical frame is at ``pose`` (4, 4) in the world.
@@ -48,42 +76,71 @@ class GlRenderer:
         to_clip = pinhole.clip_matrix() @ view
         if mirror.light != self._lit_by:
             self._light_by(mirror.light)
-        seen = [(self._links.arrays(link, matrix, pinhole, view), packed, link.is_floor)
-                for link, matrix, packed in visible(self._links.everything(mirror), pinhole, view)]
-        buffer, depth_texture = self._targets.of(pinhole.width, pinhole.height)
+        everything = self._links.everything(mirror)
+        seen = [(self._links.arrays(link, matrix, pinhole, view), matrix, packed, link)
+                for link, matrix, packed in visible(everything, pinhole, view)]
+        target = self._targets.of(pinhole.width, pinhole.height)
         picture = distance = None
         if colour:
-            self._shadows.draw(mirror, lambda: [(link.arrays[1], packed) for link, _, packed
-                                                in self._links.everything(mirror) if not link.is_floor])
+            casters = [entry for entry in everything if not entry[0].is_floor]
+            if self._shadows.draw(mirror, casters, pinhole, pose):
+                self._programs.shadow_by(self._shadows)
             screens = self._screens.visible(mirror, pinhole, view)
-            buffer.use()
-            buffer.clear(*mirror.light.background, 1.0, depth=1.0)
-            self._shadows.use(0)
-            for program, floor in ((self._programs.surface, False), (self._programs.floor, True)):
-                program["to_clip"].write(matrix_bytes(to_clip))
-                program["eye"].value = tuple(pose[:3, 3])
-                draw(program, [(arrays[0], packed) for arrays, packed, is_floor in seen if is_floor == floor])
+            target.clear(mirror.light.background)
+            self._shadows.use()
+            self._programs.look(to_clip, pose[:3, 3])
+            self._draw(seen)
             self._screens.draw(screens, to_clip)
-            picture = np.frombuffer(buffer.read(components=3, alignment=1), np.uint8)
-            picture = picture.reshape(pinhole.height, pinhole.width, 3)
+            if mirror.light.sky:
+                self._programs.sky["from_clip"].write(matrix_bytes(_rays(pinhole, pose)))
+                target.draw_behind(self._sky)
+            picture = target.picture()
         else:
-            buffer.use()
-            buffer.clear(depth=1.0)
+            target.clear()
             self._programs.shadow["to_clip"].write(matrix_bytes(to_clip))
-            draw(self._programs.shadow, [(arrays[1], packed) for arrays, packed, _ in seen])
+            draw(self._programs.shadow, [(arrays[1], packed) for arrays, _, packed, _ in seen])
         if depth:
-            raw = np.frombuffer(depth_texture.read(alignment=1), np.float32)
-            distance = pinhole.depth_from_buffer(raw.reshape(pinhole.height, pinhole.width))
+            distance = pinhole.depth_from_buffer(target.depth())
         return picture, distance
 
     def close(self):
         """Release the context."""
         self._context.release()
 
+    def _draw(self, seen):
+        """Draw ``seen``, (vertex arrays, matrix, packed matrix, :class:`sensor_renderer.links.Link`), the floor last.
+        """
+        for program, is_mesh in ((self._programs.mesh, True), (self._programs.solid, False)):
+            draw(program, [(arrays[0], packed) for arrays, _, packed, link in seen
+                           if link.is_mesh == is_mesh and not link.is_floor])
+        for _, matrix, packed, link in seen:
+            if link.is_floor:
+                self._floor.draw(link.parts[0].colour, matrix, packed, self._shadows.corners)
+
     def _light_by(self, light):
         if not self._programs.fit(light):
             self._links.clear()
+            self._floor.clear()
             self._programs.compile(light)
+            self._floor.build()
         self._lit_by = light
         self._shadows.light_by(light)
-        self._programs.light_by(light, self._shadows.to_map)
+        self._programs.light_by(light)
+
+
+def _rays(pinhole, pose):
+    """The matrix (4, 4) from clip space at the largest depth to directions in the world."""
+    turn = np.zeros((4, 4))
+    wide, high = pinhole.width / 2.0, pinhole.height / 2.0
+    turn[:3, :3] = pose[:3, :3] @ np.array([
+        [wide / pinhole.fx, 0.0, (wide - 0.5 - pinhole.cx) / pinhole.fx],
+        [0.0, high / pinhole.fy, (high - 0.5 - pinhole.cy) / pinhole.fy], [0.0, 0.0, 1.0]])
+    return turn
+
+
+def _grid(cells):
+    """Two triangles (float32, corner by corner) for each of ``cells`` times ``cells`` squares from -1 to 1."""
+    low = np.linspace(-1.0, 1.0, cells + 1)[:-1]
+    corners = np.array([(0, 0), (1, 0), (0, 1), (1, 0), (1, 1), (0, 1)]) * (2.0 / cells)
+    places = np.stack(np.meshgrid(low, low), axis=-1).reshape(-1, 1, 2)
+    return (places + corners).astype(np.float32)

@@ -5,30 +5,40 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from world_picture.drawing import reduced
+
 # A link of which the radius in the picture is larger than this [pixels] is drawn with its fine meshes: smaller ones
 # would show no difference.
 _FINE_FROM_PX = 40.0
+# Share of the coarse triangles that casts a mesh's shadow, and how many at least: half of the cost of a picture would
+# be its shadow map.
+_CASTER_SHARE, _CASTER_LEAST = 0.25, 60
 
 
 @dataclass
 class Link:
     """The geometry of one draw call: vertex arrays for colour and for depth only, coarse and fine; a bounding sphere;
-    its parts. The fine arrays are made when the link is first seen so near."""
+    its parts; whether it has meshes; the array that casts its shadow. The fine arrays are made when the link is first
+    seen so near."""
 
     arrays: tuple
     centre: np.ndarray
     radius: float
     is_floor: bool
     parts: tuple = ()
+    is_mesh: bool = False
+    caster: object = None
     fine: tuple | None = None
 
 
 class Links:
     """The vertex arrays of one context, one set for each different link."""
 
-    def __init__(self, context, programs):
-        """``programs``: :class:`sensor_renderer.programs.Programs`."""
+    def __init__(self, context, programs, thin_casters):
+        """``programs``: :class:`sensor_renderer.programs.Programs`; ``thin_casters``: whether meshes cast the shadows
+        of fewer triangles."""
         self._context = context
+        self._thin_casters = thin_casters
         self._programs = programs
         self._links = {}
         self._links_of = weakref.WeakKeyDictionary()
@@ -36,8 +46,9 @@ class Links:
     def clear(self):
         """Release all arrays."""
         for link in self._links.values():
-            for array in (*link.arrays, *(link.fine or ())):
-                array.release()
+            for array in {*link.arrays, *(link.fine or ()), link.caster}:
+                if array is not None:
+                    array.release()
         self._links = {}
         self._links_of.clear()
 
@@ -60,25 +71,36 @@ class Links:
             return link.arrays
         if link.fine is None:
             rows = _rows(link.parts, [part.fine() if part.fine else part.triangles for part in link.parts])
-            link.fine = self._arrays_of(rows, link.is_floor)
+            link.fine = self._arrays_of(rows, link)
         return link.fine
 
     def _link(self, parts):
-        key = tuple((part.key, part.colour) for part in parts)
+        key = tuple((part.key, part.colour, part.gloss) for part in parts)
         found = self._links.get(key)
         if found is None:
             rows = _rows(parts, [part.triangles for part in parts])
-            is_floor = any(part.is_floor for part in parts)
             low, high = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
             centre = (low + high) / 2.0
-            radius = float(np.linalg.norm(rows[:, :3] - centre, axis=1).max())
-            found = self._links[key] = Link(self._arrays_of(rows, is_floor), centre, radius, is_floor, tuple(parts))
+            found = self._links[key] = Link((), centre, float(np.linalg.norm(rows[:, :3] - centre, axis=1).max()),
+                                            any(part.is_floor for part in parts), tuple(parts),
+                                            any(part.fine for part in parts))
+            found.arrays = self._arrays_of(rows, found)
+            found.caster = self._caster_of(rows) if found.is_mesh and self._thin_casters else found.arrays[1]
         return found
 
-    def _arrays_of(self, rows, is_floor):
-        program = self._programs.floor if is_floor else self._programs.surface
-        return (self._vertex_array(program, rows, "3f 3f 3f", "position", "normal", "colour"),
-                self._vertex_array(self._programs.shadow, rows[:, :3], "3f", "position"))
+    def _arrays_of(self, rows, link):
+        depth = self._vertex_array(self._programs.shadow, rows[:, :3], "3f", "position")
+        if link.is_floor:
+            return None, depth  # :class:`sensor_renderer.floor.Floor` draws it
+        program = self._programs.mesh if link.is_mesh else self._programs.solid
+        return self._vertex_array(program, rows, "3f 3f 4f", "position", "normal", "colour"), depth
+
+    def _caster_of(self, rows):
+        corners = rows[:, :3].astype(float)
+        faces = np.arange(len(rows)).reshape(-1, 3)
+        vertices, faces = reduced(corners, faces, max(_CASTER_LEAST, round(_CASTER_SHARE * len(faces))))
+        return self._vertex_array(self._programs.shadow, vertices[faces].reshape(-1, 3).astype(np.float32), "3f",
+                                  "position")
 
     def _vertex_array(self, program, rows, layout, *names):
         """The GPU processes shared vertices once."""
@@ -89,9 +111,9 @@ class Links:
 
 
 def _rows(parts, triangles):
-    """(n, 9) position, normal, colour of the corners of all parts. One call draws a link: in software a call costs as
-    much as some hundred triangles."""
-    return np.concatenate([np.hstack([rows, np.tile(np.float32(part.colour[:3]), (len(rows), 1))])
+    """(n, 10) position, normal, colour and gloss of the corners of all parts. One call draws a link: in software a call
+    costs as much as some hundred triangles."""
+    return np.concatenate([np.hstack([rows, np.tile(np.float32([*part.colour[:3], part.gloss]), (len(rows), 1))])
                            for part, rows in zip(parts, triangles, strict=True)])
 
 

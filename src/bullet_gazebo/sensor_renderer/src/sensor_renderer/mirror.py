@@ -14,6 +14,8 @@ from world_picture.shared_picture import PictureReader
 from world_picture.snapshot import SnapshotError
 
 DEFAULT_COLOUR = (0.7, 0.7, 0.7, 1.0)
+#: Gloss of what does not say: paint and plastic.
+GLOSS = 0.3
 #: How far the floor reaches [m]; its colour.
 FLOOR_HALF_M = 50.0
 FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
@@ -21,13 +23,15 @@ FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
 
 class Part(NamedTuple):
     """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1. ``fine()``: more
-    triangles of the same shape, for a near view; None where there are none."""
+    triangles of the same shape, for a near view; None where there are none. ``gloss``: strength of its highlights, from
+    0 to 1."""
 
     key: tuple
     triangles: np.ndarray
     colour: tuple
     is_floor: bool = False
     fine: Callable | None = None
+    gloss: float = GLOSS
 
 
 class Screen(NamedTuple):

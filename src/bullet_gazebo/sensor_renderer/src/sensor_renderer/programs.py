@@ -1,178 +1,88 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The shaders, and the programs compiled from them. ROS-free."""
+"""The programs of the shaders in ``shaders``, and their uniforms. ROS-free."""
 import numpy as np
 
-from sensor_renderer.light import MOST_LAMPS, Lamp
+from sensor_renderer import shaders
 
-_NO_LAMP = Lamp((0.0,) * 4, (0.0,) * 3, (0.0,) * 4, (0.0,) * 3, (0.0,) * 3)
-
-# Light without shadows, of up to MOST_LAMPS lamps. In software, even an empty loop costs as much as the rest of a
-# picture: without lamps, the shaders have no such loop.
-_NO_LAMPS = """
-#version 330
-vec3 lamplight(vec3 there, vec3 n) { return vec3(0.0); }
-"""
-
-_LAMPS = """
-#version 330
-uniform int lamps;
-uniform vec4 lamp_place[%d];
-uniform vec3 lamp_colour[%d];
-uniform vec4 lamp_fade[%d];
-uniform vec3 lamp_beam[%d];
-uniform vec3 lamp_cone[%d];
-vec3 lamplight(vec3 there, vec3 n) {
-    vec3 sum = vec3(0.0);
-    for (int k = 0; k < lamps; ++k) {
-        vec3 ray = lamp_place[k].xyz - lamp_place[k].w * there;
-        vec3 to_lamp = ray / max(length(ray), 1e-6);
-        float away = lamp_place[k].w * length(ray);
-        vec4 fade = lamp_fade[k];
-        vec3 cone = lamp_cone[k];
-        float part = clamp((dot(-to_lamp, lamp_beam[k]) - cone.y) / (cone.x - cone.y), 0.0, 1.0);
-        float strength = pow(part, cone.z) / max(fade.x + away * (fade.y + away * fade.z), 1e-6);
-        sum += lamp_colour[k] * max(dot(n, to_lamp), 0.0) * (away > fade.w ? 0.0 : strength);
-    }
-    return sum;
-}
-""" % ((MOST_LAMPS,) * 5)
-
-# Light is computed per vertex and only shadow per pixel: without a graphics card, pixels are expensive. The floor has
-# only four corners, so its lamps are computed per pixel.
-_VERTEX = """
-uniform vec3 ambient;
-uniform vec3 sun;
-uniform mat4 body;
-uniform mat4 to_clip;
-uniform mat4 to_shadow;
-uniform vec3 eye;
-uniform vec3 to_sun;
-in vec3 position;
-in vec3 normal;
-in vec3 colour;
-out vec3 dim;
-out vec3 bright;
-out vec3 shadow_place;
-out vec3 place;
-out vec3 own;
-void main() {
-    vec4 there = body * vec4(position, 1.0);
-    vec3 n = mat3(body) * normal;
-    // Thinned meshes are not closed everywhere: both sides of a triangle are outside.
-    n = dot(n, eye - there.xyz) < 0.0 ? -n : n;
-    own = colour;
-    dim = colour * (ambient * (1.1 + 0.3 * n.z) + LAMPLIGHT);
-    bright = colour * sun * max(dot(n, to_sun), 0.0);
-    // 12 mm out of the surface and 4 mm towards the sun: more than a pixel of the map; else lit surfaces are specked.
-    shadow_place = (to_shadow * (there + vec4(0.012 * n, 0.0))).xyz - vec3(0.0, 0.0, 0.001);
-    place = there.xyz;
-    gl_Position = to_clip * there;
-}
-"""
-
-_FRAGMENT = """
-#version 330
-uniform sampler2DShadow shadow;
-in vec3 dim;
-in vec3 bright;
-in vec3 shadow_place;
-out vec4 seen;
-void main() { seen = vec4(dim + bright * texture(shadow, shadow_place), 1.0); }
-"""
-
-_FLOOR_FRAGMENT = """
-uniform sampler2DShadow shadow;
-in vec3 dim;
-in vec3 bright;
-in vec3 shadow_place;
-in vec3 place;
-in vec3 own;
-out vec4 seen;
-void main() {
-    vec2 tile = fract(place.xy) - 0.5;
-    vec3 light = dim + bright * texture(shadow, shadow_place);
-    light += own * lamplight(place, vec3(0.0, 0.0, 1.0));
-    seen = vec4(light * (tile.x * tile.y > 0.0 ? 1.0 : 0.92), 1.0);
-}
-"""
-
-_SHADOW_VERTEX = """
-#version 330
-uniform mat4 body;
-uniform mat4 to_clip;
-in vec3 position;
-void main() { gl_Position = to_clip * (body * vec4(position, 1.0)); }
-"""
-
-_SHADOW_FRAGMENT = """
-#version 330
-void main() {}
-"""
-
-
-_SCREEN_VERTEX = """
-#version 330
-uniform mat4 body;
-uniform mat4 to_clip;
-in vec2 corner;
-out vec2 place;
-void main() {
-    place = vec2(0.5 + corner.x, 0.5 - corner.y);
-    gl_Position = to_clip * (body * vec4(corner, 0.0, 1.0));
-}
-"""
-
-_SCREEN_FRAGMENT = """
-#version 330
-uniform sampler2D picture;
-in vec2 place;
-out vec4 seen;
-void main() { seen = texture(picture, place); }
-"""
+# What is seen of a mesh and what casts its shadow differ by up to about this much [m].
+_THINNED_M = 0.015
 
 
 class Programs:
-    """The programs of one context. ``surface`` draws everything but the floor, ``floor`` the floor, ``shadow`` depth
-    alone, ``screen`` a picture on a rectangle."""
+    """The programs of one context. ``mesh`` computes light per vertex, ``solid`` per pixel; ``floor`` draws the floor,
+    ``bare_floor`` the parts of it to which no shadow of the sun reaches; ``shadow`` draws depth alone, ``screen`` a
+    picture on a rectangle, ``sky`` the background."""
 
-    def __init__(self, context):
-        """Compiles all but ``surface`` and ``floor``, which :meth:`light_by` compiles."""
+    def __init__(self, context, shadow_taps, per_pixel):
+        """Compiles those that do not depend on the light. ``shadow_taps``: comparisons along one side of the square
+        over which the edges of shadows are filtered; ``per_pixel``: whether ``mesh`` computes light per pixel too."""
         self._context = context
-        self.screen = context.program(vertex_shader=_SCREEN_VERTEX, fragment_shader=_SCREEN_FRAGMENT)
-        self.shadow = context.program(vertex_shader=_SHADOW_VERTEX, fragment_shader=_SHADOW_FRAGMENT)
-        self.surface = self.floor = None
-        self._with_lamps = None
+        self._taps, self._per_pixel = shadow_taps, per_pixel
+        self.screen = context.program(vertex_shader=shaders.SCREEN_VERTEX, fragment_shader=shaders.SCREEN_FRAGMENT)
+        self.shadow = context.program(vertex_shader=shaders.SHADOW_VERTEX, fragment_shader=shaders.SHADOW_FRAGMENT)
+        self.sky = context.program(vertex_shader=shaders.SKY_VERTEX, fragment_shader=shaders.SKY_FRAGMENT)
+        self.mesh = self.solid = self.floor = self.bare_floor = None
+        self._lit = ()
+        self._kinds = None
 
     def fit(self, light):
-        """Whether ``surface`` and ``floor`` are the ones for ``light`` already."""
-        return self._with_lamps == bool(light.lamps)
+        """Whether the programs are the ones for ``light`` already."""
+        return self._kinds == _kinds(light)
 
     def compile(self, light):
-        """Make ``surface`` and ``floor`` for ``light``; vertex arrays of the old ones must have been released."""
-        for old in (self.surface, self.floor):
-            if old is not None:
-                old.release()
-        self._with_lamps = bool(light.lamps)
-        lamps = _LAMPS if light.lamps else _NO_LAMPS
-        corners = _VERTEX.replace("LAMPLIGHT", "lamplight(there.xyz, n)")
-        self.surface = self._context.program(vertex_shader=lamps + corners, fragment_shader=_FRAGMENT)
-        corners = _NO_LAMPS + _VERTEX.replace("LAMPLIGHT", "0.0")
-        self.floor = self._context.program(vertex_shader=corners, fragment_shader=lamps + _FLOOR_FRAGMENT)
+        """Make the programs for ``light``; vertex arrays of the old ones must have been released."""
+        for old in self._lit:
+            old.release()
+        self._kinds = shadow, sky, lamps = _kinds(light)
+        meshes = shaders.placed_shaders if self._per_pixel else shaders.lit_shaders
+        self.mesh = self._program(meshes(shadow, lamps, self._taps if self._per_pixel else 1))
+        self.solid = self._program(shaders.placed_shaders(shadow, lamps, self._taps))
+        self.floor = self._program(shaders.floor_shaders(shadow, lamps, self._taps, sky))
+        self.bare_floor = self._program(shaders.floor_shaders(False, lamps, self._taps, sky))
+        self._lit = self.mesh, self.solid, self.floor, self.bare_floor
 
-    def light_by(self, light, to_shadow):
-        """Set the uniforms of ``light``; ``to_shadow`` (4, 4): from the world to the shadow map's texture."""
-        for program in (self.surface, self.floor):
-            program["ambient"].value, program["sun"].value = light.ambient, light.sun
-            program["to_sun"].value = light.to_sun
-            program["to_shadow"].write(matrix_bytes(to_shadow))
-            if not light.lamps:
-                continue
-            program["lamps"].value = len(light.lamps)
-            for name in Lamp._fields:
-                values = np.zeros((MOST_LAMPS, len(getattr(_NO_LAMP, name))), dtype=np.float32)
-                for row, lamp in zip(values, light.lamps, strict=False):
-                    row[:] = getattr(lamp, name)
-                program["lamp_" + name].write(values.tobytes())
+    def light_by(self, light):
+        """Set the uniforms of ``light``."""
+        for program in self._lit:
+            for name in ("ambient", "sun", "sun_shine", "to_sun", "horizon"):
+                _set(program, name, getattr(light, name))
+            for unit, name in enumerate(("shadow", "picture", "lamp_shadow")):
+                _set(program, name, unit)
+            for number, lamp in enumerate(light.lamps):
+                for name, value in lamp.uniforms().items():
+                    _set(program, "%s_%d" % (name, number), value)
+        for name in ("horizon", "zenith", "sun", "to_sun"):
+            _set(self.sky, name, getattr(light, name))
+
+    def look(self, to_clip, eye):
+        """Set the camera: from the world to clip space (4, 4), its place (3)."""
+        for program in self._lit:
+            program["to_clip"].write(matrix_bytes(to_clip))
+            _set(program, "eye", tuple(eye))
+
+    def shadow_by(self, shadows):
+        """Set where the maps of :class:`sensor_renderer.shadows.Shadows` are."""
+        for program in self._lit:
+            if "to_shadow" in program:
+                program["to_shadow"].write(matrix_bytes(shadows.to_map))
+            for number, matrix in shadows.lamp_matrices.items():
+                if "lamp_matrix_%d" % number in program:
+                    program["lamp_matrix_%d" % number].write(matrix_bytes(matrix))
+            _set(program, "margin", shadows.margin_m + (_THINNED_M if program is self.mesh else 0.0))
+
+    def _program(self, vertex_and_fragment):
+        vertex, fragment = vertex_and_fragment
+        return self._context.program(vertex_shader=vertex, fragment_shader=fragment)
+
+
+def _set(program, name, value):
+    # The compiler leaves out what a program does not use.
+    if name in program:
+        program[name].value = value
+
+
+def _kinds(light):
+    return light.shadows and any(light.sun), light.sky, tuple(lamp.kind for lamp in light.lamps)
 
 
 def matrix_bytes(matrix):

@@ -1,18 +1,59 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What pictures are drawn into. ROS-free."""
+import numpy as np
 
 
 class Targets:
-    """The framebuffers of one context, one for each size."""
+    """The targets of one context, one for each size."""
 
-    def __init__(self, context):
+    def __init__(self, context, samples):
+        """``samples``: of each pixel, for smooth edges."""
         self._context = context
-        self._buffers = {}
+        self._samples = samples
+        self._targets = {}
 
     def of(self, width, height):
-        """(framebuffer, its depth texture) of this size [pixels]."""
-        if (width, height) not in self._buffers:
-            depth = self._context.depth_texture((width, height))
-            buffer = self._context.framebuffer(self._context.renderbuffer((width, height), 4), depth)
-            self._buffers[width, height] = buffer, depth
-        return self._buffers[width, height]
+        """The :class:`Target` of this size [pixels]."""
+        if (width, height) not in self._targets:
+            self._targets[width, height] = Target(self._context, (width, height), self._samples)
+        return self._targets[width, height]
+
+
+class Target:
+    """A framebuffer: colour and depth."""
+
+    def __init__(self, context, size, samples):
+        """``size``: width, height [pixels]."""
+        self._context = context
+        self._size = size
+        self._depth = context.depth_texture(size)
+        self._read = self._drawn = context.framebuffer(context.renderbuffer(size, 4), self._depth)
+        if samples > 1:
+            self._drawn = context.framebuffer(context.renderbuffer(size, 4, samples=samples),
+                                              context.depth_renderbuffer(size, samples=samples))
+
+    def clear(self, colour=(0.0, 0.0, 0.0)):
+        """Draw into this target from now on; it is empty."""
+        self._drawn.use()
+        self._drawn.clear(*colour, 1.0, depth=1.0)
+
+    def draw_behind(self, array):
+        """Render ``array`` where nothing has been drawn; its depth is not kept."""
+        self._drawn.depth_mask = False
+        array.render()
+        self._drawn.depth_mask = True
+
+    def picture(self):
+        """uint8 (height, width, 3)."""
+        self._resolve()
+        pixels = np.frombuffer(self._read.read(components=3, alignment=1), np.uint8)
+        return pixels.reshape(self._size[1], self._size[0], 3)
+
+    def depth(self):
+        """float32 (height, width), 0 to 1."""
+        self._resolve()
+        return np.frombuffer(self._depth.read(alignment=1), np.float32).reshape(self._size[1], self._size[0])
+
+    def _resolve(self):
+        if self._drawn is not self._read:
+            self._context.copy_framebuffer(self._read, self._drawn)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sensor_renderer.floor import on_floor
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.light import MOST_LAMPS, Light
 from sensor_renderer.mirror import Mirror
@@ -73,7 +74,7 @@ def test_a_shadow_has_a_soft_edge_where_geometry_says(renderer, tmp_path):
         row = picture[100, :, 0].astype(int)[::-turn]
         assert (np.diff(row) <= 0).all() and row[0] > 1.4 * row[-1]
         between = np.flatnonzero((row < row[0] - 5) & (row > row[-1] + 5))
-        assert 5 <= len(between) <= 20, "a ramp of about the 9 mm of a pixel of the shadow map"
+        assert 4 <= len(between) <= 20, "a ramp of one or two pixels of the shadow map, of 4 mm"
         assert abs(between.mean() - 100) <= 20
 
 
@@ -110,6 +111,90 @@ def test_lamps_light_what_they_reach(renderer, tmp_path):
         assert at(picture, 0.4, 0.4)[2] > at(picture, -0.4, -0.4)[2] + 40
         short = seen(renderer, world(tmp_path, {"lights": [{**point, "range": 0.2}], "ambient": [0.1] * 3}, *bodies))
         assert short[..., 2].max() < 50
+
+
+@pytest.mark.parametrize("kind", ["spot", "point"])
+def test_the_strongest_lamps_throw_shadows(renderer, tmp_path, kind):
+    """A lamp above and to the left of a cube: its shadow lies to the right, where the lines from the lamp end."""
+    cube = {"name": "cube", "urdf": CUBE, "joints": []}, [0, 0, 0.3, *UPRIGHT]
+    values = {"place": [0, 0.5, 1.0], "direction": [0, -0.5, -0.8], "spot": [1.6, 1.8, 1.0], "diffuse": [1.2] * 3}
+    for turn in (1, -1):
+        values["place"][1], values["direction"][1] = 0.5 * turn, -0.5 * turn
+        lit, shaded = (seen(renderer, world(tmp_path, {"lights": [lamp(kind, cast_shadows=casts, **values)]}, cube))
+                       for casts in (False, True))
+        # Through the middle of the cube at 0.3 m, and past it.
+        assert at(shaded, 0.0, -0.21 * turn).sum() < 0.75 * at(lit, 0.0, -0.21 * turn).sum()
+        for x, y in ((0.0, 0.3 * turn), (0.5, -0.2 * turn), (0.0, -0.75 * turn)):
+            assert at(shaded, x, y) == pytest.approx(at(lit, x, y), abs=2)
+
+
+def test_only_the_strongest_lamps_have_shadow_maps():
+    lamps = [lamp("point", diffuse=[value] * 3, cast_shadows=casts)
+             for value, casts in ((0.2, True), (0.9, False), (0.5, True), (0.4, True))]
+    assert [made.shadow for made in Light.of_scene({"lights": lamps}).lamps] == [None, None, 0, 1]
+    assert not any(made.kind[1] for made in Light.of_scene({"lights": lamps, "shadows": False}).lamps)
+
+
+def test_glossy_things_have_a_highlight_where_the_mirror_image_of_the_lamp_is(renderer, tmp_path):
+    ball = {"name": "ball", "urdf": BALL, "joints": []}, [0, 0, 0.2, *UPRIGHT]
+    lights = [[lamp("directional", direction=(0.0, -1.0, -1.0), specular=[value] * 3)] for value in (0.0, 0.3)]
+    without, with_it = (seen(renderer, world(tmp_path, {"lights": light, "ambient": [0.1] * 3}, ball)).sum(axis=2)
+                        for light in lights)
+    row, column = np.unravel_index((with_it - without).argmax(), without.shape)
+    # On a ball of 0.4 m, 22.5 degrees towards the light from the top.
+    y = 0.4 * np.sin(np.pi / 8)
+    depth = 1.8 - 0.4 * np.cos(np.pi / 8)
+    assert row == pytest.approx(99.5, abs=4) and column == pytest.approx(99.5 - PINHOLE.fx * y / depth, abs=4)
+    assert (with_it - without).max() > 15
+
+
+def test_the_sky_is_bright_at_the_horizon_and_blue_above(renderer, tmp_path):
+    level = pose_matrix((0.0, 0.0, 2.0), (0.0, -0.4, 0.0)) @ OPTICAL
+    picture = seen(renderer, world(tmp_path, {}), level)
+    red, blue = picture[..., 0].mean(axis=1), picture[..., 2].mean(axis=1)
+    assert (np.diff(red[:185]) >= -0.5).all(), "darker further up"
+    assert blue[0] - red[0] > blue[180] - red[180] + 20
+    given = {"background": [0.2, 0.3, 0.2]}
+    assert (seen(renderer, world(tmp_path, given), level)[50] == (51, 76, 51)).all()
+    assert np.ptp(seen(renderer, world(tmp_path, {**given, "sky": True}), level)[:, 0], axis=0).max() > 20
+
+
+def test_far_tiles_of_the_floor_are_one_grey(renderer, tmp_path):
+    level = pose_matrix((0.0, 0.0, 2.0), (0.0, 0.15, 0.0)) @ OPTICAL
+    row = seen(renderer, world(tmp_path, {}), level)[72]  # about 40 m away
+    assert np.ptp(row, axis=0).max() <= 3
+
+
+def test_a_still_has_smoother_edges(renderer, tmp_path):
+    cube = {"name": "cube", "urdf": CUBE, "joints": []}, [0, 0, 0.3, 0, 0, 0.131, 0.991]
+    mirror = world(tmp_path, {"ambient": [1.0] * 3, "lights": []}, cube)
+    still = GlRenderer(still=True)
+    shades = [len(np.unique(drawn.render(mirror, PINHOLE, ABOVE)[0][60:140, 60:140].reshape(-1, 3), axis=0))
+              for drawn in (renderer, still)]
+    still.close()
+    assert shades[1] >= shades[0] + 3, "pixels at the edge are between cube and floor"
+
+
+def test_the_map_is_drawn_again_when_something_has_moved_by_more_than_it_shows(renderer, tmp_path):
+    cube = {"name": "cube", "urdf": CUBE, "joints": []}, np.array([0, 0, 0.3, *UPRIGHT])
+    mirror = world(tmp_path, {}, cube)
+    seen(renderer, mirror)
+    drawn = []
+    inner = renderer._shadows._draw_from
+    renderer._shadows._draw_from = lambda *arguments: drawn.append(inner(*arguments))
+    for away, count in ((1e-5, 0), (0.0, 0), (0.02, 1)):
+        mirror.set_state(np.concatenate([[0, 0, 0, *UPRIGHT], cube[1] + [away, 0, 0, 0, 0, 0, 0]]))
+        seen(renderer, mirror)
+        assert len(drawn) == count
+
+
+def test_the_shaded_part_of_the_floor_is_where_the_light_meets_it():
+    corners = np.array([(-1.0, -1.0, 2.0), (1.0, -1.0, 2.0), (1.0, 1.0, 2.0), (-1.0, 1.0, 2.0)])
+    floor = pose_matrix((0.0, 0.0, 0.5), (0.0, 0.0, 0.0))
+    away = np.array((0.6, 0.0, 0.8))
+    assert on_floor(floor, corners, away)[:, 0] == pytest.approx(np.array((-1.0, 1.0, 1.0, -1.0)) - 1.5 * 0.75)
+    assert on_floor(floor, corners, away)[:, 1] == pytest.approx(corners[:, 1])
+    assert on_floor(floor, corners, np.array((1.0, 0.0, 0.05))) is None
 
 
 def test_strange_lights_do_no_harm():
