@@ -13,8 +13,8 @@ import yaml
 
 from model_files.resources import ResourceFinder
 from rospy_limits.node import limit_ports
-from sensor_renderer.errors import RenderingError, SensorError
-from sensor_renderer.gl_renderer import GlRenderer
+from sensor_renderer.best import best_renderer
+from sensor_renderer.errors import SensorError
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.sensor_element import SensorEntry
 from world_picture.drawing import DrawingCache
@@ -174,14 +174,9 @@ def _find_snapshot(stop):
 
 def make_renderer():
     """Return the best renderer of this machine, and log which one it is."""
-    try:
-        renderer = GlRenderer()
-    except RenderingError as error:
-        from sensor_renderer.tiny_renderer import TinyRenderer
-
-        rospy.logwarn("%s; pictures come from PyBullet's TinyRenderer, about ten times slower. Install libegl1 and "
-                      "libgl1-mesa-dri." % error)
-        renderer = TinyRenderer()
+    renderer, problem = best_renderer()
+    if problem:
+        rospy.logwarn(problem)
     rospy.loginfo("cameras are drawn by %s" % renderer.name)
     return renderer
 

@@ -1,53 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The world from outside: a camera outside of the robot, and frames drawn into its picture. ROS-free."""
-import math
-
 import cv2
 import numpy as np
 
-from sensor_renderer.errors import RenderingError
+from sensor_renderer.best import best_renderer
 from sensor_renderer.following import WorldFollower
-from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.pinhole import Pinhole
+from sensor_renderer.viewpoint import extent, looking_at, overview
 
 FIELD_OF_VIEW_RAD = 0.75
-# Default position of the camera, relative to the centre of the scene.
-DIRECTION = np.array([0.78, 0.48, 0.34])
 # Axes x, y, z as everywhere in ROS [red, green, blue].
 _AXIS_COLOURS = ((214, 39, 40), (34, 150, 60), (31, 90, 210))
-
-
-def looking_at(eye, target):
-    """Pose (4, 4) in the world of an optical frame (z ahead, x right, y down) at `eye` that looks at `target` [m].
-
-    Raises ValueError if the camera would look straight up or down.
-    """
-    ahead = np.subtract(target, eye).astype(float)
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
-    if np.linalg.norm(right) < 1e-6 * max(np.linalg.norm(ahead), 1e-6):
-        raise ValueError("the camera at %s cannot look at %s: that is straight up, straight down, or itself"
-                         % (tuple(eye), tuple(target)))
-    ahead /= np.linalg.norm(ahead)
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, np.cross(ahead, right), ahead], axis=1)
-    pose[:3, 3] = eye
-    return pose
-
-
-def extent(mirror):
-    """(low, high): the box [m] around all bodies except floors. The unit box if there are none."""
-    corners = []
-    for body in mirror.bodies.values():
-        for parts, matrix in zip(body.parts, body.matrices, strict=True):
-            for part in parts:
-                if part.is_floor:
-                    continue
-                points = part.triangles[:, :3] @ matrix[:3, :3].T + matrix[:3, 3]
-                corners += [points.min(axis=0), points.max(axis=0)]
-    if not corners:
-        return np.zeros(3), np.ones(3)
-    return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
 def draw_frame(pixels, pinhole, view, frame, length, name=""):
@@ -92,26 +55,14 @@ class Outside(WorldFollower):
         [m].
         """
         if target is None or eye is None:
-            low, high = extent(self.mirror)
-            middle, radius = (low + high) / 2.0, float(np.linalg.norm(high - low)) / 2.0
-            target = middle if target is None else np.asarray(target, dtype=float)
-            narrow = FIELD_OF_VIEW_RAD * min(1.0, height / width)
-            away = DIRECTION / np.linalg.norm(DIRECTION)
-            eye = target + away * 0.92 * radius / math.sin(narrow / 2.0) if eye is None else eye
+            outside, target = overview(*extent(self.mirror), width / height, FIELD_OF_VIEW_RAD, target)
+            eye = outside if eye is None else eye
         pose = looking_at(eye, target)
         pinhole = Pinhole.from_field_of_view(width, height, FIELD_OF_VIEW_RAD, 0.05, 100.0)
         if self._renderer is None:
-            self._renderer = _make_renderer()
+            self._renderer, _ = best_renderer()
         pixels = self._renderer.render(self.mirror, pinhole, pose)[0].copy()
         for name, frame in (frames or {}).items():
             draw_frame(pixels, pinhole, np.linalg.inv(pose), frame, length, name)
         return pixels
 
-
-def _make_renderer():
-    try:
-        return GlRenderer()
-    except RenderingError:
-        from sensor_renderer.tiny_renderer import TinyRenderer
-
-        return TinyRenderer()

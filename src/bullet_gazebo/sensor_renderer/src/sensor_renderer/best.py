@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The best renderer of this machine. ROS-free."""
+from sensor_renderer.errors import RenderingError
+from sensor_renderer.gl_renderer import GlRenderer
+
+
+def best_renderer():
+    """(renderer, problem): a :class:`GlRenderer` and "", or, where there is no EGL, a
+    :class:`sensor_renderer.tiny_renderer.TinyRenderer` and a line that says why. It belongs to the calling thread."""
+    try:
+        return GlRenderer(), ""
+    except RenderingError as error:
+        from sensor_renderer.tiny_renderer import TinyRenderer
+
+        return TinyRenderer(), ("%s; pictures come from PyBullet's TinyRenderer, about ten times slower. Install "
+                                "libegl1 and libgl1-mesa-dri." % error)
