@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The services and the topic under /gazebo that are about single links and joints."""
+import time
+
 import numpy as np
+from bullet_sim_msgs.msg import Drag
 from gazebo_msgs.msg import LinkState
 from gazebo_msgs.srv import (
     ApplyBodyWrench,
@@ -26,6 +29,7 @@ from gazebo_msgs.srv import (
 )
 
 from bullet_sim import BulletSimError, Pose
+from gazebo_ros import dragging
 from gazebo_ros.convert import msg_from_pose, msg_from_twist, pose_from_msg, twist_from_msg, vector_from_msg
 from gazebo_ros.entities import WORLD_FRAMES, UnknownEntity
 from gazebo_ros.jobs import TimedJobs
@@ -35,10 +39,12 @@ from urdf_model import bounds
 _REFUSALS = (UnknownEntity, BulletSimError, ValueError)
 _JOINT_TYPES = {"revolute": GetJointPropertiesResponse.REVOLUTE, "continuous": GetJointPropertiesResponse.CONTINUOUS,
                 "prismatic": GetJointPropertiesResponse.PRISMATIC}
-# Fields of ODEJointProperties that are about ODE's solver and have no counterpart in Bullet.
 # Largest number of wrenches and efforts at a time. Only a program that never ends one reaches it, and each one costs
 # time in every tick.
 _MOST_JOBS = 1000
+# A hand has one pointer.
+_MOST_DRAGS = 20
+# Fields of ODEJointProperties that are about ODE's solver and have no counterpart in Bullet.
 _ODE_ONLY = ("erp", "cfm", "stop_erp", "stop_cfm", "fudge_factor", "fmax", "vel")
 
 
@@ -56,6 +62,8 @@ class BodyServices:
         self._faults = ros.faults
         self._wrenches = TimedJobs()  # of (model, link)
         self._efforts = TimedJobs()  # of (model, joint)
+        self._drags = dragging.Drags()  # of (model, link)
+        self._drag_commands = ros.subscription("/gazebo/drag", Drag, depth=10, notice=notice)
         self._link_state_commands = ros.subscription("/gazebo/set_link_state", LinkState, depth=10, notice=notice)
         for name, srv_class, handler in (
                 ("apply_body_wrench", ApplyBodyWrench, self._apply_body_wrench),
@@ -71,8 +79,9 @@ class BodyServices:
             ros.service("/gazebo/" + name, srv_class, handler)
 
     def take_commands(self):
-        """Execute the messages of /gazebo/set_link_state."""
+        """Execute the messages of /gazebo/set_link_state and /gazebo/drag."""
         self._link_state_commands.handle(self._take_link_state)
+        self._drag_commands.handle(self._take_drag)
 
     def _take_link_state(self, command):
         try:
@@ -80,8 +89,30 @@ class BodyServices:
         except _REFUSALS as error:
             self._log.warn_throttle(5.0, "/gazebo/set_link_state: %s" % error)
 
+    def _take_drag(self, command):
+        try:
+            model, link = self._entities.link(command.link)
+            target = model.name, link
+            if not command.hold:
+                self._drags.remove(lambda other: other == target)
+                return
+            if model.static and model.merged.frames[link].link == model.merged.root:
+                raise ValueError("link '%s' is fixed in the world; nothing pulls it away" % command.link)
+            grip = vector_from_msg(command.grip, bounds.POSITION, "the grip")
+            end = vector_from_msg(command.target, bounds.POSITION, "the target")
+        except _REFUSALS as error:
+            self._log.warn_throttle(5.0, "/gazebo/drag: %s" % error)
+            return
+        if target not in self._drags and len(self._drags) >= _MOST_DRAGS:
+            self._log.warn_throttle(5.0, "/gazebo/drag: %d links are pulled already, expected less" % len(self._drags))
+            return
+        self._drags.ask(target, dragging.Drag(grip, end, time.monotonic()))
+
     def push(self):
-        """Before a physics step: apply the wrenches and efforts that are due."""
+        """Before a physics step: apply the wrenches, efforts and pulls that are due."""
+        if self._drags:
+            for target, drag in self._drags.due(time.monotonic()):
+                self._push_one(self._drags, target, self._pull_link, drag)
         if not (self._wrenches or self._efforts):
             return
         now = self._simulation.time_ns
@@ -97,6 +128,9 @@ class BodyServices:
             self._faults.note("pushing %s::%s" % target, error, "it is pushed no more")
             jobs.remove(lambda other: other == target)
 
+    def _pull_link(self, model_name, link, drag):
+        dragging.push(self._world.models[model_name], link, drag, self._simulation.step_s)
+
     def _push_link(self, model_name, link, force, torque):
         self._world.models[model_name].apply_wrench(link, force, torque)
 
@@ -105,8 +139,8 @@ class BodyServices:
         model.add_effort(model.index([joint]), np.array([effort]))
 
     def forget(self, model_name=None):
-        """Drop the wrenches and efforts of a model that is gone, or all."""
-        for jobs in (self._wrenches, self._efforts):
+        """Drop the wrenches, efforts and pulls of a model that is gone, or all."""
+        for jobs in (self._wrenches, self._efforts, self._drags):
             jobs.remove(lambda target: model_name is None or target[0] == model_name)
 
     # -- wrenches and efforts -------------------------------------------------------------------------------------

@@ -5,9 +5,10 @@ import struct
 import time
 
 import rospy
-from gazebo_msgs.msg import LinkStates, ModelStates, PerformanceMetrics
+from gazebo_msgs.msg import ContactsState, LinkStates, ModelStates, PerformanceMetrics
 from rosgraph_msgs.msg import Clock
 
+from gazebo_ros.contact_messages import contact_states
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
 from gazebo_ros.pacing import RateMeter, SlownessWatch, slowness_line, ticks_between
 from sim_time.stamps import stamp_ns
@@ -20,6 +21,9 @@ MAX_WALL_CLOCK_RATE = 500.0
 MAX_WALL_SNAPSHOT_RATE = 100.0
 # Model and link states and the snapshot go out at this rate, in simulation time [Hz].
 STATES_RATE = 100.0
+# The contacts of the whole world go out at this rate, in simulation time and, faster than real time, at most so often
+# per wall second [Hz].
+CONTACTS_RATE = 25.0
 # Rate of the snapshot in a paused world, where services can still move models [Hz, wall time].
 PAUSED_SNAPSHOT_RATE = 20.0
 
@@ -46,6 +50,8 @@ class Publications:
         self._clock = ros.publisher("/clock", Clock, greet=True)
         self._model_states = ros.publisher("/gazebo/model_states", ModelStates)
         self._link_states = ros.publisher("/gazebo/link_states", LinkStates)
+        self._contacts = ros.publisher("/gazebo/contacts", ContactsState)
+        self._contacts_sent_at = 0.0
         self._metrics = ros.publisher("/gazebo/performance_metrics", PerformanceMetrics)
         self.publish_clock()
 
@@ -54,6 +60,7 @@ class Publications:
         tick_rate = 1.0 / self._simulation.step_s
         self._clock_divisor = ticks_between(self._clock_rate, tick_rate)
         self._states_divisor = ticks_between(STATES_RATE, tick_rate)
+        self._contacts_divisor = ticks_between(CONTACTS_RATE, tick_rate)
 
     def on_turn(self):
         """While the world is paused: exclude that time from the measured rate, and show what services change."""
@@ -84,6 +91,8 @@ class Publications:
                 self._snapshot_written_at = now
                 self.write_snapshot()
             self._publish_states()
+        if tick % self._contacts_divisor == 0 or paused:
+            self._publish_contacts(now)
         factor = self._meter.update(simulation.time_s)
         if factor is not None:
             self._report(factor)
@@ -110,7 +119,7 @@ class Publications:
             if model.joint_names:
                 parts.append(model.read_joints()[0])
         try:
-            self._snapshot.write(self._simulation.tick, self._simulation.time_s, parts)
+            self._snapshot.write(self._simulation.tick, self._simulation.time_s, parts, self._simulation.paused)
         except ValueError as error:
             if not self._snapshot_too_small:
                 self._log.warn("%s; windows and cameras stand still" % error)
@@ -136,6 +145,14 @@ class Publications:
                     message.pose.append(msg_from_pose(model.link_pose(link)))
                     message.twist.append(msg_from_twist(*model.link_twist(link)))
             self._link_states.publish(message)
+
+    def _publish_contacts(self, now):
+        too_soon = now - self._contacts_sent_at < 0.5 / CONTACTS_RATE and not self._simulation.paused
+        if self._contacts.has_listeners and not too_soon:
+            self._contacts_sent_at = now
+            message = ContactsState(states=contact_states(self._simulation.world.contacts()))
+            message.header.stamp, message.header.frame_id = stamp_ns(self._simulation.time_ns), "world"
+            self._contacts.publish(message)
 
     def _report(self, factor):
         simulation = self._simulation

@@ -2,13 +2,14 @@
 """Gazebo's sensor plugins that measure without pictures: laser, range finder, IMU, bumper, pose, joint states."""
 
 import numpy as np
-from gazebo_msgs.msg import ContactsState, ContactState
-from geometry_msgs.msg import Quaternion, Vector3, Wrench
+from gazebo_msgs.msg import ContactsState
+from geometry_msgs.msg import Quaternion, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState, LaserScan, Range
 from std_srvs.srv import Empty, EmptyResponse
 
 from bullet_sim import Pose
+from gazebo_ros.contact_messages import contact_states
 from gazebo_ros.convert import msg_from_pose, msg_from_twist
 from gazebo_ros.model_plugin import ModelPlugin, PluginError
 from gazebo_ros.ray_pattern import RayPattern, RayPatternError, Sweep
@@ -278,32 +279,9 @@ class Bumper(PacedSensor):
     def publish(self, time_s):
         if not self.is_due(time_s):
             return
-        model, touching = self.context.model, {}
-        for contact in self.context.world.contacts(model):
-            sides = ((contact.model_a, contact.link_a), (contact.model_b, contact.link_b))
-            if (model.name, self._body) not in sides:
-                continue
-            # The normal points from b to a: turned, where the link is b.
-            mine, other, sign = (*sides, 1.0) if sides[0] == (model.name, self._body) else (*sides[::-1], -1.0)
-            touching.setdefault((mine, other), []).append((contact, sign))
-        states = [_contact_state(mine, other, points) for (mine, other), points in touching.items()]
+        model = self.context.model
+        states = contact_states(self.context.world.contacts(model), about=(model.name, self._body))
         self.publisher.publish(self.stamped(ContactsState(states=states), time_s, self._frame))
-
-
-def _contact_state(mine, other, points):
-    state = ContactState(collision1_name="%s::%s" % mine, collision2_name="%s::%s" % other)
-    state.info = "%d contact points" % len(points)
-    total = np.zeros(3)
-    for contact, sign in points:
-        normal = sign * np.asarray(contact.normal)
-        force = contact.force * normal + sign * np.asarray(contact.friction)
-        total += force
-        state.wrenches.append(Wrench(force=Vector3(*force)))
-        state.contact_positions.append(Vector3(*contact.position))
-        state.contact_normals.append(Vector3(*normal))
-        state.depths.append(max(-contact.distance, 0.0))
-    state.total_wrench.force = Vector3(*total)
-    return state
 
 
 class JointStatePublisher(PacedSensor):

@@ -94,6 +94,7 @@ class Spawner:
     def listed(self):
         """The scene's entry of each model of the world."""
         return [{"name": model.name, "joints": list(model.joint_names), "urdf": self.drawings.get(model.name),
+                 "static": bool(model.static),
                  "sensors": self.sensors.get(model.name, []),
                  "screens": [entry for entry, _ in self._screens.get(model.name, [])]}
                 for model in self._simulation.world.models.values()]

@@ -4,9 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from bullet_sim import Contact
 from gazebo_ros import publications
 
 STEP_S = 0.002
+TOUCH = Contact("cup", "body", "table", "top", (0.1, 0.2, 0.3), (0.0, 0.0, 1.0), -0.001, 5.0, (1.0, 0.0, 0.0))
 
 
 class World:
@@ -16,15 +18,23 @@ class World:
         self.wall_s, self.factor, self.snapshots, self.clocks = 100.0, factor, [], 0
         monkeypatch.setattr(publications.time, "perf_counter", lambda: self.wall_s)
         self.simulation = SimpleNamespace(step_s=STEP_S, tick=0, time_ns=0, time_s=0.0, paused=paused, is_stepping=True,
-                                          real_time_factor=asked, world=SimpleNamespace(models={}))
+                                          real_time_factor=asked,
+                                          world=SimpleNamespace(models={}, contacts=lambda: [TOUCH, TOUCH]))
+        self.contacts = SimpleNamespace(has_listeners=False, publish=lambda message: self.messages.append(message))
+        self.messages, self.pauses = [], []
         publisher = SimpleNamespace(has_listeners=False, publish_serialized=self._count)
-        ros = SimpleNamespace(publisher=lambda *arguments, **options: publisher)
-        self.snapshot = SimpleNamespace(write=lambda tick, time_s, parts: self.snapshots.append(tick), resets=0)
+        ros = SimpleNamespace(publisher=lambda topic, *arguments, **options: (
+            self.contacts if topic == "/gazebo/contacts" else publisher))
+        self.snapshot = SimpleNamespace(write=self._write, resets=0)
         self.publications = publications.Publications(self.simulation, ros, self.snapshot, log=None, clock_rate=500.0)
         self.clocks = 0
 
     def _count(self, data):
         self.clocks += 1
+
+    def _write(self, tick, time_s, parts, paused):
+        self.snapshots.append(tick)
+        self.pauses.append(paused)
 
     def run(self, seconds):
         for _ in range(round(seconds / STEP_S)):
@@ -65,3 +75,28 @@ def test_a_reset_of_the_time_is_counted_and_shown_at_once(monkeypatch):
     world.publications.time_was_reset()
     assert world.snapshot.resets == 1
     assert world.snapshots == [5, 0]
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_the_snapshot_says_whether_the_world_is_paused(monkeypatch, paused):
+    world = World(monkeypatch, factor=1.0, paused=paused, asked=1.0)
+    world.publications.write_snapshot()
+    assert world.pauses == [paused]
+
+
+def test_contacts_go_out_to_subscribers_only_and_no_more_often_than_they_can_use(monkeypatch):
+    world = World(monkeypatch, factor=1.0, asked=1.0)
+    world.run(1.0)
+    assert world.messages == []
+    world.contacts.has_listeners = True
+    world.run(1.0)
+    assert len(world.messages) == publications.CONTACTS_RATE
+    state, = world.messages[-1].states
+    assert (state.collision1_name, state.collision2_name) == ("cup::body", "table::top")
+    assert len(state.contact_positions) == 2 and state.contact_positions[0].z == 0.3
+    assert (state.total_wrench.force.x, state.total_wrench.force.z) == (2.0, 10.0) and state.depths == [0.001, 0.001]
+    assert world.messages[-1].header.frame_id == "world"
+    fast = World(monkeypatch, factor=50.0, asked=0.0)
+    fast.contacts.has_listeners = True
+    fast.run(50.0)
+    assert 0.9 * publications.CONTACTS_RATE < len(fast.messages) <= 2.0 * publications.CONTACTS_RATE + 1

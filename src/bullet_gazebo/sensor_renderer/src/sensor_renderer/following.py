@@ -8,7 +8,7 @@ from world_picture.snapshot import SnapshotReader
 
 class WorldFollower:
     """Use it in the thread that made it. ``mirror``: the :class:`sensor_renderer.mirror.Mirror`; ``revision``: the
-    number of the scene that it shows, None before the first; ``warn(text)``.
+    number of the scene that it shows, None before the first; ``snapshot``: the state that it shows; ``warn(text)``.
     """
 
     def __init__(self, folder, warn):
@@ -16,7 +16,7 @@ class WorldFollower:
         self._reader = SnapshotReader(folder)
         self._finder = ResourceFinder()
         self.mirror = Mirror(DrawingCache(), self._finder, warn)
-        self.revision = None
+        self.revision = self.snapshot = None
 
     @property
     def is_alive(self):
@@ -38,4 +38,5 @@ class WorldFollower:
             self.mirror.set_scene(scene.bodies, scene.light)
             self.revision = scene.revision
         self.mirror.set_state(snapshot.values)
+        self.snapshot = snapshot
         return True

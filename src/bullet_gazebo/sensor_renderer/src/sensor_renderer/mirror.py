@@ -48,10 +48,12 @@ class Screen(NamedTuple):
 class Body:
     """A model: its links as parts, its screens, and their poses."""
 
-    def __init__(self, links, joints, screens=()):
-        """``links``: list of (name, parts), parents first; ``joints``: one ``urdf_model.Joint`` per link but the first.
+    def __init__(self, links, joints, screens=(), static=False):
+        """``links``: list of (name, parts), parents first; ``joints``: one ``urdf_model.Joint`` per link but the first;
+        ``static``: whether its root is fixed in the world.
         """
         self.screens = screens
+        self._static = static
         self._joints = joints
         self._index = {name: number for number, (name, _) in enumerate(links)}
         self.parts = [parts for _, parts in links]
@@ -97,6 +99,10 @@ class Body:
                 found[number] = matrices[number] = matrices[parent] @ joint.origin @ _motion(joint, position)
         return found
 
+    def is_fixed(self, name):
+        """Whether a body link is fixed in the world; ``KeyError`` for an unknown one."""
+        return self._static and self._index[name] == 0
+
     def link_matrix(self, name):
         """Pose (4, 4) of a body link's frame in the world; ``KeyError`` for an unknown one."""
         return self.matrices[self._index[name]]
@@ -136,7 +142,7 @@ class Mirror:
         self._bodies = {}
         for entry in listed:
             name = entry["name"]
-            key = (entry["urdf"], tuple(entry["joints"]), str(entry.get("screens")))
+            key = (entry["urdf"], tuple(entry["joints"]), str(entry.get("screens")), bool(entry.get("static")))
             old = known.get(name)
             self._bodies[name] = old if old is not None and old[0] == key else (key, self._build(entry))
         self.bodies = {name: body for name, (_, body) in self._bodies.items()}
@@ -150,15 +156,21 @@ class Mirror:
             start += body.size
         self.version += moved
 
+    @property
+    def has_new_pictures(self):
+        """Whether a screen shows another picture than the one that was read last."""
+        return any(screen.picture.has_news for body in self.bodies.values() for screen in body.screens)
+
     def _build(self, entry):
         if entry["urdf"] is None:
-            return Body([("", [_floor()])], [])
+            return Body([("", [_floor()])], [], static=True)
         merged = merge_fixed(parse_urdf(entry["urdf"], source=entry["name"]))
         joints = list(merged.joints.values())
         order = [merged.root, *(joint.child for joint in joints)]
         links = [(name, [part for shape in merged.links[name].visuals for part in self._parts_of(shape)])
                  for name in order]
-        return Body(links, joints, [screen for screen in map(self._screen, entry.get("screens", ())) if screen])
+        screens = [screen for screen in map(self._screen, entry.get("screens", ())) if screen]
+        return Body(links, joints, screens, bool(entry.get("static")))
 
     def _screen(self, listed):
         try:

@@ -76,6 +76,12 @@ class PictureReader:
             raise SnapshotError("%s is shorter than a picture of %d x %d" % (path, self.width, self.height))
         self._seen = None
 
+    @property
+    def has_news(self):
+        """Whether :meth:`read` would return a picture."""
+        sequence, = _SEQUENCE.unpack_from(self._memory, _SEQUENCE_AT)
+        return sequence != self._seen and sequence % 2 == 0
+
     def read(self):
         """The picture (height, width, 3), a copy, if it has changed since the last call; else None."""
         sequence, = _SEQUENCE.unpack_from(self._memory, _SEQUENCE_AT)

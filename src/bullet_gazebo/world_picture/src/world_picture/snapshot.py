@@ -8,8 +8,8 @@ simulator holds a lock on ``state``, so a folder whose lock is free belonged to 
 ``state`` begins with a header (magic, sequence number) and has two slots. The writer fills the one that is not current,
 then raises the sequence number; a slot carries its own number, which is zero during a write, so a reader notices an
 interrupted read and tries again. A slot is: number, scene revision, how many times simulation time was reset, tick,
-count of values, time [s], then the values. Of each body, in the scene's order: position x y z [m], quaternion x y z w,
-joint angles [rad or m].
+count of values, time [s], whether the world is paused, then the values. Of each body, in the scene's order: position x
+y z [m], quaternion x y z w, joint angles [rad or m].
 """
 import contextlib
 import errno
@@ -26,11 +26,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAGIC = 0x42475332
+MAGIC = 0x42475333
 #: Values that a slot holds [float64]; pages that are never written take no memory.
 CAPACITY = 65536
 _HEADER = struct.Struct("<QQ")
-_SLOT = struct.Struct("<QQQQQd")
+_SLOT = struct.Struct("<QQQQQdQ")
 _SLOT_BYTES = _SLOT.size + 8 * CAPACITY
 _NUMBER = struct.Struct("<Q")
 _PREFIX = "bullet_gazebo-"
@@ -155,7 +155,7 @@ class NoSnapshot:
     def write_scene(self, bodies, light=None):
         """Does nothing, as the others here."""
 
-    def write(self, tick, time_s, parts):
+    def write(self, tick, time_s, parts, paused=False):
         """Does nothing."""
 
     def close(self):
@@ -213,8 +213,9 @@ class SnapshotWriter:
                 draft.unlink(missing_ok=True)
             raise SnapshotError(no_room(path, error)) from error
 
-    def write(self, tick, time_s, parts):
-        """Write the state: ``parts`` are arrays; concatenated, they are the slot's values.
+    def write(self, tick, time_s, parts, paused=False):
+        """Write the state: ``parts`` are arrays; concatenated, they are the slot's values. ``paused``: whether time
+        stands still.
 
         Raises ``ValueError`` when they are more than :data:`CAPACITY`.
         """
@@ -230,7 +231,7 @@ class SnapshotWriter:
                 raise ValueError("the world has more than %d state values, the snapshot's capacity" % CAPACITY)
             values[count:end] = part
             count = end
-        _SLOT.pack_into(self._memory, offset, 0, self.revision, self.resets, tick, count, time_s)
+        _SLOT.pack_into(self._memory, offset, 0, self.revision, self.resets, tick, count, time_s, paused)
         _NUMBER.pack_into(self._memory, offset, number)
         self._sequence = number
         _NUMBER.pack_into(self._memory, 8, number)
@@ -255,16 +256,17 @@ class Scene(NamedTuple):
 
 class Snapshot:
     """One state: ``tick``, ``time_s``, ``revision`` of the scene, ``resets`` of the time so far, ``values`` (float64
-    array, a copy)."""
+    array, a copy), ``paused``."""
 
-    __slots__ = ("revision", "resets", "tick", "time_s", "values")
+    __slots__ = ("paused", "resets", "revision", "tick", "time_s", "values")
 
-    def __init__(self, revision, resets, tick, time_s, values):
+    def __init__(self, revision, resets, tick, time_s, values, paused=False):
         self.revision = revision
         self.resets = resets
         self.tick = tick
         self.time_s = time_s
         self.values = values
+        self.paused = paused
 
 
 class SnapshotReader:
@@ -293,12 +295,12 @@ class SnapshotReader:
             if number == 0:
                 return None
             offset = _HEADER.size + (number & 1) * _SLOT_BYTES
-            before, revision, resets, tick, count, time_s = _SLOT.unpack_from(self._memory, offset)
+            before, revision, resets, tick, count, time_s, paused = _SLOT.unpack_from(self._memory, offset)
             if before != number or count > CAPACITY:
                 continue
             values = np.frombuffer(self._memory, np.float64, count, offset + _SLOT.size).copy()
             if _NUMBER.unpack_from(self._memory, offset)[0] == number:
-                return Snapshot(revision, resets, tick, time_s, values)
+                return Snapshot(revision, resets, tick, time_s, values, bool(paused))
 
     def scene(self):
         """The :class:`Scene` as it is now."""

@@ -36,7 +36,9 @@ def test_a_reader_gets_what_was_written_last(writer):
         writer.write(tick, tick * 0.002, [(tick, 0.0, 1.0), np.arange(tick, dtype=float)])
     read = reader.read()
     assert (read.tick, read.time_s, read.revision) == (5, 0.01, writer.revision)
-    assert read.values.tolist() == [5.0, 0.0, 1.0, 0.0, 1.0, 2.0, 3.0, 4.0]
+    assert read.values.tolist() == [5.0, 0.0, 1.0, 0.0, 1.0, 2.0, 3.0, 4.0] and read.paused is False
+    writer.write(5, 0.01, [[1.0]], paused=True)
+    assert reader.read().paused is True
 
 
 def test_what_was_read_does_not_change_afterwards(writer):
@@ -264,6 +266,17 @@ def test_a_picture_is_written_through_no_link(tmp_path):
     with pytest.raises(SnapshotError):
         PictureReader(tmp_path / "screen1")
     assert precious.read_text(encoding="ascii") == "mine"
+
+
+def test_a_viewer_knows_of_another_picture_before_it_reads_it(tmp_path):
+    writer = PictureWriter(tmp_path / "screen1", 4, 2)
+    reader = PictureReader(tmp_path / "screen1")
+    reader.read()
+    assert not reader.has_news and reader.read() is None
+    writer.show(np.full((2, 4, 3), 9, dtype=np.uint8))
+    assert reader.has_news and reader.has_news
+    assert reader.read().max() == 9
+    assert not reader.has_news
 
 
 def test_a_picture_that_is_shorter_than_it_says_is_refused(tmp_path):
