@@ -33,6 +33,12 @@ def measure(report, quick, number):
         with Lab(screen=True, enable="true", **{"gui": "false", "rviz": "false", what: "true"}) as lab:
             lab.part("swing")
             add(report, lab, {"gui": "the window", "rviz": "rviz"}[what], seconds, DRAWN)
+            if what == "gui":
+                window, wall = lab.process("/gazebo_gui"), time.monotonic()
+                used = window.cpu_s()
+                arrivals(lab, PLAN, ("/robot/joint_states",), seconds)
+                share = (window.cpu_s() - used) / (time.monotonic() - wall)
+                report.add("the window: its own CPU", 100.0 * share, "% of a core")
 
 
 def add(report, lab, what, seconds, least):

@@ -39,6 +39,7 @@ SUITES = {
     "physics": ("world_bench", "the stack at full speed beside bare steps: alone, with objects, clients, contact"),
     "loop": ("loop_bench", "real time: CPU, joint_states jitter, latency, with 0, 5 and 20 subscribers"),
     "keeps_up": ("keeps_up_bench", "real time with the window, rviz, a stopped reader, a busy thread in /gazebo"),
+    "window": ("window_bench", "the world's window: pictures per second, CPU of a picture and of a world at rest"),
     "hostile": ("hostile_bench", "hostile descriptions spawned: the longest gap in joint_states, the longest answer"),
     "lockstep": ("lockstep_bench", "two fresh labs in lock-step, the same commands: joint states bit for bit"),
     "services": ("service_bench", "the IK service beside an empty service"),

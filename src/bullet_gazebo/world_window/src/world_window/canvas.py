@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The widget with the picture: shows frames, and passes mouse and wheel on."""
+from PyQt5.QtCore import QPointF, Qt
+from PyQt5.QtGui import QColor, QFont, QImage, QPainter, QPen
+from PyQt5.QtWidgets import QWidget
+
+from world_window import overlay
+from world_window.stage import LEFT, MIDDLE, RIGHT
+
+_BUTTONS = {Qt.LeftButton: LEFT, Qt.MiddleButton: MIDDLE, Qt.RightButton: RIGHT}
+_SKY = QColor(158, 178, 204)
+_PER_NOTCH = 120.0  # of Qt's wheel
+
+
+class Canvas(QWidget):
+    """``events``: has ``press``, ``move``, ``release``, ``wheel`` and ``resize`` with the arguments of
+    :class:`world_window.stage.Stage`'s."""
+
+    def __init__(self, events, parent=None):
+        super().__init__(parent)
+        self._events = events
+        self._image = self._pixels = None
+        self._shapes = ()
+        #: Words in the middle while there is no picture.
+        self.words = "waiting for the simulator"
+        self._font = QFont("Sans", 9)
+        self.setFocusPolicy(Qt.StrongFocus)
+        self.setAttribute(Qt.WA_OpaquePaintEvent)
+        self.setMinimumSize(200, 150)
+
+    def show_frame(self, pixels, shapes):
+        """Show ``pixels`` (height, width, 3) with ``shapes`` of :mod:`world_window.overlay` over them."""
+        height, width = pixels.shape[:2]
+        self._pixels, self._shapes = pixels, shapes  # QImage does not copy
+        self._image = QImage(pixels.data, width, height, 3 * width, QImage.Format_RGB888)
+        self.update()
+
+    def show_nothing(self, words):
+        """Show ``words`` instead of a picture."""
+        self._image, self.words = None, words
+        self.update()
+
+    def paintEvent(self, event):
+        painter = QPainter(self)
+        if self._image is None:
+            painter.fillRect(self.rect(), _SKY)
+            painter.drawText(self.rect(), Qt.AlignCenter, self.words)
+            return
+        if self._image.size() == self.size():
+            painter.drawImage(0, 0, self._image)
+        else:
+            painter.drawImage(self.rect(), self._image)  # until one of this size comes
+        painter.setRenderHint(QPainter.Antialiasing)
+        painter.setFont(self._font)
+        for shape in self._shapes:
+            _paint(painter, shape)
+
+    def resizeEvent(self, event):
+        self._events.resize(event.size().width(), event.size().height())
+
+    def mousePressEvent(self, event):
+        button = _BUTTONS.get(event.button())
+        if button is not None:
+            keys = event.modifiers()
+            self._events.press(button, event.x(), event.y(), bool(keys & Qt.ShiftModifier),
+                               bool(keys & Qt.ControlModifier))
+
+    def mouseMoveEvent(self, event):
+        self._events.move(event.x(), event.y())
+
+    def mouseReleaseEvent(self, event):
+        button = _BUTTONS.get(event.button())
+        if button is not None:
+            self._events.release(button, event.x(), event.y())
+
+    def wheelEvent(self, event):
+        steps = event.angleDelta().y() / _PER_NOTCH
+        if steps:
+            self._events.wheel(steps, event.x(), event.y())
+
+
+def _paint(painter, shape):
+    if isinstance(shape, overlay.Line):
+        painter.setPen(QPen(QColor(*shape.colour), shape.width))
+        painter.drawLine(QPointF(shape.x0, shape.y0), QPointF(shape.x1, shape.y1))
+    elif isinstance(shape, overlay.Dot):
+        painter.setPen(Qt.NoPen)
+        painter.setBrush(QColor(*shape.colour))
+        painter.drawEllipse(QPointF(shape.x, shape.y), shape.radius, shape.radius)
+    else:
+        place = QPointF(shape.x, shape.y)
+        painter.setPen(QColor(0, 0, 0, 160))
+        painter.drawText(place + QPointF(1.0, 1.0), shape.words)
+        painter.setPen(QColor(255, 255, 255))
+        painter.drawText(place, shape.words)

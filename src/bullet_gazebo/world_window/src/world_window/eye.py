@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The viewer's eye: its place, and how it orbits, pans and zooms. ROS-free."""
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+# Steeper looks would turn the picture over [rad].
+_STEEPEST_RAD = math.radians(89.5)
+# An eye never comes nearer than this to the point that it zooms to, nor gets farther from the origin [m].
+NEAREST_M, FARTHEST_M = 0.08, 1000.0
+
+
+class Eye(NamedTuple):
+    """``position`` [m, world]; ``yaw``: the direction of view about the vertical, 0 along x; ``pitch``: how far it
+    looks up [rad]. The horizon is level."""
+
+    position: tuple
+    yaw: float
+    pitch: float
+
+    @classmethod
+    def looking_at(cls, position, target):
+        """An eye at ``position`` (3,) with ``target`` (3,) [m] in its middle."""
+        x, y, z = np.subtract(target, position)
+        return cls(tuple(map(float, position)), math.atan2(y, x), _not_steeper(math.atan2(z, math.hypot(x, y))))
+
+    def rotation(self):
+        """(3, 3): columns right, down and ahead, in the world: the optical frame of REP-103."""
+        ahead = np.array([math.cos(self.pitch) * math.cos(self.yaw), math.cos(self.pitch) * math.sin(self.yaw),
+                          math.sin(self.pitch)])
+        right = np.array([math.sin(self.yaw), -math.cos(self.yaw), 0.0])
+        return np.stack([right, np.cross(ahead, right), ahead], axis=1)
+
+    def pose(self):
+        """Pose (4, 4) of the optical frame in the world."""
+        pose = np.eye(4)
+        pose[:3, :3] = self.rotation()
+        pose[:3, 3] = self.position
+        return pose
+
+    def orbited(self, about, left_rad, up_rad):
+        """Moved on a sphere about the point ``about`` (3,), which stays where it is in the picture."""
+        turned = self._replace(yaw=self.yaw + left_rad, pitch=_not_steeper(self.pitch + up_rad))
+        in_view = self.rotation().T @ np.subtract(about, self.position)
+        return turned.at(np.asarray(about) - turned.rotation() @ in_view)
+
+    def panned(self, right_px, down_px, pinhole, depth_m):
+        """Moved sideways so that what is ``depth_m`` ahead moves by these pixels in the picture."""
+        right, down, _ = self.rotation().T
+        return self.at(np.asarray(self.position) - right * (right_px * depth_m / pinhole.fx)
+                       - down * (down_px * depth_m / pinhole.fy))
+
+    def zoomed(self, towards, factor):
+        """Moved to ``factor`` times its distance from the point ``towards`` (3,)."""
+        towards = np.asarray(towards, dtype=float)
+        away = np.asarray(self.position) - towards
+        distance = max(float(np.linalg.norm(away)), 1e-9)
+        return self.at(towards + away * max(factor, min(1.0, NEAREST_M / distance)))
+
+    def at(self, position):
+        """The same look from another ``position`` (3,)."""
+        position = np.asarray(position, dtype=float)
+        distance = np.linalg.norm(position)
+        return self._replace(position=tuple((position * min(1.0, FARTHEST_M / max(distance, 1e-9))).tolist()))
+
+
+def _not_steeper(pitch):
+    return min(max(pitch, -_STEEPEST_RAD), _STEEPEST_RAD)

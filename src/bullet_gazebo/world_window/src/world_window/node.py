@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The node of the window, ``/gazebo_gui``."""
+import os
+import signal
+import subprocess
+import sys
+import threading
+import traceback
+
+import rosgraph
+import rospy
+
+from rospy_limits.node import limit_ports
+
+_PROBE = "from PyQt5.QtWidgets import QApplication; QApplication(['gazebo'])"
+_PROBE_TIMEOUT_S = 30.0
+# While Python's signal handlers wait for Qt's loop: how often they get their turn [ms].
+_SIGNALS_MS = 100
+# Without a master for this long, the window closes [s].
+_ALONE_S = 5.0
+_ASK_MASTER_S = 1.0
+
+
+def main():
+    """Show the world until the user closes the window; returns the exit code.
+
+    Without a screen it prints one line and returns 0: the lab goes on without a window.
+    """
+    # Physics comes first: the window runs at the lowest priority.
+    os.nice(19)
+    reason = _why_no_screen()
+    if reason:
+        print("gazebo_gui: %s, the lab goes on without a window" % reason)
+        return 0
+    ending = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ending.set())
+    limit_ports()
+    rospy.init_node("gazebo_gui", disable_rostime=True, disable_signals=True)
+    _show(ending)
+    rospy.signal_shutdown("the window is closed")
+    sys.stdout.flush()
+    # A call to a simulator that does not answer must not keep the process alive.
+    os._exit(0)
+
+
+def _why_no_screen():
+    """Why no window can be opened, or None. A child process tries it, since Qt aborts its process if it cannot."""
+    displays = [os.environ[name] for name in ("DISPLAY", "WAYLAND_DISPLAY") if os.environ.get(name)]
+    if not displays:
+        return "no display (DISPLAY is not set)"
+    try:
+        probe = subprocess.run([sys.executable, "-c", _PROBE], timeout=_PROBE_TIMEOUT_S, check=False,
+                               capture_output=True, text=True)
+    except subprocess.TimeoutExpired:
+        return "display %s does not answer within %g s" % (displays[0], _PROBE_TIMEOUT_S)
+    if "ModuleNotFoundError" in probe.stderr:
+        return "PyQt5 is missing (apt install python3-pyqt5)"
+    return None if probe.returncode == 0 else "no window can be opened on display %s" % displays[0]
+
+
+def _show(ending):
+    from PyQt5.QtCore import QTimer, qInstallMessageHandler
+    from PyQt5.QtWidgets import QApplication
+
+    from sensor_renderer.best import best_renderer
+    from world_window.simulator import Simulator
+    from world_window.stage import Stage
+    from world_window.viewer import Viewer
+    from world_window.window import Window
+
+    # PyQt ends the process at an exception in a handler of an event, unless this is another function than Python's.
+    sys.excepthook = lambda *error: rospy.logerr("".join(traceback.format_exception(*error)).rstrip())
+    qInstallMessageHandler(lambda kind, context, text: rospy.logdebug("Qt: %s", text))
+    application = QApplication(["gazebo"])
+    window = Window()
+
+    def make_renderer():
+        renderer, problem = best_renderer()
+        if problem:
+            rospy.logwarn(problem)
+        return renderer
+
+    simulator = Simulator(window.tell, lambda contacts: viewer.post(Stage.take_contacts, contacts))
+    viewer = Viewer(lambda: _parameter("/gazebo/snapshot"), make_renderer, window.frame, simulator.pull, rospy.logwarn)
+    window.build(viewer, simulator)
+    viewer.start()
+    alone = threading.Event()
+    threading.Thread(target=_watch_master, args=(ending, alone), daemon=True).start()
+    timer = QTimer()
+    timer.timeout.connect(lambda: (ending.is_set() or rospy.is_shutdown() or alone.is_set()) and application.quit())
+    timer.start(_SIGNALS_MS)
+    window.show()
+    window.activateWindow()
+    application.exec_()
+    viewer.end()
+
+
+def _parameter(name):
+    try:
+        return rospy.get_param(name, None)
+    except (OSError, rosgraph.MasterException):
+        return None
+
+
+def _watch_master(ending, alone):
+    """Set ``alone`` once the master has not answered for some seconds."""
+    missed = 0
+    while not ending.wait(_ASK_MASTER_S):
+        missed = 0 if rosgraph.is_master_online() else missed + 1
+        if missed * _ASK_MASTER_S >= _ALONE_S:
+            alone.set()
+            return
