@@ -4,11 +4,12 @@ from sensor_renderer.errors import RenderingError
 from sensor_renderer.gl_renderer import GlRenderer
 
 
-def best_renderer():
+def best_renderer(still=False):
     """(renderer, problem): a :class:`GlRenderer` and "", or, where there is no EGL, a
-    :class:`sensor_renderer.tiny_renderer.TinyRenderer` and a line that says why. It belongs to the calling thread."""
+    :class:`sensor_renderer.tiny_renderer.TinyRenderer` and a line that says why. It belongs to the calling thread.
+    ``still``: as of :class:`GlRenderer`, for single pictures."""
     try:
-        return GlRenderer(), ""
+        return GlRenderer(still=still), ""
     except RenderingError as error:
         from sensor_renderer.tiny_renderer import TinyRenderer
 

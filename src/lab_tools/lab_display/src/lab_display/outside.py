@@ -60,7 +60,7 @@ class Outside(WorldFollower):
         pose = looking_at(eye, target)
         pinhole = Pinhole.from_field_of_view(width, height, FIELD_OF_VIEW_RAD, 0.05, 100.0)
         if self._renderer is None:
-            self._renderer, _ = best_renderer()
+            self._renderer, _ = best_renderer(still=True)
         pixels = self._renderer.render(self.mirror, pinhole, pose)[0].copy()
         for name, frame in (frames or {}).items():
             draw_frame(pixels, pinhole, np.linalg.inv(pose), frame, length, name)
