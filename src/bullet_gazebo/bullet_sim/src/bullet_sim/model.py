@@ -151,9 +151,9 @@ class Model(Body):
         self.parts.command(index, pybullet.VELOCITY_CONTROL, targetVelocities=velocity.tolist(),
                            forces=max_effort.tolist())
 
-    def carry(self, index, position):
+    def carry(self, index, position, velocity=None):
         """Put joints ``index`` (k,) at ``position`` (k,) and hold them there during the next step, with unlimited
-        force.
+        force. With ``velocity`` (k,) they move at it during the step.
 
         They move without inertia: links before the joint feel no reaction, as with Gazebo's ``Joint::SetPosition``.
         Links behind it, and touched bodies, do.
@@ -161,9 +161,11 @@ class Model(Body):
         self._refuse_nan(index, position, "position")
         self._stay_awake()
         self._drive_otherwise(index)
-        self.parts.put(index, position.tolist(), [0.0] * len(index))
+        velocity = np.zeros(len(index)) if velocity is None else velocity
+        self._refuse_nan(index, velocity, "velocity")
+        self.parts.put(index, position.tolist(), velocity.tolist())
         self._reading = None
-        self.drive_velocity(index, np.zeros(len(index)), np.full(len(index), _RIGID_EFFORT))
+        self.drive_velocity(index, velocity, np.full(len(index), _RIGID_EFFORT))
 
     def drive_effort(self, index, effort):
         """Apply ``effort`` (k,) to joints ``index`` (k,) during the next step; call it again for every step.

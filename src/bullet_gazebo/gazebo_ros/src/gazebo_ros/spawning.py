@@ -22,6 +22,7 @@ from gazebo_ros.drawn_sensor import DrawnSensor
 from gazebo_ros.model_plugin import PluginContext, PluginError, PluginHost, PluginSource
 from gazebo_ros.plugin_table import PluginTable
 from gazebo_ros.simulation import HostedPlugin
+from gazebo_ros.world_lights import lights_of_links
 from loop_ros.faults import SURVIVED, described
 from model_files.resources import ResourceFinder
 from sdf_model import ModelFolders, SdfError, parse_sdf_model
@@ -47,9 +48,11 @@ class Prepared:
     drawing: str | None
     #: Joint name to start position [rad, m].
     start: dict
-    #: (class, element, namespace) of each plugin; the data for the renderer about sensors that need pictures.
+    #: (class, element, namespace) of each plugin; the data for the renderer about sensors that need pictures, and about
+    #: lights in links.
     plugins: list
     sensors: list
+    lights: list
     #: The tree of the parameter server, {} where no plugin needs it.
     parameters: dict
     #: Further arguments of ``World.spawn``.
@@ -86,6 +89,8 @@ class Spawner:
         self.drawings = {}
         #: The sensors that need pictures, for the renderer: {model name: list of dictionaries}.
         self.sensors = {}
+        #: The lights in their links, likewise.
+        self.lights = {}
         # The screens that plugins have: {model name: list of (what the scene says, PictureWriter)}.
         self._screens = {}
         self._folder = None if folder is None else Path(folder)
@@ -96,6 +101,7 @@ class Spawner:
         return [{"name": model.name, "joints": list(model.joint_names), "urdf": self.drawings.get(model.name),
                  "static": bool(model.static),
                  "sensors": self.sensors.get(model.name, []),
+                 "lights": self.lights.get(model.name, []),
                  "screens": [entry for entry, _ in self._screens.get(model.name, [])]}
                 for model in self._simulation.world.models.values()]
 
@@ -155,7 +161,8 @@ class Spawner:
             self._mesh_files.parts(merged.links[link].collisions, stands_fast and link == merged.root,
                                    options.get("mesh_cuts"))
         return Prepared(name=name, xml=xml, robot=robot, merged=merged, drawing=drawing, start=start, plugins=plugins,
-                        sensors=sensors, parameters=parameters() if plugins else {}, options=options, mended=mended)
+                        sensors=sensors, lights=lights_of_links(robot, merged, self._log.warn),
+                        parameters=parameters() if plugins else {}, options=options, mended=mended)
 
     def make_shapes(self, prepared):
         """Any thread but the loop's, while that runs: let the loop make a model's slow shapes, one per turn.
@@ -179,6 +186,7 @@ class Spawner:
             self._set_start(model, prepared.start)
             self.drawings[prepared.name] = prepared.drawing
             self.sensors[prepared.name] = prepared.sensors
+            self.lights[prepared.name] = prepared.lights
             for plugin_class, element, namespace in prepared.plugins:
                 self._start_plugin(prepared, model.name, plugin_class, element, namespace)
         except (PluginError, BulletSimError) as error:
@@ -213,6 +221,7 @@ class Spawner:
         self._simulation.world.delete(name)
         self.drawings.pop(name, None)
         self.sensors.pop(name, None)
+        self.lights.pop(name, None)
         for _, picture in self._screens.pop(name, []):
             picture.close()
 

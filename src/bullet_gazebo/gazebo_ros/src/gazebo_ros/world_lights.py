@@ -3,9 +3,10 @@
 import dataclasses
 
 import numpy as np
+from lxml import etree
 
 from gazebo_ros.entities import UnknownEntity
-from sdf_model import Scene
+from sdf_model import Scene, SdfError, parse_light
 
 
 class WorldLights:
@@ -47,15 +48,43 @@ class WorldLights:
     def listed(self):
         """The scene's entry of light: plain data.
 
-        ``ambient``, ``background``: red, green, blue, or None to let the viewer choose; ``shadows``; ``lights``: a list
-        of dictionaries, or None to let the viewer choose. Places and directions are the world's.
+        ``ambient``, ``background``: red, green, blue, or None to let the viewer choose; ``shadows``, ``sky``;
+        ``lights``: a list of dictionaries, or None to let the viewer choose. Places and directions are the world's.
         """
         return {"ambient": self._scene.ambient, "background": self._scene.background, "shadows": self._scene.shadows,
+                "sky": self._scene.sky,
                 "lights": None if self._unlit else [_listed(light) for light in self._lights.values()]}
 
 
 def _listed(light):
     return {"type": light.type, "place": light.pose[:3, 3].tolist(),
             "direction": (light.pose[:3, :3] @ light.direction).tolist(), "diffuse": list(light.diffuse[:3]),
+            "specular": list(light.specular[:3]),
             "attenuation": list(light.attenuation), "range": light.range_m, "spot": light.spot,
             "cast_shadows": light.cast_shadows}
+
+
+def lights_of_links(robot, merged, warn):
+    """The lights in links of a model, for its entry of the scene: as :meth:`WorldLights.listed` has them, with
+    ``link``, the body's link in whose frame they are.
+
+    ``robot``: ``urdf_model.Robot``; ``merged``: its MergedRobot. A light that cannot be read is left out, and
+    ``warn(text)`` says why.
+    """
+    found = []
+    for gazebo in robot.gazebo:
+        for element in gazebo.findall("light"):
+            link = gazebo.get("reference")
+            try:
+                light = parse_light(etree.tostring(element, with_tail=False), "a light of '%s'" % robot.name)
+            except SdfError as error:
+                warn(str(error))
+                continue
+            if link not in merged.frames:
+                warn("light '%s' of '%s' is on '%s' and is left out; links: %s"
+                     % (light.name, robot.name, link, ", ".join(robot.links)))
+                continue
+            frame = merged.frames[link]
+            listed = _listed(dataclasses.replace(light, pose=frame.offset @ light.pose))
+            found.append({**listed, "link": frame.link})
+    return found

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Lights as services change them, and pictures in shared memory."""
+import re
+
 import numpy as np
 import pytest
 
 from gazebo_ros.entities import UnknownEntity
-from gazebo_ros.world_lights import WorldLights
-from sdf_model import Light, Scene
+from gazebo_ros.world_lights import WorldLights, lights_of_links
+from sdf_model import Light, ModelFolders, Scene, parse_sdf_model
+from urdf_model import merge_fixed, parse_urdf
 from urdf_model.transforms import pose_matrix
 from world_picture.shared_picture import PictureReader, PictureWriter
 from world_picture.snapshot import SnapshotError
@@ -33,6 +36,33 @@ def test_viewers_are_told_in_the_frame_of_the_world_and_of_each_change():
 
 def test_a_world_that_names_no_light_leaves_it_to_the_viewer():
     assert WorldLights([]).listed()["lights"] is None
+
+
+LAMP = """<sdf version="1.6"><model name="post"><link name="foot"/><link name="head"><pose>0 0 2 0 0 0</pose>
+<light name="bulb" type="spot"><pose>0.5 0 0 0 0 0</pose><direction>1 0 0</direction>
+<cast_shadows>1</cast_shadows></light></link>
+<joint name="j" type="fixed"><parent>foot</parent><child>head</child></joint></model></sdf>"""
+URDF_LAMP = """<robot name="post"><link name="foot"/><gazebo reference="%s"><light name="bulb" type="%s">
+<diffuse>%s</diffuse></light></gazebo></robot>"""
+
+
+def test_lights_in_links_are_in_the_frame_of_the_body():
+    robot = parse_sdf_model(LAMP, "post", ModelFolders([])).robot
+    bulb, = lights_of_links(robot, merge_fixed(robot), pytest.fail)
+    assert bulb["link"] == "foot" and bulb["place"] == pytest.approx([0.5, 0.0, 2.0])
+    assert bulb["direction"] == pytest.approx([1.0, 0.0, 0.0]) and bulb["type"] == "spot" and bulb["cast_shadows"]
+    robot = parse_urdf(URDF_LAMP % ("foot", "point", "1 0 0 1"))
+    bulb, = lights_of_links(robot, merge_fixed(robot), pytest.fail)
+    assert (bulb["type"], bulb["diffuse"]) == ("point", [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("values", "text"), [(("knee", "point", "1 0 0 1"), "'bulb' of 'post' is on 'knee'.*foot"),
+                                              (("foot", "point", "red"), "a light of 'post'.*red")])
+def test_a_light_that_cannot_be_used_is_named_and_left_out(values, text):
+    said = []
+    robot = parse_urdf(URDF_LAMP % values)
+    assert lights_of_links(robot, merge_fixed(robot), said.append) == []
+    assert len(said) == 1 and re.search(text, said[0])
 
 
 def test_a_picture_is_read_when_it_is_new(tmp_path):

@@ -3,7 +3,7 @@
 
 from .document import SdfError
 from .folders import ModelFolders, description_file
-from .lights import Light, Scene
+from .lights import Light, Scene, parse_light
 from .model import SdfModel, parse_sdf_model
 from .world import SdfWorld, parse_sdf_world
 
@@ -15,6 +15,7 @@ __all__ = [
     "SdfModel",
     "SdfWorld",
     "description_file",
+    "parse_light",
     "parse_sdf_model",
     "parse_sdf_world",
 ]

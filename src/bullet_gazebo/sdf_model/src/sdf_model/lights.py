@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .document import Document, Notes
+
 
 @dataclass
 class Light:
@@ -24,11 +26,12 @@ class Light:
 
 @dataclass
 class Scene:
-    """Ambient light, background and shadows of a world. Colours red, green, blue from 0 to 1; None: not given."""
+    """Ambient light, background, sky and shadows of a world. Colours red, green, blue from 0 to 1; None: not given."""
 
     ambient: tuple | None = None
     background: tuple | None = None
     shadows: bool = True
+    sky: bool = False
 
 
 def read_light(document, element, origin):
@@ -66,7 +69,17 @@ def read_scene(document, element):
         *(None if element.find(tag) is None else colour(document, element, tag, None)[:3]
           for tag in ("ambient", "background")),
         document.flag(element, "shadows", True),
+        element.find("sky") is not None,
     )
+
+
+def parse_light(xml, source):
+    """Return the Light of the text of one <light>; its pose is in the frame of the link that it is in.
+
+    Raises SdfError. ``source`` names the text in messages.
+    """
+    document = Document(b"<sdf>%s</sdf>" % xml, source, None, Notes())
+    return read_light(document, document.root.find("light"), np.eye(4))
 
 
 def colour(document, element, tag, default):

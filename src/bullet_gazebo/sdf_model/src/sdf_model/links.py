@@ -21,8 +21,8 @@ _INERTIA += (("izz", 2, 2, 1.0),)
 
 def read_link(document, element, name):
     """Return the urdf_model.Link of a <link>, named ``name``, in its own frame."""
-    document.note_unknown(element, ("pose", "inertial", "collision", "visual", "sensor", "gravity", "self_collide",
-                                    "kinematic", *_QUIET))
+    document.note_unknown(element, ("pose", "inertial", "collision", "visual", "sensor", "light", "gravity",
+                                    "self_collide", "kinematic", *_QUIET))
     if document.flag(element, "self_collide"):
         document.note(element.find("self_collide"))
     link = Link(name, _inertial(document, element), line=element.sourceline)

@@ -158,7 +158,7 @@ class ModelReader:
             if name in parts.links:
                 raise document.error(link, "link '%s' appears twice" % name)
             parts.links[name] = (read_link(document, link, name), frames.where(name, link))
-            parts.gazebo += _sensors(link, name)
+            parts.gazebo += _sensors_and_lights(document, link, name)
         if not parts.links:
             raise document.error(element, "model '%s' has no <link>" % element.get("name"))
         names = {joint.name for joint in parts.joints}
@@ -225,9 +225,12 @@ def _moved(parts, prefix, origin):
     return Parts(links, parts.joints, parts.gazebo, parts.static)
 
 
-def _sensors(link, name):
-    """Return the <sensor> elements of a link as a <gazebo> element that refers to it, the way a URDF has them."""
-    found = link.findall("sensor")
+def _sensors_and_lights(document, link, name):
+    """Return the <sensor> and <light> elements of a link as a <gazebo> element that refers to it, the way a URDF has
+    them."""
+    for light in link.iterchildren("light"):
+        read_light(document, light, np.eye(4))  # complains here, where file and line are known
+    found = link.findall("sensor") + link.findall("light")
     if not found:
         return []
     holder = etree.Element("gazebo", reference=name)

@@ -76,13 +76,14 @@ class Light(NamedTuple):
     zenith = property(lambda self: _ZENITH if self.sky else self.background, doc="The sky's colour overhead.")
 
     @classmethod
-    def of_scene(cls, listed):
-        """``listed`` as from :meth:`gazebo_ros.world_lights.WorldLights.listed`; missing values get the defaults."""
+    def of_scene(cls, listed, more=()):
+        """``listed`` as from :meth:`gazebo_ros.world_lights.WorldLights.listed`; missing values get the defaults.
+        ``more``: lights beside those, in the same form."""
         lights = listed.get("lights")
         if lights is None:
             lights = [{"type": "directional", "direction": _SUN_DIRECTION, "diffuse": _SUN_DIFFUSE,
                        "specular": _SUN_SPECULAR, "cast_shadows": True}]
-        lights = [light for light in lights if light["type"] != "directional" or any(light["direction"])]
+        lights = [light for light in [*lights, *more] if light["type"] != "directional" or any(light["direction"])]
         suns = sorted((light for light in lights if light["type"] == "directional"),
                       key=lambda light: not light["cast_shadows"])
         sun = suns[0] if suns else {"direction": _SUN_DIRECTION, "diffuse": _BLACK, "specular": _BLACK,

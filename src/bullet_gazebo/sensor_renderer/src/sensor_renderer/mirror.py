@@ -48,17 +48,24 @@ class Screen(NamedTuple):
 class Body:
     """A model: its links as parts, its screens, and their poses."""
 
-    def __init__(self, links, joints, screens=(), static=False):
+    def __init__(self, links, joints, screens=(), static=False, lights=()):
         """``links``: list of (name, parts), parents first; ``joints``: one ``urdf_model.Joint`` per link but the first;
-        ``static``: whether its root is fixed in the world.
+        ``static``: whether its root is fixed in the world; ``lights``: as in the scene's entry, in the frames of their
+        links.
         """
         self.screens = screens
         self._static = static
+        self._lights = lights
         self._joints = joints
         self._index = {name: number for number, (name, _) in enumerate(links)}
         self.parts = [parts for _, parts in links]
         self.matrices = np.tile(np.eye(4), (len(links), 1, 1))
         self._shown = None
+
+    @property
+    def has_lights(self):
+        """Whether some of its links hold lights."""
+        return bool(self._lights)
 
     @property
     def size(self):
@@ -103,6 +110,12 @@ class Body:
         """Whether a body link is fixed in the world; ``KeyError`` for an unknown one."""
         return self._static and self._index[name] == 0
 
+    def lights(self):
+        """The lights in its links, as the scene lists those of the world."""
+        return [{**light, "place": (matrix[:3, :3] @ light["place"] + matrix[:3, 3]).tolist(),
+                 "direction": (matrix[:3, :3] @ light["direction"]).tolist()}
+                for light in self._lights for matrix in [self.link_matrix(light["link"])]]
+
     def link_matrix(self, name):
         """Pose (4, 4) of a body link's frame in the world; ``KeyError`` for an unknown one."""
         return self.matrices[self._index[name]]
@@ -132,20 +145,23 @@ class Mirror:
         self.bodies = {}
         #: The light: :class:`sensor_renderer.light.Light`.
         self.light = Light.of_scene({})
+        self._world_light = {}
         #: Counts visible changes, except pictures on screens.
         self.version = 0
 
     def set_scene(self, listed, light=None):
         """Show what :meth:`world_picture.snapshot.SnapshotWriter.write_scene` lists; bodies that exist already stay."""
-        self.light = Light.of_scene(light or {})
+        self._world_light = light or {}
         known = self._bodies
         self._bodies = {}
         for entry in listed:
             name = entry["name"]
-            key = (entry["urdf"], tuple(entry["joints"]), str(entry.get("screens")), bool(entry.get("static")))
+            key = (entry["urdf"], tuple(entry["joints"]), str(entry.get("screens")), bool(entry.get("static")),
+                   str(entry.get("lights")))
             old = known.get(name)
             self._bodies[name] = old if old is not None and old[0] == key else (key, self._build(entry))
         self.bodies = {name: body for name, (_, body) in self._bodies.items()}
+        self._light_up()
         self.version += 1
 
     def set_state(self, values):
@@ -155,6 +171,12 @@ class Mirror:
             moved |= body.set_state(values[start:start + body.size])
             start += body.size
         self.version += moved
+        if moved and any(body.has_lights for body in self.bodies.values()):
+            self._light_up()
+
+    def _light_up(self):
+        lights = [light for body in self.bodies.values() for light in body.lights()]
+        self.light = Light.of_scene(self._world_light, lights)
 
     @property
     def has_new_pictures(self):
@@ -170,7 +192,7 @@ class Mirror:
         links = [(name, [part for shape in merged.links[name].visuals for part in self._parts_of(shape)])
                  for name in order]
         screens = [screen for screen in map(self._screen, entry.get("screens", ())) if screen]
-        return Body(links, joints, screens, bool(entry.get("static")))
+        return Body(links, joints, screens, bool(entry.get("static")), entry.get("lights", ()))
 
     def _screen(self, listed):
         try:

@@ -128,6 +128,18 @@ def test_the_strongest_lamps_throw_shadows(renderer, tmp_path, kind):
             assert at(shaded, x, y) == pytest.approx(at(lit, x, y), abs=2)
 
 
+def test_a_lamp_in_a_link_moves_with_it(renderer, tmp_path):
+    bulb = {**lamp("point", diffuse=[0.0, 0.0, 1.0], place=[0.0, 0.0, 0.3], attenuation=[1, 0, 4.0]), "link": "link"}
+    cube = {"name": "cube", "urdf": CUBE, "joints": [], "lights": [bulb]}
+    mirror = world(tmp_path, {"lights": [], "ambient": [0.1] * 3}, (cube, [0.0, 0.5, 0.2, *UPRIGHT]))
+    # Upside down, the lamp is below its cube.
+    for pose, y in (([0.0, 0.5, 0.7, 1, 0, 0, 0], 0.4), ([0.0, -0.5, 0.7, 1, 0, 0, 0], -0.4)):
+        mirror.set_state(np.concatenate([[0, 0, 0, *UPRIGHT], pose]))
+        picture = seen(renderer, mirror)
+        assert at(picture, 0.0, y)[2] > at(picture, 0.0, -y)[2] + 40
+    assert mirror.light.lamps[0].place == pytest.approx((0.0, -0.5, 0.4))
+
+
 def test_only_the_strongest_lamps_have_shadow_maps():
     lamps = [lamp("point", diffuse=[value] * 3, cast_shadows=casts)
              for value, casts in ((0.2, True), (0.9, False), (0.5, True), (0.4, True))]

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A conveyor: a belt whose surface moves and carries by friction what lies on it."""
+import math
+
+import numpy as np
+from std_msgs.msg import Float64
+
+from gazebo_ros.model_plugin import ModelPlugin, PluginError
+from gazebo_ros.urdf_extras import unscoped
+
+#: Fastest belt [m/s].
+MOST_M_S = 2.0
+
+
+class ConveyorBelt(ModelPlugin):
+    """``libconveyor_belt.so``. Elements: ``joint``, a prismatic joint between the frame and the belt, along which the
+    belt carries; ``speed`` (0.1 m/s); ``commandTopic`` (``conveyor/command``, std_msgs/Float64: another speed, below
+    zero backwards).
+
+    In each step the belt moves by speed times step, and it is put back before the next one: it has the speed of its
+    surface, and friction does the rest.
+    """
+
+    required = False
+
+    def __init__(self, context):
+        super().__init__(context)
+        self._what = "plugin %s of model '%s'" % (context.element.get("filename"), context.model.name)
+        name = unscoped(context.model.name, context.element_text("joint", ""))
+        belts = [joint.name for joint in context.robot.movable_joints() if joint.type == "prismatic"]
+        if name not in belts:
+            raise PluginError("%s: <joint> is '%s', expected one of the prismatic joints %s"
+                              % (self._what, name, ", ".join(belts) or "(there are none)"))
+        self._joint = context.model.index([name])
+        text = context.element_text("speed", "0.1")
+        self._speed = self._checked(text)
+        if self._speed is None:
+            raise PluginError("%s: <speed> is '%s', expected -%g to %g m/s" % (self._what, text, MOST_M_S, MOST_M_S))
+        self._commands = context.subscription(context.element_text("commandTopic", "conveyor/command"), Float64)
+
+    def update(self, time_s, dt):
+        self._commands.handle(self._take)
+        self.context.model.carry(self._joint, np.zeros(1), np.array([self._speed]))
+
+    def _take(self, message):
+        speed = self._checked(message.data)
+        if speed is None:
+            self.context.log.warn_throttle(1.0, "%s: a speed of %s was commanded, expected -%g to %g m/s"
+                                           % (self._what, message.data, MOST_M_S, MOST_M_S))
+        else:
+            self._speed = speed
+
+    @staticmethod
+    def _checked(value):
+        """The speed [m/s], or None where it is out of range."""
+        try:
+            speed = float(value)
+        except ValueError:
+            return None
+        return speed if math.isfinite(speed) and abs(speed) <= MOST_M_S else None
