@@ -49,7 +49,8 @@ class Canvas(QWidget):
         if self._image.size() == self.size():
             painter.drawImage(0, 0, self._image)
         else:
-            painter.drawImage(self.rect(), self._image)  # until one of this size comes
+            painter.setRenderHint(QPainter.SmoothPixmapTransform)
+            painter.drawImage(self.rect(), self._image)
         painter.setRenderHint(QPainter.Antialiasing)
         painter.setFont(self._font)
         for shape in self._shapes:

@@ -24,11 +24,13 @@ _ASK_MASTER_S = 1.0
 def main():
     """Show the world until the user closes the window; returns the exit code.
 
-    Without a screen it prints one line and returns 0: the lab goes on without a window.
+    Without a screen it prints one line and returns 0: the lab goes on without a window. With ``_offscreen:=true`` on
+    the command line it publishes its pictures and opens no window.
     """
     # Physics comes first: the window runs at the lowest priority.
     os.nice(19)
-    reason = _why_no_screen()
+    offscreen = bool(rospy.client.load_command_line_node_params(sys.argv).get("offscreen"))
+    reason = "" if offscreen else _why_no_screen()
     if reason:
         print("gazebo_gui: %s, the lab goes on without a window" % reason)
         return 0
@@ -37,7 +39,7 @@ def main():
         signal.signal(number, lambda *_: ending.set())
     limit_ports()
     rospy.init_node("gazebo_gui", disable_rostime=True, disable_signals=True)
-    _show(ending)
+    (_publish if offscreen else _show)(ending)
     rospy.signal_shutdown("the window is closed")
     sys.stdout.flush()
     # A call to a simulator that does not answer must not keep the process alive.
@@ -63,7 +65,7 @@ def _show(ending):
     from PyQt5.QtCore import QTimer, qInstallMessageHandler
     from PyQt5.QtWidgets import QApplication
 
-    from sensor_renderer.best import best_renderer
+    from world_window.picture_topic import PictureTopic
     from world_window.simulator import Simulator
     from world_window.stage import Stage
     from world_window.viewer import Viewer
@@ -75,18 +77,17 @@ def _show(ending):
     application = QApplication(["gazebo"])
     window = Window()
 
-    def make_renderer():
-        renderer, problem = best_renderer()
-        if problem:
-            rospy.logwarn(problem)
-        return renderer
+    topic = PictureTopic()
+
+    def take(frame):
+        window.frame(frame)
+        topic.take(frame)
 
     simulator = Simulator(window.tell, lambda contacts: viewer.post(Stage.take_contacts, contacts))
-    viewer = Viewer(lambda: _parameter("/gazebo/snapshot"), make_renderer, window.frame, simulator.pull, rospy.logwarn)
+    viewer = Viewer(_folder, _renderer, take, simulator.pull, rospy.logwarn)
     window.build(viewer, simulator)
     viewer.start()
-    alone = threading.Event()
-    threading.Thread(target=_watch_master, args=(ending, alone), daemon=True).start()
+    alone = _watch_for_master(ending)
     timer = QTimer()
     timer.timeout.connect(lambda: (ending.is_set() or rospy.is_shutdown() or alone.is_set()) and application.quit())
     timer.start(_SIGNALS_MS)
@@ -96,15 +97,45 @@ def _show(ending):
     viewer.end()
 
 
-def _parameter(name):
+def _publish(ending):
+    """Publish pictures while a program subscribes to them."""
+    from world_window.picture_topic import PictureTopic
+    from world_window.viewer import Viewer
+
+    topic = PictureTopic()
+    viewer = Viewer(_folder, _renderer, topic.take, lambda pull: None, rospy.logwarn)
+    viewer.start()
+    alone = _watch_for_master(ending)
+    while not (ending.wait(_SIGNALS_MS / 1000.0) or alone.is_set() or rospy.is_shutdown()):
+        viewer.set_visible(topic.has_listeners)
+    viewer.end()
+
+
+def _folder():
+    """The folder of the snapshot of the simulator on this master, or None."""
     try:
-        return rospy.get_param(name, None)
+        return rospy.get_param("/gazebo/snapshot", None)
     except (OSError, rosgraph.MasterException):
         return None
 
 
-def _watch_master(ending, alone):
-    """Set ``alone`` once the master has not answered for some seconds."""
+def _renderer():
+    from sensor_renderer.best import best_renderer
+
+    renderer, problem = best_renderer()
+    if problem:
+        rospy.logwarn(problem)
+    return renderer
+
+
+def _watch_for_master(ending):
+    """An event that is set once the master has not answered for some seconds."""
+    alone = threading.Event()
+    threading.Thread(target=_ask_master, args=(ending, alone), daemon=True).start()
+    return alone
+
+
+def _ask_master(ending, alone):
     missed = 0
     while not ending.wait(_ASK_MASTER_S):
         missed = 0 if rosgraph.is_master_online() else missed + 1

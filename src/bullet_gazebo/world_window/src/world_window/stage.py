@@ -79,6 +79,11 @@ class Stage:
         self.pinhole = Pinhole.from_field_of_view(width, height, FIELD_OF_VIEW_RAD, _NEAR_M, _FAR_M)
         self.version += 1
 
+    def smaller_pinhole(self, scale):
+        """The same view in a picture of ``scale`` times the width and height."""
+        width, height = (max(round(scale * size), 1) for size in self.pinhole[:2])
+        return Pinhole.from_field_of_view(width, height, FIELD_OF_VIEW_RAD, _NEAR_M, _FAR_M)
+
     def take(self, mirror, has_new_scene):
         """The world has moved, or is another one; call it after each change of the mirror."""
         self._mirror = mirror

@@ -11,6 +11,7 @@ import numpy as np
 from sensor_renderer.following import WorldFollower
 from world_picture.snapshot import SnapshotError
 from world_window.clock import Clock
+from world_window.sharpness import Sharpness
 from world_window.stage import Stage
 
 #: At most so many pictures a second; where drawing takes longer, it takes at most this share of the time.
@@ -19,6 +20,8 @@ MOST_RATE, DRAWING_SHARE = 30.0, 0.8
 _SEEK_S, _PULL_S = 0.25, 0.05
 # Times and names in the status line are renewed this often [s].
 _STATUS_S = 0.2
+# A picture of fewer pixels is drawn again with all of them when nothing has moved for so long [s].
+_REST_S = 0.3
 
 
 class Frame(NamedTuple):
@@ -52,6 +55,7 @@ class Viewer(threading.Thread):
         self._renderer = self._follower = None
         self._clock = Clock()
         self._drawn = self._shown_at = None
+        self._sharpness, self._drawn_scale = Sharpness(), 1.0
         self._visible = True
         self._spent_s = 0.0
         self._drawn_at = []
@@ -140,13 +144,14 @@ class Viewer(threading.Thread):
             state = (id(follower), follower.mirror.version, stage.version, stage.pinhole)
             if state != self._drawn or follower.mirror.has_new_pictures:
                 self._drawn = state
-                if self._renderer is None:
-                    self._renderer = self._make_renderer()
-                pixels, _ = self._renderer.render(follower.mirror, stage.pinhole, stage.eye.pose())
-                self._drawn_at = [then for then in self._drawn_at if now - then < 1.0] + [now]
+                pixels = self._picture(now, self._sharpness.scale)
+                self._sharpness.take(time.monotonic() - now)
+            elif self._drawn_scale < 1.0 and now - self._drawn_at[-1] > _REST_S:
+                pixels = self._picture(now, 1.0)
         if pixels is None and self._shown_at is not None and now - self._shown_at < _STATUS_S:
             return
         self._shown_at = now
+        self._drawn_at = [then for then in self._drawn_at if now - then < 1.0] or self._drawn_at[-1:]
         bodies = follower.mirror.bodies if follower is not None else {}
         clock = self._clock
         self._on_frame(Frame(
@@ -154,3 +159,12 @@ class Viewer(threading.Thread):
             None if follower is None else (clock.simulated_s, clock.paused, clock.factor),
             {name: body.link_names for name, body in bodies.items()}, stage.selected, stage.followed,
             float(len([then for then in self._drawn_at if now - then < 1.0]))))
+
+    def _picture(self, now, scale):
+        if self._renderer is None:
+            self._renderer = self._make_renderer()
+        self._drawn_scale = scale
+        self._drawn_at.append(now)
+        pixels, _ = self._renderer.render(self._follower.mirror, self.stage.smaller_pinhole(scale),
+                                          self.stage.eye.pose())
+        return pixels

@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The window under the hands of a user: mouse and keys of a virtual screen, and what they do in the world."""
 import functools
+import os
 import subprocess
 import unittest
 
 import numpy as np
 import rospy
 import rostest
-from gazebo_msgs.srv import GetModelState, GetPhysicsProperties, GetWorldProperties, SpawnModel
+from gazebo_msgs.srv import DeleteModel, GetModelState, GetPhysicsProperties, GetWorldProperties, SpawnModel
 from geometry_msgs.msg import Point, Pose, Quaternion
+from sensor_msgs.msg import Image
 
 from lab_testing import screen_input, skipping, virtual_screen, waiting
 
@@ -18,36 +20,56 @@ BLOCK = """<robot name="block"><link name="body">
   <visual><geometry><box size="0.2 0.2 0.2"/></geometry><material name="red"><color rgba="1 0 0 1"/></material></visual>
   <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link></robot>"""
 STEP_S = 0.001
-DEADLINE_S = 60.0
+DEADLINE_S = 100.0
 wait_until = functools.partial(waiting.wait_until, timeout_s=DEADLINE_S, interval_s=0.1)
+
+
+def red_of(picture):
+    """Rows and columns of the red pixels of a picture (height, width, 3)."""
+    picture = picture.astype(int)
+    return np.nonzero((picture[..., 0] > 90) & (picture[..., 1:].max(axis=-1) < 40))
 
 
 class WorldWindow(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        for name, kind in (("get_model_state", GetModelState), ("get_physics_properties", GetPhysicsProperties),
+        for name, kind in (("delete_model", DeleteModel), ("get_model_state", GetModelState),
+                           ("get_physics_properties", GetPhysicsProperties),
                            ("get_world_properties", GetWorldProperties), ("spawn_urdf_model", SpawnModel)):
             service = rospy.ServiceProxy("/gazebo/" + name, kind)
             service.wait_for_service(DEADLINE_S)
             setattr(cls, name, staticmethod(service))
 
-    def setUp(self):
+    def open_window(self):
         if not screen_input.is_there():
             skipping.skip(self, screen_input.MISSING)
         self._screen = virtual_screen.open_for(self)
         self.input = screen_input.ScreenInput(self._screen)
         self.addCleanup(self.input.close)
-        pose = Pose(Point(0.0, 0.0, 0.1), Quaternion(0, 0, 0, 1))
-        self.assertTrue(self.spawn_urdf_model("block", BLOCK, "", pose, "").success)
         self.window = subprocess.Popen(["rosrun", "gazebo_ros", "gzclient"], env=self._screen.environment)
         self.addCleanup(self.window.wait)
         self.addCleanup(self.window.terminate)
         wait_until(lambda: len(self.red()[0]) > 1000, "a red block in the window")
 
+    def setUp(self):
+        pose = Pose(Point(0.0, 0.0, 0.1), Quaternion(0, 0, 0, 1))
+        self.assertTrue(self.spawn_urdf_model("block", BLOCK, "", pose, "").success)
+        self.addCleanup(self.delete_model, "block")
+
+    def test_without_a_screen_the_pictures_are_a_topic(self):
+        environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+        window = subprocess.Popen(["rosrun", "gazebo_ros", "gzclient", "_offscreen:=true"], env=environment)
+        self.addCleanup(window.wait)
+        self.addCleanup(window.terminate)
+        message = rospy.wait_for_message("/gazebo_gui/image", Image, DEADLINE_S)
+        picture = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width, 3)
+        self.assertGreater(len(red_of(picture)[0]), 1000)
+        window.terminate()
+        self.assertEqual(window.wait(DEADLINE_S), 0)
+
     def red(self):
         """Rows and columns of the red pixels on the screen."""
-        picture = self._screen.picture().astype(int)
-        return np.nonzero((picture[..., 0] > 90) & (picture[..., 1:].max(axis=-1) < 40))
+        return red_of(self._screen.picture())
 
     def middle(self):
         """x, y of the middle of the block on the screen."""
@@ -59,6 +81,7 @@ class WorldWindow(unittest.TestCase):
         return np.array([position.x, position.y, position.z])
 
     def test_a_user_pulls_pauses_steps_resets_zooms_deletes_and_closes(self):
+        self.open_window()
         start = self.place()
 
         x, y = self.middle()

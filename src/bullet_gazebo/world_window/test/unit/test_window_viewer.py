@@ -9,6 +9,7 @@ from window_worlds import BLOCK_AT, SCENE, snapshot, values
 from lab_testing.waiting import wait_until
 from sensor_renderer.best import best_renderer
 from world_window.clock import Clock
+from world_window.sharpness import GOAL_S, SCALES, Sharpness
 from world_window.stage import LEFT, Stage
 from world_window.viewer import Viewer
 
@@ -152,3 +153,29 @@ def test_the_clock_measures_the_last_second():
     assert clock.factor == pytest.approx(1.0)
     clock.take(0.0, False, 201.2)
     assert clock.factor is None  # a reset does not either
+
+
+def test_slow_pictures_get_smaller_and_quick_ones_larger_again():
+    sharpness = Sharpness()
+    for _ in range(2):
+        sharpness.take(2.0 * GOAL_S)
+    sharpness.take(0.9 * GOAL_S)
+    assert sharpness.scale == SCALES[0]  # single ones do not count
+    for _ in range(20):
+        sharpness.take(2.0 * GOAL_S)
+    assert sharpness.scale == SCALES[-1]
+    for _ in range(100):
+        sharpness.take(0.5 * GOAL_S)  # larger ones would take too long
+    assert sharpness.scale == SCALES[-1]
+    for _ in range(100):
+        sharpness.take(0.1 * GOAL_S)
+    assert sharpness.scale == SCALES[0]
+
+
+def test_a_picture_of_few_pixels_is_sharp_at_rest(tmp_path):
+    with snapshot(tmp_path) as simulator, watched(simulator.folder) as seen:
+        seen.wait(lambda: seen.pictures(), "a picture")
+        seen.viewer.post(lambda stage: setattr(seen.viewer._sharpness, "scale", 0.5))
+        simulator.write(1, 0.1, [values(np.add(BLOCK_AT, 0.1))])
+        seen.wait(lambda: seen.pictures()[-1].pixels.shape == (120, 160, 3), "a small picture")
+        seen.wait(lambda: seen.pictures()[-1].pixels.shape == (240, 320, 3), "a sharp one")

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How many pixels a picture gets where drawing is slow: motion is worth more than sharpness. ROS-free."""
+
+#: Sizes of a picture, as shares of the window's width and height.
+SCALES = (1.0, 0.75, 0.5)
+#: Pictures should take no longer than this [s]: with the pauses of the viewer, 20 come a second.
+GOAL_S = 0.04
+# So many pictures in a row decide.
+_SLOW_ONES, _QUICK_ONES = 3, 15
+# A larger size is tried where its pictures would take at most this share of the goal.
+_ROOM = 0.8
+
+
+class Sharpness:
+    """``scale``: the share of the window's width and height to draw at."""
+
+    def __init__(self):
+        self.scale = SCALES[0]
+        self._slow = self._quick = 0
+
+    def take(self, spent_s):
+        """A picture of the present size took ``spent_s`` [s, wall]."""
+        place = SCALES.index(self.scale)
+        larger = SCALES[max(place - 1, 0)]
+        self._slow = self._slow + 1 if spent_s > GOAL_S else 0
+        self._quick = self._quick + 1 if spent_s * (larger / self.scale) ** 2 < _ROOM * GOAL_S else 0
+        if self._slow >= _SLOW_ONES and place + 1 < len(SCALES):
+            self.scale = SCALES[place + 1]
+        elif self._quick >= _QUICK_ONES:
+            self.scale = larger
+        else:
+            return
+        self._slow = self._quick = 0
