@@ -2,8 +2,6 @@
 """`./baxter.sh notebook [NAME]`: JupyterLab on loopback with the labs' notebooks, until Ctrl-C."""
 
 import argparse
-import json
-import os
 import secrets
 import signal
 import subprocess
@@ -13,19 +11,14 @@ import urllib.request
 import uuid
 from pathlib import Path
 
-from lab_environment import ports
+from lab_environment import jupyter, ports
 from lab_tests import processes
 
 ROOT = Path(__file__).resolve().parent.parent
 # Everything that Jupyter writes, so that nothing gets into the user's home.
-STATE = ROOT / ".baxter" / "jupyter"
-KERNEL = "baxter"
+STATE = ROOT / jupyter.STATE
 FIRST_PORT = 8888
 START_TIMEOUT_S = 60.0
-# Default settings of JupyterLab: without them it asks each new user whether to fetch news.
-SETTINGS = {"@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False}}
-# Time limit for the end of simulators that notebooks have started: as long as roslaunch may need.
-STOP_TIMEOUT_S = 40.0
 
 
 class NotebookError(Exception):
@@ -34,7 +27,7 @@ class NotebookError(Exception):
 
 def notebooks() -> list[Path]:
     """The labs' notebooks, in the order of the course."""
-    return sorted(path for path in ROOT.glob("src/*/*/notebooks/*.ipynb") if ".ipynb_checkpoints" not in path.parts)
+    return jupyter.notebooks(ROOT)
 
 
 def find(name: str) -> Path:
@@ -49,27 +42,9 @@ def find(name: str) -> Path:
     return found[0]
 
 
-def write_kernel(folder: Path):
-    """Register the kernel `Baxter lab` in Jupyter by a file below `folder`: tools/notebook_kernel.bash."""
-    kernel = folder / "kernels" / KERNEL
-    kernel.mkdir(parents=True, exist_ok=True)
-    command = [str(ROOT / "tools" / "notebook_kernel.bash"), "-f", "{connection_file}"]
-    spec = {"argv": command, "display_name": "Baxter lab", "language": "python"}
-    (kernel / "kernel.json").write_text(json.dumps(spec, indent=1) + "\n", encoding="utf-8")
-
-
-def environment(state: Path) -> dict[str, str]:
-    """The environment of Jupyter: our kernel beside its own, and all of its files in one folder."""
-    folders = {"JUPYTER_CONFIG_DIR": "config", "JUPYTER_DATA_DIR": "data", "JUPYTER_RUNTIME_DIR": "runtime",
-               "IPYTHONDIR": "ipython", "MPLCONFIGDIR": "matplotlib"}
-    made = {**os.environ, "JUPYTER_PATH": str(state)}
-    for variable, name in folders.items():
-        (state / name).mkdir(parents=True, exist_ok=True)
-        made[variable] = str(state / name)
-    defaults = state / "config" / "labconfig" / "default_setting_overrides.json"
-    defaults.parent.mkdir(exist_ok=True)
-    defaults.write_text(json.dumps(SETTINGS, indent=1) + "\n", encoding="utf-8")
-    return made
+def write_kernel():
+    """Register the kernel, which runs in the workspace's environment wherever Jupyter has started: for editors, too."""
+    jupyter.write_kernel(STATE, [str(ROOT / "tools" / "notebook_kernel.bash")])
 
 
 def free_port(first: int) -> int:
@@ -81,15 +56,8 @@ def free_port(first: int) -> int:
 
 
 def command(port: int) -> list[str]:
-    """JupyterLab on loopback. It checks for no updates, asks no questions, and prints only warnings."""
-    options = {
-        "ServerApp.ip": "127.0.0.1", "ServerApp.port": port, "ServerApp.port_retries": 0,
-        "ServerApp.open_browser": False, "ServerApp.root_dir": str(ROOT), "ServerApp.answer_yes": True,
-        "ServerApp.allow_root": os.geteuid() == 0, "Application.log_level": "WARN",
-        "KernelManager.shutdown_wait_time": 10.0,
-        "LabApp.check_for_updates_class": "jupyterlab.NeverCheckForUpdate", "LabApp.news_url": "",
-    }
-    return [sys.executable, "-m", "jupyterlab", *(f"--{name}={value}" for name, value in options.items())]
+    """JupyterLab on loopback."""
+    return jupyter.command(ROOT, {"ServerApp.ip": "127.0.0.1", "ServerApp.port": port, "ServerApp.port_retries": 0})
 
 
 def wait_for(url: str, server: subprocess.Popen):
@@ -107,9 +75,9 @@ def wait_for(url: str, server: subprocess.Popen):
 def serve(page: str, first_port: int) -> int:
     """Run JupyterLab until Ctrl-C or until it ends; all processes of its notebooks end with it."""
     port, token, run_id = free_port(first_port), secrets.token_urlsafe(24), uuid.uuid4().hex
-    write_kernel(STATE)
+    write_kernel()
     # In the environment and not on the command line, since every user of the machine can read the latter.
-    marked = {**environment(STATE), "JUPYTER_TOKEN": token, processes.NOTEBOOK_MARKER: run_id}
+    marked = {**jupyter.environment(STATE, STATE), "JUPYTER_TOKEN": token, processes.NOTEBOOK_MARKER: run_id}
     # A separate session: Ctrl-C reaches only this process, which then ends the server once.
     server = subprocess.Popen(command(port), env=marked, stdin=subprocess.DEVNULL, start_new_session=True)
     try:
@@ -125,7 +93,7 @@ def serve(page: str, first_port: int) -> int:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         if server.poll() is None:
             server.send_signal(signal.SIGTERM)
-        processes.wait_until_gone(run_id, STOP_TIMEOUT_S, processes.NOTEBOOK_MARKER)
+        processes.wait_until_gone(run_id, jupyter.STOP_TIMEOUT_S, processes.NOTEBOOK_MARKER)
         processes.kill_all(run_id, processes.NOTEBOOK_MARKER)
 
 

@@ -5,8 +5,9 @@ import os
 import unittest
 import uuid
 
-from notebook_runs import ROBOT, faults_of, prepare, tool
+from notebook_runs import ROBOT, faults_of, prepare
 
+from lab_environment import jupyter
 from lab_environment.ports import free_port
 from lab_tests import processes
 
@@ -21,7 +22,7 @@ class LabNotebookRobotTest(unittest.TestCase):
             **os.environ, MARKER: run_id, "ROS_MASTER_URI": "http://localhost:%d" % free_port(),
             "ROS_HOSTNAME": "localhost"})
         self.assertEqual(faults, [], "\n".join(faults))
-        self.assertEqual(processes.wait_until_gone(run_id, tool.STOP_TIMEOUT_S, MARKER), {})
+        self.assertEqual(processes.wait_until_gone(run_id, jupyter.STOP_TIMEOUT_S, MARKER), {})
 
 
 if __name__ == "__main__":

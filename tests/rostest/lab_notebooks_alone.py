@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from notebook_runs import CELL_TIMEOUT_S, MOVING, OWN_LAB, ROBOT, ROOT, WATCHING, faults_of, is_blank, prepare, tool
 
+from lab_environment import jupyter
 from lab_environment.ports import free_port
 from lab_testing.waiting import wait_until
 from lab_tests import processes
@@ -35,7 +36,7 @@ class LabNotebooksAloneTest(unittest.TestCase):
             **os.environ, MARKER: run_id, "ROS_MASTER_URI": "http://localhost:%d" % free_port(),
             "ROS_HOSTNAME": "localhost"})
         self.assertEqual(faults, [], "\n".join(faults))
-        self.assertEqual(processes.wait_until_gone(run_id, tool.STOP_TIMEOUT_S, MARKER), {})
+        self.assertEqual(processes.wait_until_gone(run_id, jupyter.STOP_TIMEOUT_S, MARKER), {})
 
     def test_a_blank_picture_is_told_from_one_that_shows_little(self):
         pixels = np.full((90, 120, 3), 200, np.uint8)
@@ -57,17 +58,17 @@ class LabNotebooksAloneTest(unittest.TestCase):
             self.assertTrue(found, address)
             base, page, token = found.groups()
             self.assertTrue((ROOT / page).is_file(), page)
-            request = urllib.request.Request(base + "/api/kernels", json.dumps({"name": tool.KERNEL}).encode(),
+            request = urllib.request.Request(base + "/api/kernels", json.dumps({"name": jupyter.KERNEL}).encode(),
                                              {"Authorization": "token " + token, "Content-Type": "application/json"})
             with urllib.request.urlopen(request, timeout=CELL_TIMEOUT_S) as answer:
-                self.assertEqual(json.load(answer)["name"], tool.KERNEL)
+                self.assertEqual(json.load(answer)["name"], jupyter.KERNEL)
             with self.assertRaises(urllib.error.HTTPError):
                 urllib.request.urlopen(base + "/api/kernels", timeout=CELL_TIMEOUT_S)
             # During exec a process shows no environment.
             wait_until(lambda: len(processes.marked(run_id, MARKER)) > 2, "Jupyter and its kernel")
             server.send_signal(signal.SIGINT)
             server.wait(CELL_TIMEOUT_S)
-            self.assertEqual(processes.wait_until_gone(run_id, tool.STOP_TIMEOUT_S, MARKER), {})
+            self.assertEqual(processes.wait_until_gone(run_id, jupyter.STOP_TIMEOUT_S, MARKER), {})
         finally:
             processes.kill_all(run_id, MARKER)
             server.wait()

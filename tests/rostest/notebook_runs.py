@@ -18,6 +18,7 @@ from nbclient.exceptions import CellExecutionError
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 import notebook as tool  # noqa: E402  (a tool at the root of the workspace is not an installed package)
+from lab_environment import jupyter  # noqa: E402
 
 PICTURES = ROOT / ".baxter" / "pictures"
 CELL_TIMEOUT_S = 150
@@ -56,7 +57,7 @@ class Run:
         self.path = path
         self.notebook = nbformat.read(path, 4)
         self.environment = environment
-        self.client = NotebookClient(self.notebook, timeout=CELL_TIMEOUT_S, kernel_name=tool.KERNEL,
+        self.client = NotebookClient(self.notebook, timeout=CELL_TIMEOUT_S, kernel_name=jupyter.KERNEL,
                                      resources={"metadata": {"path": str(path.parent)}})
 
     def twice(self):
@@ -94,8 +95,8 @@ class Run:
 def prepare():
     """Register the kernel through this process's environment, and make the folder of the pictures."""
     PICTURES.mkdir(parents=True, exist_ok=True)
-    tool.write_kernel(tool.STATE)
-    os.environ.update(tool.environment(tool.STATE))
+    tool.write_kernel()
+    os.environ.update(jupyter.environment(tool.STATE, tool.STATE))
 
 
 def faults_of(*rows, environment=lambda: dict(os.environ)):

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import notebook as tool
+from lab_environment import jupyter
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ["1_transforms_and_tf", "2_urdf", "3_rviz", "4_xacro", "5_moving_baxter", "6_rotating_the_gripper", "7_waving",
@@ -26,7 +27,7 @@ def test_in_git_without_outputs(path):
     staged = subprocess.run(["git", "-C", ROOT, "show", f":{name}"], capture_output=True, text=True)
     # A working copy may have outputs; committed files may not. Outside git the file itself is checked.
     content = json.loads(staged.stdout if staged.returncode == 0 else path.read_text(encoding="utf-8"))
-    assert content["metadata"]["kernelspec"]["name"] == tool.KERNEL
+    assert content["metadata"]["kernelspec"]["name"] == jupyter.KERNEL
     for cell in content["cells"]:
         assert cell.get("outputs", []) == [] and cell.get("execution_count") is None
 
@@ -54,7 +55,7 @@ def test_part_of_a_name_is_enough_if_it_is_one_notebooks():
 
 
 def test_kernel_is_the_workspaces_own(tmp_path):
-    tool.write_kernel(tmp_path)
+    jupyter.write_kernel(tmp_path, [str(ROOT / "tools" / "notebook_kernel.bash")])
     spec = json.loads((tmp_path / "kernels" / "baxter" / "kernel.json").read_text(encoding="utf-8"))
     script, *rest = spec["argv"]
     assert rest == ["-f", "{connection_file}"]
@@ -66,7 +67,7 @@ def test_kernel_is_the_workspaces_own(tmp_path):
 def test_jupyter_listens_on_loopback_and_writes_into_one_folder(tmp_path):
     assert "--ServerApp.ip=127.0.0.1" in tool.command(8888)
     assert not any("token" in word for word in tool.command(8888)), "everybody can read a command line"
-    made = tool.environment(tmp_path)
+    made = jupyter.environment(tmp_path, tmp_path)
     for name in ("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR", "IPYTHONDIR"):
         assert made[name].startswith(str(tmp_path)) and Path(made[name]).is_dir()
 
@@ -81,8 +82,8 @@ def test_jupyterlab_does_not_ask_about_news(tmp_path):
         "    schema_name='@jupyterlab/apputils-extension:notification', labextensions_path=[])\n"
         "print(json.dumps({name: entry['default'] for name, entry in found['schema']['properties'].items()}))\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], env=tool.environment(tmp_path), capture_output=True,
-                          text=True)
+    done = subprocess.run([sys.executable, "-c", program], env=jupyter.environment(tmp_path, tmp_path),
+                          capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     defaults = json.loads(done.stdout)
     assert defaults["fetchNews"] == "false" and defaults["checkForUpdates"] is False

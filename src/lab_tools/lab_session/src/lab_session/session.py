@@ -16,10 +16,9 @@ import rospy
 
 from baxter_interface import startup
 from baxter_interface.patience import Condition, wait_in_order
-from lab_environment import page_files
+from lab_environment import keeper, page_files
 from lab_environment.ports import free_port
 
-from . import keeper
 from .labs import LABS
 
 # A simulator that another program has started may still be starting; after this time it counts as another robot's [s].

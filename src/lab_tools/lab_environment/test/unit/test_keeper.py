@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The keeper ends its command when its owner is gone, in any way; and the labs behind the names."""
-import os
+"""The keeper ends its command when its owner is gone, in any way."""
 import signal
 import subprocess
 import sys
 
 import pytest
-import rospkg
 
-from lab_session import keeper
-from lab_session.labs import LABS
+from lab_environment import keeper
 from lab_testing.processes import is_alive
 from lab_testing.waiting import wait_until
 
@@ -80,10 +77,3 @@ def test_ctrl_c_and_kill_of_the_keeper_itself_change_nothing(kept):
 
 def test_command_that_ends_by_itself_hands_its_status_on(tmp_path):
     assert keep(tmp_path / "state", "sh", "-c", "exit 7").wait(DEADLINE_S) == 7
-
-
-@pytest.mark.parametrize("name", LABS)
-def test_launch_file_of_a_lab_is_there(name):
-    start = LABS[name]
-    folder = rospkg.RosPack().get_path(start.package)
-    assert any(start.launch_file in files for _, _, files in os.walk(os.path.join(folder, "launch")))

@@ -64,8 +64,19 @@ def _end_everything():
                 os.waitpid(pid, 0)
 
 
-def keep(state_path, command, after=None):
-    """Run `command` until it ends or standard input closes; returns its exit code, or 0 when it was ended."""
+def _wait_for_orphans(grace_s):
+    deadline = time.monotonic() + grace_s
+    while _own_children() and time.monotonic() < deadline:
+        with contextlib.suppress(ChildProcessError):
+            if not os.waitpid(-1, os.WNOHANG)[0]:
+                time.sleep(_POLL_S)
+
+
+def keep(state_path, command, after=None, grace_s=0.0):
+    """Run `command` until it ends or standard input closes; returns its exit code, or 0 when it was ended.
+
+    after: state file of a keeper that ends first; grace_s: time for what the command leaves to end by itself.
+    """
     with open(state_path, "a", encoding="utf-8") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
@@ -83,6 +94,7 @@ def keep(state_path, command, after=None):
                 child.send_signal(signal.SIGINT)
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     child.wait(STOP_TIMEOUT_S)
+            _wait_for_orphans(grace_s)
         finally:
             _end_everything()
             os.unlink(state_path)
