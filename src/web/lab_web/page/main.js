@@ -3,6 +3,7 @@
 import {Controls} from "./controls.js";
 import {Exercises} from "./exercises.js";
 import {Hands} from "./hands.js";
+import {Notebook} from "./notebook.js";
 import {element, Panel} from "./panel.js";
 import {Plans} from "./plans.js";
 import {Plots} from "./plots.js";
@@ -35,6 +36,7 @@ const controls = new Controls(send, query, () => state.number, note);
 const recordings = new Recordings(send, query, () => state.number, note);
 const plots = new Plots();
 const exercises = new Exercises();
+const notebook = new Notebook(send, query);
 const simulation = new Simulation(send, () => view);
 let robot = {};
 let noteTimer = 0;
@@ -86,6 +88,7 @@ function refresh() {
   recordings.allow(acting, driving);
   simulation.allow(driving);
   hands.allow(acting, driving);
+  notebook.allow(acting);
 }
 
 const served = {
@@ -127,6 +130,9 @@ const served = {
   },
   result(result) {
     exercises.show(result);
+  },
+  notebook(is) {
+    notebook.show(is);
   },
   reach(answer) {
     hands.answered(answer);
@@ -242,6 +248,7 @@ function startChoices(language) {
     buildPanels();
     buildCameras();
     exercises.refresh();
+    notebook.refresh();
     sayOfView();
     note();
     refresh();
@@ -293,4 +300,4 @@ send({address: `${sockets}lab${query}`});
 setInterval(() => send({}), ALIVE_MS);
 startTopics();
 // For the console, and for tests.
-globalThis.lab = {view, state, send, hands, controls, simulation};
+globalThis.lab = {view, state, send, hands, controls, simulation, notebook};

@@ -158,7 +158,12 @@ class Browser:
 
     def _note(self, frame):
         said = frame.get("params", {})
-        if frame.get("method") == "Runtime.exceptionThrown":
+        if frame.get("method") == "Page.javascriptDialogOpening":
+            # Nothing goes on before the answer: a page with unsaved changes asks whether it may be left.
+            self._number += 1
+            self._socket.send(json.dumps({"id": self._number, "method": "Page.handleJavaScriptDialog",
+                                          "params": {"accept": True}}))
+        elif frame.get("method") == "Runtime.exceptionThrown":
             details = said["exceptionDetails"]
             self.errors.append(details.get("exception", {}).get("description") or details["text"])
         elif frame.get("method") == "Runtime.consoleAPICalled" and said["type"] in ("error", "assert"):

@@ -2,7 +2,9 @@
 """The node lab_web: serves the page beside a running lab, and prints its address."""
 import argparse
 import contextlib
+import importlib.util
 import os
+import re
 import secrets
 import socket
 import threading
@@ -17,7 +19,7 @@ import rosgraph
 import rospkg
 import rospy
 
-from lab_environment import page_files, ports
+from lab_environment import jupyter, page_files, ports
 from lab_web.buttons import Buttons
 from lab_web.errands import Errands
 from lab_web.exercises import Results
@@ -26,6 +28,7 @@ from lab_web.lab import Lab
 from lab_web.libraries import LibrariesError, fetched
 from lab_web.loops import lasting
 from lab_web.move_group import RESULT_TOPIC, RESULT_TYPE, MoveGroup
+from lab_web.notebooks import PATH, Door, NotebookHandler, Notebooks, labs_notebooks
 from lab_web.parts import SCREEN_TOPIC, Parts
 from lab_web.planning import Planning
 from lab_web.playback import Recorder, play
@@ -88,6 +91,13 @@ def _parser():
     parser.add_argument("--view-token", type=_token, default=os.environ.get(VIEW_TOKEN),
                         help="the token of those that only watch and stop; default: the variable %s, else a new one"
                         % VIEW_TOKEN)
+    parser.add_argument("--notebook", action=argparse.BooleanOptionalAction, default=None,
+                        help="offer JupyterLab beside the robot to the operator's token; it starts when a page asks "
+                        "for it. Default: yes, but with --public no: it runs any code")
+    parser.add_argument("--notebook-root", type=Path, metavar="FOLDER",
+                        help="the topmost folder of the notebooks; the labs' are copied there. Default: the workspace")
+    parser.add_argument("--below", type=_below, default="", metavar="PATH",
+                        help="the path at which a front door shows this page, such as /anna")
     return parser
 
 
@@ -100,6 +110,12 @@ def _port_number(text):
 def _token(text):
     if not text.isprintable() or not text:
         raise argparse.ArgumentTypeError("%r is no token; letters, digits and signs are expected" % text)
+    return text
+
+
+def _below(text):
+    if not re.fullmatch(r"(/[\w-]+)*", text):
+        raise argparse.ArgumentTypeError("%r is no path of an address; /anna is one, without a slash at its end" % text)
     return text
 
 
@@ -129,7 +145,9 @@ def serve(options, page, libraries):
     bridge = Bridge(graph, codec, loop_thread.later)
     video = VideoServer(Cameras(graph, codec, loop_thread), VideoOptions(access))
     clients = Clients(bridge, loop_thread, SocketOptions(access))
+    notebooks = _notebooks(options, pages)
     application = clients.application(*routes(pages, page, libraries), *upload_routes(pages, equipment.recorder),
+                                      *_notebook_routes(notebooks, access),
                                       (r"/snapshot", SnapshotHandler, {"server": video}))
     try:
         serving = Serving(loop_thread, application, _port(options), "" if options.public else "127.0.0.1")
@@ -146,6 +164,8 @@ def serve(options, page, libraries):
     finally:
         page_files.remove_address(rosgraph.get_master_uri(), address)
         rospy.signal_shutdown("the end")
+        if notebooks is not None:
+            notebooks.close()
         for thread in threads:
             thread.join()
         equipment.guard.close()
@@ -153,6 +173,38 @@ def serve(options, page, libraries):
         serving.close()
         video.cameras.shut_down()
         loop_thread.stop()
+
+
+def _notebooks(options, pages):
+    """The Notebooks of the page, or None where it offers none. Raises Failure."""
+    offered = not options.public if options.notebook is None else options.notebook
+    if not offered or importlib.util.find_spec("jupyterlab") is None:
+        return None
+    packages = rospkg.RosPack()
+    workspace, root = Path(packages.get_path("lab_web")).parents[2], options.notebook_root
+    try:
+        if root is None and (workspace / "src").is_dir():
+            root, files = workspace, jupyter.notebooks(workspace)
+            files = [path.relative_to(workspace).as_posix() for path in files]
+        else:
+            # An install space is no place for a user's work.
+            root = (root or Path.home() / "baxter_notebooks").absolute()
+            folders = {name: Path(packages.get_path(name)) / "notebooks" for name in packages.list()}
+            files = labs_notebooks({name: path for name, path in folders.items() if path.is_dir()}, root)
+    except OSError as error:
+        raise Failure("the notebooks cannot be put into %s: %s; name another folder by --notebook-root, or add "
+                      "--no-notebook" % (root, error.strerror)) from None
+    if (workspace / "baxter.sh").is_file():
+        # Cells and terminals find the check there.
+        os.environ.setdefault("LAB_ROOT", str(workspace))
+    made = Notebooks(partial(jupyter.Server, root, options.below + PATH), files, partial(pages.share, "notebook"),
+                     options.below)
+    pages.lab.add("notebook", made.ask, needs_control=False)
+    return made
+
+
+def _notebook_routes(notebooks, access):
+    return [] if notebooks is None else [(PATH + ".*", NotebookHandler, {"door": Door(access, notebooks)})]
 
 
 class _Equipment(NamedTuple):

@@ -24,7 +24,7 @@ _LARGEST_UPLOAD = 16 << 20
 SCREEN = (1024, 600)
 # Everything comes from this server, so that the page works without a network and loads nothing foreign.
 _POLICY = "default-src 'self'; script-src 'self'%s; img-src 'self' data:; connect-src 'self' ws: wss:; " \
-          "frame-ancestors 'self'"
+          "frame-src 'self'; frame-ancestors 'self'"
 
 
 def policy(page_text=""):

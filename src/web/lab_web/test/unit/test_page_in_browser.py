@@ -102,6 +102,13 @@ async def say(sockets, robot, time_s):
                 await socket.write_message(json.dumps({"op": "publish", "topic": topic, "msg": messages[topic]}))
 
 
+class Frame(web.RequestHandler):
+    """Instead of JupyterLab."""
+
+    def get(self):
+        self.finish("<p>jupyter of %s" % self.get_query_argument("token"))
+
+
 class Server:
     """The page's server; its address is ``address``."""
 
@@ -120,13 +127,14 @@ class Server:
         buttons = Buttons(self.robot.switch, errands)
         self.lab.when_lost(buttons.release_all)
         recorder = Recorder(lambda state: self.pages.share("recording", state))
-        self.shown, self.planned = [], []
+        self.shown, self.planned, self.notebook_asks = [], [], []
         for name, serve in {"press": buttons.press, "turn": buttons.turn,
                             "screen": lambda client, operation: self.shown.append(operation["content"]),
                             "plan": self.plan,
                             "play": lambda client, operation: play(self.lab, client, recorder)}.items():
             self.lab.add(name, serve)
-        for name, serve in {"reach": hands.ask, "record": recorder.record, "load": recorder.load}.items():
+        for name, serve in {"notebook": lambda *asked: self.notebook_asks.append(asked), "reach": hands.ask,
+                            "record": recorder.record, "load": recorder.load}.items():
             self.lab.add(name, serve, needs_control=False)
         self._recorder = recorder
         self._writer = SnapshotWriter(folder)
@@ -141,6 +149,7 @@ class Server:
             "poses": ["neutral"], "hands": hands.sides, "grippers": [], "cameras": [], "has_scene": True,
             "can_plan": True, "can_press": True, "things": ["block"]})
         application = web.Application([*routes(self.pages, PAGE, libraries), *upload_routes(self.pages, recorder),
+                                       (r"/notebook/lab.*", Frame),
                                        (r"/rosbridge", Rosbridge, {"sockets": self._sockets})])
         self._serving = Serving(self.loop, application, 0, "127.0.0.1")
         self.address = "http://127.0.0.1:%d/?token=" % self._serving.port
@@ -363,6 +372,85 @@ def test_an_exercises_verdict_is_beside_the_robot(lab, browser):
     assert browser.evaluate("document.getElementById('exercise-hint').textContent") == "Hint: the sine is too short"
     assert browser.evaluate("[...document.querySelectorAll('#exercise-runs td')].map((cell) => cell.textContent)") == [
         "path", "20 / 40", "1.5 periods"]
+
+
+def share_notebook(lab, state, number="", why=""):
+    lab.pages.share("notebook", {"state": state, "why": why, "number": number, "files": ["src/1_first_steps.ipynb"]})
+
+
+@pytest.fixture
+def notebook(lab, browser):
+    """A page with an open notebook; its server."""
+    assert browser.evaluate("document.getElementById('notebook-toggle').hidden")
+    share_notebook(lab, "off")
+    browser.wait("!document.getElementById('notebook-toggle').hidden")
+    browser.click("#notebook-toggle")
+    wait_until(lambda: lab.notebook_asks, "a page that asks for the notebook")
+    share_notebook(lab, "starting")
+    browser.wait("document.getElementById('notebook-said').textContent.includes('starting')")
+    share_notebook(lab, "running", "1")
+    browser.wait(FRAME + ".contentDocument?.body?.textContent === 'jupyter of drive'")
+    yield lab
+    browser.evaluate("localStorage.clear()")
+    browser.resize(1000, 800)
+
+
+FRAME = "document.getElementById('notebook-frame')"
+BOX = ("(({left, right, top, bottom}) => [left, right, top, bottom])"
+       "(document.querySelector('%s').getBoundingClientRect())")
+
+
+def test_the_notebook_is_beside_the_robot_and_keys_and_the_pointer_divide_the_width(notebook, browser):
+    def share():
+        return int(browser.evaluate("document.getElementById('split').getAttribute('aria-valuenow')"))
+    browser.evaluate("document.getElementById('split').focus()")
+    for key, after in (("Home", 20), ("ArrowRight", 25), ("End", 80), ("ArrowLeft", 75)):
+        browser.press(key, key)
+        assert share() == after
+        _, right, _, _ = browser.evaluate(BOX % "#notebook-frame")
+        left, end, _, _ = browser.evaluate(BOX % "#view")
+        assert 0 < right < left < end <= 1000 and abs(right - 10 * after) < 30
+    left, right, top, bottom = browser.evaluate(BOX % "#split")
+    browser.drag(((left + right) / 2, (top + bottom) / 2), (400, 300))
+    assert abs(share() - 40) <= 1
+    browser.evaluate("scrollTo(0, document.body.scrollHeight)")
+    _, _, top, bottom = browser.evaluate(BOX % "#notebook-frame")
+    assert 0 < top < bottom <= 800  # it stays while the panels scroll
+
+
+def test_a_notebook_is_chosen_and_a_new_server_is_loaded_again(notebook, browser):
+    browser.evaluate("(() => { const list = document.getElementById('notebook-file'); list.selectedIndex = 1;"
+                     "list.onchange(); })()")
+    browser.wait(FRAME + ".contentWindow.location.pathname === '/notebook/lab/tree/src/1_first_steps.ipynb'")
+    browser.evaluate(FRAME + ".contentWindow.old = true")
+    share_notebook(notebook, "running", "1")
+    share_notebook(notebook, "failed", why="no space")
+    browser.wait("document.getElementById('notebook-said').textContent.startsWith('No notebook: no space.')")
+    assert browser.evaluate(FRAME + ".contentWindow.old")
+    before = len(notebook.notebook_asks)
+    for is_open in (False, True):
+        browser.click("#notebook-toggle")
+        assert browser.evaluate("document.getElementById('notebook').hidden") is not is_open
+    wait_until(lambda: len(notebook.notebook_asks) == before + 1, "another try")
+    share_notebook(notebook, "running", "2")
+    browser.wait("!%s.contentWindow.old" % FRAME)
+
+
+def test_the_notebook_is_above_the_robot_on_a_telephone(notebook, browser):
+    browser.resize(390, 844)
+    assert browser.evaluate("document.documentElement.scrollWidth") <= 390
+    _, _, _, bottom = browser.evaluate(BOX % "#notebook")
+    _, _, top, _ = browser.evaluate(BOX % "#view")
+    assert bottom < top
+    left, right, top, bottom = browser.evaluate(BOX % "#stop")
+    assert 0 <= left < right <= 390 and 0 <= top < bottom <= 844
+
+
+def test_a_page_that_only_watches_has_no_notebook(lab, browser):
+    share_notebook(lab, "running", "1")
+    browser.open(lab.address + "look")
+    browser.wait("globalThis.lab?.state.connected && lab.notebook.state")
+    assert browser.evaluate("document.getElementById('notebook-toggle').hidden && !%s.src" % FRAME)
 
 
 def test_a_picture_fills_the_screen_as_far_as_its_shape_lets_it(lab, browser, tmp_path):
