@@ -19,6 +19,8 @@ COOKIE = "lab_token"
 MOST_AT_ONCE = 64
 #: The waiting page asks again after this time [s].
 _AGAIN_S = 2
+# What an open JupyterLab asks again and again, without its user, beside listings of folders.
+_POLLED = ("kernels", "sessions", "terminals", "kernelspecs")
 _WAITING = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta http-equiv="refresh" content="%d">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>Lab of %s</title></head>
@@ -77,6 +79,17 @@ class Start(_Handler):
                     % self.request.host)
 
 
+def is_poll(method, uri):
+    """Does an open JupyterLab ask this by itself? uri: path and query below the lab. It wakes no lab."""
+    path, _, query = uri.partition("?")
+    name = path.removeprefix("/notebook/api/")
+    if method != "GET" or name == path:
+        return False
+    # A file that its user opens has a type.
+    return name in _POLLED or (name.partition("/")[0] == "contents" and "type=file" not in query
+                               and "type=notebook" not in query)
+
+
 class Passed(PassingHandler):
     """A request for a lab: /NAME/..."""
 
@@ -95,6 +108,14 @@ class Passed(PassingHandler):
             return
         if not below.startswith("/"):
             self.redirect(self._prefix + "/" + below)
+            return
+        self._is_poll = is_poll(self.request.method, below)
+        if self._is_poll:
+            if self.door.supervisor.is_awake(self._name):
+                await self.pass_to(self.door.supervisor.socket_of(self._name), below)
+            else:
+                # 503 would make JupyterLab ask its user what to do.
+                self.refuse(409, "this lab is not awake")
             return
         lab = self.door.supervisor.request(self._name)
         if lab.state is not State.RUNNING:
@@ -121,10 +142,12 @@ class Passed(PassingHandler):
 
     def entered(self):
         # A lab that is served must not be paused.
-        self.door.supervisor.serving(self._name, self.is_upgrade, 1)
+        if not self._is_poll:
+            self.door.supervisor.serving(self._name, self.is_upgrade, 1)
 
     def left(self):
-        self.door.supervisor.serving(self._name, self.is_upgrade, -1)
+        if not self._is_poll:
+            self.door.supervisor.serving(self._name, self.is_upgrade, -1)
 
     def may_pass(self, chunk):
         if not http_text.is_heartbeat(chunk):

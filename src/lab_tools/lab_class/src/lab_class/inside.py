@@ -27,6 +27,7 @@ def main():
     parser = argparse.ArgumentParser(prog="lab_class.inside")
     for name in ("listener", "master", "page"):
         parser.add_argument("--" + name, type=int, required=True)
+    parser.add_argument("--below", required=True)
     parser.add_argument("launch", nargs="+")
     options = parser.parse_args()
     # Orphans of the lab become children of this process, and end with it.
@@ -66,6 +67,7 @@ async def _page(options):
             break
         await asyncio.sleep(_LOOK_S)
     page = await asyncio.create_subprocess_exec("rosrun", "lab_web", "lab_web", "--port", str(options.page),
+                                                "--below", options.below, "--notebook-root", os.environ["HOME"],
                                                 stdin=subprocess.DEVNULL)
     return await page.wait()
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from lab_class.store import HOME
 from lab_environment import isolation, ports, system_calls
 from lab_web.tokens import TOKEN, VIEW_TOKEN
+from rf_checks.handout import emptied_notebook
 
 #: Ports inside of a lab's separate network, as on any lab's machine.
 MASTER_PORT, PAGE_PORT = 11311, 8090
@@ -44,7 +45,7 @@ def prepared(place, options, tokens, listener, refused):
     else:
         home, master, page = str(place.folder / HOME), ports.free_port(), ports.free_port()
     command = [sys.executable, "-P", "-m", "lab_class.inside", "--listener", str(listener), "--master", str(master),
-               "--page", str(page), "--", *options.launch]
+               "--page", str(page), "--below", "/" + place.folder.name, "--", *options.launch]
     limits = limited(options.disk_bytes, TASKS if place.walls else None)
     environment = {**isolation.environment_of(os.environ), TOKEN: tokens.act, VIEW_TOKEN: tokens.view,
                    "ROS_MASTER_URI": "http://localhost:%d" % master, "ROS_HOSTNAME": "localhost", "HOME": home,
@@ -57,10 +58,26 @@ def prepared(place, options, tokens, listener, refused):
         return [*limits, *command], environment, (listener,)
     options_of_calls, descriptors = refused
     binds = [(place.folder / HOME, home, True), (place.libraries, home + "/.cache/lab_web", False),
-             *isolation.caches(os.environ, place.folder / "caches")]
+             *isolation.caches(os.environ, place.folder / "caches"),
+             *_notebooks(os.environ, place.folder / "caches")]
     enter = isolation.command(os.environ, binds, (*HIDDEN, str(place.state_folder)), True, options_of_calls,
                               SCRATCH_BYTES)
     return [*enter, *limits, *command], environment, (listener, *descriptors)
+
+
+def _notebooks(environment, folder):
+    """The labs' notebooks without solutions, as binds in the place of those of the workspace."""
+    binds = []
+    for root in isolation.workspaces(environment):
+        for source in sorted(path for pattern in ("src/*/*/notebooks", "share/*/notebooks", "install/share/*/notebooks")
+                             for path in Path(root).glob(pattern)):
+            copy = folder / ("notebooks-%d" % len(binds))
+            copy.mkdir(parents=True)
+            for notebook in source.glob("*.ipynb"):
+                text = emptied_notebook(notebook.read_text(encoding="utf-8"))
+                (copy / notebook.name).write_text(text, encoding="utf-8")
+            binds.append((copy, source, False))
+    return binds
 
 
 def limited(file_bytes, tasks):

@@ -28,6 +28,7 @@ from lab_environment.family import children_of, is_running
 from lab_environment.ports import free_port
 from lab_testing.waiting import stretched, wait_until
 from lab_web import libraries
+from rf_checks.handout import SOLUTION_TAG
 
 NAMES = ("student-01", "student-02")
 ABSTRACT = "lab-class-test-%d" % os.getpid()
@@ -127,6 +128,7 @@ class TwoLabs(unittest.TestCase):
         self.check_that_labs_are_apart()
         if self.walls:
             self.check_walls()
+        self.check_notebook()
         self.check_pause()
         self.check_end_by_force()
         self.check_second_start()
@@ -186,6 +188,57 @@ class TwoLabs(unittest.TestCase):
             results = json.loads(report.read_text())
             self.assertEqual(len(results), 21, results)
             self.assertEqual([attempt for attempt, result in results.items() if result == "reached"], [], results)
+
+    def ask(self, path, body=None, **headers):
+        """The JSON that the first lab's JupyterLab answers; None while it starts."""
+        address = "http://127.0.0.1:%d/%s/notebook/%s" % (self.port, NAMES[0], path)
+        request = urllib.request.Request(address, body, headers)
+        try:
+            with urllib.request.urlopen(request, timeout=stretched(_LONG_S)) as answer:
+                return json.load(answer)
+        except urllib.error.HTTPError as error:
+            with error:
+                if error.code == 503:
+                    return None
+                raise
+
+    def check_notebook(self):
+        """A cell runs in the student's lab, and writes into the student's folder."""
+        own, other = (self.tokens[name] for name in NAMES)
+        for token in (own.view, other.act, ""):
+            self.assertEqual(self.get("/%s/notebook/api?token=%s" % (NAMES[0], token))[0], 403)
+        opened = {}
+
+        class Cookies(urllib.request.HTTPRedirectHandler):
+            def redirect_request(self, request, answer, code, message, headers, address):
+                cookies = [text.partition(";")[0] for text in headers.get_all("Set-Cookie")]
+                opened.update(address=address, Cookie="; ".join(cookies))
+
+        with contextlib.suppress(urllib.error.HTTPError):
+            urllib.request.build_opener(Cookies).open("http://127.0.0.1:%d/%s/notebook/api?token=%s"
+                                                      % (self.port, NAMES[0], own.act), timeout=stretched(_LONG_S))
+        self.assertEqual(opened.pop("address"), "http://127.0.0.1:%d/%s/notebook/api" % (self.port, NAMES[0]))
+        wait_until(lambda: self.ask("api", **opened), "the lab's JupyterLab", _START_S)
+        kernel = self.ask("api/kernels", json.dumps({"name": "baxter"}).encode(), **opened)
+        address = "ws://127.0.0.1:%d/%s/notebook/api/kernels/%s/channels" % (self.port, NAMES[0], kernel["id"])
+        channel = websocket.create_connection(address, timeout=stretched(_LONG_S), header=opened)
+        self.addCleanup(channel.close)
+        code = "import os, pathlib; pathlib.Path.home().joinpath('cell.txt').write_text(os.environ['ROS_MASTER_URI'])"
+        channel.send(json.dumps({
+            "header": {"msg_id": "1", "username": "", "session": "1", "msg_type": "execute_request", "version": "5.3"},
+            "parent_header": {}, "metadata": {}, "channel": "shell",
+            "content": {"code": code, "silent": False, "store_history": False, "user_expressions": {},
+                        "allow_stdin": False}}))
+        home = self.store.lab(NAMES[0]) / "home"
+        wait_until((home / "cell.txt").exists, "a cell that runs in the lab", _LONG_S)
+        wait_until((home / "cell.txt").read_text, "its text", _LONG_S)
+        if self.walls:
+            self.assertEqual((home / "cell.txt").read_text(), "http://localhost:11311")
+        waving = home / "notebooks" / "rf_lab2" / "7_waving.ipynb"
+        self.assertTrue(waving.is_file())
+        if self.walls:
+            self.assertNotIn(SOLUTION_TAG, [tag for cell in json.loads(waving.read_text())["cells"]
+                                            for tag in cell["metadata"].get("tags", ())])
 
     def family(self):
         return children_of([self.supervisor]) - {self.supervisor}

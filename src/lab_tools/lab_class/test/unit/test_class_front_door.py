@@ -465,3 +465,26 @@ def test_the_cookie_of_the_door_does_not_reach_the_lab(tmp_path):
     run(check())
 
 
+
+
+def test_an_open_jupyterlab_that_nobody_touches_wakes_no_lab_and_keeps_none_awake(tmp_path):
+    polls = ("kernels?1", "sessions", "terminals", "contents?content=1&hash=0&7", "contents/notebooks?content=1")
+
+    async def check():
+        async with House(tmp_path, hello) as house:
+            token, lab = house.tokens["anna"].act, house.supervisor.labs["anna"]
+            for name in polls:
+                assert (await house.ask("/anna/notebook/api/" + name, Cookie="lab_token=" + token))[0] == 200
+            assert house.supervisor.requests == [] and (lab.busy, lab.pages) == (0, 0)
+            lab.state = State.PAUSED
+            for name in polls:
+                assert (await house.ask("/anna/notebook/api/" + name, Cookie="lab_token=" + token))[0] == 409
+            assert lab.state is State.PAUSED
+            assert (await house.ask("/anna/notebook/api/kernels"))[0] == 403
+            await house.ask("/anna/notebook/api/contents/a.ipynb?type=notebook&content=1", Cookie="lab_token=" + token)
+            assert lab.state is State.RUNNING
+            lab.state = State.PAUSED
+            await house.ask("/anna/notebook/api/kernels", "POST", Cookie="lab_token=" + token)
+            assert lab.state is State.RUNNING
+
+    run(check())
