@@ -17,7 +17,7 @@ from workspace_tree import ROOT, is_in_tests, is_python, own_files, packages
 PACKAGES = {**packages(), "lab_testing": Path("tests/lab_testing"), "workspace_tests": Path("tests")}
 #: Modules whose Debian package has another name: the name in a manifest.
 RENAMED = {"PyKDL": "python3-pykdl", "PyQt5": "python3-pyqt5", "cv2": "python3-opencv", "lxml": "python3-lxml",
-           "numpy": "python3-numpy", "yaml": "python3-yaml", "hypothesis": "python3-hypothesis",
+           "numpy": "python3-numpy", "h5py": "python3-h5py", "yaml": "python3-yaml", "hypothesis": "python3-hypothesis",
            "rospkg": "python3-rospkg"}
 SHARES = (Path("/usr/share"), Path("/opt/ros/noetic/share"))
 #: Students' programs, which run in the environment of a whole lab.

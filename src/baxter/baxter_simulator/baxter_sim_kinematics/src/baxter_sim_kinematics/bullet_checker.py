@@ -30,12 +30,13 @@ class BulletChecker:
         self._plans = {}
 
     @classmethod
-    def of_robot(cls, robot, self_collision_pairs=None, margin_m=0.0, find_mesh=None, mesh_cuts=None):
+    def of_robot(cls, robot, self_collision_pairs=None, margin_m=0.0, find_mesh=None, mesh_cuts=None,
+                 warn=lambda text: None):
         """Return a checker with a separate world, in which ``robot`` (urdf_model.Robot) stands fixed at the origin.
 
-        ``find_mesh``: as for ``bullet_sim.World``; ``mesh_cuts``: as for its ``spawn``.
+        ``find_mesh``, ``warn``: as for ``bullet_sim.World``; ``mesh_cuts``: as for its ``spawn``.
         """
-        world = World(**({} if find_mesh is None else {"find_mesh": find_mesh}))
+        world = World(warn=warn, **({} if find_mesh is None else {"find_mesh": find_mesh}))
         options = {} if mesh_cuts is None else {"mesh_cuts": mesh_cuts}
         model = world.spawn(robot, robot.name or "robot", static=True, **options)
         return cls(world, model, self_collision_pairs, margin_m)
@@ -57,29 +58,44 @@ class BulletChecker:
 
     def contact(self, joint_names, q):
         """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None if there is none."""
-        index, moved = self._plan(tuple(joint_names))
+        return self.contact_and_cause(joint_names, q)[0]
+
+    def contact_and_cause(self, joint_names, q):
+        """Return (:meth:`contact`, whether the pose of the last joint's link alone is the cause).
+
+        It is where that link, or one beyond it, touches a body that none of ``joint_names`` (base to tip) moves: then
+        every posture touches that has this link in the same pose.
+        """
+        index, moved, last = self._plan(tuple(joint_names))
         self._model.set_joint_positions(index, q)
-        worst = None
+        worst, is_fixed = None, False
         for found in self._world.touching(self._model):
-            if found.distance >= -self._margin_m or (worst is not None and found.distance >= -worst.depth_m):
+            if found.distance >= -self._margin_m:
                 continue
             ours, others = self._named(found)
-            if ours[0] in moved or ours[-1] in moved:
+            ours_moved = [link for link in ours if link in moved]
+            if not ours_moved:
+                continue
+            is_fixed = is_fixed or (len(ours_moved) == 1 and ours_moved[0] in last)
+            if worst is None or found.distance < -worst.depth_m:
                 worst = Touch(ours[0], others, len(ours) == 1, -found.distance)
-        return worst
+        return worst, is_fixed
 
     def close(self):
         """Close the world."""
         self._world.close()
 
     def _plan(self, joint_names):
-        """Return (index of the joints, names of the links that they move); computed once."""
+        """Return (index of the joints, names of the links that they move, of those that the last one moves); computed
+        once."""
         if joint_names not in self._plans:
-            moved = set()
+            moved, last = set(), set()
             for joint in self._model.merged.joints.values():  # parents come before their children
                 if joint.name in joint_names or joint.parent in moved:
                     moved.add(joint.child)
-            self._plans[joint_names] = (self._model.index(joint_names), moved)
+                if joint.name == joint_names[-1] or joint.parent in last:
+                    last.add(joint.child)
+            self._plans[joint_names] = (self._model.index(joint_names), moved, last)
         return self._plans[joint_names]
 
     def _named(self, found):
@@ -91,14 +107,14 @@ class BulletChecker:
         return (found.link_b,), "%s/%s" % (found.model_a, found.link_a)
 
 
-def self_checker(robot, find_mesh):
+def self_checker(robot, find_mesh, warn=lambda text: None):
     """Return a BulletChecker of a robot alone: with Baxter's own pairs and convex pieces, or of another robot with all
-    pairs that make sense. ``robot``: urdf_model.Robot; ``find_mesh``: as for ``bullet_sim.World``.
+    pairs that make sense. ``robot``: urdf_model.Robot; ``find_mesh``, ``warn``: as for ``bullet_sim.World``.
     """
     pairs = self_collision_pairs(robot.links)
     if not pairs:
-        return BulletChecker.of_robot(robot, find_mesh=find_mesh)
-    return BulletChecker.of_robot(robot, pairs, find_mesh=find_mesh, mesh_cuts=MESH_CUTS)
+        return BulletChecker.of_robot(robot, find_mesh=find_mesh, warn=warn)
+    return BulletChecker.of_robot(robot, pairs, find_mesh=find_mesh, mesh_cuts=MESH_CUTS, warn=warn)
 
 
 def plausible_pairs(world, model, samples=50):

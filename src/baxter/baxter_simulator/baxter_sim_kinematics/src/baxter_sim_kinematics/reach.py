@@ -8,17 +8,19 @@ import signal
 import zipfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
-from baxter_sim_kinematics.batch import solve_batch
-from baxter_sim_kinematics.budget import Budget
-from baxter_sim_kinematics.errors import KinematicsError, NoSolution
-from baxter_sim_kinematics.ik import solve
+from baxter_sim_kinematics.errors import KinematicsError
+from baxter_sim_kinematics.reach_search import search_cells
 from urdf_model.transforms import matrix_from_quaternion
 
-# Cells that are computed, saved and counted together: about a second of work.
-_CHUNK = 32
+# Cells that are computed, saved and counted together: about a second of work. Postures of neighbouring cells help each
+# other within a part alone, so that a map does not depend on the order of its parts.
+PART = 128
+# Of the search. Parts of another number do not belong to the same map.
+_METHOD = 2
 # A million cells take a day. A request for far more is a mistake, and would not fit into memory.
 _MOST_CELLS = 10_000_000
 
@@ -67,8 +69,17 @@ class MapSettings:
         """Return the centres (cells, 3) [m] of ``count`` cells from number ``first`` on, by default of all; x slowest.
         """
         cells = math.prod(self.shape)
-        numbers = np.arange(first, cells if count is None else min(first + count, cells))
-        return np.array(self.lower) + self.cell_m * (0.5 + np.column_stack(np.unravel_index(numbers, self.shape)))
+        return np.array(self.lower) + self.cell_m * (0.5 + self.cells(first, cells if count is None else count))
+
+    def cells(self, first, count):
+        """Return the indices (count, 3) of cells from number ``first`` on, as far as there are any; x slowest."""
+        numbers = np.arange(first, min(first + count, math.prod(self.shape)))
+        return np.column_stack(np.unravel_index(numbers, self.shape))
+
+    def parts(self):
+        """Return {number of the first cell: number of cells} of the parts of the map."""
+        cells = math.prod(self.shape)
+        return {first: min(PART, cells - first) for first in range(0, cells, PART)}
 
     def rotations(self):
         """Return the orientations (orientations, 3, 3) tried in every cell: the same for the same settings."""
@@ -84,19 +95,37 @@ class MapSettings:
                                           math.cos(t) * np.cross(z, x) - math.sin(t) * x, z)) for t in turns])
 
 
+class PoseChecker(Protocol):
+    """Checks postures for contact, as bullet_checker.BulletChecker does. Not thread-safe."""
+
+    def contact(self, joint_names, q):
+        """Return the deepest Touch of the robot with its ``joint_names`` at ``q``, or None where it is clear."""
+
+    def contact_and_cause(self, joint_names, q):
+        """Return (:meth:`contact`, whether all postures touch that have the last joint's link in the same pose)."""
+
+
+@dataclass(frozen=True)
+class PartValues:
+    """reached: (cells, orientations) bool; manipulability: (cells,) the mean over the reached orientations, NaN where
+    none is."""
+
+    reached: np.ndarray
+    manipulability: np.ndarray
+
+
 def compute(chain, settings, folder, processes, progress=lambda done, total: None, new_checker=None):
-    """Compute a map and return (share (x, y, z) in 0 to 1, mean manipulability (x, y, z), NaN where nothing is
-    reached).
+    """Compute a map and return its PartValues, of all cells, x slowest.
 
     Each finished part is kept in ``folder``; existing parts are not computed again. ``progress`` is
-    called with the number of cells done and of all. ``new_checker()``: a CollisionChecker for each process, which
+    called with the number of cells done and of all. ``new_checker()``: a PoseChecker for each process, which
     ``self_collision`` needs. Raises ReachError where ``folder`` holds parts of another map.
     """
     if settings.self_collision and new_checker is None:
         raise ReachError("a map of postures in which the robot does not touch itself needs a collision checker")
     parts = _Parts(Path(folder), settings)
-    cells = math.prod(settings.shape)
-    sizes = {first: min(_CHUNK, cells - first) for first in range(0, cells, _CHUNK)}
+    sizes = settings.parts()
+    cells = sum(sizes.values())
     values = parts.load(sizes)
     todo = [first for first in sizes if first not in values]
     done = sum(sizes[first] for first in values)
@@ -108,70 +137,55 @@ def compute(chain, settings, folder, processes, progress=lambda done, total: Non
                 done += sizes[first]
                 progress(done, cells)
         values.update(parts.load({first: sizes[first] for first in todo}))
-    share, manipulability = zip(*(values[first] for first in sizes), strict=True)
-    return np.concatenate(share).reshape(settings.shape), np.concatenate(manipulability).reshape(settings.shape)
+    return PartValues(np.concatenate([values[first].reached for first in sizes]),
+                      np.concatenate([values[first].manipulability for first in sizes]))
 
 
-def cell_values(chain, settings, centres, checker=None):
-    """Return share and mean manipulability (k,) of the cells at ``centres`` (k, 3).
+class MapParts:
+    """The parts of a map that several programs compute, each some of them, into one folder."""
 
-    Manipulability is Yoshikawa's sqrt(det(J J^T)), the mean over the reached orientations. ``checker``: a
-    CollisionChecker; postures with contacts do not count.
+    def __init__(self, chain, settings, folder, checker=None):
+        """Arguments as of :func:`compute`. Raises ReachError."""
+        self.settings = settings
+        self._chain, self._checker, self._parts = chain, checker, _Parts(Path(folder), settings)
+
+    def compute(self, first):
+        """Compute and keep the part that begins with cell number ``first``, and return its PartValues. A part that is
+        there already is not computed again."""
+        found = self._parts.load({first: self.settings.parts()[first]})
+        if first not in found:
+            found[first] = part_values(self._chain, self.settings, first, self._checker)
+            self._parts.save(first, found[first])
+        return found[first]
+
+
+def part_values(chain, settings, first, checker=None):
+    """Return the PartValues of the part that begins with cell number ``first``.
+
+    Manipulability is Yoshikawa's sqrt(det(J J^T)). ``checker``: a PoseChecker; postures with contacts do not count.
     """
-    rotations = settings.rotations()
-    budget = Budget(candidates=1, max_starts=settings.starts, tolerance_m=1e-5, tolerance_rad=1e-5)
-    share, manipulability = np.zeros(len(centres)), np.full(len(centres), math.nan)
-    for k, centre in enumerate(centres):
-        # No search is needed beyond the outstretched arm.
-        if math.dist(centre, chain.shoulder) > chain.tip_reach_m:
-            continue
-        targets = np.tile(np.eye(4), (len(rotations), 1, 1))
-        targets[:, :3, :3], targets[:, :3, 3] = rotations, centre
-        targets = targets[~_beyond_wrist(chain, targets)]
-        if not len(targets):
-            continue
-        found = solve_batch(chain, targets, chain.mid_range, budget=budget, threads=1)
-        reached = [(target, q) for target, q in zip(targets[found.solved], found.q[found.solved], strict=True)]
-        postures = [q for _, q in reached] if checker is None else _without_contact(chain, reached, budget, checker)
-        share[k] = len(postures) / len(rotations)
-        if postures:
-            manipulability[k] = np.mean([yoshikawa(chain.jacobian(q)) for q in postures])
-    return share, manipulability
+    found = search_cells(chain, settings.cells(first, PART), settings.centres(first, PART), settings.rotations(),
+                         settings.starts, checker)
+    manipulability = np.full(len(found.reached), math.nan)
+    for cell, reached in enumerate(found.reached):
+        if reached.any():
+            jacobians = np.array([chain.jacobian(q) for q in found.postures[cell, reached]])
+            manipulability[cell] = yoshikawa(jacobians).mean()
+    return PartValues(found.reached, manipulability)
 
 
-def _beyond_wrist(chain, targets):
-    """Which targets (m, 4, 4) would have the last joint's origin beyond the outstretched arm."""
-    if not chain.wrist_is_fixed:
-        return np.zeros(len(targets), dtype=bool)
-    wrists = targets[:, :3, 3] - targets[:, :3, :3] @ chain.wrist_in_tip
-    return np.linalg.norm(wrists - chain.shoulder, axis=1) > chain.wrist_reach_m
-
-
-def _without_contact(chain, reached, budget, checker):
-    """Postures without contact for the (target, posture) of ``reached``: the same ones, or others where there are."""
-    postures = []
-    for target, q in reached:
-        if checker.contact(chain.joint_names, q) is not None:
-            try:
-                q = solve(chain, target, chain.mid_range, budget=budget, checker=checker).q
-            except NoSolution:
-                continue
-        postures.append(q)
-    return postures
-
-
-def yoshikawa(jacobian):
-    """Return the manipulability of a Jacobian (6, n)."""
-    return math.sqrt(max(np.linalg.det(jacobian @ jacobian.T), 0.0))
+def yoshikawa(jacobians):
+    """Return the manipulability of a Jacobian (6, n), or of many (m, 6, n)."""
+    return np.sqrt(np.maximum(np.linalg.det(jacobians @ np.swapaxes(jacobians, -1, -2)), 0.0))
 
 
 class _Parts:
     """The files of a map that is being computed."""
 
     def __init__(self, folder, settings):
-        self._folder = folder / "parts"
+        self._folder, self._orientations = folder / "parts", settings.orientations
         self._folder.mkdir(parents=True, exist_ok=True)
-        wanted = json.loads(json.dumps(asdict(settings)))
+        wanted = json.loads(json.dumps({**asdict(settings), "method": _METHOD}))
         note = self._folder / "settings.json"
         if note.exists():
             try:
@@ -191,22 +205,22 @@ class _Parts:
             unfinished.rename(note)
 
     def load(self, sizes):
-        """Return {first cell: (share, manipulability)} of the complete parts of ``sizes`` {first cell: cells}.
-        """
+        """Return {first cell: PartValues} of the complete parts of ``sizes`` {first cell: cells}."""
         values = {}
         for first, size in sizes.items():
             try:
                 with np.load(self._path(first)) as part:
-                    value = part["share"], part["manipulability"]
+                    bits, manipulability = part["reached"], part["manipulability"]
             except (OSError, ValueError, LookupError, EOFError, zipfile.BadZipFile):
                 continue  # not there, or cut off when the machine went down
-            if value[0].shape == value[1].shape == (size,):
-                values[first] = value
+            if bits.shape == (size, math.ceil(self._orientations / 8)) and manipulability.shape == (size,):
+                reached = np.unpackbits(bits, axis=1, count=self._orientations).astype(bool)
+                values[first] = PartValues(reached, manipulability)
         return values
 
-    def save(self, first, share, manipulability):
+    def save(self, first, values):
         unfinished = self._folder / (".%07d.%d.npz" % (first, os.getpid()))
-        np.savez(unfinished, share=share, manipulability=manipulability)
+        np.savez(unfinished, reached=np.packbits(values.reached, axis=1), manipulability=values.manipulability)
         unfinished.rename(self._path(first))
 
     def _path(self, first):
@@ -224,5 +238,5 @@ def _begin(chain, settings, parts, new_checker):
 
 def _work(first):
     chain, settings, parts, checker = _task
-    parts.save(first, *cell_values(chain, settings, settings.centres(first, _CHUNK), checker))
+    parts.save(first, part_values(chain, settings, first, checker))
     return first

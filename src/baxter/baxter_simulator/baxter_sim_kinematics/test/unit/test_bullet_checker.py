@@ -51,6 +51,20 @@ def test_straight_arm_is_clear_and_folded_arm_touches(checker):
     assert checker.contact(_JOINTS, np.zeros(3)) is None
 
 
+def test_cause_is_the_last_link_where_no_other_posture_helps(checker):
+    """A post at the end of the straight arm: the last link is there in every posture with this pose of the tip."""
+    checker.world.spawn(box("post", "0.2 0.2 1"), "post", Pose((2.5, 0.0, 0)), static=True)
+    touch, is_fixed = checker.contact_and_cause(_JOINTS, np.zeros(3))
+    assert touch.link_b == "post/box" and is_fixed
+    checker.world.delete("post")
+    checker.world.spawn(box("post", "0.2 0.2 1"), "post", Pose((1.5, 0.0, 0)), static=True)
+    touch, is_fixed = checker.contact_and_cause(_JOINTS, np.zeros(3))
+    assert touch.link_b == "post/box" and not is_fixed
+    # The last link on the first one, which another posture moves.
+    touch, is_fixed = checker.contact_and_cause(_JOINTS, np.array([1.0, 2 * math.pi / 3, 2 * math.pi / 3 + 0.12]))
+    assert {touch.link_a, touch.link_b} == {"l1", "l3"} and not is_fixed
+
+
 def test_world_is_seen_and_named(checker):
     checker.world.spawn(box("post", "0.2 0.2 1"), "post", Pose((1.5, 0.6, 0)), static=True)
     assert checker.contact(_JOINTS, np.zeros(3)) is None
