@@ -31,6 +31,7 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
                         labs for a class on this machine, behind one front door; --help
   handout FOLDER        make the students' copy of this workspace: without solutions, and without what reveals them
   batch JOB --seeds A:B run a job once for each seed on all processors; --list names the jobs, --help the options
+  batch-node            this machine as one of several for 'batch --engine ray', until Ctrl-C; --help
   bench [NAMES]         run the benchmarks, beside other libraries; --list shows the suites
   conformance [HOST]    compare the robot with a physical Baxter's interface, and print a score by group
   doctor [HOST]         check master, network, clock, build, Python and robot; print a fix for each problem
@@ -140,6 +141,11 @@ main() {
             use_loopback
             use_build || exit
             exec python3 -m lab_batch "$@"
+            ;;
+        batch-node)
+            bring_up_to_date || exit
+            use_build || exit
+            exec python3 -m lab_batch.ray_node "$@"
             ;;
         notebook)
             bring_up_to_date || exit

@@ -25,18 +25,46 @@ STARTS = 3
 
 def ensure_installed(root: Path):
     """Make Ray importable here and in its workers; install it below root/.baxter on first use. Raises JobError."""
+    if importlib.util.find_spec("ray") is not None:
+        return
     folder = root / ".baxter" / "ray"
-    if importlib.util.find_spec("ray") is None and not (folder / "ray").is_dir():
-        print("batch: Ray is installed into %s (80 MB from PyPI)" % folder, file=sys.stderr)
-        done = subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(folder),
-                               "-r", str(REQUIREMENTS)])
-        if done.returncode != 0:
-            raise JobError("pip could not install Ray from %s (exit code %d); the engine `processes` needs nothing" % (
-                REQUIREMENTS, done.returncode))
-    if importlib.util.find_spec("ray") is None:
-        sys.path.append(str(folder))
-        os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [os.environ.get("PYTHONPATH"), str(folder)]))
-        importlib.invalidate_caches()
+    if not _is_complete(folder):
+        _install(folder)
+    sys.path.append(str(folder))
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [os.environ.get("PYTHONPATH"), str(folder)]))
+    importlib.invalidate_caches()
+
+
+def _is_complete(folder):
+    """Whether all of REQUIREMENTS, as they are now, are installed there."""
+    kept = folder / REQUIREMENTS.name
+    return kept.is_file() and kept.read_bytes() == REQUIREMENTS.read_bytes()
+
+
+def _install(folder):
+    print("batch: Ray is installed into %s (80 MB from PyPI)" % folder, file=sys.stderr)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".ray-", dir=folder.parent) as unfinished:
+            new = Path(unfinished) / "ray"
+            done = subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(new),
+                                   "-r", str(REQUIREMENTS)])
+            if done.returncode != 0:
+                raise JobError("pip could not install Ray from %s (exit code %d); the engine `processes` needs nothing"
+                               % (REQUIREMENTS, done.returncode))
+            # Last of all: a folder with it is complete.
+            shutil.copy(REQUIREMENTS, new)
+            shutil.rmtree(folder, ignore_errors=True)
+            new.rename(folder)
+    except OSError as error:
+        raise JobError("Ray cannot be installed into %s: %s" % (folder, error)) from error
+
+
+def has_token():
+    """Whether this user has a token of Ray's, where Ray looks for it."""
+    named = os.environ.get("RAY_AUTH_TOKEN_PATH")
+    file = Path(named) if named else Path.home() / ".ray" / "auth_token"
+    return bool(os.environ.get("RAY_AUTH_TOKEN")) or file.is_file()
 
 
 class _Episodes:
@@ -58,6 +86,9 @@ def map_seeds(spec, seeds, limits, address=None):
     ensure_installed(Path(os.environ.get("LAB_ROOT", Path.cwd())))
     for name, value in ENVIRONMENT.items():
         os.environ.setdefault(name, value)
+    if address and has_token():
+        # Ray sends its token only where this says so; to a head that asks for it, it would try without it for ever.
+        os.environ.setdefault("RAY_AUTH_MODE", "token")
     import ray
 
     with contextlib.ExitStack() as ending:

@@ -115,5 +115,9 @@ def _last_object(text):
 # Name: (class, one line for --list).
 JOBS = {
     "ik": ("lab_batch.shipped:InverseKinematics", "random reachable poses of an arm: how many are solved, how exactly"),
+    "reach": ("lab_batch.robot_jobs:ReachPart", "a part of a map of reach of Baxter's arm; the seed is its number"),
+    "planning": ("lab_batch.robot_jobs:Planning", "a path of Baxter's arm between random postures among random boxes"),
+    "tuning": ("lab_batch.robot_jobs:PidTuning", "random gains of a joint's PID: the answer to a step"),
+    "serials": ("lab_batch.robot_jobs:Serials", "how far the hands of the robot with this serial are from the drawing"),
     "command": ("lab_batch.shipped:Command", "a program with {seed} in its arguments, such as roslaunch"),
 }

@@ -8,12 +8,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from lab_batch import JobError, Outcome, Spec, command, load
+from baxter_sim_kinematics import reach_commands
+from lab_batch import JobError, Outcome, Spec, command, load, ray_engine, ray_node
 from lab_batch.processes import Limits, map_seeds
 from lab_batch.records import Records, RecordsError, summary
-from lab_batch.shipped import Command
+from lab_batch.shipped import JOBS, Command
 from lab_testing.waiting import wait_until
 
 HERE = Path(__file__).parent
@@ -275,6 +277,61 @@ def test_a_batch_that_is_killed_leaves_no_worker(tmp_path):
     os.kill(episode, signal.SIGKILL)
 
 
+# -- Ray's installation
+
+def test_ray_is_installed_whole_or_not_at_all(tmp_path, monkeypatch):
+    """pip is a program that writes a part and fails, then one that writes all; then the requirements change."""
+    calls = []
+    monkeypatch.setattr(ray_engine.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(ray_engine, "REQUIREMENTS", tmp_path / "requirements-ray.txt")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    ray_engine.REQUIREMENTS.write_text("ray==1\n")
+
+    def run_pip(words, code):
+        target = Path(words[words.index("--target") + 1])
+        (target / "ray").mkdir(parents=True)
+        calls.append(target)
+        return subprocess.CompletedProcess(words, code)
+
+    monkeypatch.setattr(ray_engine.subprocess, "run", lambda words: run_pip(words, 1))
+    with pytest.raises(JobError, match="pip could not install Ray"):
+        ray_engine.ensure_installed(tmp_path)
+    assert list((tmp_path / ".baxter").iterdir()) == []
+    monkeypatch.setattr(ray_engine.subprocess, "run", lambda words: run_pip(words, 0))
+    for _ in range(2):
+        ray_engine.ensure_installed(tmp_path)
+    assert len(calls) == 2 and (tmp_path / ".baxter" / "ray" / "ray").is_dir()
+    ray_engine.REQUIREMENTS.write_text("ray==2\n")
+    ray_engine.ensure_installed(tmp_path)
+    assert len(calls) == 3
+
+
+# -- Ray's machines
+
+def test_a_token_is_found_where_ray_looks_for_it(tmp_path, monkeypatch):
+    for name in ("RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert not ray_engine.has_token()
+    (tmp_path / ".ray").mkdir()
+    (tmp_path / ".ray" / "auth_token").write_text("x")
+    assert ray_engine.has_token()
+    monkeypatch.setenv("RAY_AUTH_TOKEN_PATH", str(tmp_path / "other"))
+    assert not ray_engine.has_token()
+    monkeypatch.setenv("RAY_AUTH_TOKEN", "y")
+    assert ray_engine.has_token()
+
+
+def test_machines_of_a_cluster_are_started_with_fixed_ports():
+    head = ray_node.command_of(ray_node.parse(["--head", "--listen", "10.0.0.1", "--cpus", "0"]))
+    other = ray_node.command_of(ray_node.parse(["--address", "10.0.0.1:6379", "--listen", "10.0.0.2", "--cpus", "3"]))
+    assert " ".join(head).endswith(
+        "start --block --disable-usage-stats --head --port 6379 --include-dashboard false --node-ip-address 10.0.0.1 "
+        "--num-cpus 0 --node-manager-port 6380 --object-manager-port 6381 --runtime-env-agent-port 6382 "
+        "--min-worker-port 10002 --max-worker-port 10999")
+    assert " --address 10.0.0.1:6379 --node-ip-address 10.0.0.2 --num-cpus 3 " in " ".join(other)
+
+
 # -- jobs that come with the workspace
 
 def test_a_program_gets_its_seed_and_a_separate_master():
@@ -298,3 +355,53 @@ def test_inverse_kinematics_solves_reachable_poses():
     found = outcomes("lab_batch.shipped:InverseKinematics", [5], Limits(1), poses=20)[5]
     assert found.result["all_solved"], found
     assert found.result["farthest_off_m"] < 1e-4
+
+
+def one(name, seed, **parameters):
+    """The result of one episode of a shipped job, in this process."""
+    job = load(Spec(JOBS[name][0], parameters))
+    try:
+        return job.run(seed)
+    finally:
+        job.end()
+
+
+def test_parts_of_a_map_are_those_of_reach(tmp_path):
+    """Computed by a batch, then put together by the command, which finds all of them there."""
+    words = ["--cell", "0.6", "--orientations", "3", "--out", str(tmp_path)]
+    job = load(Spec(JOBS["reach"][0], {"out": str(tmp_path), "cell": 0.6, "orientations": 3, "self_collision": False}))
+    found = job.run(0)
+    assert found["parts"] == 1 and 0 < found["reached_poses"] < 3 * found["cells"]
+    with pytest.raises(ValueError, match="1 parts, 0 to 0"):
+        job.run(1)
+    written = (tmp_path / "parts" / "0000000.npz").stat().st_mtime_ns
+    script = Path(reach_commands.__file__).parents[2] / "scripts" / "reach"
+    done = subprocess.run([sys.executable, str(script), *words], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "parts" / "0000000.npz").stat().st_mtime_ns == written
+    assert np.load(tmp_path / "reach.npz")["share"].sum() * 3 == pytest.approx(found["reached_poses"])
+
+
+def test_plans_among_boxes_depend_on_the_seed_alone():
+    found = [one("planning", seed, boxes=3) for seed in (1, 2, 1)]
+    assert found[0] == found[2] != found[1]
+    for result in found:
+        if result["planned"]:
+            assert result["length_rad"] >= result["straight_rad"] - 1e-6
+
+
+def test_gains_are_drawn_and_their_step_is_simulated():
+    """With much of the good and with hardly any gain; gains in between are drawn by the seed."""
+    good = one("tuning", 0, joint="joint_6", p=(60.0, 60.0), i=(1.0, 1.0), d=(3.0, 3.0))
+    weak = one("tuning", 0, p=(1e-3, 1e-3), i=(1e-3, 1e-3), d=(1e-3, 1e-3))
+    assert good["itae"] < weak["itae"] and not weak["settles"]
+    first, again, other = (one("tuning", seed, seconds=0.1) for seed in (3, 3, 4))
+    assert first == again and first["p"] != other["p"]
+    with pytest.raises(JobError, match="bounds of p"):
+        one("tuning", 0, p=(0.0, 1.0))
+
+
+def test_robot_zero_is_the_drawing_and_others_are_not():
+    drawing, own = (one("serials", serial, postures=20) for serial in (0, 5))
+    assert max(drawing[name] for name in drawing if name.endswith("mm")) < 1e-6
+    assert all(0.5 < own[side + "_hand_off_most_mm"] < 60.0 for side in ("left", "right"))

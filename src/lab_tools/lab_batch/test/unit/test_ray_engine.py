@@ -24,7 +24,7 @@ for one in ray_engine.map_seeds(spec, range(int(sys.argv[3])), Limits(2)):
 import ray, psutil
 print(json.dumps([child.name() for child in psutil.Process().children(recursive=True)]))
 """
-# It installs 250 MB, and starts in 10 s on a quiet machine, in minutes on a busy one.
+# It installs 250 MB, once, and starts in 10 s on a quiet machine, in minutes on a busy one.
 pytestmark = pytest.mark.long
 
 
