@@ -77,7 +77,7 @@ class GlRenderer:
         if mirror.light != self._lit_by:
             self._light_by(mirror.light)
         everything = self._links.everything(mirror)
-        seen = [(self._links.arrays(link, matrix, pinhole, view), matrix, packed, link)
+        seen = [(self._links.arrays(link, matrix, pinhole, view, depth), matrix, packed, link)
                 for link, matrix, packed in visible(everything, pinhole, view)]
         target = self._targets.of(pinhole.width, pinhole.height)
         picture = distance = None

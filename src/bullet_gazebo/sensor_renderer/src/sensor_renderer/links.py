@@ -1,34 +1,36 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Links as vertex arrays, in levels of detail, and which of them a camera sees. ROS-free."""
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from world_picture.drawing import reduced
+from world_picture.reduction import reduced
 
-# A link of which the radius in the picture is larger than this [pixels] is drawn with its fine meshes: smaller ones
-# would show no difference.
-_FINE_FROM_PX = 40.0
-# Share of the coarse triangles that casts a mesh's shadow, and how many at least: half of the cost of a picture would
-# be its shadow map.
-_CASTER_SHARE, _CASTER_LEAST = 0.25, 60
+# How far the drawn surface of a link may be from its original, in pixels of the picture; in pictures of depth, whose
+# values are compared with millimetres, also in metres.
+_MOST_PX = 0.5
+_MOST_IN_DEPTH_M = 0.001
+_NEAREST_M = 0.01
+# Share of the plain triangles that casts a mesh's shadow, and how many at least: half of the cost of a picture would
+# be its shadow map. In pictures that may take their time, how far what casts shadows may be from the original.
+_CASTER_SHARE, _CASTER_LEAST = 0.2, 60
+_CASTER_M = 0.003
 
 
 @dataclass
 class Link:
-    """The geometry of one draw call: vertex arrays for colour and for depth only, coarse and fine; a bounding sphere;
-    its parts; whether it has meshes; the array that casts its shadow. The fine arrays are made when the link is first
-    seen so near."""
+    """The geometry of one draw call: a bounding sphere; its parts; whether it has meshes; the array that casts its
+    shadow. Vertex arrays, for colour and for depth only, are made of a level of detail when it is first needed, by the
+    numbers of the parts' levels."""
 
-    arrays: tuple
     centre: np.ndarray
     radius: float
     is_floor: bool
     parts: tuple = ()
     is_mesh: bool = False
     caster: object = None
-    fine: tuple | None = None
+    by_level: dict = field(default_factory=dict)
 
 
 class Links:
@@ -46,7 +48,7 @@ class Links:
     def clear(self):
         """Release all arrays."""
         for link in self._links.values():
-            for array in {*link.arrays, *(link.fine or ()), link.caster}:
+            for array in {link.caster, *(array for arrays in link.by_level.values() for array in arrays)}:
                 if array is not None:
                     array.release()
         self._links = {}
@@ -64,15 +66,20 @@ class Links:
             found += [entry for entry in zip(links, body.matrices, packed, strict=True) if entry[0] is not None]
         return found
 
-    def arrays(self, link, matrix, pinhole, view):
-        """The vertex arrays of the level of detail that the link's size in the picture asks for."""
-        distance = np.linalg.norm((view @ matrix @ [*link.centre, 1.0])[:3])
-        if link.radius * pinhole.fx <= _FINE_FROM_PX * distance or not any(part.fine for part in link.parts):
-            return link.arrays
-        if link.fine is None:
-            rows = _rows(link.parts, [part.fine() if part.fine else part.triangles for part in link.parts])
-            link.fine = self._arrays_of(rows, link)
-        return link.fine
+    def arrays(self, link, matrix, pinhole, view, depth=False):
+        """The vertex arrays of the level of detail that the link's distance asks for, in a picture of ``depth``, too."""
+        distance = np.linalg.norm((view @ matrix @ [*link.centre, 1.0])[:3]) - link.radius
+        error_m = _MOST_PX * max(distance, _NEAREST_M) / pinhole.fx
+        return self._level(link, min(error_m, _MOST_IN_DEPTH_M) if depth else error_m)
+
+    def _level(self, link, error_m):
+        numbers = tuple(part.level(error_m) for part in link.parts)
+        found = link.by_level.get(numbers)
+        if found is None:
+            rows = _rows(link.parts, [part.triangles_of(number)
+                                      for part, number in zip(link.parts, numbers, strict=True)])
+            found = link.by_level[numbers] = self._arrays_of(rows, link)
+        return found
 
     def _link(self, parts):
         key = tuple((part.key, part.colour, part.gloss) for part in parts)
@@ -81,11 +88,11 @@ class Links:
             rows = _rows(parts, [part.triangles for part in parts])
             low, high = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
             centre = (low + high) / 2.0
-            found = self._links[key] = Link((), centre, float(np.linalg.norm(rows[:, :3] - centre, axis=1).max()),
+            found = self._links[key] = Link(centre, float(np.linalg.norm(rows[:, :3] - centre, axis=1).max()),
                                             any(part.is_floor for part in parts), tuple(parts),
-                                            any(part.fine for part in parts))
-            found.arrays = self._arrays_of(rows, found)
-            found.caster = self._caster_of(rows) if found.is_mesh and self._thin_casters else found.arrays[1]
+                                            any(part.levels for part in parts))
+            thin = found.is_mesh and self._thin_casters
+            found.caster = self._caster_of(rows) if thin else self._level(found, _CASTER_M)[1]
         return found
 
     def _arrays_of(self, rows, link):

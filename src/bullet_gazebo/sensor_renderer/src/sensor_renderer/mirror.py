@@ -9,7 +9,7 @@ from sensor_renderer import triangles
 from sensor_renderer.light import Light
 from urdf_model import Mesh, merge_fixed, parse_urdf
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, rigid
-from world_picture.drawing import DrawingError, read_fine
+from world_picture.drawing import DrawingError, read_level
 from world_picture.shared_picture import PictureReader
 from world_picture.snapshot import SnapshotError
 
@@ -21,17 +21,32 @@ FLOOR_HALF_M = 50.0
 FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
 
 
+class Level(NamedTuple):
+    """A level of detail of a part: its distance from the original [m]; ``make()`` -> its triangles (3 m, 6)."""
+
+    error_m: float
+    make: Callable
+
+
 class Part(NamedTuple):
-    """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1. ``fine()``: more
-    triangles of the same shape, for a near view; None where there are none. ``gloss``: strength of its highlights, from
-    0 to 1."""
+    """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1. ``levels``: of
+    the same shape, the finest first; none for shapes that have no other. ``gloss``: strength of its highlights, from 0
+    to 1."""
 
     key: tuple
     triangles: np.ndarray
     colour: tuple
     is_floor: bool = False
-    fine: Callable | None = None
+    levels: tuple = ()
     gloss: float = GLOSS
+
+    def level(self, error_m):
+        """The number of the coarsest level that is within ``error_m`` [m] of the original; 0, the finest, if none."""
+        return max((number for number, level in enumerate(self.levels) if level.error_m <= error_m), default=0)
+
+    def triangles_of(self, number):
+        """The triangles of the level of that number."""
+        return self.levels[number].make() if self.levels else self.triangles
 
 
 class Screen(NamedTuple):
@@ -205,7 +220,8 @@ class Mirror:
     def _parts_of(self, shape):
         geometry, colour = shape.geometry, shape.colour or DEFAULT_COLOUR
         if not isinstance(geometry, Mesh):
-            return [self._placed((geometry,), lambda: triangles.of_primitive(geometry), shape.origin, colour)]
+            return [self._placed((geometry,), lambda: _at(shape.origin, triangles.of_primitive(geometry)), shape.origin,
+                                 colour)]
         path = self._find_mesh(geometry.filename)
         if path is None:
             return []  # /gazebo has logged it
@@ -214,17 +230,24 @@ class Mirror:
         except DrawingError as error:
             self._warn(str(error))
             return []
-        scale = np.diag([*geometry.scale, 1.0])
-        return [self._placed((part.path, geometry.scale), lambda part=part: triangles.of_wavefront(part.path),
-                             shape.origin @ scale, part.colour or colour,
-                             lambda part=part: triangles.of_mesh(*read_fine(part.fine))) for part in found]
+        return [self._part_of_mesh(part, shape.origin @ np.diag([*geometry.scale, 1.0]), part.colour or colour)
+                for part in found]
 
-    def _placed(self, what, make, origin, colour, make_fine=None):
+    def _part_of_mesh(self, part, origin, colour):
+        factor = float(np.linalg.norm(origin[:3, :3], axis=0).max())
+        levels = tuple(Level(level.error * factor, lambda path=level.path: _at(origin, _read(path)))
+                       for level in part.levels)
+        return self._placed((part.path,), levels[part.plain].make, origin, colour, levels)
+
+    def _placed(self, what, make, origin, colour, levels=()):
         key = (*what, origin.tobytes())
         if key not in self._parts:
-            self._parts[key] = _at(origin, make())
-        fine = None if make_fine is None else lambda: _at(origin, make_fine())
-        return Part(key, self._parts[key], tuple(colour), fine=fine)
+            self._parts[key] = make()
+        return Part(key, self._parts[key], tuple(colour), levels=levels)
+
+
+def _read(path):
+    return triangles.indexed(*read_level(path))
 
 
 def _at(origin, rows):

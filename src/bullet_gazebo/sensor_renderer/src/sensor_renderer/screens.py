@@ -33,7 +33,7 @@ class Screens:
         for body in mirror.bodies.values():
             for screen in body.screens:
                 matrix = body.link_matrix(screen.link) @ screen.offset
-                face = Link((), np.zeros(3), float(np.hypot(*screen.size)) / 2.0, False)
+                face = Link(np.zeros(3), float(np.hypot(*screen.size)) / 2.0, False)
                 local = view @ matrix
                 if local[:3, 2] @ local[:3, 3] < 0.0 and visible([(face, matrix, None)], pinhole, view):
                     found.append((self._texture(mirror, screen.picture), matrix @ np.diag([*screen.size, 1.0, 1.0])))

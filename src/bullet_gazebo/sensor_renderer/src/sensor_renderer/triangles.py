@@ -8,9 +8,8 @@ import math
 import numpy as np
 
 from urdf_model import Box, Cylinder, Sphere
+from world_picture.reduction import corner_normals
 
-# Faces that meet at less than this angle look like one smooth surface [rad].
-CREASE_RAD = math.radians(40.0)
 _CIRCLE = 32
 
 
@@ -28,50 +27,18 @@ def of_primitive(geometry):
     raise TypeError("no primitive: %r" % (geometry,))
 
 
-def of_wavefront(path):
-    """Triangles of a Wavefront file of bare vertices and triangles, as ``world_picture.drawing`` writes them."""
-    vertices, faces = [], []
-    with open(path, encoding="ascii") as file:
-        for line in file:
-            words = line.split()
-            if words[0] == "v":
-                vertices.append(words[1:4])
-            elif words[0] == "f":
-                faces.append(words[1:4])
-    return of_mesh(np.array(vertices, dtype=float), np.array(faces, dtype=int) - 1)
+def indexed(vertices, normals, faces):
+    """Triangles of vertices (n, 3) [m] with normals (n, 3), and faces (m, 3)."""
+    return np.hstack([vertices, normals]).astype(np.float32)[faces.ravel()]
 
 
 def of_mesh(vertices, faces):
-    """Triangles of vertices (n, 3) and faces (m, 3). Normals are smooth except at edges sharper than
-    :data:`CREASE_RAD`.
-
-    Triangles without area are left out.
-    """
-    corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    double_area = np.linalg.norm(cross, axis=1)
-    solid = double_area > 1e-12
-    faces, corners, cross = faces[solid], corners[solid], cross[solid]
-    flat = cross / double_area[solid, None]
-    if not len(faces):
-        return np.zeros((0, 6), dtype=np.float32)
-
-    # Each corner averages the faces at its vertex with nearly the same orientation, weighted by area.
-    vertex = faces.ravel()
-    face = np.repeat(np.arange(len(faces)), 3)
-    order = np.argsort(vertex, kind="stable")
-    _, start, count = np.unique(vertex[order], return_index=True, return_counts=True)
-    groups = np.repeat(np.arange(len(start)), count)
-    neighbours = count[groups]
-    mine = np.repeat(np.arange(len(order)), neighbours)
-    ends = np.cumsum(neighbours)
-    theirs = start[groups[mine]] + np.arange(ends[-1]) - np.repeat(ends - neighbours, neighbours)
-    my_face, their_face = face[order[mine]], face[order[theirs]]
-    alike = np.einsum("ij,ij->i", flat[my_face], flat[their_face]) > math.cos(CREASE_RAD)
-    normals = np.zeros((len(order), 3))
-    np.add.at(normals, order[mine[alike]], cross[their_face[alike]])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
-    return np.hstack([corners.reshape(-1, 3), normals]).astype(np.float32)
+    """Triangles of vertices (n, 3) [m] and faces (m, 3), smooth where faces meet at a small angle. Triangles without
+    area are left out."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    faces = faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-12]
+    normals = corner_normals(vertices, faces).reshape(-1, 3)
+    return np.hstack([vertices[faces.ravel()], normals]).astype(np.float32)
 
 
 def _box(half):

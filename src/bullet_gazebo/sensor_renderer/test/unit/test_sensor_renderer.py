@@ -119,12 +119,12 @@ def test_depth_agrees_with_rays(renderer, tmp_path):
     assert hits >= 50
 
 
-def test_a_near_mesh_is_drawn_finely_and_a_far_one_coarsely(tmp_path):
+def test_a_near_mesh_is_drawn_finely_and_a_far_one_coarsely(tmp_path, monkeypatch):
     """A ball of many triangles: near, its outline is round within a pixel; of coarse triangles it is not."""
     vertices, faces = sphere(120)
     trimesh.Trimesh(0.3 * vertices, faces).export(str(tmp_path / "ball.stl"))
     urdf = BALL % (tmp_path / "ball.stl")
-    mirror = Mirror(DrawingCache(tmp_path / "cache", triangles=100), lambda uri: uri, pytest.fail)
+    mirror = Mirror(DrawingCache(tmp_path / "cache"), lambda uri: uri, pytest.fail)
     mirror.set_scene([{"name": "ball", "urdf": urdf, "joints": []}])
     mirror.set_state(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
     renderer = GlRenderer()
@@ -136,13 +136,16 @@ def test_a_near_mesh_is_drawn_finely_and_a_far_one_coarsely(tmp_path):
         away = np.hypot(rows - rows.mean(), columns - columns.mean())
         return away.max() - np.sqrt(len(rows) / np.pi)
 
-    far = roundness(12.0)
+    roundness(20.0)
     link, = renderer._links._links.values()
-    assert link.fine is None and far < 2.0
-    near = roundness(1.0)
-    assert link.fine is not None and near < 3.0
-    link.fine = link.arrays
-    assert roundness(1.0) > near + 2.0, "coarse triangles would show"
+    counts = []
+    for distance in (20.0, 5.0, 1.0):
+        assert roundness(distance) < 1.5
+        drawn = renderer._links.arrays(link, np.eye(4), pinhole, np.linalg.inv(looking_at_origin(distance)))
+        counts.append(drawn[0].vertices // 3)
+    assert counts[0] < counts[1] < counts[2]
+    monkeypatch.setattr(renderer._links, "arrays", lambda *_: link.by_level[max(link.by_level)])
+    assert roundness(1.0) > 3.0, "coarse triangles would show"
     renderer.close()
 
 

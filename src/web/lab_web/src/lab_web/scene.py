@@ -11,8 +11,8 @@ import numpy as np
 
 from sensor_renderer.following import WorldFollower
 
-# A part whose longest side exceeds this [m] has its fine triangles: without them the pedestal's feet are in pieces.
-_LARGE_M = 0.8
+# How far the triangles that a browser gets may be from the mesh [m].
+_WITHIN_M = 0.003
 
 
 class Picture:
@@ -66,7 +66,7 @@ def picture_of(mirror, revision):
                 if part.is_floor:
                     continue
                 if part.key not in names:
-                    content = _triangles_of(part).astype("<f4").tobytes()
+                    content = part.triangles_of(part.level(_WITHIN_M)).astype("<f4").tobytes()
                     names[part.key] = hashlib.sha256(content).hexdigest()[:24]
                     shapes[names[part.key]] = content
                 shown.append({"shape": names[part.key], "colour": [float(value) for value in part.colour]})
@@ -75,11 +75,6 @@ def picture_of(mirror, revision):
     light = {key: [float(value) for value in getattr(mirror.light, key)] for key in ("ambient", "to_sun", "sun")}
     return Picture(revision, json.dumps({"revision": revision, "bodies": bodies, "light": light}), shapes,
                    dict(mirror.bodies))
-
-
-def _triangles_of(part):
-    is_large = len(part.triangles) and np.ptp(part.triangles[:, :3], axis=0).max() > _LARGE_M
-    return part.fine() if is_large and part.fine is not None else part.triangles
 
 
 def bodies_of(picture, joints):
