@@ -67,7 +67,8 @@ class Links:
         return found
 
     def arrays(self, link, matrix, pinhole, view, depth=False):
-        """The vertex arrays of the level of detail that the link's distance asks for, in a picture of ``depth``, too."""
+        """The vertex arrays of the level of detail that the link's distance asks for; finer ones for a picture of
+        ``depth``."""
         distance = np.linalg.norm((view @ matrix @ [*link.centre, 1.0])[:3]) - link.radius
         error_m = _MOST_PX * max(distance, _NEAREST_M) / pinhole.fx
         return self._level(link, min(error_m, _MOST_IN_DEPTH_M) if depth else error_m)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lab_web.scene import SceneFollower, picture_of
-from sensor_renderer.mirror import Part
+from sensor_renderer.mirror import Level, Part
 from world_picture.snapshot import SnapshotError, SnapshotWriter
 
 BOX = """<robot name="box"><link name="box"><visual><geometry><box size="0.2 0.2 0.2"/></geometry>
@@ -62,17 +62,17 @@ def test_a_new_body_makes_a_new_picture(writer):
     assert follower.follow() and follower.picture.revision > first.revision and len(follower.picture.shapes) == 2
 
 
-@pytest.mark.parametrize(("side_m", "is_fine"), [(0.2, False), (2.0, True)])
-def test_large_parts_have_their_fine_triangles(side_m, is_fine):
-    coarse, fine = (np.zeros((3 * count, 6), np.float32) for count in (1, 4))
-    coarse[1, 2] = side_m
-    part = Part("shape", coarse, (1.0, 0.0, 0.0, 1.0), fine=lambda: fine)
-    body = SimpleNamespace(parts=[[part, Part("box", coarse, (1.0, 0.0, 0.0, 1.0))]], joint_names=[])
+def test_parts_have_the_coarsest_triangles_that_are_near_the_original():
+    plain, near, finest = (np.full((3 * count, 6), count, np.float32) for count in (1, 4, 9))
+    levels = tuple(Level(error_m, lambda rows=rows: rows)
+                   for error_m, rows in ((0.001, finest), (0.0025, near), (0.01, plain)))
+    part = Part("shape", plain, (1.0, 0.0, 0.0, 1.0), levels=levels)
+    body = SimpleNamespace(parts=[[part, Part("box", plain, (1.0, 0.0, 0.0, 1.0))]], joint_names=[])
     light = SimpleNamespace(ambient=[0.5], to_sun=[0.0, 0.0, 1.0], sun=[0.5])
     picture = picture_of(SimpleNamespace(bodies={"a": body}, light=light), 1)
     (first, second), = json.loads(picture.text)["bodies"][0]["links"]
-    assert len(picture.shapes[first["shape"]]) == (fine if is_fine else coarse).nbytes
-    assert len(picture.shapes[second["shape"]]) == coarse.nbytes
+    assert len(picture.shapes[first["shape"]]) == near.nbytes
+    assert len(picture.shapes[second["shape"]]) == plain.nbytes
 
 
 def test_without_a_simulator_there_is_no_scene(tmp_path):
