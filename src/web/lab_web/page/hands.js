@@ -113,6 +113,7 @@ class Hand {
     clearTimeout(this.timer);
     this.number += 1;
     this.fields.hidden = true;
+    this.hands.view()?.asks(false);
     this.hands.view()?.removeGhost(this.side);
     this.hands.refresh();
   }
@@ -126,6 +127,7 @@ class Hand {
   askNow() {
     clearTimeout(this.timer);
     this.asked = null;
+    this.hands.view()?.asks(Boolean(this.wanted));
     if (!this.wanted) return;
     this.asked = performance.now();
     this.number += 1;
@@ -137,6 +139,7 @@ class Hand {
   answered(answer) {
     if (answer.number !== this.number || !this.shown) return;
     this.take(answer);
+    this.hands.view()?.asks(false);
     this.askNow();
   }
 

@@ -10,6 +10,8 @@ const PLACES = {front: [3.6, 1.2, 1.9], side: [0.25, -3.9, 1.3], top: [0.2, 0, 5
 // Pictures a second at most; and drawing gets this share of the time where no graphics card helps.
 const SHORTEST_MS = 33;
 const SHARE = 0.33;
+// A picture waits that long for an answer that it is to show: without a graphics card, drawing would hold the answer up.
+const LONGEST_WAIT_MS = 50;
 // Where a hand would be: reached, and the nearest posture of one that is not.
 const GHOST = {true: 0x2f9e64, false: 0xd0342c};
 const GHOST_OPACITY = 0.5;
@@ -36,8 +38,8 @@ export class View {
     this.links = [];
     this.ghosts = new Map();
     this.revision = null;
-    this.planned = false;
-    this.lastEnd = 0;
+    this.planned = this.isAsking = this.answered = false;
+    this.lastEnd = this.due = this.timer = 0;
     this.cost = 0;
     this.pictures = 0;
     new ResizeObserver(() => this.fit()).observe(canvas);
@@ -186,8 +188,24 @@ export class View {
   draw() {
     if (this.planned) return;
     this.planned = true;
-    const pause = Math.max(SHORTEST_MS, this.cost / SHARE) - (performance.now() - this.lastEnd);
-    setTimeout(() => requestAnimationFrame(() => this.drawNow()), Math.max(0, pause));
+    this.due = Math.max(performance.now(), this.lastEnd + Math.max(SHORTEST_MS, this.cost / SHARE));
+    this.plan();
+  }
+
+  plan() {
+    clearTimeout(this.timer);
+    const time = this.due + (this.isAsking && !this.answered ? LONGEST_WAIT_MS : 0);
+    this.timer = setTimeout(() => {
+      this.timer = 0;
+      requestAnimationFrame(() => this.drawNow());
+    }, Math.max(0, time - performance.now()));
+  }
+
+  // A question has been asked, or is over. A picture waits for the first answer that comes, and for no later one.
+  asks(isAsking) {
+    this.answered ||= !isAsking;
+    this.isAsking = isAsking;
+    if (this.timer) this.plan();
   }
 
   drawNow() {

@@ -13,6 +13,9 @@ from sensor_renderer.following import WorldFollower
 
 # How far the triangles that a browser gets may be from the mesh [m].
 _WITHIN_M = 0.003
+# A link is at rest where no number of its pose changes by more than this [m, and parts of rotation matrices]: less than
+# a page could show. A robot that stands trembles by less, and pages draw nothing then.
+_REST = 1e-4
 
 
 class Picture:
@@ -34,25 +37,30 @@ class SceneFollower(WorldFollower):
     def __init__(self, folder, warn):
         """Raises world_picture.snapshot.SnapshotError if there is no snapshot in ``folder``."""
         super().__init__(folder, warn)
-        self._seen = None
+        self._shown = None  # poses that follow() told of
         #: The newest :class:`Picture`, or None.
         self.picture = None
 
     def follow(self):
-        """Read the newest state. Returns whether anything has changed. Raises SnapshotError."""
+        """Read the newest state. Returns whether there is anything new to see. Raises SnapshotError."""
         if not super().follow():
             return False
+        poses = self._matrices()
         if self.picture is None or self.picture.revision != self.revision:
             self.picture = picture_of(self.mirror, self.revision)
-        changed, self._seen = self.mirror.version != self._seen, self.mirror.version
-        return changed
+        elif np.allclose(poses, self._shown, rtol=0.0, atol=_REST):
+            return False
+        self._shown = poses
+        return True
 
     def poses(self):
         """Bytes: the revision [uint32], then for each link in the scene's order the upper three rows of its pose in the
         world [float32, (3, 4)].
         """
-        rows = [body.matrices[:, :3, :].astype("<f4").tobytes() for body in self.mirror.bodies.values()]
-        return np.uint32(self.revision).astype("<u4").tobytes() + b"".join(rows)
+        return np.uint32(self.revision).astype("<u4").tobytes() + self._matrices().astype("<f4").tobytes()
+
+    def _matrices(self):
+        return np.concatenate([np.empty((0, 3, 4)), *(body.matrices[:, :3, :] for body in self.mirror.bodies.values())])
 
 
 def picture_of(mirror, revision):

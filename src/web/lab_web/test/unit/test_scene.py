@@ -51,6 +51,19 @@ def test_shapes_come_once_and_poses_follow_the_bodies(writer):
     assert np.frombuffer(follower.poses()[4:], "<f4").reshape(3, 3, 4)[2, 0, 3] == 5.0
 
 
+def test_a_body_that_trembles_is_at_rest_and_a_slow_one_is_not(writer):
+    writer.write_scene([body("a")])
+    follower, told, x = SceneFollower(writer.folder, pytest.fail), [], 0.0
+    for tick in range(1, 41):
+        # Twenty ticks of trembling, then 50 um in each.
+        x = 2e-5 * (-1) ** tick if tick <= 20 else x + 5e-5
+        writer.write(tick, 0.05 * tick, [np.array(pose(x))])
+        if follower.follow():
+            told.append((tick, np.frombuffer(follower.poses()[4:], "<f4")[3]))
+    assert told[0][0] == 1 and all(tick > 20 for tick, _ in told[1:])
+    assert 5 <= len(told) <= 12 and told[-1][1] == pytest.approx(x, abs=1.5e-4)
+
+
 def test_a_new_body_makes_a_new_picture(writer):
     writer.write_scene([body("a")])
     writer.write(1, 0.0, [np.array(pose(0.0))])
