@@ -4,6 +4,8 @@ import {Controls} from "./controls.js";
 import {Exercises} from "./exercises.js";
 import {Hands} from "./hands.js";
 import {Notebook} from "./notebook.js";
+import {Numbers} from "./numbers.js";
+import {arePoints, Overlay} from "./overlay.js";
 import {element, Panel} from "./panel.js";
 import {Plans} from "./plans.js";
 import {Plots} from "./plots.js";
@@ -35,9 +37,11 @@ const hands = new Hands(send, () => view, plans);
 const controls = new Controls(send, query, () => state.number, note);
 const recordings = new Recordings(send, query, () => state.number, note);
 const plots = new Plots();
+const numbers = new Numbers(() => new Topics(`${sockets}rosbridge${query}`));
 const exercises = new Exercises();
 const notebook = new Notebook(send, query);
 const simulation = new Simulation(send, () => view);
+const overlay = new Overlay(send, () => view);
 let robot = {};
 let noteTimer = 0;
 let noted = null;
@@ -99,6 +103,7 @@ const served = {
   },
   hello({number, may_act}) {
     Object.assign(state, {number, may_act});
+    if (overlay.isWatching) overlay.watch();
     refresh();
   },
   control({mine, free}) {
@@ -122,6 +127,10 @@ const served = {
   simulation(is) {
     simulation.show(is);
   },
+  topics({types}) {
+    numbers.list(types);
+    overlay.listTopics(types);
+  },
   grabbed(object) {
     simulation.grabbed(object);
   },
@@ -140,7 +149,14 @@ const served = {
   plan(answer) {
     plans.answered(answer);
   },
+  frames({frames}) {
+    overlay.showFrames(frames);
+  },
   poses({data}) {
+    if (arePoints(data)) {
+      overlay.showPoints(data);
+      return;
+    }
     if (!view || view.setPoses(data)) return;
     loadScene(data);
   },
@@ -300,4 +316,4 @@ send({address: `${sockets}lab${query}`});
 setInterval(() => send({}), ALIVE_MS);
 startTopics();
 // For the console, and for tests.
-globalThis.lab = {view, state, send, hands, controls, simulation, notebook};
+globalThis.lab = {view, state, send, hands, controls, simulation, notebook, overlay};

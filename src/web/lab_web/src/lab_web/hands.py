@@ -42,6 +42,14 @@ class Hands:
                 warn("the page cannot move the %s hand: %s" % (side, error))
         self._chains = chains
 
+    def base(self, picture):
+        """The pose of the arms' base frame in the scene ``picture`` (4 x 4), or None."""
+        measured = self._measured()
+        for chain in self._chains.values():
+            if all(name in measured for name in chain.joint_names):
+                return base_of(picture, chain, {name: measured[name] for name in chain.joint_names})
+        return None
+
     def ask(self, client, question):
         """An operation "reach" of a page: ``side``, ``number``, and ``position`` [m], ``orientation`` (x, y, z, w) of
         the hand in the robot's base frame; without them, the hand as it is. Does not wait.
@@ -94,18 +102,37 @@ def ghost(picture, chain, joints):
     ``revision``; ``base``, the pose of the chain's base in the world, and ``links`` {number in the scene: pose}, as the
     upper three rows, 12 numbers. None where the scene has no such arm.
     """
+    found = _body_of(picture, joints)
+    if found is None:
+        return None
+    first, body = found
+    moved = body.moved(joints)
+    return {"revision": picture.revision, "base": _rows(_base(body, moved, chain, joints)),
+            "links": {first + number: _rows(pose) for number, pose in moved.items()}}
+
+
+def base_of(picture, chain, joints):
+    """The pose of the chain's base in the scene ``picture`` (4 x 4), or None where the scene has no such arm."""
+    found = _body_of(picture, joints)
+    return None if found is None else _base(found[1], {}, chain, joints)
+
+
+def _body_of(picture, joints):
+    """(number of its first link in the scene, body) of the robot with these joints, or None."""
     first = 0
     for body in picture.bodies.values() if picture else ():
         if set(joints) <= set(body.joint_names):
-            moved = body.moved(joints)
-            frames = chain.link_frames([joints[name] for name in chain.joint_names])
-            link = next(name for name in chain.link_names if name in body.link_names)
-            number = body.link_names.index(link)
-            base = moved.get(number, body.matrices[number]) @ inverse(frames[link])
-            return {"revision": picture.revision, "base": _rows(base),
-                    "links": {first + number: _rows(pose) for number, pose in moved.items()}}
+            return first, body
         first += len(body.parts)
     return None
+
+
+def _base(body, moved, chain, joints):
+    frames = chain.link_frames([joints[name] for name in chain.joint_names])
+    # The one that is nearest to the base.
+    link = next(name for name in chain.link_names if name in body.link_names)
+    number = body.link_names.index(link)
+    return moved.get(number, body.matrices[number]) @ inverse(frames[link])
 
 
 def _rows(pose):

@@ -38,18 +38,22 @@ class Lab:
         self._motion = Motion({})
         self._moving = threading.Event()
         self._served = dict(_OPERATIONS)
+        self._for_viewers = set()
         self._releases = []
         self._releases_of_silent = []
 
-    def add(self, name, serve, needs_control=True):
+    def add(self, name, serve, needs_control=True, for_viewers=False):
         """An operation beside those of this module: ``serve(client, operation)`` does not wait, and raises RobotError;
-        with ``needs_control`` only for the page that has the control.
+        with ``needs_control`` only for the page that has the control, with ``for_viewers`` also for one that may not
+        act.
         """
         def checked(lab, client, operation):
             if needs_control:
                 lab._check(client)
             serve(client, operation)
         self._served[name] = checked
+        if for_viewers:
+            self._for_viewers.add(name)
 
     def when_lost(self, release, when_silent=True):
         """``release()`` is called when the robot is stopped, and when a page loses the control, goes or (with
@@ -77,7 +81,7 @@ class Lab:
         serve = self._served.get(op) if isinstance(op, str) else None
         if serve is None:
             self._told(client, "unknown", "unknown operation %r" % (op,))
-        elif not may_act:
+        elif not may_act and op not in self._for_viewers:
             self._told(client, "only_watches", "this address only watches; it can stop the robot, nothing else")
         else:
             try:

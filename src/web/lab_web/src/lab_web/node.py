@@ -29,6 +29,7 @@ from lab_web.libraries import LibrariesError, fetched
 from lab_web.loops import lasting
 from lab_web.move_group import RESULT_TOPIC, RESULT_TYPE, MoveGroup
 from lab_web.notebooks import PATH, Door, NotebookHandler, Notebooks, labs_notebooks
+from lab_web.overlay import Overlay
 from lab_web.parts import SCREEN_TOPIC, Parts
 from lab_web.planning import Planning
 from lab_web.playback import Recorder, play
@@ -36,6 +37,7 @@ from lab_web.release_guard import ReleaseGuard
 from lab_web.robot import ARM_LINKS, Baxter
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, routes, upload_routes
+from lab_web.sights import Sights
 from lab_web.simulation import Simulation
 from lab_web.tokens import TOKEN, VIEW_TOKEN
 from loop_ros.faults import Faults
@@ -214,6 +216,7 @@ class _Equipment(NamedTuple):
     simulation: Simulation
     recorder: Recorder
     guard: ReleaseGuard
+    sights: Sights
     loops: dict
 
 
@@ -222,6 +225,10 @@ def _equip(pages, robot, faults):
     lab = pages.lab
     hands = Hands(robot.measured, lambda chain, joints: ghost(pages.picture, chain, joints), pages.answer)
     lab.add("reach", hands.ask, needs_control=False)
+    sights = Sights(lambda: hands.base(pages.picture))
+    overlay = Overlay(sights, pages.show, pages.answer, pages.tell)
+    lab.add("watch", overlay.watch, needs_control=False, for_viewers=True)
+    pages.when_closed = overlay.forget
     parts = Parts()
     errands, switches, plans = (Errands(pages.tell, faults) for _ in range(3))
     guard = ReleaseGuard()
@@ -241,7 +248,8 @@ def _equip(pages, robot, faults):
     for name, serve in {"press": buttons.press, "turn": buttons.turn, **parts.operations(),
                         **simulation.operations()}.items():
         lab.add(name, serve)
-    return _Equipment(hands, simulation, recorder, guard, {
+    return _Equipment(hands, simulation, recorder, guard, sights, {
+        "points and frames": overlay.run,
         "the hands": hands.run, "errands": errands.run, "plans": plans.run,
         "buttons": lambda ends: switches.run(ends, buttons.release_all)})
 
@@ -276,7 +284,7 @@ def _announce(port, tokens, public):
 
 def _watch(robot, equipment, pages, ends):
     """Look after what changes rarely, until the node or the lab ends."""
-    told, results = None, Results(page_files.result_file())
+    told, types, results = None, {}, Results(page_files.result_file())
     while not ends():
         if not rosgraph.is_master_online():
             print("The lab has ended, and the page with it.", flush=True)
@@ -284,23 +292,27 @@ def _watch(robot, equipment, pages, ends):
         # The master may end between the two lines.
         with contextlib.suppress(OSError, rospy.ROSException, rosgraph.MasterException):
             robot.look_after()
+            equipment.sights.look_after()
             description = robot.read_description()
             if description is not None:
                 equipment.hands.know(description, ARM_LINKS, rospy.logwarn)
-            now = _described(robot, equipment)
+            published = dict(rospy.get_published_topics())
+            now = _described(robot, equipment, published)
             if now["has_scene"] and len(pages):
                 equipment.simulation.look()
             if (result := results.newest()) is not None:
                 pages.share("result", result)
+            if published != types:
+                types = published
+                pages.share("topics", {"types": types})
             if now != told:
                 pages.share("robot", now)
                 told = now
         rospy.rostime.wallsleep(_LOOK_S)
 
 
-def _described(robot, equipment):
-    """What pages are told of the robot: the operation "robot"."""
-    published = dict(rospy.get_published_topics())
+def _described(robot, equipment, published):
+    """What pages are told of the robot: the operation "robot". ``published``: {topic: type}."""
     return {"joints": [{"name": name, "lower": limits.lower, "upper": limits.upper}
                        for name, limits in robot.limits.items()],
             "poses": list(robot.poses), "hands": equipment.hands.sides, "grippers": robot.grippers,

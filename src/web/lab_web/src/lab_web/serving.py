@@ -43,6 +43,8 @@ class Pages:
         self.lab = None
         #: The scene of now (:class:`lab_web.scene.Picture`) and its newest poses, or None.
         self.picture = self.poses = None
+        #: Called with the number of a page that has gone, in the loop; does not wait.
+        self.when_closed = lambda number: None
         self._shared = {"robot": {"op": "robot"}}
         self._sockets = {}
 
@@ -65,6 +67,7 @@ class Pages:
     def closed(self, socket):
         if self._sockets.pop(socket.number, None) is not None:
             self.control_changed()
+            self.when_closed(socket.number)
 
     # From any thread.
 
@@ -91,6 +94,12 @@ class Pages:
         self.picture, self.poses = picture, poses
         for socket in list(self._sockets.values()):
             socket.outgoing.offer([poses], "poses", 1)
+
+    def show(self, number, data):
+        """Bytes to one page, in the place of older ones that it has not got yet."""
+        socket = self._sockets.get(number)
+        if socket is not None:
+            socket.outgoing.offer([data], "points", 1)
 
     # In the loop.
 
