@@ -63,9 +63,9 @@ def measure(report, quick, number):
 
 
 def sizes(pid):
-    """(resident memory [MB], threads, descriptors) of a process."""
+    """(allocated memory in RAM [MB], threads, descriptors) of a process; files it reads do not count."""
     fields = dict(line.split(":", 1) for line in Path("/proc/%d/status" % pid).read_text().splitlines())
-    return int(fields["VmRSS"].split()[0]) / 1024.0, int(fields["Threads"]), len(os.listdir("/proc/%d/fd" % pid))
+    return int(fields["RssAnon"].split()[0]) / 1024.0, int(fields["Threads"]), len(os.listdir("/proc/%d/fd" % pid))
 
 
 def visits(address, ended, counts):

@@ -535,8 +535,8 @@ def test_points_and_frames_are_seen_where_they_are(lab, browser):
     pose = np.eye(4)
     pose[:3, 3] = 0.5, 0.0, 1.0
     # A red wall in front of the robot.
-    wall = np.array([[0.0, 0.02 * column, 0.02 * row] for column in range(20) for row in range(20)], np.float32)
-    lab.pages.show(number, packed(wall, np.full((400, 3), (255, 0, 0), np.uint8), pose))
+    wall = np.array([[0.0, 0.01 * column, 0.01 * row] for column in range(40) for row in range(40)], np.float32)
+    lab.pages.show(number, packed(wall, np.full((1600, 3), (255, 0, 0), np.uint8), pose))
     lab.pages.answer(number, {"op": "frames", "frames": [["base", pose[:3].ravel().tolist()]]})
     browser.wait("lab.overlay.points && lab.overlay.frames && !lab.view.planned")
     browser.evaluate("scrollTo(0, 0)")

@@ -3,8 +3,6 @@
 import subprocess
 import sys
 
-import pytest
-
 # Large blocks and small ones in turns; then the large ones go.
 PROGRAM = """
 import sys
@@ -37,6 +35,5 @@ def test_large_blocks_go_back():
     assert growth_mb("mended") < 15.0
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="glibc's malloc is what the mending is about")
 def test_without_the_mending_malloc_keeps_them():
     assert growth_mb("as it is") > 50.0
