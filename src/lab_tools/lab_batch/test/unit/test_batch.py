@@ -328,6 +328,7 @@ def test_machines_of_a_cluster_are_started_with_fixed_ports():
     assert " ".join(head).endswith(
         "start --block --disable-usage-stats --head --port 6379 --include-dashboard false --node-ip-address 10.0.0.1 "
         "--num-cpus 0 --node-manager-port 6380 --object-manager-port 6381 --runtime-env-agent-port 6382 "
+        "--dashboard-agent-grpc-port 6383 --dashboard-agent-listen-port 6384 --metrics-export-port 6385 "
         "--min-worker-port 10002 --max-worker-port 10999")
     assert " --address 10.0.0.1:6379 --node-ip-address 10.0.0.2 --num-cpus 3 " in " ".join(other)
 
