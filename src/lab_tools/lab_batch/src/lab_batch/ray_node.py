@@ -18,8 +18,7 @@ from .job import JobError
 
 RAY = (sys.executable, "-m", "ray.scripts.scripts")
 PORT = 6379
-# Fixed, so that a firewall can name them. Ray draws the others. A node that draws its agent's port gives up where the
-# agent does not start within some seconds, as on a busy machine.
+# Fixed, so that a firewall can name them. Ray draws the others.
 FIXED = {"--node-manager-port": 6380, "--object-manager-port": 6381, "--runtime-env-agent-port": 6382,
          "--dashboard-agent-grpc-port": 6383, "--dashboard-agent-listen-port": 6384, "--metrics-export-port": 6385,
          "--min-worker-port": 10002, "--max-worker-port": 10999}
