@@ -27,11 +27,22 @@ def image(picture, encoding):
                  data=data)
 
 
+def values_image(values):
+    """sensor_msgs/Image of one number a pixel, (height, width): uint8 (mono8), uint16 (mono16), float32 (32FC1); or of
+    two, (height, width, 2) of float32 (32FC2)."""
+    height, width = values.shape[:2]
+    encoding = "32FC2" if values.ndim == 3 else {1: "mono8", 2: "mono16", 4: "32FC1"}[values.dtype.itemsize]
+    data = np.ascontiguousarray(values).tobytes()
+    return Image(height=height, width=width, encoding=encoding, is_bigendian=_BIG_ENDIAN, step=len(data) // height,
+                 data=data)
+
+
 def depth_image(values):
     """sensor_msgs/Image of float32 metres or uint16 millimetres (height, width)."""
-    height, width = values.shape
-    return Image(height=height, width=width, encoding="16UC1" if values.dtype.itemsize == 2 else "32FC1",
-                 is_bigendian=_BIG_ENDIAN, step=width * values.dtype.itemsize, data=values.tobytes())
+    message = values_image(values)
+    if message.encoding == "mono16":
+        message.encoding = "16UC1"
+    return message
 
 
 def compressed_image(picture, quality=JPEG_QUALITY):

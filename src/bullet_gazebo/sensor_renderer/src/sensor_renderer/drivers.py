@@ -4,115 +4,22 @@
 A driver is made from a :class:`SensorEntry`. The drawing thread asks whether it is due and makes it publish.
 ``config/camera_drivers.yaml`` maps plugin file names to drivers.
 """
-import threading
+import zlib
 
-import rospy
 from rosgraph.names import is_legal_name
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 
-from loop_ros.reconfigure import Setting, SettingsServer
+from loop_ros.reconfigure import Setting
 from sensor_renderer import convert
+from sensor_renderer.camera_settings import CameraSettings
 from sensor_renderer.errors import SensorError
-from sensor_renderer.pictures import Cloud, Noise, millimetres, within
+from sensor_renderer.imager import Imager
+from sensor_renderer.pictures import Cloud, millimetres, within
+from sensor_renderer.structured_light import StructuredLight
+from sensor_renderer.topics import ColourTopics, LearningTopics, Topic
 from sim_time.pace import Pace
 
 _FASTEST_HZ = 1000.0
-
-
-class Topic:
-    """A publisher that knows whether it has subscribers. A service's thread may close it at any time."""
-
-    def __init__(self, name, message_class):
-        # A queue of one: a subscriber that has stopped reading loses pictures and delays nobody.
-        self._publisher = rospy.Publisher(name, message_class, queue_size=1)
-        self._lock = threading.Lock()
-
-    @property
-    def has_listeners(self):
-        """True while a subscriber is connected."""
-        with self._lock:
-            return self._publisher is not None and self._publisher.get_num_connections() > 0
-
-    def publish(self, message):
-        """Send a message, unless the topic has been closed."""
-        with self._lock:
-            if self._publisher is not None:
-                self._publisher.publish(message)
-
-    def close(self):
-        """Unregister the topic."""
-        with self._lock:
-            publisher, self._publisher = self._publisher, None
-        if publisher is not None:
-            publisher.unregister()
-
-
-class ReconfigureServer:
-    """Settings for clients of dynamic_reconfigure; closed like a topic."""
-
-    #: These topics need no picture.
-    has_listeners = False
-
-    def __init__(self, name, settings, apply):
-        """As :class:`loop_ros.reconfigure.SettingsServer`; ``apply`` is called in a service's thread."""
-        self._opened = []
-        self._lock = threading.Lock()
-        SettingsServer(self, name, settings, apply)
-
-    def publisher(self, topic, msg_class, latch):
-        """For SettingsServer."""
-        publisher = rospy.Publisher(topic, msg_class, latch=latch, queue_size=1)
-        self._opened.append(publisher.unregister)
-        return publisher
-
-    def service(self, name, srv_class, handler):
-        """For SettingsServer."""
-        def one_at_a_time(request):
-            with self._lock:
-                return handler(request)
-
-        try:
-            service = rospy.Service(name, srv_class, one_at_a_time)
-        except rospy.ServiceException:
-            rospy.logwarn("%s: another camera of this name has it already" % name)
-            return
-        self._opened.append(lambda: service.shutdown("the sensor is gone"))
-
-    def close(self):
-        """Unregister topics and service."""
-        while self._opened:
-            self._opened.pop()()
-
-
-class ColourTopics:
-    """Image, compressed image and camera_info of one colour camera."""
-
-    def __init__(self, image_topic, info_topics):
-        self.image = Topic(image_topic, Image)
-        self.compressed = Topic(image_topic + "/compressed", CompressedImage)
-        self.infos = [Topic(name, CameraInfo) for name in info_topics]
-        self._quality = convert.JPEG_QUALITY
-        settings = ReconfigureServer(image_topic + "/compressed", [
-            Setting("jpeg_quality", self._quality, 1, 100, "of the pictures, in percent")], self._apply)
-        self.all = [self.image, self.compressed, *self.infos, settings]
-
-    def _apply(self, values):
-        self._quality = values["jpeg_quality"]
-
-    @property
-    def want_picture(self):
-        """Whether a picture topic has subscribers."""
-        return self.image.has_listeners or self.compressed.has_listeners
-
-    def publish(self, time_s, frame, picture, encoding, info):
-        """``picture`` may be None without subscribers."""
-        for topic in self.infos:
-            if topic.has_listeners:
-                topic.publish(convert.header(info, time_s, frame))
-        if picture is not None and self.image.has_listeners:
-            self.image.publish(convert.header(convert.image(picture, encoding), time_s, frame))
-        if picture is not None and self.compressed.has_listeners:
-            self.compressed.publish(convert.header(convert.compressed_image(picture, self._quality), time_s, frame))
 
 
 class Driver:
@@ -123,6 +30,8 @@ class Driver:
         self.entry = entry
         self.topics = []
         self._pace = Pace(entry.rate)
+        #: How long the world must remember its states for this sensor [s].
+        self.memory_s = 0.0
 
     def name(self, text):
         """A ROS name: relative ones live in the sensor's namespace. Raises :class:`SensorError` for an invalid name."""
@@ -132,14 +41,15 @@ class Driver:
                               % (self.entry, name))
         return name
 
-    def rate_setting(self, camera_name):
+    @property
+    def rate_setting(self):
         """The setting of the rate, under the name that Gazebo's cameras use."""
-        def apply(values):
-            self._pace.rate = values["imager_rate"]
+        return Setting("imager_rate", self._pace.rate, 0.0, _FASTEST_HZ,
+                       "pictures a second [Hz]; 0: one of every state")
 
-        return ReconfigureServer(self.name(camera_name), [
-            Setting("imager_rate", self._pace.rate, 0.0, _FASTEST_HZ, "pictures a second [Hz]; 0: one of every state")],
-            apply)
+    def seed(self, camera_name):
+        """The seed of a camera's noise: the same in every run, another for each camera."""
+        return zlib.crc32(("%s %s" % (self.entry, camera_name)).encode())
 
     def under_camera(self, text, camera_name):
         """A topic below the camera's own name."""
@@ -158,15 +68,12 @@ class Driver:
         """Whether there is anything to do for the state at ``time_s``."""
         return self._pace.is_due(time_s) and self.has_listeners
 
-    def take(self, time_s, link_pose, draw):
-        """Publish the view at ``time_s`` of a sensor whose link is at ``link_pose`` (4, 4).
+    def take(self, moment):
+        """Publish the view at a :class:`sensor_renderer.moments.Moment` of the sensor's link."""
+        self._pace.took(moment.time_s)
+        self.publish(moment)
 
-        ``draw(pinhole, pose, colour, depth)`` -> (picture, depth).
-        """
-        self._pace.took(time_s)
-        self.publish(time_s, link_pose, draw)
-
-    def publish(self, time_s, link_pose, draw):
+    def publish(self, moment):
         """Draw and publish the topics that have subscribers."""
         raise NotImplementedError
 
@@ -190,18 +97,26 @@ class Camera(Driver):
             folder = base if len(cameras) == 1 else "%s/%s" % (base, camera.name)
             topics = ColourTopics(self.under_camera(entry.text("imageTopicName", "image_raw"), folder),
                                   [self.under_camera(entry.text("cameraInfoTopicName", "camera_info"), folder)])
-            self._cameras.append((camera, topics, Noise(camera.noise) if camera.noise else None,
+            learning = LearningTopics(self.name(folder))
+            self._cameras.append((Imager(camera, self.seed(camera.name)), topics, learning,
                                   convert.camera_info(camera.pinhole, baseline, camera.distortion)))
-            self.topics += topics.all
-        self.topics.append(self.rate_setting(base))
+            self.topics += [*topics.all, learning]
+        first = cameras[0]
+        self._settings = CameraSettings(self.name(base), self._apply, (first.noise_mean, first.noise),
+                                        more=[self.rate_setting])
+        self.topics.append(self._settings)
 
-    def publish(self, time_s, link_pose, draw):
-        for camera, topics, noise, info in self._cameras:
-            picture = None
-            if topics.want_picture:
-                picture, _ = camera.view(link_pose, draw, True, False)
-                picture = noise.add(picture) if noise else picture
-            topics.publish(time_s, self._frame, picture, camera.encoding, info)
+    def _apply(self, settings):
+        self._pace.rate = settings.value("imager_rate")
+        self.memory_s = settings.exposure.exposure_time
+        for imager, _, learning, _ in self._cameras:
+            settings.apply(imager, learning)
+
+    def publish(self, moment):
+        for imager, topics, learning, info in self._cameras:
+            middle, picture, _ = imager.taken(moment, topics.want_picture, False)
+            topics.publish(middle.time_s, self._frame, picture, imager.camera.encoding, info)
+            learning.publish(middle, imager.camera, self._frame)
 
 
 class DepthCamera(Driver):
@@ -226,22 +141,36 @@ class DepthCamera(Driver):
         self._depth = topic("depthImageTopicName", "depth/image_raw", Image)
         self._depth_info = topic("depthImageCameraInfoTopicName", "depth/camera_info", CameraInfo)
         self._points = topic("pointCloudTopicName", "depth/points", PointCloud2)
-        self.topics = [*self._colour.all, self._depth, self._depth_info, self._points, self.rate_setting(base)]
+        self._learning = LearningTopics(self.name(base))
         self._cloud = Cloud(pinhole, self._camera.lens and self._camera.lens.rays)
-        self._noise = Noise(self._camera.noise) if self._camera.noise else None
+        self._imager = Imager(self._camera, self.seed(base))
+        self._pattern = None
         distortion = self._camera.distortion
         self._info = convert.camera_info(pinhole, entry.number(entry.plugin, "hackBaseline", 0.0), distortion)
         self._plain_info = convert.camera_info(pinhole, 0.0, distortion)
+        settings = CameraSettings(self.name(base), self._apply, (self._camera.noise_mean, self._camera.noise), more=[
+            self.rate_setting, Setting("depth_noise", False, meaning="depth as the first Kinect measures it")])
+        self.topics = [*self._colour.all, self._depth, self._depth_info, self._points, self._learning, settings]
 
-    def publish(self, time_s, link_pose, draw):
+    def _apply(self, settings):
+        self._pace.rate = settings.value("imager_rate")
+        self.memory_s = settings.exposure.exposure_time
+        settings.apply(self._imager, self._learning)
+        if not settings.value("depth_noise"):
+            self._pattern = None
+        elif self._pattern is None:
+            self._pattern = StructuredLight(self._camera.pinhole, self.seed("depth"))
+
+    def publish(self, moment):
         points = self._points.has_listeners
         want_colour, want_depth = points or self._colour.want_picture, points or self._depth.has_listeners
-        picture = depth = None
+        pattern, picture, depth = self._pattern, None, None
         if want_colour or want_depth:
-            picture, depth = self._camera.view(link_pose, draw, want_colour, want_depth)
-        if want_colour and self._noise:
-            picture = self._noise.add(picture)
+            moment, picture, depth = self._imager.taken(moment, want_colour, want_depth)
+        time_s = moment.time_s
         if want_depth:
+            if pattern is not None:
+                depth = pattern.measured(depth, time_s)
             depth = within(depth, self._nearest, self._furthest)
         self._colour.publish(time_s, self._frame, picture, self._camera.encoding, self._plain_info)
         if self._depth_info.has_listeners:
@@ -252,3 +181,4 @@ class DepthCamera(Driver):
         if points:
             found = self._cloud.points(depth, picture)
             self._points.publish(convert.header(convert.point_cloud(found), time_s, self._frame))
+        self._learning.publish(moment, self._camera, self._frame)

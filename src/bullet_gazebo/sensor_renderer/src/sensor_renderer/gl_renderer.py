@@ -103,6 +103,31 @@ class GlRenderer:
             distance = pinhole.depth_from_buffer(target.depth())
         return picture, distance
 
+    def identify(self, mirror, pinhole, pose):
+        """What each pixel of the same view shows: (numbers, links, depth).
+
+        ``numbers``: uint16 (height, width), 0 for nothing, else one more than the index in ``links``, a list of
+        (model's name, number of the link in its ``parts``); ``depth`` as :meth:`render` returns it. A screen
+        counts as what is behind it.
+        """
+        view = np.linalg.inv(pose)
+        if mirror.light != self._lit_by:
+            self._light_by(mirror.light)
+        seen = visible(self._links.named(mirror), pinhole, view)
+        buffer, depth_texture = self._targets.numbered(pinhole.width, pinhole.height)
+        buffer.use()
+        buffer.clear(depth=1.0)
+        program, links = self._programs.shadow, []
+        program["to_clip"].write(matrix_bytes(pinhole.clip_matrix() @ view))
+        for link, matrix, (name, packed) in seen:
+            links.append(name)
+            program["number"].value = len(links)
+            draw(program, [(self._links.arrays(link, matrix, pinhole, view, True)[1], packed)])
+        size = pinhole.height, pinhole.width
+        numbers = np.frombuffer(buffer.read(components=1, dtype="u2", alignment=1), np.uint16).reshape(size)
+        raw = np.frombuffer(depth_texture.read(alignment=1), np.float32).reshape(size)
+        return numbers, links, pinhole.depth_from_buffer(raw)
+
     def close(self):
         """Release the context."""
         self._context.release()

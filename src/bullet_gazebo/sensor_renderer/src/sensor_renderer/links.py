@@ -59,12 +59,20 @@ class Links:
         shapes."""
         found = []
         for body in mirror.bodies.values():
-            links = self._links_of.get(body)
-            if links is None:
-                links = self._links_of[body] = [self._link(parts) if parts else None for parts in body.parts]
-            packed = np.ascontiguousarray(body.matrices.transpose(0, 2, 1), dtype=np.float32)
-            found += [entry for entry in zip(links, body.matrices, packed, strict=True) if entry[0] is not None]
+            found += [entry for entry in self._of(body) if entry[0] is not None]
         return found
+
+    def named(self, mirror):
+        """The same, with ((model's name, link's number), the packed matrix) in place of the packed matrix."""
+        return [(link, matrix, ((name, number), packed)) for name, body in mirror.bodies.items()
+                for number, (link, matrix, packed) in enumerate(self._of(body)) if link is not None]
+
+    def _of(self, body):
+        links = self._links_of.get(body)
+        if links is None:
+            links = self._links_of[body] = [self._link(parts) if parts else None for parts in body.parts]
+        packed = np.ascontiguousarray(body.matrices.transpose(0, 2, 1), dtype=np.float32)
+        return zip(links, body.matrices, packed, strict=True)
 
     def arrays(self, link, matrix, pinhole, view, depth=False):
         """The vertex arrays of the level of detail that the link's distance asks for; finer ones for a picture of

@@ -15,7 +15,9 @@ from model_files.resources import ResourceFinder
 from rospy_limits.node import limit_ports
 from sensor_renderer.best import best_renderer
 from sensor_renderer.errors import SensorError
+from sensor_renderer.labels import Labels, classes_of_parameter
 from sensor_renderer.mirror import Mirror
+from sensor_renderer.moments import Moment, World
 from sensor_renderer.sensor_element import SensorEntry
 from world_picture.drawing import DrawingCache
 from world_picture.snapshot import SnapshotError, SnapshotReader
@@ -26,18 +28,20 @@ _LOOK_S, _IDLE_S, _SEEK_S = 0.004, 0.05, 0.25
 # A sensor that fails this many times within this time [s, simulated time] is not restarted again.
 FAILURES, FAILURES_WITHIN_S = 3, 10.0
 
+# Parameter that groups models into classes for masks.
+CLASSES = "/sensor_renderer/semantic_classes"
+
 
 class SensorRenderer:
     """Sensors of the world by name, and the loop that serves them."""
 
-    def __init__(self, make_renderer, drivers):
+    def __init__(self, make_renderer, drivers, labels=None):
         """``make_renderer()`` -> ``GlRenderer`` or ``TinyRenderer``, called before the first picture; ``drivers``:
-        {file name: "module:Class"}."""
-        self._make_renderer = make_renderer
-        self._renderer = None
+        {file name: "module:Class"}; ``labels``: :class:`sensor_renderer.labels.Labels`."""
         self._drivers = drivers
         self._finder = ResourceFinder()
         self._mirror = Mirror(DrawingCache(), self._finder, rospy.logwarn)
+        self._world = World(self._mirror, make_renderer, labels)
         self._sensors = {}
         self._refused = set()
         self._failed_at = {}  # of sensors that failed: simulation times [s]
@@ -75,17 +79,20 @@ class SensorRenderer:
                 return  # a state of the new scene follows
             self._finder.forget_missing()
             self._mirror.set_scene(scene.bodies, scene.light)
+            self._world.forget()
             self._set_sensors(scene.bodies)
             self._revision = scene.revision
         if snapshot.resets != self._resets:
             self._resets, self._drawn_s = snapshot.resets, None
+            self._world.forget()
             self._revive()
             for driver in self._sensors.values():
                 driver.time_was_reset()
+        memory_s = max((driver.memory_s for driver in self._sensors.values()), default=0.0)
+        self._world.remember(snapshot.time_s, snapshot.values, memory_s)
         due = [driver for driver in list(self._sensors.values()) if driver.is_due(snapshot.time_s)]
         if not due or snapshot.time_s == self._drawn_s:
             return
-        self._mirror.set_state(snapshot.values)
         self._drawn_s = snapshot.time_s
         for driver in due:
             self._serve(driver, snapshot.time_s)
@@ -93,8 +100,7 @@ class SensorRenderer:
     def _serve(self, driver, time_s):
         entry = driver.entry
         try:
-            pose = self._mirror.bodies[entry.model].link_matrix(entry.link)
-            driver.take(time_s, pose, self._draw)
+            driver.take(Moment(self._world, entry.model, entry.link, time_s))
         except rospy.ROSException:
             return  # the node is shutting down
         except Exception as error:  # noqa: BLE001  (one sensor that fails must not blind the others)
@@ -124,11 +130,6 @@ class SensorRenderer:
             self._refused -= self._failed_at.keys()
             self._failed_at.clear()
             self._revision = None
-
-    def _draw(self, pinhole, pose, colour, depth):
-        if self._renderer is None:
-            self._renderer = self._make_renderer()
-        return self._renderer.render(self._mirror, pinhole, pose, colour, depth)
 
     def _set_sensors(self, bodies):
         wanted = {}
@@ -172,6 +173,15 @@ def _find_snapshot(stop):
     return None
 
 
+def _labels():
+    """The numbers of masks, with the classes of the parameter."""
+    try:
+        return Labels(classes_of_parameter(rospy.get_param(CLASSES, [])))
+    except ValueError as error:
+        rospy.logerr("%s; classes are the models' names" % error)
+        return Labels()
+
+
 def make_renderer():
     """Return the best renderer of this machine, and log which one it is."""
     renderer, problem = best_renderer()
@@ -202,7 +212,7 @@ def main():
     path = os.path.join(rospkg.RosPack().get_path("sensor_renderer"), "config", "camera_drivers.yaml")
     with open(path, encoding="utf-8") as file:
         drivers = yaml.safe_load(file)
-    node = SensorRenderer(make_renderer, drivers)
+    node = SensorRenderer(make_renderer, drivers, _labels())
     node.run(lambda: ending.is_set() or rospy.is_shutdown())
     node.close()
     rospy.signal_shutdown("the renderer ends")

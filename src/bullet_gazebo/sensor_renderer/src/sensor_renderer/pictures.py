@@ -10,10 +10,11 @@ _BYTES = {"rgb8": 3, "bgr8": 3, "mono8": 1, "bgra8": 4}
 class Noise:
     """Normal noise on every value of a picture."""
 
-    def __init__(self, deviation, seed=0):
-        """``deviation``: standard deviation, 1.0 being full brightness."""
+    def __init__(self, deviation, mean=0.0, seed=0):
+        """``deviation``: standard deviation, and ``mean``, 1.0 being full brightness."""
         self._random = np.random.default_rng(seed)
-        self._values = np.round(self._random.normal(0.0, 255.0 * deviation, _NOISE_LENGTH)).astype(np.int16)
+        values = self._random.normal(255.0 * mean, 255.0 * deviation, _NOISE_LENGTH)
+        self._values = np.round(values).astype(np.int16)
 
     def add(self, picture):
         """The picture (uint8) with noise."""

@@ -10,8 +10,8 @@ _THINNED_M = 0.015
 
 class Programs:
     """The programs of one context. ``mesh`` computes light per vertex, ``solid`` per pixel; ``floor`` draws the floor,
-    ``bare_floor`` the parts of it to which no shadow of the sun reaches; ``shadow`` draws depth alone, ``screen`` a
-    picture on a rectangle, ``sky`` the background."""
+    ``bare_floor`` the parts of it to which no shadow of the sun reaches; ``shadow`` draws depth alone, or with it a
+    number for each link; ``screen`` a picture on a rectangle, ``sky`` the background."""
 
     def __init__(self, context, shadow_taps, per_pixel):
         """Compiles those that do not depend on the light. ``shadow_taps``: comparisons along one side of the square

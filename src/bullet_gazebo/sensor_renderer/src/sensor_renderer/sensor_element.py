@@ -21,8 +21,8 @@ class CameraElement(NamedTuple):
     """One camera of a ``<sensor>``.
 
     ``offset`` (4, 4): its optical frame in the frame of the link; ``encoding`` of its images as ROS names it;
-    ``noise`` [of 1.0 for full brightness] is the standard deviation of each pixel; ``lens``: a
-    :class:`sensor_renderer.lens.Lens` if it distorts, with these coefficients, else None.
+    ``noise`` and ``noise_mean`` [of 1.0 for full brightness] are standard deviation and mean of the noise of each
+    pixel; ``lens``: a :class:`sensor_renderer.lens.Lens` if it distorts, with these coefficients, else None.
     """
 
     name: str
@@ -32,16 +32,39 @@ class CameraElement(NamedTuple):
     noise: float
     distortion: Distortion = Distortion()
     lens: Lens | None = None
+    noise_mean: float = 0.0
 
-    def view(self, link_pose, draw, colour, depth):
-        """(picture, depth) as this camera sees them from a link at ``link_pose`` (4, 4); None if not requested.
-        ``draw(pinhole, pose, colour, depth)`` does so for an ideal camera."""
-        pose = link_pose @ self.offset
+    def view(self, moment, colour, depth):
+        """(picture, depth) as this camera sees them at a :class:`sensor_renderer.moments.Moment`; None if not
+        requested."""
         if self.lens is None:
-            return draw(self.pinhole, pose, colour, depth)
-        picture, distance = draw(self.lens.ideal, pose, colour, depth)
+            return moment.draw(self.pinhole, self.offset, colour, depth)
+        picture, distance = moment.draw(self.lens.ideal, self.offset, colour, depth)
         return (None if picture is None else self.lens.picture(picture),
                 None if distance is None else self.lens.nearest(distance))
+
+    def identified(self, moment):
+        """(numbers, links, depth) as :meth:`GlRenderer.identify` returns them, of this camera."""
+        if self.lens is None:
+            return moment.identify(self.pinhole, self.offset)
+        numbers, links, distance = moment.identify(self.lens.ideal, self.offset)
+        return self.lens.nearest(numbers), links, self.lens.nearest(distance)
+
+    @property
+    def rays(self):
+        """x / z and y / z, (height, width) each, of the pixels."""
+        if self.lens is not None:
+            return self.lens.rays
+        pinhole = self.pinhole
+        columns, rows = np.meshgrid(np.arange(pinhole.width), np.arange(pinhole.height))
+        return (columns - pinhole.cx) / pinhole.fx, (rows - pinhole.cy) / pinhole.fy
+
+    def project(self, points):
+        """Pixels (n, 2) of points (n, 3) [m] in the optical frame, through the lens."""
+        if self.lens is None:
+            return self.pinhole.project(points)
+        arrivals = self.distortion.distorted(points[:, :2] / points[:, 2:])
+        return arrivals * (self.pinhole.fx, self.pinhole.fy) + (self.pinhole.cx, self.pinhole.cy)
 
 
 class SensorEntry:
@@ -109,9 +132,22 @@ class SensorEntry:
             lens = Lens(pinhole, distortion) if any(distortion) else None
         except SensorError as error:
             raise SensorError("%s: %s" % (self, error)) from error
+        noise, mean = self._noise(camera)
         offset = self.offset @ self._pose(self.element) @ self._pose(camera) @ OPTICAL
         return CameraElement(camera.get("name") or "camera%d" % number, pinhole, offset, _FORMATS[written],
-                             max(self.number(camera, "noise/stddev", 0.0), 0.0), distortion, lens)
+                             noise, distortion, lens, mean)
+
+    def _noise(self, camera):
+        """(standard deviation, mean) of the camera's <noise>."""
+        kind = (camera.findtext("noise/type") or "gaussian").strip().lower()
+        if kind == "none":
+            return 0.0, 0.0
+        if kind != "gaussian":
+            raise SensorError("%s: the <type> of its <noise> is '%s', expected gaussian or none" % (self, kind))
+        deviation, mean = self.number(camera, "noise/stddev", 0.0), self.number(camera, "noise/mean", 0.0)
+        if deviation < 0.0:
+            raise SensorError("%s: <noise/stddev> is %g, expected 0 or more" % (self, deviation))
+        return deviation, mean
 
     def _distortion(self, camera):
         """Of the camera's <distortion>; where there is none, of the plugin's, as older descriptions have it."""

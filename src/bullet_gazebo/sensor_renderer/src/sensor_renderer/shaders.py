@@ -227,7 +227,10 @@ void main() { gl_Position = to_clip * (body * vec4(position, 1.0)); }
 """
 
 SHADOW_FRAGMENT = _HEAD + """
-void main() {}
+// The number counts only where a picture of numbers is drawn.
+uniform uint number;
+out uint seen;
+void main() { seen = number; }
 """
 
 SCREEN_VERTEX = _HEAD + """

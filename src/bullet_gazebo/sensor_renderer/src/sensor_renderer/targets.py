@@ -11,12 +11,21 @@ class Targets:
         self._context = context
         self._samples = samples
         self._targets = {}
+        self._numbered = {}
 
     def of(self, width, height):
         """The :class:`Target` of this size [pixels]."""
         if (width, height) not in self._targets:
             self._targets[width, height] = Target(self._context, (width, height), self._samples)
         return self._targets[width, height]
+
+    def numbered(self, width, height):
+        """(framebuffer of one uint16 a pixel, its depth texture) of this size [pixels]."""
+        if (width, height) not in self._numbered:
+            depth = self._context.depth_texture((width, height))
+            buffer = self._context.framebuffer(self._context.renderbuffer((width, height), 1, dtype="u2"), depth)
+            self._numbered[width, height] = buffer, depth
+        return self._numbered[width, height]
 
 
 class Target:

@@ -24,24 +24,39 @@ class TinyRenderer:
 
     def render(self, mirror, pinhole, pose, colour=True, depth=False):
         """As :meth:`GlRenderer.render`."""
-        self._follow(mirror)
-        light = mirror.light
-        clip = pinhole.clip_matrix()
-        clip[1] *= -1.0  # PyBullet turns the picture over by itself
-        # OpenGL's eye looks along -z with y up.
-        turn = np.diag([1.0, -1.0, -1.0, 1.0])
-        _, _, rgba, values, _ = pybullet.getCameraImage(
-            pinhole.width, pinhole.height, (turn @ np.linalg.inv(pose)).T.ravel().tolist(),
-            (clip @ turn).T.ravel().tolist(), lightDirection=list(light.to_sun), shadow=0,
-            lightAmbientCoeff=1.1 * float(np.mean(light.ambient)), lightDiffuseCoeff=float(np.mean(light.sun)),
-            lightSpecularCoeff=_SPECULAR, flags=pybullet.ER_NO_SEGMENTATION_MASK,
-            renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client)
+        rgba, values, _ = self._image(mirror, pinhole, pose, pybullet.ER_NO_SEGMENTATION_MASK)
         size = pinhole.height, pinhole.width
         picture = np.array(rgba, dtype=np.uint8).reshape(*size, 4)[:, :, :3] if colour else None
         distance = None
         if depth:
             distance = pinhole.depth_from_buffer(np.array(values, dtype=np.float32).reshape(size))
         return picture, distance
+
+    def identify(self, mirror, pinhole, pose):
+        """As :meth:`GlRenderer.identify`."""
+        _, values, mask = self._image(mirror, pinhole, pose, 0)
+        size = pinhole.height, pinhole.width
+        links = list(dict.fromkeys(key[:2] for key in self._bodies))
+        number = {body: 1 + links.index(key[:2]) for key, (_, body) in self._bodies.items()}
+        table = np.zeros(2 + max(number, default=0), dtype=np.uint16)
+        table[[body + 1 for body in number]] = list(number.values())
+        numbers = table[np.array(mask).reshape(size) + 1]  # nothing is -1
+        return numbers, links, pinhole.depth_from_buffer(np.array(values, dtype=np.float32).reshape(size))
+
+    def _image(self, mirror, pinhole, pose, flags):
+        """(colours, depth buffer, mask) of the view, as PyBullet has them."""
+        self._follow(mirror)
+        light = mirror.light
+        clip = pinhole.clip_matrix()
+        clip[1] *= -1.0  # PyBullet turns the picture over by itself
+        # OpenGL's eye looks along -z with y up.
+        turn = np.diag([1.0, -1.0, -1.0, 1.0])
+        return pybullet.getCameraImage(
+            pinhole.width, pinhole.height, (turn @ np.linalg.inv(pose)).T.ravel().tolist(),
+            (clip @ turn).T.ravel().tolist(), lightDirection=list(light.to_sun), shadow=0,
+            lightAmbientCoeff=1.1 * float(np.mean(light.ambient)), lightDiffuseCoeff=float(np.mean(light.sun)),
+            lightSpecularCoeff=_SPECULAR, flags=flags,
+            renderer=pybullet.ER_TINY_RENDERER, physicsClientId=self._client)[2:]
 
     def close(self):
         """Disconnect the client."""

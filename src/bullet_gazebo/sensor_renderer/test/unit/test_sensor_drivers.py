@@ -2,11 +2,11 @@
 """From a description to messages: the <sensor> element, when a picture is due, the messages."""
 import numpy as np
 import pytest
-from dynamic_reconfigure.msg import Config, DoubleParameter, IntParameter
+from dynamic_reconfigure.msg import BoolParameter, Config, DoubleParameter, IntParameter
 from dynamic_reconfigure.srv import ReconfigureRequest
 from sensor_msgs.msg import PointField
 
-from sensor_renderer import convert, drivers, node
+from sensor_renderer import best, convert, drivers, node, topics
 from sensor_renderer.errors import RenderingError, SensorError
 from sensor_renderer.pictures import Cloud, Noise, encoded, millimetres, within
 from sensor_renderer.pinhole import Pinhole
@@ -79,11 +79,11 @@ def test_depth_and_points_agree_with_the_pinhole():
 
 
 def test_without_egl_pictures_come_from_pybullet_and_that_is_said(monkeypatch):
-    def no_egl():
+    def no_egl(still):
         raise RenderingError("no OpenGL 3.3 on EGL: libEGL.so not found")
 
     said = []
-    monkeypatch.setattr(node, "GlRenderer", no_egl)
+    monkeypatch.setattr(best, "GlRenderer", no_egl)
     monkeypatch.setattr(node.rospy, "logwarn", said.append)
     monkeypatch.setattr(node.rospy, "loginfo", said.append)
     renderer = node.make_renderer()
@@ -92,46 +92,162 @@ def test_without_egl_pictures_come_from_pybullet_and_that_is_said(monkeypatch):
     renderer.close()
 
 
-def test_settings_are_served_once_and_felt_at_once(monkeypatch):
-    class Opened:
-        def __init__(self, *arguments, **_):
-            self.arguments, self.sent, self.open = arguments, [], True
-            found.append(self)
+class Opened:
+    """A publisher or service that records what it is asked."""
 
-        def publish(self, message):
-            self.sent.append(message)
+    def __init__(self, ros, *arguments, **_):
+        self.arguments, self.sent, self.open = arguments, [], True
+        ros.opened.append(self)
 
-        def unregister(self, *_):
-            self.open = False
+    def publish(self, message):
+        self.sent.append(message)
 
-        shutdown = unregister
-        get_num_connections = staticmethod(lambda: 1)
+    def unregister(self, *_):
+        self.open = False
 
-    found = []
-    monkeypatch.setattr(drivers.rospy, "Publisher", Opened)
-    monkeypatch.setattr(drivers.rospy, "Service", Opened)
+    shutdown = unregister
+    get_num_connections = staticmethod(lambda: 1)
+
+
+class Ros:
+    """What cameras have opened, and the parameters that they find."""
+
+    def __init__(self, monkeypatch):
+        self.opened, self.parameters = [], {}
+        for kind in ("Publisher", "Service"):
+            monkeypatch.setattr(topics.rospy, kind, lambda *arguments, **_: Opened(self, *arguments))
+        monkeypatch.setattr(topics.rospy, "get_param", lambda name, default: self.parameters.get(name, default))
+
+    def names(self):
+        return [opened.arguments[0] for opened in self.opened if opened.open]
+
+    def change(self, name, **values):
+        """As a client of dynamic_reconfigure does."""
+        config = Config()
+        for key, value in values.items():
+            kind, field = {bool: (BoolParameter, config.bools), int: (IntParameter, config.ints),
+                           float: (DoubleParameter, config.doubles)}[type(value)]
+            field.append(kind(key, value))
+        handler, = (opened.arguments[-1] for opened in self.opened
+                    if opened.open and opened.arguments[0] == name + "/set_parameters")
+        return handler(ReconfigureRequest(config))
+
+    def sent(self, name):
+        found, = (opened for opened in self.opened if opened.open and opened.arguments[0] == name)
+        return found.sent
+
+
+@pytest.fixture
+def ros(monkeypatch):
+    return Ros(monkeypatch)
+
+
+class Still:
+    """A moment of a world that does not move; everything is drawn as `picture`."""
+
+    def __init__(self, time_s, picture=None, depth=None):
+        self.time_s, self.picture, self.depth = time_s, picture, depth
+
+    def at(self, time_s):
+        return Still(time_s, self.picture, self.depth)
+
+    def is_still(self, seconds):
+        return True
+
+    def draw(self, pinhole, offset, colour, depth):
+        return self.picture, self.depth
+
+
+def test_settings_are_served_once_and_felt_at_once(ros):
     camera = drivers.Camera(entry())
-    names = [opened.arguments[0] for opened in found]
-    assert "/ns/eye/image_raw/compressed/set_parameters" in names and "/ns/eye/parameter_updates" in names
-    handler = {opened.arguments[0]: opened.arguments[-1] for opened in found}
-    handler["/ns/eye/image_raw/compressed/set_parameters"](ReconfigureRequest(Config(ints=[
-        IntParameter("jpeg_quality", 5)])))
+    assert "/ns/eye/image_raw/compressed/set_parameters" in ros.names() and "/ns/eye/parameter_updates" in ros.names()
+    ros.change("/ns/eye/image_raw/compressed", jpeg_quality=5)
     noise = np.random.default_rng(0).integers(0, 255, (48, 64, 3)).astype(np.uint8)
 
     def taken(time_s):
-        camera.take(time_s, np.eye(4), lambda *_: (noise, None))
-        compressed, = (opened for opened in found if opened.arguments[0] == "/ns/eye/image_raw/compressed")
-        return len(compressed.sent[-1].data)
+        camera.take(Still(time_s, noise))
+        return len(ros.sent("/ns/eye/image_raw/compressed")[-1].data)
 
     small = taken(0.0)
-    handler["/ns/eye/image_raw/compressed/set_parameters"](ReconfigureRequest(Config(ints=[
-        IntParameter("jpeg_quality", 90)])))
+    ros.change("/ns/eye/image_raw/compressed", jpeg_quality=90)
     assert taken(1.0) > 2 * small
     assert not camera.is_due(1.05)
-    handler["/ns/eye/set_parameters"](ReconfigureRequest(Config(doubles=[DoubleParameter("imager_rate", 100.0)])))
+    ros.change("/ns/eye", imager_rate=100.0)
     assert camera.is_due(1.05)
     camera.close()
-    assert not any(opened.open for opened in found)
+    assert not any(opened.open for opened in ros.opened)
+
+
+def test_exposure_and_noise_come_from_parameters_and_change_at_run_time(ros):
+    ros.parameters.update({"/ns/eye": {"exposure_time": 0.02, "imager_rate": 20}, "/sensor_renderer": {"gain": -6.0}})
+    camera = drivers.Camera(entry())
+    grey = np.full((48, 64, 3), 100, dtype=np.uint8)
+    assert camera.memory_s == 0.02 and camera.is_due(0.0)
+    camera.take(Still(1.0, grey))
+    image = ros.sent("/ns/eye/image_raw")[-1]
+    assert image.header.stamp.to_sec() == pytest.approx(0.99), "the middle of the exposure"
+    assert abs(np.frombuffer(image.data, np.uint8).mean() - 100.0) < 1.5, "twice the time, half the gain"
+    ros.change("/ns/eye", exposure_time=0.0, gain=0.0, noise_stddev=0.1)
+    camera.take(Still(2.0, grey))
+    assert np.frombuffer(ros.sent("/ns/eye/image_raw")[-1].data, np.uint8).std() == pytest.approx(25.5, rel=0.05)
+    assert camera.memory_s == 0.0
+
+
+@pytest.mark.parametrize(("name", "value", "text"), [
+    ("exposure_time", 5, "parameter exposure_time of camera /ns/eye is 5, expected 0 to 0.1"),
+    ("gain", "high", "parameter gain of camera /ns/eye is 'high', expected a number"),
+    ("gain", True, "is True, expected a number"), ("auto_exposure", 1, "is 1, expected true or false")])
+def test_parameters_that_are_of_no_use_are_refused(ros, name, value, text):
+    ros.parameters["/ns/eye"] = {name: value}
+    with pytest.raises(SensorError, match=text):
+        drivers.Camera(entry())
+
+
+def test_topics_for_learning_come_and_go_by_a_setting(ros):
+    camera = drivers.Camera(entry())
+    wanted = {"/ns/eye/" + name for name in ("semantic/image_raw", "semantic/labels", "instance/image_raw",
+                                             "instance/labels", "ideal_depth/image_raw", "flow/image_raw")}
+    assert not wanted & set(ros.names())
+    ros.change("/ns/eye", learning_topics=True)
+    assert wanted <= set(ros.names())
+    ros.change("/ns/eye", learning_topics=False)
+    assert not wanted & set(ros.names())
+    ros.change("/ns/eye", learning_topics=True)
+    camera.close()
+    assert not ros.names()
+
+
+def test_the_kinect_measures_as_one_when_it_is_asked_to(ros):
+    kinect = drivers.DepthCamera(entry(camera=CAMERA % ("640", "R8G8B8")))
+    flat = np.full((48, 640), 2.0, dtype=np.float32)
+    picture = np.zeros((48, 640, 3), dtype=np.uint8)
+
+    def measured(time_s):
+        kinect.take(Still(time_s, picture, flat))
+        return np.frombuffer(ros.sent("/ns/eye/depth/image_raw")[-1].data, np.float32)
+
+    assert (measured(0.0) == 2.0).all()
+    ros.change("/ns/eye", depth_noise=True)
+    noisy = measured(1.0)
+    assert 0.003 < np.nanstd(noisy) < 0.01 and abs(np.nanmean(noisy) - 2.0) < 0.002
+    ros.change("/ns/eye", depth_noise=False)
+    assert (measured(2.0) == 2.0).all()
+
+
+@pytest.mark.parametrize(("noise", "found"), [
+    ("<noise><type>gaussian</type><mean>0.1</mean><stddev>0.02</stddev></noise>", (0.02, 0.1)),
+    ("<noise><type>none</type><stddev>0.02</stddev></noise>", (0.0, 0.0)), ("", (0.0, 0.0))])
+def test_noise_as_gazebo_describes_it(noise, found):
+    camera, = entry(camera="<camera>%s</camera>" % noise).cameras()
+    assert (camera.noise, camera.noise_mean) == found
+
+
+@pytest.mark.parametrize(("noise", "text"), [
+    ("<noise><type>custom</type></noise>", "<type> of its <noise> is 'custom', expected gaussian or none"),
+    ("<noise><stddev>-1</stddev></noise>", "<noise/stddev> is -1, expected 0 or more")])
+def test_noise_that_is_of_no_use_is_said(noise, text):
+    with pytest.raises(SensorError, match=text):
+        entry(camera="<camera>%s</camera>" % noise).cameras()
 
 
 def test_names_that_are_none_are_refused():

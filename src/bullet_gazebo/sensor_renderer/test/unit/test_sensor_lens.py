@@ -70,6 +70,45 @@ def test_a_lens_that_folds_the_picture_is_refused(distortion, text):
         Lens(PINHOLE, distortion)
 
 
+@pytest.mark.parametrize("distortion", [None, BARREL, CUSHION])
+def test_camera_info_says_within_a_tenth_of_a_pixel_where_points_are_seen(tmp_path, distortion):
+    """The corners of a chessboard, as OpenCV finds them in the picture and as it projects them by K and D."""
+    cell, columns, rows = 40, 9, 7
+    dark = (np.indices((rows * cell, columns * cell)) // cell).sum(axis=0) % 2
+    board = np.where(dark, 25, 230).astype(np.uint8)
+    writer = PictureWriter(tmp_path / "board", columns * cell, rows * cell)
+    writer.show(np.repeat(board[:, :, None], 3, axis=2))
+    square_m = 0.06
+    mirror = Mirror(DrawingCache(tmp_path), lambda uri: None, pytest.fail)
+    mirror.set_scene([{"name": "sheet", "urdf": SHEET, "joints": [], "screens": [
+        {"link": "link", "offset": np.eye(4).ravel().tolist(), "size": [columns * square_m, rows * square_m],
+         "picture": str(writer.path)}]}])
+    mirror.set_state(np.array([0, 0, 0, 0, 0, 0, 1.0]))
+    points = np.array([((x - columns / 2.0) * square_m, (rows / 2.0 - y) * square_m, 0.0)
+                       for y in range(1, rows) for x in range(1, columns)])
+    lens = Lens(PINHOLE, distortion) if distortion else None
+    info = convert.camera_info(PINHOLE, 0.0, distortion or Distortion())
+    renderer = GlRenderer()
+    for slant, turn, away in ((0.05, 0.25, 0.5), (0.4, 0.3, 0.6), (-0.5, 2.0, 0.7)):
+        pose = pose_matrix((0.0, 0.0, 0.0), (0.0, np.pi / 2 + slant, turn)) @ OPTICAL
+        pose[:3, 3] = -away * pose[:3, 2] + 0.03 * pose[:3, 0]
+        picture, _ = renderer.render(mirror, lens.ideal if lens else PINHOLE, pose)
+        picture = lens.picture(picture) if lens else picture
+        camera = inverse(pose)
+        expected, _ = cv2.projectPoints(points, cv2.Rodrigues(camera[:3, :3])[0], camera[:3, 3], *matrix(info))
+        expected = expected.reshape(-1, 2)
+        inside = ((expected > 12) & (expected < (640 - 12, 400 - 12))).all(axis=1)
+        assert inside.sum() > 30
+        # Edges of one pixel's width would count by where they fall on the pixels.
+        grey = cv2.GaussianBlur(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), (0, 0), 1.0)
+        seen = cv2.cornerSubPix(grey, expected[inside].astype(np.float32).reshape(-1, 1, 2), (5, 5), (-1, -1),
+                                (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 50, 1e-4)).reshape(-1, 2)
+        off = np.linalg.norm(seen - expected[inside], axis=1)
+        assert off.mean() < 0.05 and off.max() < 0.1
+    renderer.close()
+    writer.close()
+
+
 @pytest.mark.parametrize("distortion", [None, BARREL])
 def test_opencv_finds_a_tag_where_it_is(tmp_path, distortion):
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)

@@ -19,6 +19,7 @@ class Eye:
     """A driver that records calls instead of drawing."""
 
     has_listeners = True
+    memory_s = 0.0
 
     def __init__(self, entry):
         self.entry, self.pace, self.taken = entry, Pace(10.0), []
@@ -30,9 +31,9 @@ class Eye:
     def is_due(self, time_s):
         return self.pace.is_due(time_s)
 
-    def take(self, time_s, link_pose, draw):
-        self.pace.took(time_s)
-        self.taken.append(time_s)
+    def take(self, moment):
+        self.pace.took(moment.time_s)
+        self.taken.append(moment.time_s)
 
     def close(self):
         pass
@@ -92,8 +93,8 @@ def test_a_sensor_that_fails_restarts_and_is_left_out_at_the_third_time_until_a_
             super().__init__(entry)
             made.append(self)
 
-        def take(self, time_s, link_pose, draw):
-            super().take(time_s, link_pose, draw)
+        def take(self, moment):
+            super().take(moment)
             if failing and failing.pop():
                 raise RuntimeError("broken on purpose")
 

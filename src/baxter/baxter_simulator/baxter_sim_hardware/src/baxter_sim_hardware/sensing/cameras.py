@@ -113,9 +113,13 @@ class CaptureSettings(NamedTuple):
         if factors != [1.0, 1.0, 1.0]:
             levels = np.clip(np.arange(256)[:, None] * factors, 0, 255).astype(np.uint8)
             picture = np.stack([levels[:, k][picture[:, :, k]] for k in range(3)], axis=2)
-        rows = -1 if self.control(FLIP) == 1 else 1
-        columns = -1 if self.control(MIRROR) == 1 else 1
+        rows, columns = self.turns
         return picture[::rows, ::columns]
+
+    @property
+    def turns(self):
+        """(rows, columns): -1 where they run the other way after flip and mirror, else 1."""
+        return (-1 if self.control(FLIP) == 1 else 1), (-1 if self.control(MIRROR) == 1 else 1)
 
 
 class Rack:

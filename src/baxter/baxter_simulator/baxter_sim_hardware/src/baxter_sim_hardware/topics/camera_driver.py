@@ -18,8 +18,12 @@ from baxter_sim_hardware.errors import HardwareError
 from baxter_sim_hardware.sensing.cameras import FLIP, MIRROR, CameraRefused, CaptureSettings, Rack
 from baxter_sim_hardware.sensing.optics import Optics
 from sensor_renderer import convert
-from sensor_renderer.drivers import ColourTopics, Driver
+from sensor_renderer.camera_settings import CameraSettings
+from sensor_renderer.drivers import Driver
 from sensor_renderer.errors import SensorError
+from sensor_renderer.imager import Imager
+from sensor_renderer.lens import Lens
+from sensor_renderer.topics import ColourTopics, LearningTopics
 from sim_time.pace import Pace
 
 # Two of the robot's three cameras can have power (baxter_interface 1.1.0).
@@ -137,8 +141,10 @@ class BaxterCamera(Driver):
         self._camera = camera
         self._frame = entry.text("frameName", entry.member)
         self._use = None
+        self._learning = LearningTopics(self.name(self.camera_name))
         self._services = CameraServices.of(entry.namespace)
         self._optics = self._services.optics(self.camera_name)
+        self._settings = CameraSettings(self.name(self.camera_name), self._apply, (camera.noise_mean, camera.noise))
         pinhole = camera.pinhole
         controls = _UPRIGHT if self.camera_name == _HEAD else {}
         if self._services.as_robot:
@@ -164,20 +170,31 @@ class BaxterCamera(Driver):
         topics = self._use[0] if self._use is not None else ColourTopics(
             self.name("%s/image" % self.camera_name),
             [self.name("%s/%s" % (self.camera_name, name)) for name in ("camera_info", "camera_info_std")])
-        self._use = topics, settings, pinhole, convert.camera_info(settings.turned(pinhole))
+        distortion = self._camera.distortion
+        lens = Lens(pinhole, distortion) if any(distortion) else None
+        imager = Imager(self._camera._replace(pinhole=pinhole, lens=lens), self.seed(self.camera_name))
+        self._use = topics, settings, imager, convert.camera_info(settings.turned(pinhole), 0.0, distortion)
         self._pace = Pace(settings.rate)
-        self.topics = topics.all
+        self._apply(self._settings)
+        self.topics = [*topics.all, self._learning]
 
-    def publish(self, time_s, link_pose, draw):
+    def _apply(self, settings):
+        self.memory_s = settings.exposure.exposure_time
+        use = self._use
+        if use is not None:
+            settings.apply(use[2], self._learning)
+
+    def publish(self, moment):
         use = self._use
         if use is None:
             return  # closed by a client since the node asked
-        topics, settings, pinhole, info = use
-        picture = None
-        if topics.want_picture:
-            picture, _ = draw(pinhole, link_pose @ self._camera.offset, True, False)
-            picture = settings.developed(self._optics.seen(picture, pinhole, time_s))
-        topics.publish(time_s, self._frame, picture, self._encoding, info)
+        topics, settings, imager, info = use
+        middle, picture, _ = imager.taken(moment, topics.want_picture, False)
+        if picture is not None:
+            picture = settings.developed(self._optics.seen(picture, imager.camera.pinhole, middle.time_s))
+        topics.publish(middle.time_s, self._frame, picture, self._encoding, info)
+        self._learning.publish(middle, imager.camera, self._frame, settings.turns)
 
     def close(self):
+        self._settings.close()
         self._services.remove(self)
