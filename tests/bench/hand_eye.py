@@ -6,7 +6,7 @@ its description, as for any program.
 """
 import numpy as np
 
-from baxter_sim_examples import BLOCK_SIZE_M, TABLE_TOP_M, TABLE_XY_M
+from baxter_sim_examples import TABLE_TOP_M, TABLE_XY_M
 from baxter_sim_examples.looking import View
 from baxter_sim_examples.scene import TABLE_SIZE_M
 from baxter_sim_hardware import effects
@@ -23,13 +23,14 @@ NAME = "left_hand_camera"
 ARRAY_FOCAL = 476.7  # of the drawing's camera [pixels]
 BOX = """<robot name="%s"><link name="%s"><visual><origin xyz="0 0 %g"/><geometry><box size="%g %g %g"/></geometry>
 <material name="wood"><color rgba="%s 1"/></material></visual></link></robot>"""
-TABLE_COLOUR, BLOCK_COLOUR = "0.55 0.38 0.22", "0.8 0.6 0.35"
+TABLE_COLOUR = "0.55 0.38 0.22"
 
 
 class Eye:
-    """lab: a Lab; robot_xml: its description; block: body of the block; parameters: profile and serial of the robot."""
+    """lab: a Lab; robot_xml: its description; block: body of the block, block_xml: its description; parameters: profile
+    and serial of the robot."""
 
-    def __init__(self, lab, robot, robot_xml, block, parameters):
+    def __init__(self, lab, robot, robot_xml, block, block_xml, parameters):
         self._lab, self._block = lab, block
         chosen = effects.ALL if parameters.get("profile") == "robot" else effects.NONE
         self._optics = Optics(NAME, effects.chosen(chosen), parameters.get("serial", 0), seed=1)
@@ -38,11 +39,10 @@ class Eye:
         self._chain = Chain.from_robot(robot, base="base", tip=NAME)
         self._joints = list(merge_fixed(robot).joints)
         table = BOX % ("table", "table", TABLE_TOP_M - 0.02, TABLE_SIZE_M, TABLE_SIZE_M, 0.04, TABLE_COLOUR)
-        cube = BOX % ("block", "block", 0.0, BLOCK_SIZE_M, BLOCK_SIZE_M, BLOCK_SIZE_M, BLOCK_COLOUR)
         self._mirror = Mirror(DrawingCache(), ResourceFinder(), print)
         self._mirror.set_scene([
             {"name": "floor", "urdf": None, "joints": []}, {"name": "robot", "urdf": robot_xml, "joints": self._joints},
-            {"name": "table", "urdf": table, "joints": []}, {"name": "block", "urdf": cube, "joints": []}])
+            {"name": "table", "urdf": table, "joints": []}, {"name": "block", "urdf": block_xml, "joints": []}])
         self._renderer = GlRenderer()
 
     def close(self):

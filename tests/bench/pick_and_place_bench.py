@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pick and place a block by friction in lock-step, one trial per seed: success rate and speed.
 
-    python tests/bench/pick_and_place_bench.py [--seeds 100] [--first 0] [--profile robot] [--serial 0] [--looking]
+    python tests/bench/pick_and_place_bench.py [--seeds 100] [--first 0] [--profile robot] [--serial 0]
+        [--looking | --tagged]
 
 With `--profile robot` the arm has a physical robot's effects, with `--serial N` it is that robot's. With `--looking`
 the arm knows the block's target, but not its pose: it finds the block with the hand's camera and the range sensor.
+With `--tagged` it finds a block with a tag, by the camera alone.
 The robot's own plugin on the real physics, without a master. Commands are messages at 100 Hz of simulation time;
 simulation time passes only between them. A seed decides the block's pose, its target, its mass, its friction, and the
 arm's start posture.
@@ -25,9 +27,10 @@ from robot_bench import load_lab
 import xacro
 from baxter_interface.joint_motion import Move
 from baxter_sim_examples import BASE_HEIGHT_M, BLOCK_SIZE_M, TABLE_XY_M, BlockLost, Trial, block_urdf, pick_and_place
-from baxter_sim_examples.looking import NotSeen, locate
+from baxter_sim_examples.looking import NotSeen, locate, locate_tagged
 from baxter_sim_examples.pick_and_place import aside_angles, grip_yaw
 from baxter_sim_examples.scene import ABOUT_M, MIDDLE_M
+from baxter_sim_examples.tagged import tagged_block_urdf
 from baxter_sim_hardware import effects, individual
 from baxter_sim_kinematics import Chain, NoSolution, pose_from_quaternion, solve
 from bullet_sim import Pose
@@ -168,11 +171,11 @@ def load_scene(serial=individual.DRAWING):
             parse_sdf_model(table.read_text(), str(table)).robot)
 
 
-def run(lab_class, robot, table, trial, parameters=None, looking=None):
+def run(lab_class, robot, table, trial, parameters=None, looking=None, tagged=False):
     """One trial. Returns (simulated seconds, distance from the target [m]).
 
     parameters: those of baxter_sim_hardware, beside `enable`; looking: the robot's description, if the arm must
-    find the block itself. Raises Failure, BlockLost, NoSolution, NotSeen.
+    find the block itself, by its tag if ``tagged``. Raises Failure, BlockLost, NoSolution, NotSeen.
     """
     eye = None
     lab = lab_class(robot, pose="untucked", parameters={"enable": True, **(parameters or {})}, meshes=True)
@@ -183,20 +186,20 @@ def run(lab_class, robot, table, trial, parameters=None, looking=None):
         lab.model.set_joint_positions(index, np.array(list(trial.start.values())))
         lab.plugin.joints_set()
         lab.world.spawn(table, "cafe_table", Pose((*TABLE_XY_M, 0.0)), static=True)
-        block = parse_urdf(block_urdf(trial.mass_kg, trial.friction), source="block")
-        block = lab.world.spawn(block, "block", world_pose(trial.source))
+        block_xml = (tagged_block_urdf if tagged else block_urdf)(trial.mass_kg, trial.friction)
+        block = lab.world.spawn(parse_urdf(block_xml, source="block"), "block", world_pose(trial.source))
         chain, height, source = Chain.from_robot(robot, base="base", tip="left_gripper"), [], trial.source
         if looking is not None:
-            eye = Eye(lab, robot, looking, block, parameters or {})
+            eye = Eye(lab, robot, looking, block, block_xml, parameters or {})
         arm = LabArm(lab, chain) if eye is None else SeeingArm(lab, chain, robot, eye)
         arm.watch = lambda: height.append(block.base_pose().position[2])
         target = trial.target
         arm.calibrate()
         LabArm(lab, Chain.from_robot(robot, base="base", tip="right_gripper")).move_to(aside_angles("right"))
         if eye is not None:
-            source = locate(arm, MIDDLE_M, ABOUT_M)
+            source = (locate_tagged if tagged else locate)(arm, MIDDLE_M, ABOUT_M)
             target = replace(target, z=source.z)
-            print("seen %.1f mm beside the block, table felt %.1f mm too high, turned by %.1f degrees" % (
+            print("seen %.1f mm beside the block, %.1f mm too high, turned by %.1f degrees" % (
                 1e3 * math.dist(astuple(source)[:2], astuple(trial.source)[:2]), 1e3 * (source.z - trial.source.z),
                 math.degrees(grip_yaw(source.yaw - trial.source.yaw))), flush=True)
         pick_and_place(arm, source, target)
@@ -226,17 +229,17 @@ class Outcome:
     cpu_s: float = 0.0
 
 
-def run_seeds(seeds, profile="sim", serial=individual.DRAWING, looks=False):
+def run_seeds(seeds, profile="sim", serial=individual.DRAWING, looks=False, tagged=False):
     """Run one trial per seed, on the robot `serial` with that profile; print the reason of each failure."""
     robot, table = load_scene(serial)
-    looking = described(serial) if looks else None
+    looking = described(serial) if looks or tagged else None
     lab_class = load_lab()
     outcome = Outcome()
     begin, begin_cpu = time.monotonic(), time.process_time()
     for seed in seeds:
         try:
             seconds, miss = run(lab_class, robot, table, Trial.from_seed(seed), {"profile": profile, "serial": serial},
-                                looking)
+                                looking, tagged)
         except (Failure, BlockLost, NoSolution, NotSeen) as failure:
             print("seed %d failed: %s" % (seed, failure), flush=True)
             continue
@@ -253,10 +256,12 @@ def main():
     parser.add_argument("--first", type=int, default=0, help="the first seed (default: %(default)s)")
     parser.add_argument("--profile", choices=("sim", "robot"), default="sim", help="(default: %(default)s)")
     parser.add_argument("--serial", type=int, default=individual.DRAWING, help="of the robot (default: %(default)s)")
-    parser.add_argument("--looking", action="store_true", help="the arm finds the block itself")
+    ways = parser.add_mutually_exclusive_group()
+    ways.add_argument("--looking", action="store_true", help="the arm finds the block by looking and feeling")
+    ways.add_argument("--tagged", action="store_true", help="the arm finds the block by the tag on it")
     arguments = parser.parse_args()
     outcome = run_seeds(range(arguments.first, arguments.first + arguments.seeds), arguments.profile, arguments.serial,
-                        arguments.looking)
+                        arguments.looking, arguments.tagged)
     print("%d of %d succeeded; worst distance from the target %.2f mm; %.1f simulated s a run; %.1f times real time by "
           "the clock, %.1f by processor time" % (
               outcome.succeeded, arguments.seeds, 1e3 * max(outcome.misses_m, default=0.0),

@@ -7,6 +7,8 @@ import numpy as np
 
 from .pick_and_place import Spot, start_angles, tool_down
 from .scene import BLOCK_SIZE_M
+from .tagged import BLOCK_TAG, BLOCK_TAG_M
+from .tags import find_tags
 
 # Wood is reddish: its blue is less than this share of its red. The block's wood is lighter than what is around it.
 _WOODEN, _LIGHTER = 0.7, 1.2
@@ -33,17 +35,24 @@ class NotSeen(Exception):
 
 
 class View(NamedTuple):
-    """A picture and where it was taken: `picture` (height, width, 3) uint8 red, green, blue; `matrix` (3, 3), K of the
-    camera; `pose` (4, 4) of the optical frame in `base` [m]."""
+    """A picture and where it was taken: `picture` (height, width, 3) uint8 red, green, blue; `matrix` (3, 3) and
+    `distortion` (n,), K and D of the camera; `pose` (4, 4) of the optical frame in `base` [m]."""
 
     picture: np.ndarray
     matrix: np.ndarray
     pose: np.ndarray
+    distortion: tuple = ()
+
+    def rays(self, pixels):
+        """x / z and y / z (n, 2), in the optical frame, of what pixels (n, 2) show."""
+        pixels = np.asarray(pixels, dtype=float).reshape(-1, 1, 2)
+        if not np.any(self.distortion):
+            return (pixels.reshape(-1, 2) - self.matrix[:2, 2]) / np.diag(self.matrix)[:2]
+        return cv2.undistortPoints(pixels, self.matrix, np.array(self.distortion, dtype=float)).reshape(-1, 2)
 
     def on_plane(self, pixels, height):
         """(n, 2) x and y [m] in `base` of the points at `height` [m] that pixels (n, 2) show."""
-        pixels = np.column_stack([np.asarray(pixels, dtype=float), np.ones(len(pixels))])
-        rays = np.linalg.solve(self.matrix, pixels.T).T @ self.pose[:3, :3].T
+        rays = np.column_stack([self.rays(pixels), np.ones(len(pixels))]) @ self.pose[:3, :3].T
         lengths = (height - self.pose[2, 3]) / rays[:, 2]
         return self.pose[:2, 3] + lengths[:, None] * rays[:, :2]
 
@@ -108,19 +117,48 @@ def locate(arm, middle, about_m):
         heights.append(table_height(*arm.feel()))
     # What stands on a table is higher than the table. The lowest of noisy heights is too low, their mean is not.
     table_m = float(np.mean([height for height in heights if height < min(heights) + BLOCK_SIZE_M / 2.0]))
-    spot, pose = _seen(arm, middle, table_m, pose)
+    spot, pose = _seen(arm, middle, table_m, pose, lambda view: find_block(view, table_m))
     _go(arm, (spot.x, spot.y, table_m + _LOW_M), pose)
     return find_block(arm.look(), table_m)
 
 
-def _seen(arm, middle, table_m, pose):
-    """(Spot, the arm's angles) from the first place from which the block is seen; the arm is above the middle."""
+def find_tagged_block(view, number=BLOCK_TAG, tag_m=BLOCK_TAG_M, side_m=BLOCK_SIZE_M):
+    """The Spot of the block of `side_m` [m] with tag `number`, of `tag_m` [m], on its upper face; the table's height
+    need not be known. Raises NotSeen."""
+    found = find_tags(view, tag_m)
+    if number not in found:
+        raise NotSeen("tag %d is not seen; tags in the picture: %s" % (
+            number, ", ".join("%d" % other for other in sorted(found)) or "none"))
+    pose = found[number]
+    x, y, z = pose[:3, 3] - side_m / 2.0 * pose[:3, 2]
+    return Spot(float(x), float(y), float(z), float(np.arctan2(pose[1, 0], pose[0, 0])))
+
+
+def locate_tagged(arm, middle, about_m):
+    """As :func:`locate` for the block with a tag: the arm looks, and need not feel.
+
+    From nearer, a finger may hide a corner of the tag: then the first look counts.
+    """
+    pose = _go(arm, (*middle, about_m + _HIGH_M), start_angles(arm.name))
+    spot, pose = _seen(arm, middle, about_m, pose, find_tagged_block)
+    _go(arm, (spot.x, spot.y, about_m + _LOW_M), pose)
+    try:
+        return find_tagged_block(arm.look())
+    except NotSeen:
+        return spot
+
+
+def _seen(arm, middle, table_m, pose, find):
+    """(Spot, the arm's angles) from the first place from which the block is seen; the arm is above the middle.
+
+    find(view) -> Spot, raises NotSeen.
+    """
     for x, y in _ELSEWHERE_M:
         try:
-            return find_block(arm.look(), table_m), pose
+            return find(arm.look()), pose
         except NotSeen:
             pose = _go(arm, (middle[0] + x, middle[1] + y, table_m + _HIGH_M), pose)
-    return find_block(arm.look(), table_m), pose
+    return find(arm.look()), pose
 
 
 def _go(arm, place, seed):

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Patches of one colour in a camera's picture, by thresholds on hue, saturation and value. Free of ROS."""
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+#: Ranges of hue [half degrees, as OpenCV counts: 0 to 179] of each colour.
+HUES = {"red": ((0, 8), (172, 179)), "yellow": ((22, 34),), "green": ((45, 80),), "blue": ((105, 130),)}
+# Grey things have a low saturation, dark ones no certain hue [of 255].
+_SATURATED, _BRIGHT = 120, 50
+
+
+class Patch(NamedTuple):
+    """A patch of one colour: its middle [pixels] and its area [square pixels]."""
+
+    u: float
+    v: float
+    area: float
+
+
+def find_patches(picture, colour, least_area=40.0):
+    """Patches of `colour`, one of :data:`HUES`, in a picture (height, width, 3) uint8 red, green, blue, the largest
+    first; smaller ones than `least_area` [square pixels] are left out. ``ValueError`` for an unknown colour."""
+    if colour not in HUES:
+        raise ValueError("colour '%s' is not known; expected one of %s" % (colour, ", ".join(HUES)))
+    hsv = cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2HSV)
+    mask = sum(cv2.inRange(hsv, (low, _SATURATED, _BRIGHT), (high, 255, 255)) for low, high in HUES[colour])
+    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    found = []
+    for outline in outlines:
+        moments = cv2.moments(outline)
+        if moments["m00"] >= least_area:
+            found.append(Patch(moments["m10"] / moments["m00"], moments["m01"] / moments["m00"], moments["m00"]))
+    return sorted(found, key=lambda patch: -patch.area)
