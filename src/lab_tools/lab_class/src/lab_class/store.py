@@ -25,10 +25,11 @@ class StoreError(Exception):
 
 @dataclass(frozen=True)
 class Options:
-    """How a class runs. ``launch``: the words after roslaunch; ``idle_s``: None means never; ``memory_bytes``,
-    ``disk_bytes``: of each lab; ``at_once``: labs that start at a time."""
+    """How a class runs. ``launch``: the words after roslaunch, by default with half of the messages of a lab's clock;
+    ``idle_s``: None means never; ``memory_bytes``, ``disk_bytes``: of each lab; ``at_once``: labs that start at a time.
+    """
 
-    launch: tuple = ("baxter_gazebo", "baxter_world.launch", "gui:=false")
+    launch: tuple = ("baxter_gazebo", "baxter_world.launch", "gui:=false", "clock_rate:=250")
     port: int = 8100
     public: bool = False
     trusted: bool = False

@@ -18,6 +18,7 @@ from urllib.parse import quote
 import rosgraph
 import rospkg
 import rospy
+from rosgraph_msgs.msg import Clock
 
 from lab_environment import jupyter, page_files, ports
 from lab_web.buttons import Buttons
@@ -34,6 +35,7 @@ from lab_web.parts import SCREEN_TOPIC, Parts
 from lab_web.planning import Planning
 from lab_web.playback import Recorder, play
 from lab_web.release_guard import ReleaseGuard
+from lab_web.resting import rest
 from lab_web.robot import ARM_LINKS, Baxter
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, routes, upload_routes
@@ -60,6 +62,8 @@ FIRST_PORT = 8090
 _LARGEST_PORT = 65535
 #: Period of poses to the pages [s]; of looks at what changes rarely [s].
 _POSES_S, _LOOK_S = 0.05, 1.0
+# Between reads of the robot's topics, and of the clock, for which other clients may still wait, without a page [s].
+_REST_S, _REST_OF_CLOCK_S = 0.05, 0.02
 # Between warnings of the same [s].
 _COMPLAIN_S = 60.0
 _SNAPSHOT = "/gazebo/snapshot"
@@ -143,6 +147,12 @@ def serve(options, page, libraries):
     pages.lab = Lab(robot, pages.control_changed, pages.tell)
     faults = Faults(SimpleNamespace(error=rospy.logerr))
     equipment = _equip(pages, robot, faults)
+
+    def is_needed():
+        return len(pages) > 0 or equipment.recorder.is_running
+
+    rest(robot.topics, is_needed, _REST_S)
+    rest({"/clock": Clock}, is_needed, _REST_OF_CLOCK_S)
     graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, ros_graph.now)
     bridge = Bridge(graph, codec, loop_thread.later)
     video = VideoServer(Cameras(graph, codec, loop_thread), VideoOptions(access))

@@ -38,6 +38,11 @@ class Recorder:
         #: The last :class:`Tape`, or None.
         self.recording = None
 
+    @property
+    def is_running(self):
+        """Whether a recording is under way."""
+        return self._rows is not None
+
     def record(self, _client, operation):
         """An operation "record" of a page: ``on``, begin or end. Raises RobotError."""
         with self._lock:

@@ -63,11 +63,13 @@ class Baxter:
                                              queue_size=10) for side in SIDES}
         rospy.Subscriber("/robot/joint_states", JointState, self._on_joints, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("/robot/state", AssemblyState, self._on_state, queue_size=1, tcp_nodelay=True)
+        #: What it reads: {topic: message class}.
+        self.topics = {"/robot/joint_states": JointState, "/robot/state": AssemblyState}
         for side in SIDES:
-            rospy.Subscriber("/robot/end_effector/%s_gripper/state" % side, EndEffectorState, self._on_gripper, side,
-                             queue_size=1)
-            rospy.Subscriber("/robot/end_effector/%s_gripper/properties" % side, EndEffectorProperties, self._on_kind,
-                             side, queue_size=1)
+            gripper = "/robot/end_effector/%s_gripper/" % side
+            rospy.Subscriber(gripper + "state", EndEffectorState, self._on_gripper, side, queue_size=1)
+            rospy.Subscriber(gripper + "properties", EndEffectorProperties, self._on_kind, side, queue_size=1)
+            self.topics.update({gripper + "state": EndEffectorState, gripper + "properties": EndEffectorProperties})
 
     @property
     def poses(self):
