@@ -40,6 +40,18 @@ function button(lab, verb) {
   return made;
 }
 
+// Exercise and points of the student's own checks, the last of each.
+function verdictsOf(lab) {
+  const made = cell("", "verdicts");
+  for (const [name, {points, passed}] of Object.entries(lab.verdicts)) {
+    const one = document.createElement("span");
+    one.textContent = `${name} ${points === null ? "not graded" : Math.round(points)}`;
+    one.dataset.passed = passed;
+    made.append(one);
+  }
+  return made;
+}
+
 const VERBS = {running: ["pause", "stop"], paused: ["start", "stop"], starting: ["stop"], waiting: ["stop"],
                stopped: ["start"], failed: ["start"]};
 
@@ -53,7 +65,8 @@ function row(lab) {
   made.append(cell(lab.full_name), cell(lab.reason ? `${lab.state}: ${lab.reason}` : lab.state, "state"),
               cell(lab.pages, "number"), cell(lab.factor?.toFixed(2) ?? "", "number factor"),
               cell(lab.memory_bytes === null ? "" : `${Math.round(lab.memory_bytes / 2 ** 20)} MB`, "number"),
-              cell(lab.unused_s === null ? "" : `${Math.round(lab.unused_s / 60)} min`, "number"), actions);
+              cell(lab.unused_s === null ? "" : `${Math.round(lab.unused_s / 60)} min`, "number"),
+              verdictsOf(lab), actions);
   return made;
 }
 

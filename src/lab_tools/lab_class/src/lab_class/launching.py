@@ -56,6 +56,7 @@ def prepared(place, options, tokens, listener, refused):
                            XDG_CACHE_HOME=str(place.libraries.parent))
         environment.pop("XDG_RUNTIME_DIR", None)
         return [*limits, *command], environment, (listener,)
+    environment[isolation.WALLED] = "1"
     options_of_calls, descriptors = refused
     binds = [(place.folder / HOME, home, True), (place.libraries, home + "/.cache/lab_web", False),
              *isolation.caches(os.environ, place.folder / "caches"),

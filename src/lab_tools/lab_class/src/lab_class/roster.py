@@ -12,6 +12,8 @@ MOST_STUDENTS = 500
 RESERVED = ("instructor", "class")
 _LONGEST_NAME = 40
 _COLUMNS = ("name", "student", "full name")
+# Letters that are no ASCII letter with a mark; ß becomes ss by itself.
+_LETTERS = str.maketrans({"æ": "ae", "œ": "oe", "ø": "o", "ł": "l", "đ": "d", "ð": "d", "þ": "th", "ı": "i"})
 
 
 class RosterError(Exception):
@@ -79,5 +81,5 @@ def _students(rows, name_column, id_column):
 
 def slug(text):
     """The part of an address that stands for a text: "" where no letter or digit of it is ASCII."""
-    plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
+    plain = unicodedata.normalize("NFKD", text.casefold().translate(_LETTERS)).encode("ascii", "ignore").decode()
     return re.sub(r"[^a-z0-9]+", "-", plain).strip("-")[:_LONGEST_NAME].strip("-")

@@ -22,11 +22,12 @@ from lab_class import control_groups, front_door, launching
 from lab_class.factors import Factors
 from lab_class.lab_process import END_S, LabProcess, disk_bytes, remove
 from lab_class.labs import Action, ClassError, Labs, State
-from lab_class.store import Store, StoreError
+from lab_class.store import HOME, Store, StoreError
+from lab_class.verdicts import Verdicts
 from lab_environment.isolation import NotIsolated
 from web_bridge.serving import IDLE_S, LARGEST_BODY, LimitedServer
 
-_TICK_S, _MEMORY_S, _DISK_S = 0.2, 5.0, 30.0
+_TICK_S, _VERDICTS_S, _MEMORY_S, _DISK_S = 0.2, 2.0, 5.0, 30.0
 _PROBE = b"GET /?token=%s HTTP/1.0\r\nHost: localhost\r\n\r\n"
 _PROBE_S = 5.0
 _LAST_BYTES = 4000
@@ -49,6 +50,7 @@ class Supervisor:
         # Short: the address of a socket has 107 bytes at most.
         self._runtime = Path(tempfile.mkdtemp(prefix="lab-class-"))
         self._factors = Factors(self.socket_of, record.tokens)
+        self._verdicts = {name: Verdicts(store.lab(name), store.lab(name) / HOME) for name in names}
         self._class_groups = control_groups.found(self._runtime.name, len(names))
 
     # For the front door.
@@ -90,7 +92,7 @@ class Supervisor:
                 "since_s": round(now - lab.since, 1), "unused_s": round(now - lab.used, 1) if lab.used else None,
                 "pages": lab.pages, "factor": self._factors.of(lab.name) if lab.state is State.RUNNING else None,
                 "memory_bytes": self._memory.get(lab.name) if lab.has_processes else None,
-                "token": tokens.act, "view_token": tokens.view})
+                "token": tokens.act, "view_token": tokens.view, "verdicts": self._verdicts[lab.name].known})
         return {"labs": labs, "idle_s": self._record.options.idle_s, "limits": str(self._class_groups)}
 
     def end(self):
@@ -112,7 +114,7 @@ class Supervisor:
                 self._do(self.labs.start(lab.name, self._now()))
             watches = [asyncio.ensure_future(watch) for watch in (
                 self._every(_TICK_S, self._tick), self._every(_MEMORY_S, self._look_at_memory),
-                self._every(_DISK_S, self._look_at_disk))]
+                self._every(_DISK_S, self._look_at_disk), self._every(_VERDICTS_S, self._look_at_verdicts))]
             await self._end.wait()
             for watch in watches:
                 watch.cancel()
@@ -272,6 +274,10 @@ class Supervisor:
         if self.labs[name].has_processes:
             self._do(self.labs.exceeded(name, "it used all of its memory, %.1f GB"
                                         % (self._record.options.memory_bytes / 2**30), self._now()))
+
+    async def _look_at_verdicts(self):
+        for name in self._processes:
+            self._verdicts[name].look()
 
     async def _look_at_disk(self):
         most = self._record.options.disk_bytes

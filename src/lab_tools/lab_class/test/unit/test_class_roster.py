@@ -26,6 +26,10 @@ def test_an_id_gives_the_address_and_other_scripts_get_a_number():
     assert roster.read("name,id\nAnna,s123\n李雷,\n") == [("s123", "Anna"), ("student-02", "李雷")]
 
 
+def test_letters_that_are_no_letter_with_a_mark_are_spelt_out():
+    assert [student.name for student in roster.read("Søren Groß\nŁucja Æbelø\n")] == ["soren-gross", "lucja-aebelo"]
+
+
 @pytest.mark.parametrize(("text", "words"), [
     ("", "empty"), ("team,group\na,1\n", "team, group"), ("name,id\nAnna,1\n,2\n", "line 3 has no name"),
     ("Anna\nBen\nanna\n", "lines 1 and 3"), ("Instructor\n", "/instructor"), ("name\n", "0 students")])

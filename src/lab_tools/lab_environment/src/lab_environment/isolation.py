@@ -18,6 +18,8 @@ import sys
 from pathlib import Path
 
 HOME = "/home/student"
+#: This variable says that a process is in the sandbox of its user's lab already: the user's own programs need no other.
+WALLED = "LAB_WALLED"
 #: Size limit of a writable folder of a sandbox [bytes].
 FOLDER_BYTES = 64 << 20
 # Files of /etc that programs need to start; none with passwords.

@@ -4,11 +4,13 @@
 student/sitecustomize.py replaces Python's own clocks and `time.sleep` by it. Free of ROS; Linux only.
 """
 import ctypes
+import errno
 import fcntl
 import mmap
 import os
 import platform
 import struct
+import tempfile
 import time
 
 #: The environment variable with the number of the page's descriptor.
@@ -28,11 +30,12 @@ class RunClock:
     """Advances only by :meth:`advance`. Must be closed."""
 
     def __init__(self):
-        writable = os.memfd_create("run-clock", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+        writable, can_be_sealed = _new_page()
         try:
             os.ftruncate(writable, mmap.PAGESIZE)
             self._page = mmap.mmap(writable, mmap.PAGESIZE)
-            fcntl.fcntl(writable, _ADD_SEALS, _SEALS)
+            if can_be_sealed:
+                fcntl.fcntl(writable, _ADD_SEALS, _SEALS)
             #: For the program: a read-only descriptor.
             self.descriptor = os.open("/proc/self/fd/%d" % writable, os.O_RDONLY)
         finally:
@@ -68,3 +71,15 @@ class RunClock:
         word.value += 1
         self._page[_CONTENT:PAGE.size] = content[_CONTENT:]
         word.value += 1
+
+
+def _new_page():
+    """(descriptor, whether it can be sealed) of a file in memory without a name."""
+    try:
+        return os.memfd_create("run-clock", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), True
+    except OSError as error:
+        if error.errno != errno.ENOSYS:
+            raise
+    # In the lab of a class (lab_environment.system_calls), where programs are their author's own risk.
+    with tempfile.TemporaryFile(dir="/dev/shm") as file:
+        return os.dup(file.fileno()), False

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The clocks of a check: simulated time in place of the program's own, and limits that do not depend on the machine's
 load. No master, no simulator."""
+import errno
 import os
 import subprocess
 import sys
@@ -55,6 +56,23 @@ def test_a_program_sleeps_in_simulated_time_however_long_that_takes(clock, slept
     # Two seconds; a sleep may end one step early.
     assert 197 <= steps[0] <= 200
     assert [b - a for a, b in zip(*lines, strict=True)] == pytest.approx([1.0, 1.0], abs=3 * STEP_S)
+
+
+def test_the_clock_works_where_the_kernel_refuses_files_in_memory(monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    monkeypatch.setattr(os, "memfd_create", refuse)
+    clock = RunClock()
+    try:
+        clock.advance(1000.0)
+        before = time.time()
+        with start(clock, "import time\nprint(time.time())") as program:
+            assert float(program.stdout.readline()) >= before + 900.0
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.write(clock.descriptor, b"x")
+    finally:
+        clock.close()
 
 
 def test_simulated_clocks_never_stand_and_never_go_back(clock):

@@ -133,6 +133,24 @@ def test_the_labs_page_finds_the_result(tmp_path, monkeypatch, capsys):
     assert command.main(["lab2", "wave", "my_node.py"]) == command.NOT_PASSED
 
 
+@pytest.mark.parametrize(("walled", "trusted"), [(None, False), ("1", True)])
+def test_in_the_lab_of_a_class_no_second_sandbox_is_asked_for(walled, trusted, monkeypatch, tmp_path):
+    asked = []
+
+    class Asked(CalmJudge):
+        def __init__(self, _wall_limit, trusted, _which):
+            asked.append(trusted)
+
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    monkeypatch.setattr(command, "Judge", Asked)
+    if walled is None:
+        monkeypatch.delenv("LAB_WALLED", raising=False)
+    else:
+        monkeypatch.setenv("LAB_WALLED", walled)
+    assert command.main(["lab2", "wave", "my_node.py"]) == command.NOT_PASSED
+    assert asked == [trusted]
+
+
 @pytest.mark.parametrize("script", ["check", "check_rostest"])
 def test_the_installed_programs_find_what_they_import(script):
     # Another process, since a program enters a network of its own as it is loaded.
