@@ -9,7 +9,8 @@ from pathlib import Path
 from lab_class.store import HOME
 from lab_environment import isolation, ports, system_calls
 from lab_web.tokens import TOKEN, VIEW_TOKEN
-from rf_checks.handout import emptied_notebook
+from rf_checks import hidden
+from rf_checks.handout import STUBBED, emptied_notebook, stub
 
 #: Ports inside of a lab's separate network, as on any lab's machine.
 MASTER_PORT, PAGE_PORT = 11311, 8090
@@ -18,9 +19,7 @@ SCRATCH_BYTES = 512 << 20
 #: Most processes and threads of a lab at a time.
 TASKS = 4096
 #: Paths below the workspace that no lab shows: the judge's solutions, the history, other people's notebooks and logs.
-HIDDEN = (".git", "src/rf_labs/rf_checks/exercises/solutions", "src/rf_labs/rf_checks/test", "src/rf_labs/rf_lab2/test",
-          "share/rf_checks/exercises/solutions", "install/share/rf_checks/exercises/solutions", ".baxter/jupyter",
-          ".baxter/logs", ".baxter/labs")
+HIDDEN = (*hidden.SOLVED, ".baxter/jupyter", ".baxter/logs", ".baxter/labs")
 
 
 @dataclass(frozen=True)
@@ -60,25 +59,37 @@ def prepared(place, options, tokens, listener, refused):
     options_of_calls, descriptors = refused
     binds = [(place.folder / HOME, home, True), (place.libraries, home + "/.cache/lab_web", False),
              *isolation.caches(os.environ, place.folder / "caches"),
-             *_notebooks(os.environ, place.folder / "caches")]
+             *_without_solutions(os.environ, place.folder / "caches")]
     enter = isolation.command(os.environ, binds, (*HIDDEN, str(place.state_folder)), True, options_of_calls,
                               SCRATCH_BYTES)
     return [*enter, *limits, *command], environment, (listener, *descriptors)
 
 
-def _notebooks(environment, folder):
-    """The labs' notebooks without solutions, as binds in the place of those of the workspace."""
+def _without_solutions(environment, folder):
+    """The labs' notebooks without solutions, and what stands for nodes that solve an exercise, as binds in their place.
+
+    folder: of the copies, which exists."""
     binds = []
-    for root in isolation.workspaces(environment):
-        for source in sorted(path for pattern in ("src/*/*/notebooks", "share/*/notebooks", "install/share/*/notebooks")
-                             for path in Path(root).glob(pattern)):
+    for root in map(Path, isolation.workspaces(environment)):
+        for source in _found(root, ("src/*/*/notebooks", "share/*/notebooks", "install/share/*/notebooks")):
             copy = folder / ("notebooks-%d" % len(binds))
             copy.mkdir(parents=True)
             for notebook in source.glob("*.ipynb"):
                 text = emptied_notebook(notebook.read_text(encoding="utf-8"))
                 (copy / notebook.name).write_text(text, encoding="utf-8")
             binds.append((copy, source, False))
+        for name in STUBBED:
+            file = Path(name).name
+            for source in _found(root, (name, "lib/*/" + file, "install/lib/*/" + file)):
+                copy = folder / ("node-%d" % len(binds))
+                copy.write_text(stub(name), encoding="utf-8")
+                copy.chmod(0o755)
+                binds.append((copy, source, False))
     return binds
+
+
+def _found(root, patterns):
+    return sorted(path for pattern in patterns for path in root.glob(pattern))
 
 
 def limited(file_bytes, tasks):

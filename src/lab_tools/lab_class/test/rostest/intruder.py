@@ -79,6 +79,18 @@ def open_another(path):
     raise LookupError("no process has a folder open below " + path)
 
 
+def read_solution(workspace):
+    """Whether a finished node that is an exercise, a solved cell of a notebook or the judge's solutions can be read."""
+    lab = Path(workspace, "src/rf_labs/rf_lab2")
+    nodes = [lab / "nodes/wave.py", lab / "nodes/tf_listener.py"]
+    notebooks = list(lab.glob("notebooks/*.ipynb"))
+    if not all("is yours to write" in node.read_text() for node in nodes) or not notebooks or \
+            any('"solution"' in notebook.read_text() for notebook in notebooks):
+        return
+    if not any(Path(workspace, "src/rf_labs/rf_checks/exercises/solutions").glob("*")):
+        raise LookupError("nodes and notebooks are unsolved, and there are no solutions")
+
+
 def attempts(targets):
     """name -> function that raises where it does not succeed."""
     found = {"file " + path: lambda path=path: Path(path).read_bytes() for path in targets["files"]}
@@ -88,6 +100,7 @@ def attempts(targets):
     return {**found, "another network": lambda: connect(socket.AF_INET, ("192.0.2.1", 80)),
             "abstract socket": lambda: connect(socket.AF_UNIX, "\0" + targets["abstract"]),
             "workspace": lambda: write_and_remove(Path(targets["workspace"], "intruder")),
+            "solution": lambda: read_solution(os.environ["LAB_ROOT"]),
             "supervisor": lambda: find_process("lab_class.supervisor"), "namespace": new_namespace,
             "the machine's host": lambda: socket.socket(socket.AF_VSOCK).close(), "keys": add_key,
             "message queue": lambda: open_queue(targets["queue"]),

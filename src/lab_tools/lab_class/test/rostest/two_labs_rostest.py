@@ -186,7 +186,7 @@ class TwoLabs(unittest.TestCase):
             report = self.store.lab(name) / "home" / "report.json"
             wait_until(report.exists, "the intruder's report", _LONG_S)
             results = json.loads(report.read_text())
-            self.assertEqual(len(results), 21, results)
+            self.assertEqual(len(results), 22, results)
             self.assertEqual([attempt for attempt, result in results.items() if result == "reached"], [], results)
 
     def ask(self, path, body=None, **headers):

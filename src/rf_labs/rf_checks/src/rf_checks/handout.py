@@ -42,6 +42,11 @@ def is_left_out(name):
     return any(name == left or name.startswith(left + "/") for left in LEFT_OUT)
 
 
+def stub(name):
+    """The program (text) that stands for a node of STUBBED."""
+    return _STUB % {"exercise": STUBBED[name], "name": Path(name).name}
+
+
 def names(workspace):
     """Names of the workspace's own files, relative to it; links among them."""
     try:
@@ -88,7 +93,7 @@ def make(workspace, target):
         if source.is_symlink():
             os.symlink(os.readlink(source), copy)
         elif name in STUBBED:
-            copy.write_text(_STUB % {"exercise": STUBBED[name], "name": source.name}, encoding="utf-8")
+            copy.write_text(stub(name), encoding="utf-8")
             shutil.copymode(source, copy)
         elif name.endswith(".ipynb"):
             copy.write_text(emptied_notebook(source.read_text(encoding="utf-8")), encoding="utf-8")
