@@ -9,6 +9,8 @@ import numpy as np
 HUES = {"red": ((0, 8), (172, 179)), "yellow": ((22, 34),), "green": ((45, 80),), "blue": ((105, 130),)}
 # Grey things have a low saturation, dark ones no certain hue [of 255].
 _SATURATED, _BRIGHT = 120, 50
+# A block shows some of its sides beside its upper face, and something may hide a little of it: shares of that face.
+_BLOCK_AREAS = (0.8, 2.5)
 
 
 class Patch(NamedTuple):
@@ -33,3 +35,21 @@ def find_patches(picture, colour, least_area=40.0):
         if moments["m00"] >= least_area:
             found.append(Patch(moments["m10"] / moments["m00"], moments["m01"] / moments["m00"], moments["m00"]))
     return sorted(found, key=lambda patch: -patch.area)
+
+
+def find_blocks(view, colour, side_m, top_m):
+    """[(x, y [m] in `base`, Patch)] of the patches of `colour` in a `looking.View` that are as large as blocks of
+    `side_m` [m] whose upper faces are at height `top_m` [m] in `base`; so the robot itself, which is red, is left out.
+    ``ValueError`` for an unknown colour."""
+    patches = find_patches(view.picture, colour)
+    # A pixel's area at that height, from its places and those of its neighbours: smaller below the camera than aside.
+    middles = np.array([patch[:2] for patch in patches]).reshape(-1, 2)
+    places = view.on_plane(middles, top_m)
+    right = view.on_plane(middles + (0.5, 0.0), top_m) - view.on_plane(middles - (0.5, 0.0), top_m)
+    down = view.on_plane(middles + (0.0, 0.5), top_m) - view.on_plane(middles - (0.0, 0.5), top_m)
+    pixel_m2 = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
+    found = []
+    for patch, (x, y), area in zip(patches, places, pixel_m2, strict=True):
+        if _BLOCK_AREAS[0] < patch.area * area / side_m ** 2 < _BLOCK_AREAS[1]:
+            found.append((float(x), float(y), patch))
+    return found

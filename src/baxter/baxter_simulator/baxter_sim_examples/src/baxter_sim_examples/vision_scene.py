@@ -34,10 +34,10 @@ def _on_table(name, x, y, height, yaw):
     return Thing(name, x, y, TABLE_TOP_M - BASE_HEIGHT_M + height / 2.0, yaw)
 
 
-#: Models of `model_files` by name.
-COLOURED = (_on_table("red_block", 0.65, 0.20, COLOURED_M, 0.3), _on_table("green_block", 0.72, 0.05, COLOURED_M, -0.2),
+#: Models of `model_files` by name; where the untucked arms hide nothing from the Kinect.
+COLOURED = (_on_table("red_block", 0.60, 0.11, COLOURED_M, 0.3), _on_table("green_block", 0.72, 0.05, COLOURED_M, -0.2),
             _on_table("blue_block", 0.62, -0.12, COLOURED_M, 0.6))
-THE_BOARD = _on_table(BOARD, 0.80, 0.28, BOARD_SIZE_M[2], 0.4)
+THE_BOARD = _on_table(BOARD, 0.85, -0.05, BOARD_SIZE_M[2], 0.4)
 
 
 def board_urdf():

@@ -8,7 +8,7 @@ import pytest
 import rospkg
 
 from baxter_sim_examples import tagged, vision_scene
-from baxter_sim_examples.colours import HUES, find_patches
+from baxter_sim_examples.colours import HUES, find_blocks, find_patches
 from baxter_sim_examples.looking import NotSeen, View, find_tagged_block, locate_tagged
 from baxter_sim_examples.planes import NoPlane, fit_plane
 from baxter_sim_examples.scene import BLOCK_SIZE_M, TABLE_SIZE_M
@@ -174,9 +174,13 @@ def test_coloured_blocks_are_found_by_thresholds(renderer, tmp_path):
     for pinhole in CAMERAS.values():
         view = seen(renderer, mirror, pinhole, looking_at((0, 0, 0), 0.9, 0.3, 0.4))
         for colour, place in places.items():
-            patch, = find_patches(view.picture, colour)
+            (x, y, patch), = find_blocks(view, colour, 2.0 * half, 2.0 * half)
             # Its sides are seen, too.
-            assert math.dist(view.on_plane([patch[:2]], 2.0 * half)[0], place) < 0.02
+            assert math.dist((x, y), place) < 0.02
+            assert [patch] == find_patches(view.picture, colour)
+            # As blocks of twice or half the size they have the wrong area.
+            assert not find_blocks(view, colour, 4.0 * half, 2.0 * half)
+            assert not find_blocks(view, colour, half, 2.0 * half)
     assert set(HUES) == set(places)
     with pytest.raises(ValueError, match="colour 'pink' is not known; expected one of red, "):
         find_patches(view.picture, "pink")

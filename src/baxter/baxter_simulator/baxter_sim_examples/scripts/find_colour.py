@@ -1,0 +1,32 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where blocks of a colour are: find_colour.py COLOUR, in the picture of a camera that looks at the table.
+
+Prints x and y in `base` [m] of each patch that is as large as a block on the table. Parameters: ~image, ~info: the
+camera's topics, the Kinect's by default.
+"""
+import sys
+
+import rospy
+
+from baxter_interface.programs import expect, run
+from baxter_sim_examples.colours import HUES, find_blocks
+from baxter_sim_examples.hand_senses import Eyes
+from baxter_sim_examples.scene import BASE_HEIGHT_M, TABLE_TOP_M
+from baxter_sim_examples.vision_scene import COLOURED_M
+
+
+def look(colour):
+    view = Eyes().view(rospy.get_param("~image", "/kinect/rgb/image_raw"),
+                       rospy.get_param("~info", "/kinect/rgb/camera_info"))
+    blocks = find_blocks(view, colour, COLOURED_M, TABLE_TOP_M + COLOURED_M - BASE_HEIGHT_M)
+    expect(blocks, "no %s block is in the picture" % colour)
+    for x, y, patch in blocks:
+        print("%s: x %.3f y %.3f, %.0f pixels" % (colour, x, y, patch.area))
+
+
+if __name__ == "__main__":
+    words = rospy.myargv()[1:]
+    if len(words) != 1 or words[0] not in HUES:
+        sys.exit("usage: find_colour.py %s" % " | ".join(HUES))
+    sys.exit(run("find_colour", lambda: look(words[0]), anonymous=True))
