@@ -39,7 +39,11 @@ class Proxy:
         return [init]
 
     def _to_frame(self, one):
-        """Express a marker's pose in the page's frame; it stays as it is where tf cannot say."""
+        """Express a marker's pose in the page's frame; it stays as it is where tf cannot say, and without a stamp."""
+        if one.header.stamp == rospy.Time():
+            # The marker moves with its frame: the page follows it in tf, and the server takes the page's poses as being
+            # in that frame.
+            return
         try:
             found = self._buffer.lookup_transform(self._frame, one.header.frame_id.lstrip("/"), rospy.Time(0)).transform
         except tf2_ros.TransformException as error:

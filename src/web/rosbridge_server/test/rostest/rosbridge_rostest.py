@@ -83,7 +83,8 @@ class RobotOnTheGraph(WebRobot):
         self._transforms = tf2_ros.StaticTransformBroadcaster()
         self._transforms.sendTransform(transform)
         marker = InteractiveMarker(name="ball")
-        marker.header.frame_id, marker.pose.position.x, marker.pose.orientation.w = "hand", 1.0, 1.0
+        marker.header.frame_id, marker.header.stamp = "hand", rospy.Time.now()
+        marker.pose.position.x, marker.pose.orientation.w = 1.0, 1.0
         self._markers = rospy.Publisher("/lab/markers/update_full", InteractiveMarkerInit, latch=True, queue_size=1)
         self._markers.publish("lab", 1, [marker])
         self.changes = rospy.Publisher("/lab/markers/update", InteractiveMarkerUpdate, queue_size=10)
@@ -277,7 +278,8 @@ class RosbridgeTest(unittest.TestCase):
         topic = "/lab/markers/tunneled/update"
         client.send("subscribe", topic=topic, type="visualization_msgs/InteractiveMarkerUpdate")
         pose = InteractiveMarkerPose(name="ball")
-        pose.header.frame_id, pose.pose.position.x, pose.pose.orientation.w = "hand", 2.0, 1.0
+        pose.header.frame_id, pose.header.stamp = "hand", rospy.Time.now()
+        pose.pose.position.x, pose.pose.orientation.w = 2.0, 1.0
         wait_until(lambda: self.robot.changes.get_num_connections(), "the proxy")
         timer = rospy.Timer(rospy.Duration(0.1), lambda _: self.robot.changes.publish(
             InteractiveMarkerUpdate(server_id="lab", seq_num=2, type=InteractiveMarkerUpdate.UPDATE, poses=[pose])))
