@@ -3,6 +3,7 @@
 import {Controls} from "./controls.js";
 import {Exercises} from "./exercises.js";
 import {Hands} from "./hands.js";
+import {Interface} from "./interface.js";
 import {Notebook} from "./notebook.js";
 import {Numbers} from "./numbers.js";
 import {arePoints, Overlay} from "./overlay.js";
@@ -39,6 +40,7 @@ const recordings = new Recordings(send, query, () => state.number, note);
 const plots = new Plots();
 const numbers = new Numbers(() => new Topics(`${sockets}rosbridge${query}`));
 const exercises = new Exercises();
+const comparison = new Interface(send);
 const notebook = new Notebook(send, query);
 const simulation = new Simulation(send, () => view);
 const overlay = new Overlay(send, () => view);
@@ -93,6 +95,7 @@ function refresh() {
   simulation.allow(driving);
   hands.allow(acting, driving);
   notebook.allow(acting);
+  comparison.allow(acting);
 }
 
 const served = {
@@ -139,6 +142,9 @@ const served = {
   },
   result(result) {
     exercises.show(result);
+  },
+  interface(state) {
+    comparison.show(state);
   },
   notebook(is) {
     notebook.show(is);
@@ -264,6 +270,7 @@ function startChoices(language) {
     buildPanels();
     buildCameras();
     exercises.refresh();
+    comparison.refresh();
     notebook.refresh();
     sayOfView();
     note();

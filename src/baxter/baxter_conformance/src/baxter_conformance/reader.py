@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Reads a master: its tables, a message of each topic, tf. Looks only; it calls no service and publishes nothing."""
+import http.client
 import time
 import xml.etree.ElementTree as ElementTree
+import xmlrpc.client
 
 import rosgraph
 import roslib.message
@@ -13,12 +15,14 @@ from .comparison import Seen, alternatives, may_be_silent
 
 BATCH = 40  # topics listened to at a time: a robot's nodes get no more new connections than that at once
 POLL_S = 0.02
+#: Errors of :func:`read` where the master, or a node that was just asked, is gone.
+NO_ANSWER = (rosgraph.MasterException, rospy.ROSException, OSError, xmlrpc.client.Error, http.client.HTTPException)
 
 
 def read(robot, timeout_s):
     """Return a Seen. robot: the Interface of which the topics are listened to. timeout_s: how long to wait for them.
 
-    Call after rospy.init_node(). Raises rosgraph.MasterException or OSError where the master does not answer.
+    Call after rospy.init_node(). Raises one of NO_ANSWER where the master does not answer.
     """
     master = rosgraph.Master(rospy.get_name())
     published, listened, services = master.getSystemState()

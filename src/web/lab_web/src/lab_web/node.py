@@ -20,8 +20,11 @@ import rospkg
 import rospy
 from rosgraph_msgs.msg import Clock
 
+from baxter_conformance.reader import NO_ANSWER, read
+from baxter_model.interface import physical_robot
 from lab_environment import jupyter, page_files, ports
 from lab_web.buttons import Buttons
+from lab_web.comparison import Comparison, findings_of
 from lab_web.errands import Errands
 from lab_web.exercises import Results
 from lab_web.hands import Hands, ghost
@@ -66,6 +69,8 @@ _POSES_S, _LOOK_S = 0.05, 1.0
 _REST_S, _REST_OF_CLOCK_S = 0.05, 0.02
 # Between warnings of the same [s].
 _COMPLAIN_S = 60.0
+# How long the comparison with a physical robot waits for the messages of some topics [s].
+_MESSAGES_S = 5.0
 _SNAPSHOT = "/gazebo/snapshot"
 _COMPRESSED = "sensor_msgs/CompressedImage"
 
@@ -240,7 +245,7 @@ def _equip(pages, robot, faults):
     lab.add("watch", overlay.watch, needs_control=False, for_viewers=True)
     pages.when_closed = overlay.forget
     parts = Parts()
-    errands, switches, plans = (Errands(pages.tell, faults) for _ in range(3))
+    errands, switches, plans, comparisons = (Errands(pages.tell, faults) for _ in range(4))
     guard = ReleaseGuard()
     buttons = Buttons(parts.switch, switches, guard.pressed)
     simulation = Simulation(errands, lambda: bodies_of(pages.picture, robot.limits), pages.answer,
@@ -255,13 +260,19 @@ def _equip(pages, robot, faults):
     lab.add("record", recorder.record, needs_control=False)
     lab.add("load", recorder.load, needs_control=False)
     lab.add("play", lambda client, _operation: play(lab, client, recorder))
+    comparison = Comparison(_findings, comparisons, partial(pages.share, "interface"), time.time)
+    lab.add("compare", comparison.ask, needs_control=False)
     for name, serve in {"press": buttons.press, "turn": buttons.turn, **parts.operations(),
                         **simulation.operations()}.items():
         lab.add(name, serve)
     return _Equipment(hands, simulation, recorder, guard, sights, {
         "points and frames": overlay.run,
-        "the hands": hands.run, "errands": errands.run, "plans": plans.run,
+        "the hands": hands.run, "errands": errands.run, "plans": plans.run, "comparison": comparisons.run,
         "buttons": lambda ends: switches.run(ends, buttons.release_all)})
+
+
+def _findings():
+    return findings_of(physical_robot(), lambda robot: read(robot, _MESSAGES_S), rosgraph.is_master_online, NO_ANSWER)
 
 
 def _port(options):

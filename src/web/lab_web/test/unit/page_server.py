@@ -126,14 +126,15 @@ class Server:
         buttons = Buttons(self.robot.switch, errands)
         self.lab.when_lost(buttons.release_all)
         recorder = Recorder(lambda state: self.pages.share("recording", state))
-        self.shown, self.planned, self.notebook_asks, self.watched = [], [], [], {}
+        self.shown, self.planned, self.notebook_asks, self.watched, self.compared = [], [], [], {}, []
         self.lab.add("watch", self.watched.__setitem__, needs_control=False, for_viewers=True)
         for name, serve in {"press": buttons.press, "turn": buttons.turn,
                             "screen": lambda client, operation: self.shown.append(operation["content"]),
                             "plan": self.plan,
                             "play": lambda client, operation: play(self.lab, client, recorder)}.items():
             self.lab.add(name, serve)
-        for name, serve in {"notebook": lambda *asked: self.notebook_asks.append(asked), "reach": hands.ask,
+        for name, serve in {"compare": lambda client, _operation: self.compared.append(client),
+                            "notebook": lambda *asked: self.notebook_asks.append(asked), "reach": hands.ask,
                             "record": recorder.record, "load": recorder.load}.items():
             self.lab.add(name, serve, needs_control=False)
         self._recorder = recorder

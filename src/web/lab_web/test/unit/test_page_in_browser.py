@@ -154,6 +154,25 @@ def test_an_exercises_verdict_is_beside_the_robot(lab, browser):
         "path", "20 / 40", "1.5 periods"]
 
 
+def test_how_much_of_a_physical_robots_interface_is_here(lab, browser):
+    said = "document.getElementById('interface-said').textContent"
+    browser.evaluate("document.getElementById('interface').open = true")
+    assert "how many of them are here?" in browser.evaluate(said)
+    click_until(browser, "#interface-compare", lambda: lab.compared)
+    lab.pages.share("interface", {"is_running": True})
+    browser.wait(said + ".startsWith('Comparing') && document.getElementById('interface-compare').disabled")
+    lab.pages.share("interface", {
+        "is_running": False, "met": 258, "of": 272, "when_s": 1.79e9,
+        "groups": [{"name": "/robot", "met": 258, "of": 270}],
+        "others": [{"name": "/robot/x", "verdict": "missing", "reason": "nobody publishes it"},
+                   {"name": "/robot/y", "verdict": "other", "reason": "type a, not b"}]})
+    browser.wait(said + ".startsWith('258 of 272 are here (') && " + said + ".includes('2026')")
+    assert browser.evaluate("document.getElementById('interface-groups').textContent") == "/robot258 / 270"
+    assert browser.evaluate("[...document.querySelectorAll('#interface-others li')].map((one) => one.textContent)") == [
+        "/robot/x is missing: nobody publishes it", "/robot/y is other than expected: type a, not b"]
+    assert browser.evaluate("!document.getElementById('interface-compare').disabled")
+
+
 def test_a_picture_fills_the_screen_as_far_as_its_shape_lets_it(lab, browser, tmp_path):
     path = tmp_path / "red.svg"
     path.write_text('<svg xmlns="http://www.w3.org/2000/svg" width="100" height="100">'
