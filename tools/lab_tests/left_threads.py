@@ -4,6 +4,7 @@
 Such a thread, a server on a closed socket for example, takes processor time from all tests that follow: ten times as
 long, without a word. ``-p lab_tests.left_threads`` in a run of single files finds the one that leaves it.
 """
+import os
 import threading
 import time
 
@@ -15,13 +16,30 @@ _LOOKS = 15
 
 
 def is_busy():
-    """Whether this process computes while this thread waits, in every one of some looks."""
+    """Whether this process computes, or would if it had a processor, while this thread waits, in each of some looks."""
     for _ in range(_LOOKS):
-        begin, before = time.monotonic(), time.process_time()
+        begin, before = time.monotonic(), _wanted_s()
         time.sleep(_LOOK_S)
-        if time.process_time() - before < _SHARE * (time.monotonic() - begin):
+        least, after = _SHARE * (time.monotonic() - begin), _wanted_s()
+        if not any(wanted - before.get(thread, wanted) >= least for thread, wanted in after.items()):
             return False
     return True
+
+
+def _wanted_s():
+    """{thread: processor time and time of waiting for a processor [s]}, and of the whole process {0: processor time}.
+
+    Source: schedstat in https://docs.kernel.org/filesystems/proc.html; without it, there is only the process.
+    """
+    found = {0: time.process_time()}
+    for task in os.listdir("/proc/self/task"):
+        try:
+            with open("/proc/self/task/%s/schedstat" % task, encoding="ascii") as stream:
+                ran, waited, _ = stream.read().split()
+        except OSError:
+            continue
+        found[int(task)] = 1e-9 * (int(ran) + int(waited))
+    return found
 
 
 @pytest.hookimpl(trylast=True)

@@ -85,6 +85,7 @@ class BaxterWorldTest(unittest.TestCase):
         listener = tf2_ros.TransformListener(buffer)
         for frame in ("head", "left_hand", "right_hand", "head_camera", "left_gripper_base", "left_gripper"):
             wait_until(lambda frame=frame: buffer.can_transform("base", frame, rospy.Time()), "tf of " + frame)
+        wait_until(lambda: buffer.can_transform("world", "base", rospy.Time()), "tf of world")
         transform = buffer.lookup_transform("world", "base", rospy.Time()).transform
         self.assertEqual((transform.translation.x, transform.translation.y, transform.translation.z), (0.0, 0.0, 0.0))
         self.assertEqual(transform.rotation.w, 1.0)
