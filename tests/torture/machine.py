@@ -28,7 +28,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition
 from invariants import EmergencyStop
 from robot import Robot
-from std_msgs.msg import Bool, Empty
+from std_msgs.msg import Bool, Empty, Float64
 from std_srvs.srv import Empty as EmptyService
 from watch import STATES
 
@@ -115,6 +115,9 @@ class Machine(RuleBasedStateMachine):
             assert answer.err == 0, answer
         self.reset("simulation")
         self.lockstep.send("/robot/set_super_reset", Empty(), 10)
+        for side in SIDES:
+            # No reset restores it, and hostile messages before may have set it to zero.
+            self.lockstep.send("/robot/limb/%s/set_speed_ratio" % side, Float64(1.0), 1)
         self.robot.reset()
         if not disabled:
             self.enable()
