@@ -60,6 +60,8 @@ def _parser():
     up.add_argument("--public", action="store_true", default=None, help="open the front door to other machines")
     up.add_argument("--idle", type=_minutes, metavar="MINUTES", help="a lab that nobody uses for so long is paused; 0: "
                     "never (default: %g)" % (defaults.idle_s / 60.0))
+    up.add_argument("--keep-running", action=argparse.BooleanOptionalAction, help="do not pause labs that have started "
+                    "until their first visitor comes")
     up.add_argument("--memory", type=_gigabytes, metavar="GB", help="limit of each lab (default: %g)"
                     % (defaults.memory_bytes / 2**30))
     up.add_argument("--disk", type=_gigabytes, metavar="GB", help="limit of each student's files (default: %g)"
@@ -127,7 +129,7 @@ def _record(options, store):
                           "CSV file with their names" % store.folder)
     given = {"launch": tuple(options.launch.split()) if options.launch else None, "port": options.port,
              "public": options.public, "trusted": options.trusted, "memory_bytes": options.memory,
-             "disk_bytes": options.disk, "at_once": options.at_once}
+             "disk_bytes": options.disk, "at_once": options.at_once, "keep_running": options.keep_running}
     values = {name: value for name, value in given.items() if value is not None}
     if options.idle is not None:
         values["idle_s"] = options.idle or None
@@ -193,13 +195,13 @@ def _print_addresses(record, store):
 
 
 def _await_labs(store):
-    """Print each lab that has started; Ctrl-C only ends the watching. Returns the exit code."""
+    """Print each lab that has finished starting; Ctrl-C only ends the watching. Returns the exit code."""
     shown = set()
     try:
         while True:
             labs = control.call(store, "GET", "/labs")["labs"]
             for lab in labs:
-                if lab["name"] not in shown and lab["state"] not in (State.WAITING.value, State.STARTING.value):
+                if lab["name"] not in shown and not lab["is_starting"] and lab["state"] != State.WAITING.value:
                     shown.add(lab["name"])
                     print("%s is %s%s" % (lab["name"], lab["state"], ": " + lab["reason"] if lab["reason"] else ""),
                           flush=True)

@@ -37,6 +37,9 @@ def call(store, method, path):
         connection.request(method, path)
         answer = connection.getresponse()
         text = answer.read().decode()
+    except TimeoutError:
+        raise ClassError("the class in %s did not answer within %g s; is the machine overloaded?"
+                         % (store.folder, _TIMEOUT_S)) from None
     except OSError as error:
         raise NoClass("no class runs in %s any more (%s); ./baxter.sh labs up starts it again"
                       % (store.folder, error)) from error

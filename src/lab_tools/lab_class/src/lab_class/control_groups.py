@@ -23,8 +23,9 @@ CONTROLLERS = ("cpu", "memory", "pids")
 DOOR_WEIGHT = 10
 #: Time for a group's last process to go [s].
 REMOVAL_S = 5.0
-_LAB_SHARES_V1, _MOST_SHARES_V1 = 1024, 262144
-_LAB_WEIGHT_V2, _MOST_WEIGHT_V2 = 100, 10000
+# By version: the file, and the weight of a lab, which is the kernel's default; the largest weight.
+_LAB_WEIGHTS = {1: ("cpu.shares", 1024), 2: ("cpu.weight", 100)}
+_MOST_WEIGHT = {1: 262144, 2: 10000}
 _DOOR = "front-door"
 _PROBE_S = 10.0
 
@@ -57,6 +58,15 @@ class Group:
     def _of(self, controller):
         return next(((home.version, folder) for home, folder in self._folders if controller in home.controllers),
                     (0, None))
+
+    def share_processors(self, share):
+        """Its part of the processors while there is more work than they can do; 1.0 is that of any lab."""
+        version, folder = self._of("cpu")
+        if folder is not None:
+            file, weight = _LAB_WEIGHTS[version]
+            # A lab that is being ended may have no group any more.
+            with contextlib.suppress(OSError):
+                _write(folder / file, round(share * weight))
 
     def memory_bytes(self):
         """Memory that its processes have written to, files in memory included; None without the controller."""
@@ -231,8 +241,7 @@ def _weigh(home, labs, problems):
     """The class weighs as much as its labs do together, and the front door DOOR_WEIGHT labs."""
     if "cpu" not in home.controllers:
         return
-    file, lab, most = (("cpu.shares", _LAB_SHARES_V1, _MOST_SHARES_V1) if home.version == 1 else
-                       ("cpu.weight", _LAB_WEIGHT_V2, _MOST_WEIGHT_V2))
+    (file, lab), most = _LAB_WEIGHTS[home.version], _MOST_WEIGHT[home.version]
     try:
         (home.folder / _DOOR).mkdir(exist_ok=True)
         _write(home.folder / _DOOR / file, min(most, DOOR_WEIGHT * lab))

@@ -45,7 +45,8 @@ class ClassError(Exception):
 @dataclass
 class Lab:
     """One lab; times are of the clock that the caller passes in [s]. ``busy``: answers that are under way; ``pages``:
-    open WebSockets."""
+    open WebSockets; ``visited``: a client has asked since the lab was told to start; ``settled``: it has finished
+    starting, of which its first answer is only a part."""
 
     name: str
     state: State = State.STOPPED
@@ -56,6 +57,13 @@ class Lab:
     reason: str = ""
     failures: int = 0
     asked: bool = field(default=False, repr=False)
+    visited: bool = False
+    settled: bool = False
+
+    @property
+    def is_starting(self):
+        """Whether it takes the place of one of those that start at a time."""
+        return self.state is State.STARTING or (self.state is State.RUNNING and not self.settled)
 
     @property
     def has_processes(self):
@@ -65,11 +73,13 @@ class Lab:
 class Labs:
     """All labs of a class. Methods return the actions to take now: a list of (Action, name)."""
 
-    def __init__(self, names, at_once, idle_s):
+    def __init__(self, names, at_once, idle_s, keep_running=False):
         """names: in the order of the roster; at_once: labs that may start at a time; idle_s: a lab without a client for
-        so long is paused [s], or None."""
+        so long is paused [s], or None; keep_running: else a lab that had no client yet is paused when it has settled,
+        unless idle_s is None."""
         self._labs = {name: Lab(name) for name in names}
         self._at_once, self._idle_s = at_once, idle_s
+        self._waits_paused = idle_s is not None and not keep_running
 
     def __iter__(self):
         return iter(self._labs.values())
@@ -93,7 +103,7 @@ class Labs:
             return self._wake(lab, now)
         if lab.state in (State.STOPPED, State.FAILED):
             lab.failures = 0
-            self._set(lab, State.WAITING, now)
+            self._enter_line(lab, now)
         return []
 
     def stop(self, name, now):
@@ -110,6 +120,8 @@ class Labs:
             return []
         if lab.state is not State.RUNNING:
             raise ClassError("the lab %s is %s; only a running lab can be paused" % (name, lab.state.value))
+        # When it goes on, nobody waits for the end of its start any more.
+        lab.settled = True
         self._set(lab, State.PAUSED, now)
         return [(Action.PAUSE, name)]
 
@@ -120,8 +132,9 @@ class Labs:
         if lab.state is State.PAUSED:
             return self._wake(lab, now)
         if lab.state is State.FAILED and lab.failures < MOST_FAILURES:
-            self._set(lab, State.WAITING, now)
+            self._enter_line(lab, now)
         lab.asked = lab.state is State.WAITING
+        lab.visited = True
         return []
 
     def answering(self, name, by, now):
@@ -136,6 +149,14 @@ class Labs:
         if lab.state is State.STARTING:
             self._set(lab, State.RUNNING, now)
             lab.used = now
+
+    def has_settled(self, name, now):
+        """A lab that answers has finished starting: it waits for its first client, paused."""
+        lab = self[name]
+        if not lab.is_starting:
+            return []
+        lab.settled = True
+        return self.pause(name, now) if self._waits_paused and not (lab.visited or lab.busy or lab.pages) else []
 
     def ended(self, name, reason, now):
         """The processes of a lab have ended by themselves; those of a stopped lab are expected to."""
@@ -157,7 +178,7 @@ class Labs:
             elif (lab.state is State.RUNNING and self._idle_s is not None and not lab.busy
                   and now - lab.used > self._idle_s):
                 actions += self.pause(lab.name, now)
-        starting = sum(lab.state is State.STARTING for lab in self)
+        starting = sum(lab.is_starting for lab in self)
         for lab in self._line()[:max(0, self._at_once - starting)]:
             self._set(lab, State.STARTING, now)
             actions.append((Action.START, lab.name))
@@ -166,6 +187,10 @@ class Labs:
     def _line(self):
         """Waiting labs: those with a waiting client first, then in the order of the roster."""
         return sorted((lab for lab in self if lab.state is State.WAITING), key=lambda lab: not lab.asked)
+
+    def _enter_line(self, lab, now):
+        lab.visited = lab.settled = False
+        self._set(lab, State.WAITING, now)
 
     def _wake(self, lab, now):
         self._set(lab, State.RUNNING, now)

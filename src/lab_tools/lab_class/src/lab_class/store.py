@@ -26,7 +26,8 @@ class StoreError(Exception):
 @dataclass(frozen=True)
 class Options:
     """How a class runs. ``launch``: the words after roslaunch, by default with half of the messages of a lab's clock;
-    ``idle_s``: None means never; ``memory_bytes``, ``disk_bytes``: of each lab; ``at_once``: labs that start at a time.
+    ``idle_s``: None means never; ``keep_running``: labs do not wait for their first visitor paused; ``memory_bytes``,
+    ``disk_bytes``: of each lab; ``at_once``: labs that start at a time.
     """
 
     launch: tuple = ("baxter_gazebo", "baxter_world.launch", "gui:=false", "clock_rate:=250")
@@ -34,6 +35,7 @@ class Options:
     public: bool = False
     trusted: bool = False
     idle_s: float | None = 900.0
+    keep_running: bool = False
     memory_bytes: int = 2 << 30
     disk_bytes: int = 1 << 30
     at_once: int = 1

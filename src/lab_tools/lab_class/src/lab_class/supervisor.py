@@ -22,14 +22,18 @@ from lab_class import control_groups, front_door, launching
 from lab_class.factors import Factors
 from lab_class.lab_process import END_S, LabProcess, disk_bytes, remove
 from lab_class.labs import Action, ClassError, Labs, State
+from lab_class.settling import Settling, demand_s
 from lab_class.store import HOME, Store, StoreError
 from lab_class.verdicts import Verdicts
 from lab_environment.isolation import NotIsolated
 from web_bridge.serving import IDLE_S, LARGEST_BODY, LimitedServer
 
-_TICK_S, _VERDICTS_S, _MEMORY_S, _DISK_S = 0.2, 2.0, 5.0, 30.0
+_TICK_S, _SETTLING_S, _VERDICTS_S, _MEMORY_S, _DISK_S = 0.2, 0.5, 2.0, 5.0, 30.0
 _PROBE = b"GET /?token=%s HTTP/1.0\r\nHost: localhost\r\n\r\n"
 _PROBE_S = 5.0
+# Of the processors, while a lab starts; 1 is a running lab's. With much less, a start on a busy machine would take too
+# long.
+_STARTING_SHARE = 0.5
 _LAST_BYTES = 4000
 
 
@@ -42,7 +46,7 @@ class Supervisor:
         self._store, self._record, self._libraries, self._now = store, record, libraries, now
         names = [student.name for student in record.students]
         options = record.options
-        self.labs = Labs(names, options.at_once, options.idle_s)
+        self.labs = Labs(names, options.at_once, options.idle_s, options.keep_running)
         self.door = front_door.Door(record, self)
         self._page = page
         self._processes, self._listeners, self._tasks, self._memory, self._groups = {}, {}, {}, {}, {}
@@ -88,7 +92,8 @@ class Supervisor:
         for student in self._record.students:
             lab, tokens = self.labs[student.name], self._record.tokens[student.name]
             labs.append({
-                "name": lab.name, "full_name": student.full_name, "state": lab.state.value, "reason": lab.reason,
+                "name": lab.name, "full_name": student.full_name, "state": lab.state.value,
+                "is_starting": lab.is_starting, "reason": lab.reason,
                 "since_s": round(now - lab.since, 1), "unused_s": round(now - lab.used, 1) if lab.used else None,
                 "pages": lab.pages, "factor": self._factors.of(lab.name) if lab.state is State.RUNNING else None,
                 "memory_bytes": self._memory.get(lab.name) if lab.has_processes else None,
@@ -199,6 +204,8 @@ class Supervisor:
                     None, launching.prepared, place, self._record.options, self._record.tokens[name],
                     self._listeners[name].fileno(), refused)
                 self._groups[name] = self._class_groups.lab(name, self._record.options.memory_bytes, launching.TASKS)
+                # Those that run keep their pace meanwhile.
+                self._groups[name].share_processors(_STARTING_SHARE)
                 self._processes[name] = LabProcess(*started, place.folder / "output.txt", self._groups[name].entrances)
         except (NotIsolated, OSError) as error:
             self._do(self.labs.ended(name, str(error), self._now()))
@@ -210,8 +217,21 @@ class Supervisor:
             if await self._answers(name):
                 self.labs.answered(name, self._now())
                 self._factors.follow(name)
+                await self._await_settled(name, process)
                 return
             await asyncio.sleep(_TICK_S)
+
+    async def _await_settled(self, name, process):
+        settling = Settling(self._now())
+        while self._processes.get(name) is process and self.labs[name].is_starting:
+            family = process.family()
+            if settling.look(family, demand_s(family), self._factors.of(name) is not None, self._now()):
+                self._groups[name].share_processors(1.0)
+                self._do(self.labs.has_settled(name, self._now()))
+                return
+            await asyncio.sleep(_SETTLING_S)
+        if self._processes.get(name) is process:
+            self._groups[name].share_processors(1.0)
 
     async def _answers(self, name):
         with contextlib.suppress(OSError, TimeoutError):
@@ -235,6 +255,7 @@ class Supervisor:
             await asyncio.sleep(_TICK_S)
         await asyncio.get_running_loop().run_in_executor(None, process.kill)
         del self._processes[name]
+        self._memory.pop(name, None)
         await asyncio.get_running_loop().run_in_executor(None, self._groups.pop(name).remove)
         await asyncio.get_running_loop().run_in_executor(None, remove, self._store.lab(name) / "caches")
 
@@ -261,7 +282,8 @@ class Supervisor:
         most = self._record.options.memory_bytes
         for name, process in list(self._processes.items()):
             group = self._groups.get(name)
-            if group is None or self.labs[name].state is State.PAUSED:
+            # Nothing changes while it is paused.
+            if group is None or (self.labs[name].state is State.PAUSED and name in self._memory):
                 continue
             used = group.memory_bytes()
             if used is None:

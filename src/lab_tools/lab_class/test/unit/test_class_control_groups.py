@@ -62,6 +62,8 @@ def test_version_1_has_a_folder_for_each_controller_below_our_own(kernel, tmp_pa
     assert written(tree, "memory/service/class/anna") == {"memory.limit_in_bytes": str(2 * GB),
                                                           "memory.memsw.limit_in_bytes": str(2 * GB)}
     assert written(tree, "pids/class/anna") == {"pids.max": "4096"}
+    lab.share_processors(0.5)
+    assert written(tree, "cpu,cpuacct/class/anna") == {"cpu.shares": "512"}
     assert written(tree, "cpu,cpuacct/class") == {"cpu.shares": "16384"}
     assert written(tree, "cpu,cpuacct/class/front-door") == {"cpu.shares": "10240", "cgroup.procs": str(os.getpid())}
 
@@ -77,6 +79,8 @@ def test_version_2_uses_a_group_in_which_nobody_else_is(kernel, tmp_path):
     assert written(tree, "user/labs.scope/anna") == {"memory.max": str(2 * GB), "memory.swap.max": "0",
                                                      "memory.oom.group": "1", "pids.max": "4096"}
     assert lab.entrances == [tree.mount / "user/labs.scope/anna/cgroup.procs"]
+    lab.share_processors(1.0)
+    assert tree.read("user/labs.scope/anna/cpu.weight") == "100"
 
 
 def test_version_2_uses_a_group_above_that_hands_controllers_on(kernel, tmp_path):

@@ -19,13 +19,71 @@ def run(labs, name, now=0.0):
     while labs[name].state is not State.RUNNING:
         (_, started), = labs.due(now)
         labs.answered(started, now)
+        labs[started].visited = True
+        labs.has_settled(started, now)
 
 
 def test_labs_start_one_after_the_other(labs):
     assert labs.due(0.0) == [(Action.START, "anna")]
     assert labs.due(1.0) == []
     labs.answered("anna", 5.0)
-    assert labs.due(5.0) == [(Action.START, "ben")]
+    # Its simulator still loads the robot.
+    assert labs.due(5.0) == []
+    labs.has_settled("anna", 9.0)
+    assert labs.due(9.0) == [(Action.START, "ben")]
+
+
+def settled(labs, name="anna"):
+    labs.due(0.0)
+    labs.answered(name, 1.0)
+    return labs.has_settled(name, 2.0)
+
+
+def test_a_lab_waits_for_its_first_client_paused(labs):
+    assert settled(labs) == [(Action.PAUSE, "anna")]
+    assert labs.request("anna", 3.0) == [(Action.WAKE, "anna")]
+    # One that goes on does not start a second time.
+    assert not labs["anna"].is_starting
+    assert labs.has_settled("anna", 4.0) == []
+    assert labs["anna"].state is State.RUNNING
+
+
+@pytest.mark.parametrize("visit", [
+    lambda labs: labs.request("anna", 0.5), lambda labs: labs.answering("anna", 1, 0.5),
+    lambda labs: setattr(labs["anna"], "pages", 1)])
+def test_a_lab_with_a_client_is_not_paused_when_it_has_started(labs, visit):
+    labs.due(0.0)
+    visit(labs)
+    assert settled(labs) == []
+    assert labs["anna"].state is State.RUNNING
+
+
+def test_a_lab_that_starts_again_waits_for_its_client_again(labs):
+    labs.request("anna", 0.0)
+    settled(labs)
+    labs.stop("anna", 3.0)
+    labs.start("anna", 4.0)
+    labs.due(4.0)
+    labs.stop("ben", 4.0)
+    labs.due(4.0)
+    assert settled(labs) == [(Action.PAUSE, "anna")]
+
+
+@pytest.mark.parametrize("idle_s, keep_running", [(None, False), (IDLE_S, True)])
+def test_labs_run_from_their_start_where_that_is_wanted(idle_s, keep_running):
+    labs = Labs(["anna"], 1, idle_s, keep_running)
+    labs.start("anna", 0.0)
+    assert settled(labs) == []
+    assert labs["anna"].state is State.RUNNING
+
+
+def test_a_lab_that_is_paused_while_it_starts_makes_room_for_the_next(labs):
+    labs.due(0.0)
+    labs.answered("anna", 1.0)
+    labs.pause("anna", 1.5)
+    assert labs.due(2.0) == [(Action.START, "ben")]
+    labs.request("anna", 3.0)
+    assert not labs["anna"].is_starting
 
 
 def test_a_lab_with_a_client_that_waits_starts_first(labs):

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""When a lab has finished starting: its page answers long before its simulator has loaded the robot. `Settling` takes
+time and measurements as arguments; `demand_s` reads them from /proc.
+"""
+import contextlib
+from pathlib import Path
+
+#: A lab has settled when, for QUIET_S [s], no process of it has started or ended, and its threads have asked for less
+#: than MOST_DEMAND processors. One that starts asks for more: its programs import their libraries beside each other.
+QUIET_S, MOST_DEMAND = 3.0, 1.0
+#: A lab whose programs never become quiet counts as settled after this time [s].
+LIMIT_S = 40.0
+
+
+class Settling:
+    """One lab, from the moment at which its page answers."""
+
+    def __init__(self, now):
+        """now: a clock [s]."""
+        self._begun = now
+        self._since, self._processes, self._demand_s = None, frozenset(), 0.0
+
+    def look(self, processes, demand_s, is_simulating, now):
+        """Has it settled? processes: their ids; demand_s: by `demand_s`, since their start [s]; is_simulating: its
+        simulator has reported a real-time factor; now: the clock [s]."""
+        if now - self._begun >= LIMIT_S:
+            return True
+        processes = frozenset(processes)
+        is_same = self._since is not None and processes == self._processes
+        if is_same and now - self._since < QUIET_S:
+            return False
+        if is_same and is_simulating and demand_s - self._demand_s < MOST_DEMAND * (now - self._since):
+            return True
+        self._since, self._processes, self._demand_s = now, processes, demand_s
+        return False
+
+
+def demand_s(processes, proc=Path("/proc")):
+    """Time that all threads of these processes have run or waited for a processor, since their start [s].
+
+    The waiting makes it independent of other programs' load. Source: https://docs.kernel.org/scheduler/sched-stats.html
+    """
+    total = 0
+    for pid in processes:
+        # Processes and threads end meanwhile.
+        with contextlib.suppress(OSError, ValueError):
+            for thread in (proc / str(pid) / "task").iterdir():
+                with contextlib.suppress(OSError, ValueError):
+                    running, waiting, _ = (thread / "schedstat").read_text(encoding="ascii").split()
+                    total += int(running) + int(waiting)
+    return 1e-9 * total
