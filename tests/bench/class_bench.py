@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Labs of a class, as ./baxter.sh labs up starts them: 6 with a program each that moves both arms, then 16 of which 12
-are paused. Real-time factor through the front door, processors and memory of all processes of the class.
+stay paused. Their clients wake the others. Real-time factor through the front door, processors and memory of all
+processes of the class.
 
 The environment variable BENCH_CLASS names other classes: "6,16:4" is 6 labs, then 16 of which 4 go on.
 """
@@ -26,22 +27,38 @@ from rf_checks.pacing import cpu_time_s
 CLASSES, QUICK_CLASSES = "6,16:4", "2,3:1"
 SECONDS, QUICK_SECONDS = 30.0, 6.0
 SETTLE_S = 5.0  # simulated, from the first moment at which all labs run
-START_S, ANSWER_S = 900.0, 60.0
+START_S, ANSWER_S, DOWN_S = 900.0, 60.0, 120.0
 GB = 1e9
+# Ends the class when this program ends, killed or not: a supervisor runs on by itself. Arguments: the class's folder.
+GUARD = """
+import shutil, sys, time
+from lab_class.command import main
+sys.stdin.read()
+deadline = time.monotonic() + %r
+while main(["--folder", sys.argv[1], "down"]) != 0 and time.monotonic() < deadline:
+    time.sleep(1.0)
+shutil.rmtree(sys.argv[2], ignore_errors=True)
+""" % DOWN_S
 LAUNCH = Path(rospkg.RosPack().get_path("lab_class")) / "test/bench/both_arms.launch"
 
 
 class Class:
-    """A class in a folder that is deleted; a context manager."""
+    """A class in a folder that is deleted; a context manager. ``start_s``: time until all labs had started [s]."""
 
     def __init__(self, count):
         self._count, self._port = count, free_port()
 
     def __enter__(self):
         with contextlib.ExitStack() as stack:
-            self._store = Store(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="class-bench-"))) / "class")
-            stack.callback(self.call, "down", "--delete", check=False)
-            self.call("up", str(self._count), "--port", str(self._port), "--idle", "0", "--launch", str(LAUNCH))
+            folder = Path(tempfile.mkdtemp(prefix="class-bench-"))
+            self._store = Store(folder / "class")
+            guard = subprocess.Popen([sys.executable, "-P", "-c", GUARD, str(self._store.folder), str(folder)],
+                                     stdin=subprocess.PIPE, start_new_session=True)
+            stack.callback(guard.wait, 2.0 * DOWN_S)
+            stack.callback(guard.stdin.close)
+            begun = time.monotonic()
+            self.call("up", str(self._count), "--port", str(self._port), "--launch", str(LAUNCH))
+            self.start_s = time.monotonic() - begun
             self.names = [student.name for student in self._store.read().students]
             self._tokens = self._store.read().tokens
             self._supervisor = self._store.running()["pid"]
@@ -51,11 +68,11 @@ class Class:
     def __exit__(self, *_):
         self._stack.close()
 
-    def call(self, *words, check=True):
+    def call(self, *words):
         """Run a command on the class."""
         done = subprocess.run([sys.executable, "-P", "-m", "lab_class", "--folder", str(self._store.folder), *words],
                               capture_output=True, text=True, timeout=START_S)
-        if check and done.returncode != 0:
+        if done.returncode != 0:
             raise SystemExit("labs %s: %s" % (words[0], done.stdout + done.stderr))
 
     def overview(self):
@@ -89,8 +106,9 @@ def one_class(report, count, going_on, seconds):
     title = "%d labs" % count + (", %d of them paused" % (count - going_on) if going_on < count else "")
     with Class(count) as labs:
         running, idle = labs.names[:going_on], labs.names[going_on:]
-        if idle:
-            labs.call("pause", *idle)
+        asked = time.monotonic()
+        labs.now(running[0])
+        wake_s = time.monotonic() - asked
         settled = [labs.now(name)[0] + SETTLE_S for name in running]
         wait_until(lambda: all(labs.now(name)[0] >= time_s for name, time_s in zip(running, settled, strict=True)),
                    "the arms to swing", START_S, 1.0)
@@ -105,6 +123,8 @@ def one_class(report, count, going_on, seconds):
         factors = [(b - a) / (wall_b - wall_a) for (a, wall_a), (b, wall_b) in zip(first, last, strict=True)]
         wait_until(lambda: all(lab["memory_bytes"] for lab in labs.overview().values()), "figures of memory", 60.0, 1.0)
         memory = {name: lab["memory_bytes"] / GB for name, lab in labs.overview().items()}
+    report.add("%s: start, each" % title, labs.start_s / count, "s")
+    report.add("%s: first message of a paused one" % title, wake_s, "s")
     report.add("%s: slowest factor" % title, min(factors), "x", least=0.99)
     report.add("%s: processors" % title, cores, "cores")
     report.add("%s: each that goes on" % title, 100.0 * cores / going_on, "% of a core")

@@ -105,10 +105,10 @@ def main():
     for number in range(options.rounds):
         for name in names:
             print("round %d of %d: %s ..." % (number + 1, options.rounds, name), flush=True)
-            found = run_child(name, number, options)
-            if found is None:
+            found, is_whole = run_child(name, number, options)
+            if not is_whole:
                 broken.append(name)
-            else:
+            if found is not None:
                 rounds[name].append(found)
     machine["load_after"] = "%.2f %.2f %.2f" % os.getloadavg()
     rows, samples = [], {}
@@ -138,13 +138,17 @@ def child(options):
     """Measure one round of one suite in this process."""
     sys.path.append(str(PEERS))
     report = Report()
-    import_module(SUITES[options.child][0]).measure(report, options.quick, options.number)
-    report.save(options.out)
+    try:
+        import_module(SUITES[options.child][0]).measure(report, options.quick, options.number)
+    finally:
+        # What was measured before a failure is not lost.
+        report.save(options.out)
     return 0
 
 
 def run_child(name, number, options):
-    """Return the results of one round of a suite, or None if it failed; its output is passed through."""
+    """Return (results, is whole) of one round of a suite; one that failed has what it measured before that, or None.
+    Its output is passed through."""
     saved = options.out / ("round_%s.json" % name)
     saved.unlink(missing_ok=True)
     command = [sys.executable, str(HERE / "run.py"), "--child", name, "--number", str(number), "--out", str(saved)]
@@ -159,11 +163,11 @@ def run_child(name, number, options):
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGTERM)
             process.wait()
-    if process.returncode or not saved.exists():
-        return None
+    if not saved.exists():
+        return None, False
     found = json.loads(saved.read_text())
     saved.unlink()
-    return found
+    return found, process.returncode == 0
 
 
 def install_peers():
