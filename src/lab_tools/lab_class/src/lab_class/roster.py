@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 #: Students of one class; more is a mistake in the command.
 MOST_STUDENTS = 500
-#: Names that the front door uses itself.
-RESERVED = ("instructor", "class")
+#: Names that the front door uses itself, and the one that stands for every lab in commands.
+RESERVED = ("instructor", "class", "all")
 _LONGEST_NAME = 40
 _COLUMNS = ("name", "student", "full name")
 # Letters that are no ASCII letter with a mark; ß becomes ss by itself.
@@ -68,7 +68,8 @@ def _students(rows, name_column, id_column):
         given = row[id_column] if id_column is not None and len(row) > id_column else ""
         name = slug(given or full_name) or "student-%02d" % (len(students) + 1)
         if name in RESERVED:
-            raise RosterError("line %d: the front door uses /%s itself; give this student another id" % (line, name))
+            raise RosterError("line %d: \"%s\" has another meaning in addresses or commands; give this student another "
+                              "id" % (line, name))
         if name in seen:
             raise RosterError("lines %d and %d both get the address /%s; a column \"id\" tells students with the same "
                               "name apart" % (seen[name], line, name))

@@ -32,7 +32,8 @@ def test_letters_that_are_no_letter_with_a_mark_are_spelt_out():
 
 @pytest.mark.parametrize(("text", "words"), [
     ("", "empty"), ("team,group\na,1\n", "team, group"), ("name,id\nAnna,1\n,2\n", "line 3 has no name"),
-    ("Anna\nBen\nanna\n", "lines 1 and 3"), ("Instructor\n", "/instructor"), ("name\n", "0 students")])
+    ("Anna\nBen\nanna\n", "lines 1 and 3"), ("Instructor\n", "\"instructor\" has another meaning"),
+    ("Anna\nAll\n", "line 2: \"all\""), ("name\n", "0 students")])
 def test_a_wrong_roster_says_where(text, words):
     with pytest.raises(roster.RosterError, match=words):
         roster.read(text)
