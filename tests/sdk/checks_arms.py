@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Programs that move arms. A check returns what it measured, {name: number}, and raises AssertionError."""
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryActionResult
+from dynamic_reconfigure.client import Client
+from std_msgs.msg import UInt16
+from table import check
+
+from baxter_model.names import MIRROR_SIGNS, SIDES, joint_names
+from lab_testing.waiting import wait_until
+
+# The keys of each arm's joints, in the order s0 ... w2: increase and decrease.
+KEYS = {"left": ("98oilk.", "67yuhjn"), "right": ("43refdv", "12qwasz")}
+GRIPPER_KEYS = {"left": ",m/", "right": "cxb"}  # close, open, calibrate
+KEY_TRIES = 3  # the programs drop keys that come while they set the terminal; a user presses again
+# axes of joystick.launch's sticks: the right arm's two, the left arm's two
+STICKS = {"right": (0, 1), "left": (3, 4)}
+BUMPER = {"right": 4, "left": 5}
+TRIGGER = {"right": 2, "left": 5}  # the programs cross them: the left trigger is the right gripper's
+HELP = 6  # function1
+PUSH_N = 6.0  # [N]
+DAMPING = {"s0": 4.0, "s1": 4.0, "e0": 2.0, "e1": 2.0, "w0": 0.5, "w1": 0.5, "w2": 0.5}  # [Nm s/rad]
+# The largest that the program's settings allow [Nm/rad].
+STIFFEST = {"s0": 30.0, "s1": 30.0, "e0": 15.0, "e1": 15.0, "w0": 9.0, "w1": 4.0, "w2": 4.0}
+PLAYED = {"left_s0": 0.3, "left_w1": -0.3, "right_s0": -0.3, "right_w1": 0.3}
+
+
+def press_key(program, key, spoken, timeout_s=4.0):
+    """Type ``key`` until the program says that it has it; return how often it was lost."""
+    for lost in range(KEY_TRIES):
+        seen = len(program.output)
+        program.type(key)
+        try:
+            program.expect(spoken, timeout_s, seen)
+            return lost
+        except AssertionError:
+            if lost == KEY_TRIES - 1:
+                raise
+
+
+def ask_for_help(stick, program):
+    """Press the help button until the program answers: what a joystick sends before it is connected is lost."""
+    seen = len(program.output)
+
+    def answered():
+        stick.press(HELP)
+        rospy.sleep(0.3)
+        stick.release()
+        return "Press Ctrl-C to quit." in program.output[seen:]
+
+    wait_until(answered, "the answer to the joystick's help button", 60.0, 1.0)
+
+
+@check("joint_position_keyboard.py")
+def keyboard(lab):
+    robot = lab.robot
+    with lab.rosrun("baxter_examples", "joint_position_keyboard.py") as program:
+        program.expect("Controlling joints")
+        lost, errors = 0, []
+        for side in SIDES:
+            for name, *keys in zip(joint_names(side), *KEYS[side], strict=True):
+                for key, step in zip(keys, (0.1, -0.1), strict=True):
+                    goal = robot.angles[name] + step
+                    lost += press_key(program, key, "command: ")
+                    errors.append(robot.wait_for_joint(name, goal, 0.03))
+            for key, (low, high) in zip(GRIPPER_KEYS[side], ((0, 5), (95, 100), (90, 100)), strict=True):
+                lost += press_key(program, key, "command: ")
+                robot.wait_for_gripper(side, low, high)
+        program.type("\x1b")
+        program.finish()
+    return {"keys": 34, "keys_lost": lost, "off_rad": max(errors)}
+
+
+@check("joint_position_joystick.launch xbox")
+def joystick(lab):
+    robot = lab.robot
+    with lab.joystick() as stick, lab.roslaunch("baxter_examples", "joint_position_joystick.launch", "joystick:=xbox",
+                                                "dev:=" + stick.path) as program:
+        stick.plug_in()
+        program.expect("Press Ctrl-C to stop")
+        ask_for_help(stick, program)
+        beyond = 0.0
+        for side in SIDES:
+            order = joint_names(side)
+            for _ in order:
+                for axis, name in zip(STICKS[side], order[:2], strict=True):
+                    start = robot.angles[name]
+                    way = 1.0 if start <= lab.neutral[name] else -1.0
+                    stick.push(axis, -way)
+                    robot.wait_for_way(name, start, 0.1 * way)
+                    stick.push(axis, 0.0)
+                    at = robot.angles[name]
+                    rospy.sleep(0.5)
+                    robot.wait_for_rest(name)
+                    beyond = max(beyond, abs(robot.angles[name] - at))
+                assert beyond < 0.3, "a joint went on by %.3f rad after its stick was released" % beyond
+                seen = len(program.output)
+                stick.press(BUMPER[side])
+                program.expect("cycle joint", 15.0, seen)
+                stick.release()
+                order = order[1:] + order[:1]
+            stick.push(TRIGGER[side], -1.0)
+            robot.wait_for_gripper(side, 0, 5)
+            stick.push(TRIGGER[side], 1.0)
+            robot.wait_for_gripper(side, 95, 100)
+        program.stop()
+    return {"beyond_rad": beyond}
+
+
+@check("joint_position_waypoints.py")
+def waypoints(lab):
+    robot, offs = lab.robot, []
+    with lab.rosrun("baxter_examples", "joint_position_waypoints.py", "-l", "left") as program:
+        program.expect("Press Navigator 'Rethink'")
+        places = []
+        for change in (0.25, -0.4):
+            robot.move_by("left", change)
+            seen = len(program.output)
+            robot.press("left_button_ok")
+            program.expect("Waypoint Recorded", 15.0, seen)
+            places.append({name: robot.angles[name] for name in joint_names("left")})
+        robot.press("left_button_show")
+        program.expect("Waypoint playback loop #1")
+        for _ in range(2):
+            for place in places:
+                offs.append(lab.at(place, 0.02, 60.0))
+        program.stop()
+    return {"off_rad": max(offs)}
+
+
+@check("joint_velocity_wobbler.py")
+def wobbler(lab):
+    names = [name for side in SIDES for name in joint_names(side)]
+    with lab.rosrun("baxter_examples", "joint_velocity_wobbler.py") as program:
+        program.expect("Wobbling. Press Ctrl-C")
+        watch = lab.robot.watch()
+        rospy.sleep(6.0)
+        lab.robot.unwatch(watch)
+        program.stop()
+    least, fastest = min(map(watch.span, names)), max(watch.speed[name] for name in names)
+    assert least > 0.03 and fastest < 0.5, "a joint swings by %.3f rad; speeds up to %.2f rad/s" % (least, fastest)
+    return {"least_swing_rad": least, "fastest_rad_s": fastest, "home_off_rad": lab.at(lab.neutral, 0.05)}
+
+
+@check("joint_velocity_puppet.py")
+def puppet(lab):
+    robot = lab.robot
+    with lab.rosrun("baxter_examples", "joint_velocity_puppet.py", "-l", "left") as program:
+        program.expect("Puppeting:")
+        before = dict(robot.angles)
+        robot.move_by("left", 0.35)
+        rospy.sleep(1.0)
+        moved = {name: robot.angles[name] - before[name] for name in before}
+        ratios = [moved["right_" + joint] / (sign * moved["left_" + joint]) for joint, sign in MIRROR_SIGNS.items()]
+        program.stop()
+    assert all(0.75 < ratio < 1.25 for ratio in ratios), "the other arm's share of the motion: %s" % ratios
+    return {"least_share": min(ratios), "largest_share": max(ratios)}
+
+
+@check("joint_torque_springs.py")
+def springs(lab):
+    robot = lab.robot
+    rate = rospy.Publisher("/robot/joint_state_publish_rate", UInt16, queue_size=1, latch=True)
+    rate.publish(100)  # as the robot starts
+    with lab.rosrun("baxter_examples", "joint_torque_springs.py", "-l", "left") as program:
+        program.expect("Running. Ctrl-c to quit")
+        home = {name: lab.neutral[name] for name in joint_names("left")}
+        wait_until(lambda: robot.off(home) < 0.03, "the neutral pose", 60.0)
+        settings = Client("rsdk_joint_torque_springs_left", timeout=30.0)
+        settings.update_configuration({joint + "_damping_coefficient": value for joint, value in DAMPING.items()})
+
+        def deflection():
+            robot.push("left_wrist", (0.0, 0.0, PUSH_N), 8.0)
+            rospy.sleep(5.0)
+            deflected = lab.mean_off(home, 2.0)
+            robot.release("left_wrist")
+            return deflected
+
+        soft = deflection()
+        rospy.sleep(6.0)
+        back = lab.mean_off(home, 2.0)
+        settings.update_configuration({joint + "_spring_stiffness": value for joint, value in STIFFEST.items()})
+        stiff = deflection()
+        ended = program.stop()
+    assert soft > 0.1 and stiff < 0.8 * soft, "%g N deflect soft springs by %.3f rad, stiff ones by %.3f" % (
+        PUSH_N, soft, stiff)
+    assert back < 0.1, "the arm came back to %.3f rad" % back
+    return {"soft_rad": soft, "stiff_rad": stiff, "back_rad": back, "ended_s": ended}
+
+
+@check("joint_recorder.py")
+def recorder(lab):
+    lab.recording = None
+    path, robot = lab.folder / "recorded.csv", lab.robot
+    with lab.rosrun("baxter_examples", "joint_recorder.py", "-f", str(path)) as program:
+        program.expect("Recording. Press Ctrl-C")
+        begin = rospy.get_time()
+        watch = robot.watch()
+        robot.move({name: lab.neutral[name] + change for name, change in PLAYED.items()})
+        robot.press("left_upper_button", lambda: robot.wait_for_gripper("left", 0, 5))
+        robot.press("left_lower_button", lambda: robot.wait_for_gripper("left", 95, 100))
+        robot.move({name: lab.neutral[name] + 0.3 * change for name, change in PLAYED.items()})
+        rospy.sleep(1.0)
+        seconds = rospy.get_time() - begin
+        robot.unwatch(watch)
+        program.stop()
+    names, *lines = path.read_text().splitlines()
+    names = names.split(",")
+    rows = [[float(word) for word in line.split(",")] for line in lines if line.count(",") == len(names) - 1]
+    columns = dict(zip(names, zip(*rows, strict=True), strict=True))
+    rows_per_s = len(rows) / (rows[-1][0] - rows[0][0])
+    off = max(abs(max(columns[n]) - watch.high[n]) + abs(min(columns[n]) - watch.low[n]) for n in PLAYED)
+    assert len(names) == 17 and rows[-1][0] - rows[0][0] > seconds - 1.0, "%d columns, %.1f s of %.1f" % (
+        len(names), rows[-1][0], seconds)
+    assert 90.0 < rows_per_s < 110.0, "%.1f rows a second" % rows_per_s
+    assert off < 0.03 and min(columns["left_gripper"]) < 5 < 95 < max(columns["left_gripper"]), "%.3f rad off" % off
+    lab.recording = (path, columns)
+    return {"rows_per_s": rows_per_s, "off_rad": off}
+
+
+def judge_playback(lab, watch, tolerance):
+    """How far peaks, ends [rad] and grippers [%] are from the recording's."""
+    _, columns = lab.recording
+    peaks = max(max(abs(watch.high[n] - max(columns[n])), abs(watch.low[n] - min(columns[n]))) for n in PLAYED)
+    end = max(abs(lab.robot.angles[n] - columns[n][-1]) for n in PLAYED)
+    percents = abs(min(watch.percents["left"]) - min(columns["left_gripper"]))
+    assert max(peaks, end) < tolerance and percents < 8.0, "peak %.3f, end %.3f rad, gripper %.1f %% off" % (
+        peaks, end, percents)
+    return {"peak_off_rad": peaks, "end_off_rad": end, "gripper_off_percent": percents}
+
+
+@check("joint_position_file_playback.py")
+def position_playback(lab):
+    lab.need_recording(recorder)
+    watch = lab.robot.watch()
+    with lab.rosrun("baxter_examples", "joint_position_file_playback.py", "-f", str(lab.recording[0])) as program:
+        program.finish(90.0)
+    lab.robot.unwatch(watch)
+    return judge_playback(lab, watch, 0.03)
+
+
+@check("joint_trajectory_file_playback.launch")
+def trajectory_playback(lab):
+    lab.need_recording(recorder)
+    watch = lab.robot.watch()
+    with lab.roslaunch("baxter_examples", "joint_trajectory_file_playback.launch",
+                       "file_path:=%s" % lab.recording[0]) as program:
+        program.expect("Exiting - File Playback Complete", 120.0)
+        assert "failed or did not finish" not in program.output, program.output[-300:]
+        rospy.sleep(0.5)
+        measured = judge_playback(lab, watch, 0.04)
+        program.stop()
+    lab.robot.unwatch(watch)
+    return measured
+
+
+def last_point(side):
+    """{joint: angle [rad]} of the client's last point in 1.2.0."""
+    first = (-0.11, -0.62, -1.15, 1.32, 0.80, 1.27, 2.39)
+    return {side + "_" + joint: 1.25 * angle * (sign if side == "right" else 1)
+            for (joint, sign), angle in zip(MIRROR_SIGNS.items(), first, strict=True)}
+
+
+def judge_client(lab, side, program, tolerance):
+    results = []
+    listener = rospy.Subscriber("/robot/limb/%s/follow_joint_trajectory/result" % side,
+                                FollowJointTrajectoryActionResult, results.append)
+    program.expect("Exiting - Joint Trajectory Action Test Complete", 90.0)
+    wait_until(lambda: results, "the goal's result", 10.0)
+    listener.unregister()
+    off = lab.robot.off(last_point(side))
+    assert results[-1].status.status == GoalStatus.SUCCEEDED, results[-1]
+    assert off < tolerance, "%.3f rad off its last point" % off
+    return {"off_rad": off}
+
+
+def client(lab, mode, tolerance):
+    with lab.rosrun("baxter_interface", "joint_trajectory_action_server.py", "-l", "left", "-m", mode) as server:
+        server.expect("Running. Ctrl-c to quit")
+        with lab.rosrun("baxter_examples", "joint_trajectory_client.py", "-l", "left") as program:
+            measured = judge_client(lab, "left", program, tolerance)
+            program.finish()
+        server.stop()
+    return measured
+
+
+@check("joint_trajectory_client.py position")
+def client_position(lab):
+    return client(lab, "position", 0.05)
+
+
+@check("joint_trajectory_client.py position_w_id")
+def client_position_w_id(lab):
+    return client(lab, "position_w_id", 0.05)
+
+
+@check("joint_trajectory_client.py velocity")
+def client_velocity(lab):
+    return client(lab, "velocity", 0.3)  # their controller leaves its last velocity by its gain of 2 /s
+
+
+@check("joint_trajectory_client.launch")
+def client_launch(lab):
+    with lab.roslaunch("baxter_examples", "joint_trajectory_client.launch") as program:
+        measured = judge_client(lab, "right", program, 0.05)
+        program.stop()
+    return measured
