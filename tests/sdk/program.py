@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A program in a terminal of its own: keys are typed, its output is read."""
+"""A program in a pseudo-terminal: keys are typed, its output is read."""
 import contextlib
 import os
 import pty

@@ -9,6 +9,7 @@ import argparse
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -47,7 +48,8 @@ class Lab:
             port = os.environ["ROS_MASTER_URI"].rpartition(":")[2].rstrip("/")
             words = ["roslaunch", "-p", port, *WORLD, *(NO_GRIPPERS if self._bare else ())]
             self._launched = stack.enter_context(Program(words, dict(os.environ), self.folder))
-            wait_until(has_master, "the master", MASTER_LIMIT_S)
+            # A node that starts before the parameter is there takes its time from the wall clock.
+            wait_until(has_simulated_time, "use_sim_time on the master", MASTER_LIMIT_S)
             rospy.init_node("sdk_checks", disable_signals=True)
             wait_for_message("/robot/sim/started", Empty, timeout_s=START_LIMIT_S)
             self.robot = Robot(with_grippers=not self._bare)
@@ -137,9 +139,9 @@ def environment_of(overlay):
     return variables
 
 
-def has_master():
+def has_simulated_time():
     try:
-        return rospy.get_master().getPid()[0] == 1
+        return rospy.get_param("/use_sim_time", False)
     except OSError:
         return False
 
@@ -166,6 +168,9 @@ def main():
     parser.add_argument("--summary", action="store_true", help="only print how many of the rows passed, by program")
     parser.add_argument("--part", choices=("arms", "bare"), help=argparse.SUPPRESS)
     arguments = parser.parse_args()
+    # A shell starts its background jobs with Ctrl-C ignored, and programs started here would inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, end_in_order)
     if arguments.summary:
         return summarize(arguments.results)
     if not arguments.overlay:
@@ -181,9 +186,27 @@ def main():
     # A process for each kind of lab: a rospy node knows one master.
     for offset, part in enumerate(("arms", "bare")):
         uri = "http://localhost:%d" % (arguments.port + offset)
-        subprocess.run([sys.executable, *sys.argv, "--part", part], check=True,
-                       env={**os.environ, "ROS_MASTER_URI": uri, "ROS_HOSTNAME": "localhost"})
+        run_child([sys.executable, *sys.argv, "--part", part],
+                  {**os.environ, "ROS_MASTER_URI": uri, "ROS_HOSTNAME": "localhost"})
     return summarize(arguments.results)
+
+
+def run_child(words, environment):
+    """Run a command. Whatever ends this process meanwhile also ends the command, once, with time to clean up."""
+    child = subprocess.Popen(words, env=environment, start_new_session=True)
+    try:
+        code = child.wait()
+    except BaseException:
+        child.terminate()
+        child.wait()
+        raise
+    if code:
+        raise SystemExit("the lab's process ended with exit code %d" % code)
+
+
+def end_in_order(*_):
+    """Handle SIGTERM: everything that was started is ended."""
+    raise SystemExit(128 + signal.SIGTERM)
 
 
 def rows(path):
