@@ -32,7 +32,7 @@ class Program:
         return self
 
     def __exit__(self, *_):
-        for number, patience_s in ((signal.SIGINT, 10.0), (signal.SIGKILL, 10.0)):
+        for number, patience_s in ((signal.SIGINT, END_LIMIT_S), (signal.SIGKILL, END_LIMIT_S)):
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self._process.pid, number)
             with contextlib.suppress(AssertionError):
