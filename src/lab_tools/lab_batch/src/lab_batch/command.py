@@ -14,7 +14,9 @@ from .records import Records, RecordsError, summary, versions
 from .shipped import JOBS
 
 ROOT = Path(os.environ.get("LAB_ROOT", Path.cwd()))
-PROGRESS_S = 0.5
+# Between two lines of progress: on a terminal, where each replaces the last one, and in a file.
+PROGRESS_S, LINE_S = 0.5, 30.0
+BAR_WIDTH = 30
 ENGINES = {"processes": processes.map_seeds, "ray": ray_engine.map_seeds}
 
 
@@ -93,27 +95,53 @@ def repeating_line(job, settings, seed):
 
 
 class Progress:
-    """One line on a terminal that says how far the batch is; nothing elsewhere."""
+    """Says how far a batch is: done of total, rate, time left. A bar on a terminal, a line now and then elsewhere.
 
-    def __init__(self, total, stream=None):
-        self._stream = sys.stderr if stream is None else stream
+    clock: returns the time [s]; stream: a text stream.
+    """
+
+    def __init__(self, total, stream=None, clock=time.monotonic):
+        self._stream, self._clock = sys.stderr if stream is None else stream, clock
         self._total, self._count, self._failed = total, 0, 0
-        self._began, self._shown = time.monotonic(), 0.0
+        self._began = self._shown = clock()
 
     def step(self, outcome):
         self._count += 1
         self._failed += not outcome.is_done
-        now = time.monotonic()
-        if self._stream.isatty() and (now - self._shown >= PROGRESS_S or self._count == self._total):
-            self._shown = now
-            rest = (self._total - self._count) * (now - self._began) / self._count
-            self._stream.write("\r\x1b[K%d of %d, %d failed, %.0f s left" % (
-                self._count, self._total, self._failed, rest))
-            self._stream.flush()
+        now = self._clock()
+        terminal, is_last = self._stream.isatty(), self._count == self._total
+        if terminal and (is_last or now - self._shown >= PROGRESS_S):
+            self._write("\r\x1b[K%s %s" % (self._bar(), self._text(now)))
+        elif not terminal and now - self._shown >= LINE_S:
+            self._write(self._text(now) + "\n")
+        else:
+            return
+        self._shown = now
+
+    def _bar(self):
+        full = BAR_WIDTH * self._count // self._total
+        return "[%s%s]" % ("#" * full, "." * (BAR_WIDTH - full))
+
+    def _text(self, now):
+        seconds = max(now - self._began, 1e-9)
+        left = (self._total - self._count) * seconds / self._count
+        return "%d/%d, %d failed, %.3g/s, %s left" % (
+            self._count, self._total, self._failed, self._count / seconds, duration(left))
+
+    def _write(self, text):
+        self._stream.write(text)
+        self._stream.flush()
 
     def end(self):
         if self._stream.isatty() and self._count:
-            self._stream.write("\n")
+            self._write("\n")
+
+
+def duration(seconds):
+    """1:02:03 for 3723 s, 02:03 for 123 s."""
+    minutes, second = divmod(round(seconds), 60)
+    hours, minute = divmod(minutes, 60)
+    return "%d:%02d:%02d" % (hours, minute, second) if hours else "%02d:%02d" % (minute, second)
 
 
 def list_jobs():
