@@ -68,8 +68,13 @@ export class Controls {
         hold(true);
       };
       made.onpointerup = made.onpointercancel = made.onlostpointercapture = made.onblur = () => hold(false);
-      made.onkeydown = ({key, repeat}) => key === "Enter" && !repeat && hold(true);
-      made.onkeyup = ({key}) => key === "Enter" && hold(false);
+      // A handler that returns false would keep the Tab key here.
+      made.onkeydown = ({key, repeat}) => {
+        if (key === "Enter" && !repeat) hold(true);
+      };
+      made.onkeyup = ({key}) => {
+        if (key === "Enter") hold(false);
+      };
     }
     this.buttons.set(name, made);
     return made;

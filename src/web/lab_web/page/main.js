@@ -304,6 +304,10 @@ function startButtons() {
       if (kind === "keydown" && !event.repeat) stop();
     }, {capture: true});
   }
+  // The browser would switch a checkbox with the space bar alone.
+  addEventListener("keydown", ({key, repeat, target}) => {
+    if (key === "Enter" && !repeat && target.type === "checkbox") target.click();
+  });
 }
 
 const known = localStorage.getItem("language") ?? navigator.language.split("-")[0];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The simulation: pause, step, reset; objects to add, to move by a handle in the 3D view, and to delete.
+// The simulation: pause, step, reset; objects to add, to move by a handle in the 3D view or by
+// numbers, and to delete.
 import {element} from "./panel.js";
 import {text} from "./texts.js";
 
@@ -7,6 +8,7 @@ import {text} from "./texts.js";
 const PUT_MS = 80;
 const SETTLED_MS = 800;
 const HANDLE = "object";
+const AXES = ["x", "y", "z"];
 const WORLD = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 const byId = (name) => document.getElementById(name);
 
@@ -22,6 +24,10 @@ export class Simulation {
     byId("grab").onclick = () => (this.held ? this.letGo() : send({op: "grab", name: byId("objects").value}));
     byId("objects").onchange = () => this.held && send({op: "grab", name: byId("objects").value});
     this.names = [];
+    this.inputs = AXES.map((axis) => element("input", {
+      type: "number", id: `object-${axis}`, step: 0.01, onchange: () => this.typed()}));
+    byId("object-numbers").replaceChildren(...this.inputs.map((input, number) =>
+      element("label", {}, `${AXES[number]} [m]`, input)));
   }
 
   build({has_scene: isSimulated = false, things = []}) {
@@ -59,12 +65,15 @@ export class Simulation {
     byId("step").disabled = !this.allowed || !this.paused;
     for (const name of ["grab", "delete"]) byId(name).disabled = !this.allowed || !this.names.length;
     byId("grab").setAttribute("aria-pressed", this.held !== null);
+    byId("object-place").hidden = this.held === null;
   }
 
   grabbed({name, position, orientation}) {
     const view = this.view();
     if (!view || view.revision === null || name !== byId("objects").value) return;
     this.held = name;
+    this.pose = {position, orientation};
+    this.showPlace();
     view.showGhost(HANDLE, {revision: view.revision, base: WORLD, links: {}}, {position, orientation}, true, false,
                    (pose) => this.dragged(pose));
     this.refresh();
@@ -77,8 +86,21 @@ export class Simulation {
     this.refresh();
   }
 
+  showPlace() {
+    this.inputs.forEach((input, number) => {
+      if (document.activeElement !== input) input.value = this.pose.position[number].toFixed(3);
+    });
+  }
+
+  // The numbers as a place, turned as it is; the object's answer shows it and moves the handle there.
+  typed() {
+    const position = this.inputs.map((input) => input.valueAsNumber);
+    if (position.every(Number.isFinite)) this.dragged({...this.pose, position});
+  }
+
   dragged(pose) {
-    this.wanted = pose;
+    this.wanted = this.pose = pose;
+    this.showPlace();
     if (!this.timer) this.timer = setTimeout(() => this.put(), PUT_MS);
   }
 

@@ -28,6 +28,8 @@ _OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-
             "--disable-background-networking", "--disable-component-update", "--disable-extensions", "--disable-sync",
             "--hide-scrollbars", "--lang=en-US", "about:blank")
 _START_S, _ANSWER_S = 60.0, 60.0
+# What the browser itself does with a key goes by its number and text.
+_KEYS = {"Tab": {"windowsVirtualKeyCode": 9}, "Enter": {"windowsVirtualKeyCode": 13, "text": "\r"}}
 
 
 def why_not():
@@ -120,8 +122,15 @@ class Browser:
 
     def press(self, key, code):
         """Press a key, such as (" ", "Space")."""
+        more = _KEYS.get(key, {})
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code)
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, code=code, **more)
+
+    def focused(self):
+        """(role, name) of the element that has the keyboard, as a screen reader is told them."""
+        found = self.call("Runtime.evaluate", expression="document.activeElement")["result"]["objectId"]
+        node = self.call("Accessibility.getPartialAXTree", objectId=found, fetchRelatives=False)["nodes"][0]
+        return tuple(node.get(what, {}).get("value", "") for what in ("role", "name"))
 
     def picture(self):
         """What the window shows, uint8 (height, width, 3), red first."""

@@ -147,7 +147,7 @@ class Server:
         self.pages.share("robot", {
             "joints": [{"name": name, "lower": row.lower, "upper": row.upper} for name, row in
                        self.robot.limits.items()],
-            "poses": ["neutral"], "hands": hands.sides, "grippers": [], "cameras": [], "has_scene": True,
+            "poses": ["neutral"], "hands": hands.sides, "grippers": SIDES, "cameras": [], "has_scene": True,
             "can_plan": True, "can_press": True, "things": ["block"]})
         application = web.Application([*routes(self.pages, PAGE, libraries), *upload_routes(self.pages, recorder),
                                        (r"/notebook/lab.*", Frame),
