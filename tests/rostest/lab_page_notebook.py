@@ -125,6 +125,9 @@ class LabNotebook(PageTest):
         self.browser.wait("lab.state.robot.enabled")
         self.run_cell(1)
         self.assertIn("100 of 100 points", self.verdict("tf_listener: passed"))
+        # A click into the notebook has scrolled the page.
+        self.browser.evaluate("scrollTo(0, 0)")
+        self.keep("lab_page_notebook")
         right_of_notebook = self.box("#notebook")[1]
         for selector in ("#view", "#exercise-verdict"):
             left, right, top, bottom = self.box(selector)
@@ -137,6 +140,7 @@ class LabNotebook(PageTest):
         self.assertIn("Hint: ", self.verdict("tf_listener: not passed"))
         self.assertLessEqual(self.browser.evaluate("document.documentElement.scrollWidth"), 390)
         self.browser.evaluate("document.getElementById('exercise').scrollIntoView()")
+        self.keep("lab_page_notebook_telephone")
         left, right, top, _ = self.box("#exercise-verdict")
         self.assertTrue(0 <= left < right <= 390 and 0 <= top < 844, (left, right, top))
         left, right, top, bottom = self.box("#stop")

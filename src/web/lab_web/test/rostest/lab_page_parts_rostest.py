@@ -100,6 +100,10 @@ class LabPageParts(PageTest):
         self.browser.wait("lab.view.ghosts.has('object')")
         self.drag_handle("object", 40, 0)
         wait_until(lambda: math.dist(place_of(THING)[:2], before[:2]) > 0.05, "the object elsewhere")
+        # The same without a pointer.
+        self.browser.evaluate("(() => { const input = document.getElementById('object-y'); input.value = -0.3;"
+                              "input.dispatchEvent(new Event('change')); })()")
+        wait_until(lambda: abs(place_of(THING)[1] + 0.3) < 0.05, "the object at the typed place")
         self.browser.click("#delete")
         wait_until(lambda: place_of(THING) is None, "the world without the object")
         self.browser.wait("!lab.simulation.names.includes('%s')" % THING)
