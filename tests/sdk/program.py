@@ -17,10 +17,10 @@ END_LIMIT_S = 40.0
 class Program:
     """A command in a pseudo-terminal, as a context manager; at the end, all its processes are ended."""
 
-    def __init__(self, words, environment, folder):
-        """words: of the command; environment: {variable: value}; folder: where it runs."""
+    def __init__(self, words, environment, folder, patience_s=10.0):
+        """words: of the command; environment: {variable: value}; folder: where it runs; patience_s: until it is killed."""
         self._words, self._environment, self._folder = words, environment, folder
-        self._output = ""
+        self._output, self._patience_s = "", patience_s
 
     def __enter__(self):
         self._terminal, theirs = pty.openpty()
@@ -32,7 +32,7 @@ class Program:
         return self
 
     def __exit__(self, *_):
-        for number, patience_s in ((signal.SIGINT, END_LIMIT_S), (signal.SIGKILL, END_LIMIT_S)):
+        for number, patience_s in ((signal.SIGINT, self._patience_s), (signal.SIGKILL, END_LIMIT_S)):
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self._process.pid, number)
             with contextlib.suppress(AssertionError):

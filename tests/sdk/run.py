@@ -33,6 +33,7 @@ NO_GRIPPERS = ("left_gripper:=none", "right_gripper:=none")
 # At rest: xbox's and logitech's triggers are axes that read 1.
 STICKS_AT_REST, BUTTONS = (0, 0, 1, 0, 0, 1, 0, 0), 11
 MASTER_LIMIT_S, START_LIMIT_S = 60.0, 120.0
+LAB_END_S = 180.0  # a killed roslaunch leaves its nodes behind
 EFFORT_SHARE = 1.001
 
 
@@ -47,7 +48,7 @@ class Lab:
         with contextlib.ExitStack() as stack:
             port = os.environ["ROS_MASTER_URI"].rpartition(":")[2].rstrip("/")
             words = ["roslaunch", "-p", port, *WORLD, *(NO_GRIPPERS if self._bare else ())]
-            self._launched = stack.enter_context(Program(words, dict(os.environ), self.folder))
+            self._launched = stack.enter_context(Program(words, dict(os.environ), self.folder, LAB_END_S))
             # A node that starts before the parameter is there takes its time from the wall clock.
             wait_until(has_simulated_time, "use_sim_time on the master", MASTER_LIMIT_S)
             rospy.init_node("sdk_checks", disable_signals=True)
