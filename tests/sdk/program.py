@@ -18,7 +18,7 @@ class Program:
     """A command in a pseudo-terminal, as a context manager; at the end, all its processes are ended."""
 
     def __init__(self, words, environment, folder, patience_s=10.0):
-        """words: of the command; environment: {variable: value}; folder: where it runs; patience_s: until it is killed."""
+        """words: of the command; environment: {variable: value}; folder: where it runs; patience_s: before a kill."""
         self._words, self._environment, self._folder = words, environment, folder
         self._output, self._patience_s = "", patience_s
 
