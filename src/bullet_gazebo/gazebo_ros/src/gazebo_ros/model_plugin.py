@@ -161,16 +161,17 @@ class PluginContext(NodeHandle):
         """Loop thread: the :class:`ModelPlugin` objects that the model has now, in the order of its description."""
         return tuple(self._host.plugins())
 
-    def screen(self, link, place, size_m, pixels):
+    def screen(self, link, place, size_m, pixels, glows=False):
         """Make a screen, a rectangle of the model that shows pictures; call it in the constructor.
 
         It is fixed to ``link`` at ``place`` (4, 4): the frame of its centre, with x to the right and y up for a viewer
-        in front of it. ``size_m``: width and height; ``pixels``: columns and rows. Returns a
+        in front of it. ``size_m``: width and height; ``pixels``: columns and rows; ``glows``: for lights,
+        whose black pixels show what is behind them. Returns a
         :class:`world_picture.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """
         # It belongs to the model and is closed with it.
         return self._opening(("screen", link, tuple(size_m), tuple(pixels)),
-                             lambda: self._host.add_screen(link, np.asarray(place, dtype=float), size_m, pixels),
+                             lambda: self._host.add_screen(link, np.asarray(place, dtype=float), size_m, pixels, glows),
                              closes=False)
 
     def param(self, name, default=None):

@@ -52,12 +52,14 @@ class Part(NamedTuple):
 class Screen(NamedTuple):
     """A rectangle that shows a picture. ``offset`` (4, 4) in the frame of ``link``: the frame of its centre, x to the
     right and y up for a viewer in front of it; ``size``: width, height [m]; ``picture``:
-    :class:`world_picture.shared_picture.PictureReader`."""
+    :class:`world_picture.shared_picture.PictureReader`; ``glows``: whether it is a light, whose black pixels show what
+    is behind them."""
 
     link: str
     offset: np.ndarray
     size: tuple
     picture: PictureReader
+    glows: bool = False
 
 
 class Body:
@@ -215,7 +217,8 @@ class Mirror:
         except SnapshotError as error:
             self._warn(str(error))
             return None
-        return Screen(listed["link"], np.reshape(listed["offset"], (4, 4)), tuple(listed["size"]), picture)
+        return Screen(listed["link"], np.reshape(listed["offset"], (4, 4)), tuple(listed["size"]), picture,
+                      bool(listed.get("glows")))
 
     def _parts_of(self, shape):
         geometry, colour = shape.geometry, shape.colour or DEFAULT_COLOUR

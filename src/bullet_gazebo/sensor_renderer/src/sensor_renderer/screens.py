@@ -17,18 +17,24 @@ class Screens:
         self._square = context.vertex_array(program, [(context.buffer(corners.tobytes()), "2f", "corner")])
         self._program["picture"].value = 1
         self._pictures = {}
+        self._lit = set()  # those with a pixel that is not black
 
     def draw(self, screens, to_clip):
         """Draw ``screens``, as :meth:`visible` lists them."""
         if screens:
             self._program["to_clip"].write(matrix_bytes(to_clip))
-        for texture, matrix in screens:
+        for texture, matrix, glows in screens:
             texture.use(1)
             self._program["body"].write(matrix_bytes(matrix))
+            if glows:
+                self._context.enable(self._context.BLEND)
+                self._context.blend_func = self._context.ONE, self._context.ONE_MINUS_SRC_ALPHA
             self._square.render(self._context.TRIANGLE_STRIP)
+            if glows:
+                self._context.disable(self._context.BLEND)
 
     def visible(self, mirror, pinhole, view):
-        """The screens that show their faces: (texture, matrix of a square of 1 m)."""
+        """The screens that show their faces, lights last: (texture, matrix of a square of 1 m, whether it glows)."""
         found = []
         for body in mirror.bodies.values():
             for screen in body.screens:
@@ -36,8 +42,10 @@ class Screens:
                 face = Link(np.zeros(3), float(np.hypot(*screen.size)) / 2.0, False)
                 local = view @ matrix
                 if local[:3, 2] @ local[:3, 3] < 0.0 and visible([(face, matrix, None)], pinhole, view):
-                    found.append((self._texture(mirror, screen.picture), matrix @ np.diag([*screen.size, 1.0, 1.0])))
-        return found
+                    texture = self._texture(mirror, screen.picture)
+                    if not screen.glows or screen.picture in self._lit:
+                        found.append((texture, matrix @ np.diag([*screen.size, 1.0, 1.0]), screen.glows))
+        return sorted(found, key=lambda entry: entry[2])
 
     def _texture(self, mirror, picture):
         texture = self._pictures.get(picture)
@@ -45,6 +53,7 @@ class Screens:
             there = {screen.picture for body in mirror.bodies.values() for screen in body.screens}
             for gone in self._pictures.keys() - there:
                 self._pictures.pop(gone).release()
+                self._lit.discard(gone)
             texture = self._pictures[picture] = self._context.texture((picture.width, picture.height), 3, alignment=1)
             texture.filter = (self._context.LINEAR_MIPMAP_LINEAR, self._context.LINEAR)
             texture.repeat_x = texture.repeat_y = False
@@ -52,4 +61,5 @@ class Screens:
         if pixels is not None:
             texture.write(pixels.tobytes(), alignment=1)
             texture.build_mipmaps()
+            (self._lit.add if pixels.any() else self._lit.discard)(picture)
         return texture

@@ -248,7 +248,11 @@ SCREEN_FRAGMENT = _HEAD + """
 uniform sampler2D picture;
 in vec2 place;
 out vec4 seen;
-void main() { seen = texture(picture, place); }
+// The brightness is also the opacity, which counts for lights alone.
+void main() {
+    vec3 light = texture(picture, place).rgb;
+    seen = vec4(light, max(light.r, max(light.g, light.b)));
+}
 """
 
 # A grid over the whole picture, at the largest depth. Its colours are computed per vertex.

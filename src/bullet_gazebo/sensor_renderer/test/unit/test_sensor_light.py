@@ -248,6 +248,28 @@ def test_a_screen_shows_its_picture_the_right_way_round(renderer, tmp_path):
     assert not mirror.bodies["floor"].screens
 
 
+def test_a_light_covers_with_its_bright_pixels_alone(renderer, tmp_path):
+    pictures = PictureWriter(tmp_path / "light", 100, 100)
+    place = np.eye(4)
+    place[2, 3] = 0.02
+    light = {"link": "link", "offset": place.ravel().tolist(), "size": [0.8, 0.8], "picture": str(pictures.path)}
+    body = {"name": "sheet", "urdf": SHEET, "joints": []}
+    pose = [0, 0, 0.5, *UPRIGHT]
+    bare = seen(renderer, world(tmp_path, {}, (body, pose)))
+    mirror = world(tmp_path, {}, ({**body, "screens": [{**light, "glows": True}]}, pose))
+    assert (seen(renderer, mirror) == bare).all(), "it is off"
+    pixels = np.zeros((100, 100, 3), dtype=np.uint8)
+    pixels[:50] = (255, 40, 0)
+    pictures.show(pixels)
+    shown = seen(renderer, mirror)
+    changed = np.abs(shown - bare).max(axis=2) > 10
+    assert 0.45 < changed.sum() / (0.8 / 1.48 * PINHOLE.fx) ** 2 < 0.55
+    assert np.median(shown[changed], axis=0) == pytest.approx((255, 40, 0), abs=2)
+    pictures.show(np.zeros_like(pixels))
+    assert (seen(renderer, mirror) == bare).all(), "off again, without a new scene"
+    pictures.close()
+
+
 def test_a_screen_whose_picture_is_gone_is_left_out(tmp_path):
     said = []
     mirror = Mirror(DrawingCache(tmp_path), lambda uri: None, said.append)

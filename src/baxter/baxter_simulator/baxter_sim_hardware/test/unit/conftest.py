@@ -70,6 +70,7 @@ class Lab:
         self._heard = heard
         self.ros = FakeRos(heard=self._is_heard, clock=lambda: self.world.time_s)
         source = PluginSource(robot, element, NAMESPACE)
+        self.lights = {}
         self.context = PluginContext(self.world, self.model, source, self.log, self.ros,
                                      {"baxter_sim_hardware": parameters or {}}, PluginHost(self._screen))
         self.plugin = BaxterPlugin(self.context)
@@ -85,9 +86,13 @@ class Lab:
         for topic, publisher in self.ros.publishers.items():
             publisher.has_listeners = self._is_heard(topic)
 
-    def _screen(self, link, place, size_m, pixels):
-        self.drawn = _Drawn(link, place, size_m, pixels)
-        return self.drawn
+    def _screen(self, link, place, size_m, pixels, glows):
+        drawn = _Drawn(link, place, size_m, pixels)
+        if glows:
+            self.lights[link] = drawn
+        else:
+            self.drawn = drawn
+        return drawn
 
     # -- what tests do with it
 

@@ -2,13 +2,25 @@
 """Buttons, lights, wheels: the core's rules, and the topics and the service that show and move them."""
 from pathlib import Path
 
+import numpy as np
 import pytest
+import rospkg
 from baxter_core_msgs.msg import AnalogOutputCommand, DigitalOutputCommand
 from bullet_sim_msgs.srv import PressRequest
 from std_msgs.msg import Empty
 
 from baxter_sim_hardware.errors import CommandRefused
+from baxter_sim_hardware.sensing import navigator_lights
 from baxter_sim_hardware.sensing.panel import ANALOG, BLOWERS, DIGITAL, LIGHTS, NAVIGATORS, PUMPS, Panel
+from model_files.resources import ResourceFinder
+from sensor_renderer.gl_renderer import GlRenderer
+from sensor_renderer.mirror import Mirror
+from sensor_renderer.pinhole import Pinhole
+from urdf_model import merge_fixed
+from world_picture.drawing import DrawingCache
+from world_picture.shared_picture import PictureWriter
+
+BAXTER = Path(rospkg.RosPack().get_path("baxter_description")) / "urdf" / "baxter.urdf"
 
 
 def test_outputs_follow_and_inputs_refuse():
@@ -150,3 +162,69 @@ def test_the_interfaces_page_lists_each_output_that_nothing_follows_from():
         if name.startswith("torso_ui_output"):
             said = "torso_ui_output"
         assert ("`" + said in section) == (not is_input), name
+
+
+def test_a_light_glows_on_its_navigator_alone(make_lab):
+    lab = make_lab()
+    assert set(lab.lights) == {"left_arm_itb", "right_arm_itb", "left_torso_itb", "right_torso_itb"}
+    areas = {}
+    for light in LIGHTS:
+        lab.send("digital_io/command", DigitalOutputCommand("torso_left_%s_light" % light, True))
+        lab.run(0.02)
+        areas[light] = lab.lights["left_torso_itb"].pixels.any(axis=2)
+        assert [link for link, drawn in lab.lights.items() if drawn.pixels.any()] == ["left_torso_itb"]
+        lab.send("digital_io/command", DigitalOutputCommand("torso_left_%s_light" % light, False))
+        lab.run(0.02)
+        assert not lab.lights["left_torso_itb"].pixels.any()
+    assert not (areas["inner"] & areas["outer"]).any(), "two rings, one around the other"
+    middle = [area[area.shape[0] // 2].nonzero()[0] for area in (areas["outer"], areas["inner"])]
+    assert middle[0].min() < middle[1].min() and middle[1].max() < middle[0].max()
+
+    lab.send("digital_io/command", DigitalOutputCommand("left_outer_light", True))
+    lab.run(0.02)
+    assert lab.lights["left_arm_itb"].pixels.any()
+    lab.plugin.reset()
+    assert not lab.lights["left_arm_itb"].pixels.any()
+
+
+@pytest.mark.parametrize("navigator", NAVIGATORS)
+def test_a_light_is_seen_on_the_robot(make_lab, tmp_path, navigator):
+    """Switched at run time by a client's message, in a picture of the robot from 25 cm in front of the navigator."""
+    lab = make_lab()
+    frames = merge_fixed(lab.context.robot).frames
+    link = navigator_lights.LINKS[navigator]
+    light, itb = lab.lights[link], frames[link]
+    pictures = PictureWriter(tmp_path / "light", *navigator_lights.PIXELS)
+    mirror = Mirror(DrawingCache(), ResourceFinder(), pytest.fail)
+    mirror.set_scene([{"name": "baxter", "urdf": BAXTER.read_text(encoding="utf-8"), "joints": [], "screens": [
+        {"link": itb.link, "offset": (itb.offset @ light.place).ravel().tolist(), "size": light.size_m,
+         "picture": str(pictures.path), "glows": True}]}])
+    body = mirror.bodies["baxter"]
+    body.set_state(np.concatenate([[0, 0, 0, 0, 0, 0, 1], np.zeros(body.size - 7)]))
+    corners = np.concatenate([part.triangles[:, :3] for part in body.parts[body.link_names.index(itb.link)]])
+    corners = (corners - itb.offset[:3, 3]) @ itb.offset[:3, :3]
+    wheel = corners[(np.linalg.norm(corners[:, :2], axis=1) < 0.04) & (corners[:, 2] > 0.024) & (corners[:, 2] < 0.06)]
+    assert (wheel.min(axis=0) + wheel.max(axis=0))[:2] / 2.0 == pytest.approx(light.place[:2, 3], abs=0.002)
+    # Optical frames look along z, y down.
+    camera = np.diag([1.0, -1.0, -1.0, 1.0])
+    camera[2, 3] = 0.25
+    view = body.link_matrix(itb.link) @ itb.offset @ camera
+    renderer, seen = GlRenderer(), []
+    for inner, outer in ((False, False), (True, False), (True, True), (False, False)):
+        for name, on in zip(LIGHTS, (inner, outer), strict=True):
+            lab.send("digital_io/command", DigitalOutputCommand("%s_%s_light" % (navigator, name), on))
+            lab.run(0.02)
+        pictures.show(light.pixels)
+        seen.append(renderer.render(mirror, Pinhole.from_field_of_view(200, 200, 0.6, 0.05, 5.0), view)[0].astype(int))
+    renderer.close()
+    pictures.close()
+    dark, inner, both, again = seen
+    # Most of each ring is in front of the mesh; pixels of 0.7 mm or larger.
+    expected = [(navigator_lights.picture(*on).max(axis=2) > 128).mean() * np.prod(light.size_m)
+                for on in ((True, False), (True, True))]
+    pixel = (2.0 * np.tan(0.3) / 200 * (0.25 - navigator_lights.ABOVE_M)) ** 2
+    for picture, area in zip((inner, both), expected, strict=True):
+        changed = np.abs(picture - dark).max(axis=2) > 15
+        assert changed.sum() * pixel > 0.9 * area
+        assert picture[changed].mean(axis=0)[2] > 200
+    assert (again == dark).all()

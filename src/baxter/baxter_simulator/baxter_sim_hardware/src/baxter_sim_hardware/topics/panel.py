@@ -12,6 +12,7 @@ from bullet_sim_msgs.srv import Press, PressRequest, PressResponse
 from std_msgs.msg import UInt32
 
 from baxter_sim_hardware.errors import CommandRefused
+from baxter_sim_hardware.sensing import navigator_lights
 from baxter_sim_hardware.sensing.panel import ANALOG, BUTTONS, DIGITAL, ESTOP, LIGHTS, NAVIGATORS, Panel, navigator_name
 from sim_time.stamps import stamp
 
@@ -27,10 +28,20 @@ class PanelTopics(Part):
         """press_estop: function(whether the emergency stop is pressed now)."""
         self._panel, self._press_estop = Panel(), press_estop
         self.attach, self.attach_valve = self._panel.attach, self._panel.attach_valve
+        self._drawn = {
+            navigator: context.screen(link, navigator_lights.place(navigator), navigator_lights.SIZE_M,
+                                      navigator_lights.PIXELS, glows=True)
+            for navigator, link in navigator_lights.LINKS.items() if link in context.robot.links}
         context.service(PRESS_SERVICE, Press, self._press)
 
     def reset(self):
         self._panel.reset()
+        for navigator in self._drawn:
+            self._draw(navigator)
+
+    def _draw(self, navigator):
+        _, _, lights = self._panel.navigator(navigator)
+        self._drawn[navigator].show(navigator_lights.picture(*lights))
 
     def cuff_squeezed(self, side):
         """Whether the cuff of one hand is squeezed."""
@@ -61,6 +72,9 @@ class PanelTopics(Part):
 
     def _set_digital(self, component, msg, time_s):
         self._panel.set_digital(msg.name, msg.value)
+        for navigator in self._drawn:
+            if msg.name in ("%s_%s_light" % (navigator, light) for light in LIGHTS):
+                self._draw(navigator)
 
     def _set_analog(self, component, msg, time_s):
         self._panel.set_analog(msg.name, msg.value)
