@@ -4,6 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+# So often a plane is fitted at most; a few times are usual.
+_MOST_FITS = 20
+
 
 class NoPlane(Exception):
     """There is no plane among the points; the text says why."""
@@ -25,7 +28,7 @@ def fit_plane(points, tolerance_m, upwards=(0.0, 0.0, 1.0), seed=0, tries=200):
     """The :class:`Plane` with the most points (n, 3) [m] within `tolerance_m`; its normal points `upwards`.
 
     Three points at a time are tried (Fischler and Bolles, "Random sample consensus", 1981); the best plane is then
-    fitted to its points by least squares. Raises NoPlane.
+    fitted to the points near it by least squares, again and again until these stay the same. Raises NoPlane.
     """
     points = np.asarray(points, dtype=float)
     points = points[np.isfinite(points).all(axis=1)]
@@ -44,8 +47,20 @@ def fit_plane(points, tolerance_m, upwards=(0.0, 0.0, 1.0), seed=0, tries=200):
             best = inliers
     if best is None or best.sum() < 3:
         raise NoPlane("no three of the %d points span a plane" % len(points))
-    middle = points[best].mean(axis=0)
-    _, _, axes = np.linalg.svd(points[best] - middle, full_matrices=False)
+    # Fitted again to the points near the fitted plane: a plane through three noisy points is tilted, and so are the
+    # borders of the points near it.
+    for _ in range(_MOST_FITS):
+        plane = _fitted(points, best, upwards, tolerance_m)
+        if (plane.inliers == best).all() or plane.inliers.sum() < 3:
+            break
+        best = plane.inliers
+    return plane
+
+
+def _fitted(points, chosen, upwards, tolerance_m):
+    """The Plane by least squares through the ``chosen`` points; its inliers are those of all points."""
+    middle = points[chosen].mean(axis=0)
+    _, _, axes = np.linalg.svd(points[chosen] - middle, full_matrices=False)
     normal = axes[2] if axes[2] @ upwards >= 0.0 else -axes[2]
     distance = float(normal @ middle)
     return Plane(normal, distance, np.abs(points @ normal - distance) < tolerance_m)

@@ -204,6 +204,17 @@ def test_the_table_is_the_plane_of_what_the_kinect_measures(renderer, tmp_path):
     assert np.median(standing, axis=0) == pytest.approx([0.05, 0.05, BLOCK_SIZE_M], abs=0.008)
 
 
+def test_a_plane_does_not_lean_as_the_points_that_found_it():
+    random = np.random.default_rng(2)
+    worst = 0.0
+    for seed in range(10):
+        points = np.column_stack([random.uniform(-0.3, 0.3, (3000, 2)), random.normal(0.0, 0.004, 3000)])
+        points[:150, 2] += random.uniform(0.0, 0.06, 150)  # something stands on it
+        plane = fit_plane(points, 0.008, seed=seed)
+        worst = max(worst, math.degrees(math.acos(plane.normal[2])))
+    assert worst < 0.09
+
+
 def test_points_without_a_plane_are_said():
     with pytest.raises(NoPlane, match="2 points are too few"):
         fit_plane(np.zeros((2, 3)), 0.01)
