@@ -63,8 +63,9 @@ from world_picture.snapshot import SnapshotError
 
 FIRST_PORT = 8090
 _LARGEST_PORT = 65535
-#: Period of poses to the pages [s]; of looks at what changes rarely [s].
-_POSES_S, _LOOK_S = 0.05, 1.0
+#: Period of poses to the pages [s]; of looks at what changes rarely, each some questions to the master [s]; the same
+#: while nobody needs them.
+_POSES_S, _LOOK_S, _LOOK_UNSEEN_S = 0.05, 1.0, 5.0
 # Between reads of the robot's topics, and of the clock, for which other clients may still wait, without a page [s].
 _REST_S, _REST_OF_CLOCK_S = 0.05, 0.02
 # Between warnings of the same [s].
@@ -177,7 +178,7 @@ def serve(options, page, libraries):
     address = ""
     try:
         address = _announce(serving.port, tokens, options.public)
-        lasting(faults, "the robot's parts", partial(_watch, robot, equipment, pages))(rospy.is_shutdown)
+        lasting(faults, "the robot's parts", partial(_watch, robot, equipment, pages, is_needed))(rospy.is_shutdown)
     finally:
         page_files.remove_address(rosgraph.get_master_uri(), address)
         rospy.signal_shutdown("the end")
@@ -303,8 +304,9 @@ def _announce(port, tokens, public):
     return operators
 
 
-def _watch(robot, equipment, pages, ends):
-    """Look after what changes rarely, until the node or the lab ends."""
+def _watch(robot, equipment, pages, is_needed, ends):
+    """Look after what changes rarely, until the node or the lab ends; at once when somebody needs it (``is_needed``)
+    after a time without."""
     told, types, results = None, {}, Results(page_files.result_file())
     while not ends():
         if not rosgraph.is_master_online():
@@ -329,7 +331,10 @@ def _watch(robot, equipment, pages, ends):
             if now != told:
                 pages.share("robot", now)
                 told = now
+        looked = time.monotonic()
         rospy.rostime.wallsleep(_LOOK_S)
+        while not ends() and not is_needed() and time.monotonic() - looked < _LOOK_UNSEEN_S:
+            rospy.rostime.wallsleep(_POSES_S)
 
 
 def _described(robot, equipment, published):
