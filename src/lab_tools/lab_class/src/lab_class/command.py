@@ -109,6 +109,14 @@ def _positive(text):
     return int(_number(text, "a whole number from 1", 0.5))
 
 
+def _launch(text):
+    """The words of a launch line. A file of this folder gets its whole path: labs run in another folder."""
+    words = text.split()
+    if words and Path(words[0]).is_file():
+        words[0] = str(Path(words[0]).resolve())
+    return tuple(words)
+
+
 def _students(who):
     if who.isdecimal():
         return roster.numbered(int(who))
@@ -127,7 +135,7 @@ def _record(options, store):
     if options.who is None and earlier is None:
         raise RosterError("there is no class of last time in %s; say how many students: ./baxter.sh labs up N, or a "
                           "CSV file with their names" % store.folder)
-    given = {"launch": tuple(options.launch.split()) if options.launch else None, "port": options.port,
+    given = {"launch": _launch(options.launch) if options.launch else None, "port": options.port,
              "public": options.public, "trusted": options.trusted, "memory_bytes": options.memory,
              "disk_bytes": options.disk, "at_once": options.at_once, "keep_running": options.keep_running}
     values = {name: value for name, value in given.items() if value is not None}
