@@ -75,10 +75,7 @@ def keyboard(lab):
 @check("joint_position_joystick.launch xbox")
 def joystick(lab):
     robot = lab.robot
-    with lab.joystick() as stick, lab.roslaunch("baxter_examples", "joint_position_joystick.launch", "joystick:=xbox",
-                                                "dev:=" + stick.path) as program:
-        stick.plug_in()
-        program.expect("Press Ctrl-C to stop")
+    with lab.steered("joint_position_joystick.launch", "xbox", "Press Ctrl-C to stop") as (stick, program):
         ask_for_help(stick, program)
         beyond = 0.0
         for side in SIDES:
@@ -91,7 +88,7 @@ def joystick(lab):
                     robot.wait_for_way(name, start, 0.1 * way)
                     stick.push(axis, 0.0)
                     at = robot.angles[name]
-                    rospy.sleep(0.5)
+                    rospy.sleep(0.5)  # whether it goes on is what is tested
                     robot.wait_for_rest(name)
                     beyond = max(beyond, abs(robot.angles[name] - at))
                 assert beyond < 0.3, "a joint went on by %.3f rad after its stick was released" % beyond
@@ -135,11 +132,12 @@ def wobbler(lab):
     with lab.rosrun("baxter_examples", "joint_velocity_wobbler.py") as program:
         program.expect("Wobbling. Press Ctrl-C")
         watch = lab.robot.watch()
-        rospy.sleep(6.0)
+        wait_until(lambda: all(name in watch.high and watch.span(name) > 0.03 for name in names),
+                   "all joints to swing", 30.0)
         lab.robot.unwatch(watch)
         program.stop()
     least, fastest = min(map(watch.span, names)), max(watch.speed[name] for name in names)
-    assert least > 0.03 and fastest < 0.5, "a joint swings by %.3f rad; speeds up to %.2f rad/s" % (least, fastest)
+    assert fastest < 0.5, "speeds up to %.2f rad/s" % fastest
     return {"least_swing_rad": least, "fastest_rad_s": fastest, "home_off_rad": lab.at(lab.neutral, 0.05)}
 
 
@@ -150,11 +148,15 @@ def puppet(lab):
         program.expect("Puppeting:")
         before = dict(robot.angles)
         robot.move_by("left", 0.35)
-        rospy.sleep(1.0)
-        moved = {name: robot.angles[name] - before[name] for name in before}
-        ratios = [moved["right_" + joint] / (sign * moved["left_" + joint]) for joint, sign in MIRROR_SIGNS.items()]
+
+        def shares():
+            moved = {name: robot.angles[name] - before[name] for name in before}
+            return [moved["right_" + joint] / (sign * moved["left_" + joint]) for joint, sign in MIRROR_SIGNS.items()]
+
+        wait_until(lambda: all(0.75 < share < 1.25 for share in shares()),
+                   lambda: "the other arm to follow; its shares of the motion: %s" % shares(), 10.0)
+        ratios = shares()
         program.stop()
-    assert all(0.75 < ratio < 1.25 for ratio in ratios), "the other arm's share of the motion: %s" % ratios
     return {"least_share": min(ratios), "largest_share": max(ratios)}
 
 
@@ -172,7 +174,7 @@ def springs(lab):
 
         def deflection():
             robot.push("left_wrist", (0.0, 0.0, PUSH_N), 8.0)
-            rospy.sleep(5.0)
+            rospy.sleep(5.0)  # a spring swings: its mean is taken after a fixed time
             deflected = lab.mean_off(home, 2.0)
             robot.release("left_wrist")
             return deflected
@@ -201,7 +203,7 @@ def recorder(lab):
         robot.press("left_upper_button", lambda: robot.wait_for_gripper("left", 0, 5))
         robot.press("left_lower_button", lambda: robot.wait_for_gripper("left", 95, 100))
         robot.move({name: lab.neutral[name] + 0.3 * change for name, change in PLAYED.items()})
-        rospy.sleep(1.0)
+        rospy.sleep(1.0)  # a second of rest belongs to the recording
         seconds = rospy.get_time() - begin
         robot.unwatch(watch)
         program.stop()
@@ -248,7 +250,8 @@ def trajectory_playback(lab):
                        "file_path:=%s" % lab.recording[0]) as program:
         program.expect("Exiting - File Playback Complete", 120.0)
         assert "failed or did not finish" not in program.output, program.output[-300:]
-        rospy.sleep(0.5)
+        for name in PLAYED:
+            lab.robot.wait_for_rest(name)
         measured = judge_playback(lab, watch, 0.04)
         program.stop()
     lab.robot.unwatch(watch)

@@ -59,10 +59,7 @@ def gripper_keyboard(lab):
 @check("gripper_joystick.launch logitech")
 def gripper_joystick(lab):
     robot = lab.robot
-    with lab.joystick() as stick, lab.roslaunch("baxter_examples", "gripper_joystick.launch", "joystick:=logitech",
-                                                "dev:=" + stick.path) as program:
-        stick.plug_in()
-        program.expect("Ctrl-C to stop...")
+    with lab.steered("gripper_joystick.launch", "logitech", "Ctrl-C to stop...") as (stick, program):
         ask_for_help(stick, program)
         for side in SIDES:
             seen = len(program.output)

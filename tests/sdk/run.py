@@ -67,9 +67,15 @@ class Lab:
     def roslaunch(self, package, file, *arguments):
         return Program(["roslaunch", package, file, *arguments], self._theirs, self.folder)
 
-    def joystick(self):
-        """A FakeJoystick, not plugged in yet."""
-        return contextlib.closing(FakeJoystick(STICKS_AT_REST, [0] * BUTTONS))
+    @contextlib.contextmanager
+    def steered(self, file, kind, ready):
+        """An example's launch file with a joystick of a kind, plugged in: (FakeJoystick, Program) once it is ``ready``.
+        """
+        with contextlib.closing(FakeJoystick(STICKS_AT_REST, [0] * BUTTONS)) as stick, \
+                self.roslaunch("baxter_examples", file, "joystick:=" + kind, "dev:=" + stick.path) as program:
+            stick.plug_in()
+            program.expect(ready)
+            yield stick, program
 
     def prepare(self):
         """Enable the robot and bring arms, grippers and head to where each check begins."""
