@@ -67,7 +67,9 @@ class FakeParts:
         self._lock = threading.RLock()
         self.reload(None)
         self._services = []
-        panel = PanelTopics(SimpleNamespace(service=self._serve), lambda pressed: None)
+        # Lights are drawn at links, of which there are none here.
+        context = SimpleNamespace(service=self._serve, robot=SimpleNamespace(links={}))
+        panel = PanelTopics(context, lambda pressed: None)
         panel.attach(RANGE, lambda: RANGE_MM)
         self._joint = PanJoint()
         # The robot is enabled here.
