@@ -13,7 +13,7 @@ from lab_testing.waiting import wait_until
 # The keys of each arm's joints, in the order s0 ... w2: increase and decrease.
 KEYS = {"left": ("98oilk.", "67yuhjn"), "right": ("43refdv", "12qwasz")}
 GRIPPER_KEYS = {"left": ",m/", "right": "cxb"}  # close, open, calibrate
-KEY_TRIES = 3  # the programs drop keys that come while they set the terminal; a user presses again
+KEY_TRIES = 3  # the programs discard what is typed while they do not read; a user presses again
 # axes of joystick.launch's sticks: the right arm's two, the left arm's two
 STICKS = {"right": (0, 1), "left": (3, 4)}
 BUMPER = {"right": 4, "left": 5}
@@ -27,10 +27,10 @@ PLAYED = {"left_s0": 0.3, "left_w1": -0.3, "right_s0": -0.3, "right_w1": 0.3}
 
 
 def press_key(program, key, spoken, timeout_s=4.0):
-    """Type ``key`` until the program says that it has it; return how often it was lost."""
+    """Press ``key`` until the program says that it has it; return how often it was lost."""
     for lost in range(KEY_TRIES):
         seen = len(program.output)
-        program.type(key)
+        program.press(key)
         try:
             program.expect(spoken, timeout_s, seen)
             return lost
@@ -67,7 +67,7 @@ def keyboard(lab):
             for key, (low, high) in zip(GRIPPER_KEYS[side], ((0, 5), (95, 100), (90, 100)), strict=True):
                 lost += press_key(program, key, "command: ")
                 robot.wait_for_gripper(side, low, high)
-        program.type("\x1b")
+        program.press("\x1b")
         program.finish()
     return {"keys": 34, "keys_lost": lost, "off_rad": max(errors)}
 

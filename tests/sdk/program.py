@@ -5,6 +5,7 @@ import os
 import pty
 import signal
 import subprocess
+import termios
 import threading
 import time
 
@@ -12,6 +13,7 @@ from lab_testing.processes import living
 from lab_testing.waiting import wait_until
 
 END_LIMIT_S = 40.0
+READING_POLL_S = 0.0005  # a program may read keys for 10 ms only
 
 
 class Program:
@@ -61,6 +63,16 @@ class Program:
 
     def type(self, keys):
         os.write(self._terminal, keys.encode())
+
+    def press(self, key, timeout_s=30.0):
+        """Type ``key`` while the program reads single keys: setting the terminal to that discards earlier ones.
+
+        Raises AssertionError if the program does not read single keys within ``timeout_s`` [s] of wall time.
+        """
+        # This side of a pseudo-terminal shows the settings of the other one.
+        wait_until(lambda: not termios.tcgetattr(self._terminal)[3] & termios.ICANON, "a program that reads keys",
+                   timeout_s, READING_POLL_S)
+        self.type(key)
 
     def interrupt(self):
         """Press Ctrl-C: every process of the terminal gets SIGINT."""

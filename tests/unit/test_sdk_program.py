@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from lab_testing.processes import is_alive
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "sdk"))
 from program import Program  # noqa: E402
 
@@ -18,6 +20,13 @@ tty.setraw(0)
 print("terminal", sys.stdin.isatty(), flush=True)
 while (key := sys.stdin.read(1)) != "q":
     print("key", key, flush=True)
+"""
+DISCARDS_KEYS = """
+import sys, time, tty
+print("up", flush=True)
+time.sleep(0.5)
+tty.setraw(0)
+print("key", sys.stdin.read(1), flush=True)
 """
 CHILD = """
 import signal, subprocess, sys
@@ -37,6 +46,14 @@ def test_keys_arrive_in_a_terminal_and_the_program_ends(tmp_path):
         program.type("x")
         program.expect("key x", beyond=place)
         program.type("q")
+        program.finish()
+
+
+def test_a_pressed_key_waits_for_a_program_that_discards_earlier_ones(tmp_path):
+    with start(DISCARDS_KEYS, tmp_path) as program:
+        program.expect("up")
+        program.press("x")
+        program.expect("key x", timeout_s=20.0)
         program.finish()
 
 
@@ -63,5 +80,4 @@ def test_no_child_is_left_even_if_it_ignores_ctrl_c(tmp_path):
         place = program.expect("child ")
         program.expect("\n", beyond=place)
         child = int(program.output[place:].split()[0])
-    with pytest.raises(ProcessLookupError):
-        os.kill(child, 0)
+    assert not is_alive(child)
