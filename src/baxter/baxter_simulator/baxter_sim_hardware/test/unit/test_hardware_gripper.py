@@ -194,6 +194,17 @@ def test_holds_from_inside_what_stands_around_its_fingers(lab):
     assert held.force == pytest.approx(30.0, abs=2.0)
 
 
+@pytest.mark.parametrize("held", [False, True])
+def test_the_hands_pose_is_looked_up_only_while_the_fingers_touch_something(lab, monkeypatch, held):
+    if held:
+        hold_box(lab)
+    looked, link_pose = [], lab.model.link_pose
+    monkeypatch.setattr(lab.model, "link_pose", lambda link: looked.append(link) or link_pose(link))
+    lab.run(0.2)
+    assert ("left_gripper" in looked) is held
+    assert (state(lab).force > 1.0) is held
+
+
 def test_flags_stay_while_something_is_held(lab):
     hold_box(lab)
     seen = lab.publishers["end_effector/left_gripper/state"].messages

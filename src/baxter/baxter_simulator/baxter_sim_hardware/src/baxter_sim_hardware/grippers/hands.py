@@ -45,9 +45,11 @@ class FingersHand:
 
     def _squeeze(self):
         """Force on the fingers along their travel, the mean of both [% of the joints' effort limit]."""
+        forces = [force for link in self._links if (force := self._model.contact_force(link)).any()]
+        if not forces:
+            return 0.0  # mostly, and the pose below costs more than all else in a state message
         along = self._model.link_pose(self._tip).matrix()[:3, 1]
-        forces = [abs(float(self._model.contact_force(link) @ along)) for link in self._links]
-        return 100.0 * sum(forces) / float(self._max_effort.sum())
+        return 100.0 * sum(abs(float(force @ along)) for force in forces) / float(self._max_effort.sum())
 
     def update(self, joints):
         """One tick; joints: (position, velocity, effort) of the whole model."""
