@@ -30,7 +30,8 @@ class Options:
     ``disk_bytes``: of each lab; ``at_once``: labs that start at a time.
     """
 
-    launch: tuple = ("baxter_gazebo", "baxter_world.launch", "gui:=false", "clock_rate:=250")
+    launch: tuple = ("baxter_gazebo", "baxter_world.launch", "gui:=false", "clock_rate:=250",
+                     "light_tf:=true")
     port: int = 8100
     public: bool = False
     trusted: bool = False

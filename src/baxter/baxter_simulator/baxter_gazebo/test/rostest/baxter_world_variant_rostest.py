@@ -4,7 +4,9 @@
 import unittest
 
 import rospy
+import tf2_ros
 from robot_client import SIDES, Robot, joints
+from tf2_msgs.msg import TFMessage
 
 from lab_testing.waiting import wait_until
 
@@ -35,6 +37,26 @@ class BaxterWorldVariantTest(unittest.TestCase):
         stamps = [message.header.stamp.to_sec() for message in messages][1:]
         for earlier, later in zip(stamps, stamps[1:], strict=False):
             self.assertAlmostEqual(later - earlier, 0.01, delta=1e-6)
+
+    def test_b_tf_has_every_joint_at_50_hz(self):
+        stamps = {}
+
+        def note(message):
+            if message._connection_header["callerid"] == "/robot_state_publisher":
+                for one in message.transforms:
+                    stamps.setdefault(one.child_frame_id, []).append(one.header.stamp.to_nsec())
+
+        subscriber = rospy.Subscriber("/tf", TFMessage, note)
+        wait_until(lambda: len(stamps.get("left_upper_shoulder", ())) > 50, "tf")
+        subscriber.unregister()
+        self.assertEqual(len(stamps), 2 * 7 + 1)
+        for of_one in stamps.values():
+            self.assertEqual({b - a for a, b in zip(of_one, of_one[1:], strict=False)}, {20_000_000})
+        buffer = tf2_ros.Buffer()
+        listener = tf2_ros.TransformListener(buffer)
+        for frame in ("left_gripper", "right_hand_camera", "head_camera", "reference/left_gripper"):
+            wait_until(lambda frame=frame: buffer.can_transform("world", frame, rospy.Time()), "tf of " + frame)
+        listener.unregister()
 
     def test_c_position_mode_begins_at_the_robots_speed(self):
         robot = self.robot
