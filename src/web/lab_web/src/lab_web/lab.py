@@ -11,7 +11,7 @@ import threading
 import time
 
 from lab_web.control import SILENCE_S, Control, NotInControl
-from lab_web.motion import Motion, MotionError
+from lab_web.motion import Motion, MotionError, held
 
 #: Period of commands to the robot while it moves [s].
 TICK_S = 0.01
@@ -36,6 +36,8 @@ class Lab:
         self._lock = threading.Lock()
         self._control = Control(silence_s)
         self._motion = Motion({})
+        # Of the last step of the motion.
+        self._setpoints = {}
         self._moving = threading.Event()
         self._served = dict(_OPERATIONS)
         self._for_viewers = set()
@@ -118,6 +120,7 @@ class Lab:
         with self._lock:
             if not self._motion.is_moving:
                 self._moving.clear()
+                self._setpoints = {}
                 if not self._control.is_alive(self._clock()):
                     for release in self._releases_of_silent:
                         release()
@@ -125,7 +128,8 @@ class Lab:
             client, why, lost = self._control.holder, self._robot.why_not_ready(), None
             if self._control.is_alive(self._clock()) and not why:
                 try:
-                    self._robot.command(self._motion.step(dt, self._measured()))
+                    self._setpoints = self._motion.step(dt, self._measured())
+                    self._robot.command(self._setpoints)
                     return
                 except MotionError as error:
                     lost = error
@@ -155,10 +159,9 @@ class Lab:
 
     def _halt(self):
         if self._motion.stop():
-            # The set-point in front of the joints: hold where they are now.
-            measured = self._measured()
             if not self._robot.why_not_ready():
-                self._robot.command({joint: measured[joint] for joint in self._motion.limits if joint in measured})
+                self._robot.command(held(self._motion.limits, self._setpoints, self._measured()))
+            self._setpoints = {}
         self._moving.clear()
         for release in self._releases:
             release()

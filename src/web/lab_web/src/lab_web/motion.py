@@ -16,6 +16,9 @@ LEAD_RAD = 0.2
 #: Something else has moved a joint that is further than this from its set-point [rad]: a reset of the world, a hand.
 #: Going on would take it there at its full speed.
 LOST_RAD = 2.0 * LEAD_RAD
+#: A joint that is further behind its set-point than this [rad] is held by something; a free one is by 0.03 s of its
+#: speed, and by 0.15 s of it beside other work on the machine.
+FREE_RAD = 0.5 * LEAD_RAD
 #: A joint nearer to its target than this has arrived [rad].
 NEAR_RAD = 1e-4
 
@@ -47,6 +50,16 @@ def check_not_lost(setpoints, measured):
         if abs(position - measured.get(joint, position)) > LOST_RAD:
             raise MotionError("something else has moved %s: it is at %.2f rad, and was sent to %.2f rad"
                               % (joint, measured[joint], position))
+
+
+def held(joints, setpoints, measured):
+    """Where ``joints`` that move stop: {joint: [rad]} of those with a measured position, at once and without turning
+    back. ``setpoints``: the last ones; both {joint: [rad]}.
+
+    A free joint is a little behind its set-point, and stops there. One that is held by something stays where it is.
+    """
+    return {joint: setpoints[joint] if abs(setpoints.get(joint, math.inf) - measured[joint]) <= FREE_RAD
+            else measured[joint] for joint in joints if joint in measured}
 
 
 class _Course:

@@ -246,6 +246,17 @@ def test_the_set_point_waits_for_a_joint_that_is_held():
     assert LEAD_RAD < setpoints["left_s0"] - START["left_s0"] < LEAD_RAD + 0.02
 
 
+@pytest.mark.parametrize(("behind", "is_free"), [(0.4 * LEAD_RAD, True), (0.9 * LEAD_RAD, False)])
+def test_a_joint_that_follows_stops_at_its_set_point_and_one_that_is_held_where_it_is(hall, behind, is_free):
+    hall.lab.serve(1, True, {"op": "take"})
+    move(hall, left_s0=1.5)
+    hall.pass_time(1.0, beats_of=1)
+    sent = hall.robot.positions["left_s0"]
+    hall.robot.measured = lambda: {"left_s0": sent - behind, "left_w2": -0.5}
+    hall.lab.gone(1)
+    assert hall.robot.positions == {"left_s0": pytest.approx(sent if is_free else sent - behind), "left_w2": -0.5}
+
+
 def test_joints_without_bounds_or_speed_cannot_be_moved():
     made = (("bounded", "revolute", 'velocity="2" lower="-1" upper="1"'), ("endless", "continuous", 'velocity="2"'),
             ("slow", "revolute", 'velocity="0" lower="-1" upper="1"'))
