@@ -80,7 +80,7 @@ class LabNotebook(PageTest):
         if self.browser.evaluate("document.getElementById('notebook').hidden"):
             self.browser.click("#notebook-toggle")
         self.browser.wait("lab.notebook.loaded", 200.0)
-        self.browser.evaluate("%s.src = 'notebook/lab/tree/%s'" % (FRAME, name))
+        self.browser.evaluate("%s.src = lab.notebook.address('%s')" % (FRAME, name))
         self.browser.wait("%s.contentWindow.location.pathname.endsWith('%s')" % (FRAME, name))
         self.browser.wait("%s.contentDocument.querySelector('.jp-NotebookPanel:not(.lm-mod-hidden) "
                           ".jp-Notebook-ExecutionIndicator')?.dataset.status === 'idle'" % FRAME, 200.0)
@@ -141,8 +141,8 @@ class LabNotebook(PageTest):
         self.assertLessEqual(self.browser.evaluate("document.documentElement.scrollWidth"), 390)
         self.browser.evaluate("document.getElementById('exercise').scrollIntoView()")
         self.keep("lab_page_notebook_telephone")
-        left, right, top, _ = self.box("#exercise-verdict")
-        self.assertTrue(0 <= left < right <= 390 and 0 <= top < 844, (left, right, top))
+        left, right, top, bottom = self.box("#exercise-verdict")
+        self.assertTrue(0 <= left < right <= 390 and self.box("header")[3] < top < bottom < 844, (left, right, top))
         left, right, top, bottom = self.box("#stop")
         self.assertTrue(0 <= left < right <= 390 and 0 <= top < bottom <= 844, "stop is in sight")
 

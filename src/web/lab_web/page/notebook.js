@@ -6,6 +6,8 @@ import {text} from "./texts.js";
 const byId = (name) => document.getElementById(name);
 // The notebook's share of the width [%], as the separator says it.
 const [LEAST, MOST, STEP, DEFAULT] = [20, 80, 5, 55];
+// Below this width [px] JupyterLab shows a notebook alone: its list of files would leave too little beside it.
+const NARROW = 800;
 
 export class Notebook {
   constructor(send, query) {
@@ -69,8 +71,14 @@ export class Notebook {
     const {state, number} = this.state;
     if (state !== "running" || (this.loaded === number && !again)) return;
     this.loaded = number;
-    const path = byId("notebook-file").value;
-    byId("notebook-frame").src = `notebook/lab${path && `/tree/${path.split("/").map(encodeURIComponent).join("/")}`}${this.query}`;
+    byId("notebook-frame").src = this.address(byId("notebook-file").value);
+  }
+
+  // Of a file below the topmost folder, or, for "", of the list of files.
+  address(path) {
+    if (!path) return `notebook/lab${this.query}`;
+    const mode = byId("notebook-frame").clientWidth < NARROW ? "doc" : "lab";
+    return `notebook/${mode}/tree/${path.split("/").map(encodeURIComponent).join("/")}${this.query}`;
   }
 
   startSplit() {

@@ -150,7 +150,7 @@ class Server:
             "poses": ["neutral"], "hands": hands.sides, "grippers": SIDES, "cameras": [], "has_scene": True,
             "can_plan": True, "can_press": True, "things": ["block"]})
         application = web.Application([*routes(self.pages, PAGE, libraries), *upload_routes(self.pages, recorder),
-                                       (r"/notebook/lab.*", Frame),
+                                       (r"/notebook/(?:lab|doc).*", Frame),
                                        (r"/rosbridge", Rosbridge, {"sockets": self._sockets})])
         self._serving = Serving(self.loop, application, 0, "127.0.0.1")
         self.address = "http://127.0.0.1:%d/?token=" % self._serving.port
