@@ -42,6 +42,20 @@ def test_the_tab_key_comes_to_every_control_and_each_has_a_role_and_a_name(lab, 
     assert not unseen
 
 
+@pytest.mark.parametrize("width", [390, 1000])
+def test_what_is_scrolled_to_is_not_behind_the_header(lab, browser, width):
+    browser.resize(width, 400)
+    browser.evaluate("document.querySelectorAll('details').forEach((part) => { part.open = true; })")
+    behind = browser.evaluate("""[...document.querySelectorAll("main h2, main summary")]
+        .filter((one) => one.checkVisibility()).filter((one) => {
+            one.scrollIntoView();
+            const {left, top} = one.getBoundingClientRect();
+            return document.elementFromPoint(left + 1, top + 1)?.closest("h2, summary") !== one;
+        }).map((one) => one.textContent)""")
+    browser.resize(1000, 800)
+    assert behind == []
+
+
 def test_enter_switches_a_checkbox_and_the_space_bar_stops(lab, browser):
     browser.evaluate("document.getElementById('show-frames').focus()")
     for wanted in (True, False):
