@@ -40,12 +40,13 @@ def measure(report, quick, number):
             thread.start()
         samples = []
         try:
-            begin = time.monotonic()
-            while (time_s := time.monotonic() - begin) < 60.0 * minutes:
-                samples.append((time_s, *sizes(web.process.pid)))
-                time.sleep(SAMPLE_S)
+            with kept() as keep:
+                begin = time.monotonic()
+                while (time_s := time.monotonic() - begin) < 60.0 * minutes:
+                    samples.append((time_s, *sizes(web.process.pid)))
+                    keep(samples[-1])
+                    time.sleep(SAMPLE_S)
         finally:
-            save(samples)
             ended.set()
             for thread in crowds:
                 thread.join(TIMEOUT_S)
@@ -73,12 +74,13 @@ def sizes(pid):
     return memory_kb / 1024.0, int(fields["Threads"]), len(os.listdir("/proc/%d/fd" % pid))
 
 
-def save(samples):
-    """Keep all samples in .baxter/bench: the figures of two fifths do not show what happened between them."""
+@contextlib.contextmanager
+def kept():
+    """Yield a function that keeps a sample in .baxter/bench: the figures of two fifths do not show what is between."""
     OUT.mkdir(parents=True, exist_ok=True)
-    with (OUT / "web_soak.csv").open("w") as file:
+    with (OUT / "web_soak.csv").open("w", buffering=1) as file:
         file.write("time [s],memory [MB],threads,descriptors\n")
-        file.writelines("%.1f,%.1f,%d,%d\n" % sample for sample in samples)
+        yield lambda sample: file.write("%.1f,%.1f,%d,%d\n" % sample)
 
 
 def visits(address, ended, counts):
