@@ -8,10 +8,13 @@ import json
 import statistics
 import threading
 import time
+from socket import SHUT_RDWR
 
 import cv2
 import numpy as np
-from labs import Lab
+from baxter_core_msgs.msg import JointCommand
+from labs import Lab, Sink
+from sensor_msgs.msg import JointState
 from websocket import WebSocketException, create_connection
 
 from lab_testing.browser import Browser, why_not
@@ -26,6 +29,11 @@ STATE = ("/robot/state", "baxter_core_msgs/AssemblyState")
 #: The camera that is opened, and how.
 CAMERA, SETTINGS = "left_hand_camera", {"width": 640, "height": 400, "fps": 30.0}
 IMAGE = ("/cameras/%s/image/compressed" % CAMERA, "sensor_msgs/CompressedImage")
+#: The joint that an operator drags, and to where, in turn [rad]; above the first speed it moves, below the other one
+#: in as many joint states it is at rest [rad/s]; how long it moves at least [s].
+JOINT, GOALS = "left_s0", ({"left_s0": 1.4}, {"left_s0": -0.2})
+FAST, SLOW, RESTING_ROWS, MOVING_S = 0.4, 0.05, 50, 0.3
+COMMANDS = "/robot/limb/left/joint_command"
 TIMEOUT_S = 60.0
 
 
@@ -43,6 +51,10 @@ class Socket:
 
     def beat(self):
         self._socket.send("beat")
+
+    def cut(self):
+        """End the connection without a farewell."""
+        self._socket.shutdown()
 
     def close(self):
         self._socket.close()
@@ -98,6 +110,7 @@ def measure(report, quick, number):
         camera(report, web, seconds)
         if not why_not():
             page(report, web, times)
+        vanish(report, lab, web, 2 if quick else 10)
         stop(report, web, 3 if quick else 10)
 
 
@@ -223,6 +236,116 @@ def page(report, web, times):
         browser.close()
 
 
+class Operator:
+    """A page in control of the robot, as a context manager. ``socket``: its connection; ``goals`` {joint: [rad]} go
+    with each heartbeat, as while a slider is dragged; ``last_s``: the time of the last heartbeat [s].
+    """
+
+    def __init__(self, web, goals=None):
+        self._web = web
+        self._goals = goals
+        self._beats = threading.Event()
+        self._ended = threading.Event()
+        self.last_s = 0.0
+
+    def __enter__(self):
+        self.socket = Socket(self._web.page, lambda *_: None)
+        self._thread = threading.Thread(target=self._beat)
+        self.socket.beat()
+        self.socket.send(op="take")
+        self._beats.set()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._ended.set()
+        self._thread.join()
+        self.socket.close()
+
+    def fall_silent(self):
+        """Send nothing from now on, and stay connected: as behind a network that has gone."""
+        self._beats.clear()
+
+    def go(self):
+        """Close the connection without a farewell: as a browser that is killed."""
+        self._beats.clear()
+        self.socket.cut()
+
+    def _beat(self):
+        while not self._ended.wait(HEARTBEAT_S):
+            if not self._beats.is_set():
+                continue
+            with contextlib.suppress(OSError, WebSocketException):
+                self.last_s = time.monotonic()
+                self.socket.beat()
+                if self._goals is not None:
+                    self.socket.send(op="move", joints=self._goals)
+
+
+class Heard:
+    """Messages of a topic as its publisher sends them, as a context manager; ``rows``: (time [s], message)."""
+
+    def __init__(self, lab, topic, message_class):
+        self._connection, self._class = lab.sink(topic, message_class), message_class
+        self.rows = []
+
+    def __enter__(self):
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._connection.shutdown(SHUT_RDWR)
+        self._thread.join()
+        self._connection.close()
+
+    def _read(self):
+        sink = Sink(self._connection)
+        # The sink's way to say that the connection has ended.
+        with contextlib.suppress(OSError, SystemExit):
+            while True:
+                message = self._class().deserialize(sink.message())
+                self.rows.append((time.monotonic(), message))
+
+
+def vanish(report, lab, web, times):
+    """From the last heartbeat of an operator who streams and vanishes to the arm's last command, and to its rest."""
+    enable(web)
+    goals = itertools.cycle(GOALS)
+    for how, leave in (("falls silent", Operator.fall_silent), ("is killed", Operator.go)):
+        commanded, rested = [], []
+        for goal in itertools.islice(goals, times):
+            with Operator(web, goal) as operator, Heard(lab, COMMANDS, JointCommand) as commands, \
+                    Heard(lab, JOINTS[0], JointState) as states:
+                wait_until(lambda states=states: fastest(states.rows[-1:]) > FAST, "an arm that moves", TIMEOUT_S)
+                time.sleep(MOVING_S)
+                leave(operator)
+                wait_until(lambda states=states: fastest(states.rows[-RESTING_ROWS:]) < SLOW, "an arm at rest",
+                           TIMEOUT_S)
+            commanded.append(commands.rows[-1][0] - operator.last_s)
+            rested.append(max(time_s for time_s, message in states.rows if fastest([(0.0, message)]) > SLOW)
+                          - operator.last_s)
+        report.add("an operator who drags a slider %s: last heartbeat to last command, the longest" % how,
+                   1000.0 * max(commanded), "ms", samples=times, most=200.0)
+        report.add("the same to an arm slower than %g rad/s" % SLOW, 1000.0 * max(rested), "ms", samples=times)
+
+
+def fastest(rows):
+    """The highest speed of the dragged joint in (time, JointState) [rad/s]; 0 before it is known."""
+    speeds = [abs(dict(zip(message.name, message.velocity, strict=True)).get(JOINT, 0.0)) for _, message in rows]
+    return max(speeds, default=0.0)
+
+
+def enable(web):
+    """Enable the robot, and wait for it."""
+    state = {}
+    states = web.listen(*STATE, lambda message, _time_s: state.update(message))
+    with Operator(web) as operator:
+        wait_until(lambda: state.get("enabled") or operator.socket.send(op="enable"), "an enabled robot", TIMEOUT_S,
+                   1.0)
+    states.close()
+
+
 def stop(report, web, times):
     """From the page's operation to a state that is not enabled."""
     state, told = {}, []
@@ -232,28 +355,15 @@ def stop(report, web, times):
             told.append(time_s)
         state.update(message)
     states = web.listen(*STATE, keep)
-    driver = Socket(web.page, lambda *_: None)
-    ended = threading.Event()
-
-    def beat():
-        while not ended.wait(HEARTBEAT_S):
-            driver.beat()
-    heart = threading.Thread(target=beat)
-    heart.start()
     delays = []
-    try:
-        driver.beat()
-        driver.send(op="take")
+    with Operator(web) as operator:
         for _ in range(times):
-            wait_until(lambda: state.get("enabled") or driver.send(op="enable"), "an enabled robot", TIMEOUT_S, 1.0)
+            wait_until(lambda: state.get("enabled") or operator.socket.send(op="enable"), "an enabled robot",
+                       TIMEOUT_S, 1.0)
             told.clear()
             begin = time.monotonic()
-            driver.send(op="stop")
+            operator.socket.send(op="stop")
             wait_until(lambda: told, "a stopped robot", TIMEOUT_S, 0.001)
             delays.append(told[0] - begin)
-    finally:
-        ended.set()
-        heart.join()
-        driver.close()
-        states.close()
+    states.close()
     report.add("stop to disabled, the longest", 1000.0 * max(delays), "ms", samples=times, most=50.0)
