@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Programs that move arms. A check returns what it measured, {name: number}, and raises AssertionError."""
+from functools import partial
+
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryActionResult
@@ -19,18 +21,24 @@ STICKS = {"right": (0, 1), "left": (3, 4)}
 BUMPER = {"right": 4, "left": 5}
 TRIGGER = {"right": 2, "left": 5}  # the programs cross them: the left trigger is the right gripper's
 HELP = 6  # function1
-PUSH_N = 6.0  # [N]
+PUSH_N, PUSH_LIMIT_S = 6.0, 120.0  # [N, s]; a push that is not ended before
+KNOCK_N, KNOCK_S, KNOCKED_RAD, RETURNED_RAD = 15.0, 0.2, 0.1, 0.03
+# Pushes at the wrist of a floating arm, one after the other [N], each until a joint has moved by LEAD_RAD; how far how
+# many joints have to be from their begin then.
+LEADING_N, LEAD_RAD, LED_RAD, LED_JOINTS = ((0.0, 4.0, 0.0), (0.0, 0.0, 5.0)), 0.4, 0.1, 4
 DAMPING = {"s0": 4.0, "s1": 4.0, "e0": 2.0, "e1": 2.0, "w0": 0.5, "w1": 0.5, "w2": 0.5}  # [Nm s/rad]
 # The largest that the program's settings allow [Nm/rad].
 STIFFEST = {"s0": 30.0, "s1": 30.0, "e0": 15.0, "e1": 15.0, "w0": 9.0, "w1": 4.0, "w2": 4.0}
 PLAYED = {"left_s0": 0.3, "left_w1": -0.3, "right_s0": -0.3, "right_w1": 0.3}
 
 
-def press_key(program, key, spoken, timeout_s=4.0):
-    """Press ``key`` until the program says that it has it; return how often it was lost."""
+def press_key(program, key, spoken, timeout_s=60.0):
+    """Press ``key`` until the program says that it has it; return how often it was lost.
+
+    A command may keep the program from saying so for seconds of simulated time.
+    """
     for lost in range(KEY_TRIES):
-        seen = len(program.output)
-        program.press(key)
+        seen = program.press(key, timeout_s)
         try:
             program.expect(spoken, timeout_s, seen)
             return lost
@@ -60,12 +68,13 @@ def keyboard(lab):
         lost, errors = 0, []
         for side in SIDES:
             for name, *keys in zip(joint_names(side), *KEYS[side], strict=True):
-                for key, step in zip(keys, (0.1, -0.1), strict=True):
+                for key, step, way in zip(keys, (0.1, -0.1), ("increase", "decrease"), strict=True):
                     goal = robot.angles[name] + step
-                    lost += press_key(program, key, "command: ")
+                    lost += press_key(program, key, "command: %s %s" % (name, way))
                     errors.append(robot.wait_for_joint(name, goal, 0.03))
-            for key, (low, high) in zip(GRIPPER_KEYS[side], ((0, 5), (95, 100), (90, 100)), strict=True):
-                lost += press_key(program, key, "command: ")
+            for key, command, low, high in zip(GRIPPER_KEYS[side], ("close", "open", "calibrate"), (0, 95, 90),
+                                               (5, 100, 100), strict=True):
+                lost += press_key(program, key, "command: %s: gripper %s" % (side, command))
                 robot.wait_for_gripper(side, low, high)
         program.press("\x1b")
         program.finish()
@@ -143,21 +152,39 @@ def wobbler(lab):
 
 @check("joint_velocity_puppet.py")
 def puppet(lab):
+    """The arm is led as a person leads it: the cuff is squeezed, so that it floats, and the hand pushed."""
     robot = lab.robot
     with lab.rosrun("baxter_examples", "joint_velocity_puppet.py", "-l", "left") as program:
         program.expect("Puppeting:")
+        names = {"left_" + joint: ("right_" + joint, sign) for joint, sign in MIRROR_SIGNS.items()}
+        for name in names:
+            robot.wait_for_rest(name)
         before = dict(robot.angles)
-        robot.move_by("left", 0.35)
+        for force in LEADING_N:
+            robot.press("left_lower_cuff", partial(lead, robot, tuple(names), force))
+            for name in names:
+                robot.wait_for_rest(name)
 
         def shares():
-            moved = {name: robot.angles[name] - before[name] for name in before}
-            return [moved["right_" + joint] / (sign * moved["left_" + joint]) for joint, sign in MIRROR_SIGNS.items()]
+            """Of the joints that were led far enough: {joint: the other arm's motion by this one's}."""
+            return {led: (robot.angles[follows] - before[follows]) / (sign * (robot.angles[led] - before[led]))
+                    for led, (follows, sign) in names.items() if abs(robot.angles[led] - before[led]) > LED_RAD}
 
-        wait_until(lambda: all(0.75 < share < 1.25 for share in shares()),
+        wait_until(lambda: all(0.8 < share < 1.2 for share in shares().values()),
                    lambda: "the other arm to follow; its shares of the motion: %s" % shares(), 10.0)
-        ratios = shares()
+        ratios, led = shares(), max(abs(robot.angles[name] - before[name]) for name in names)
         program.stop()
-    return {"least_share": min(ratios), "largest_share": max(ratios)}
+    assert len(ratios) >= LED_JOINTS, "only %s moved by more than %g rad" % (", ".join(ratios), LED_RAD)
+    return {"least_share": min(ratios.values()), "largest_share": max(ratios.values()), "joints": len(ratios),
+            "led_rad": led}
+
+
+def lead(robot, names, force):
+    """Push the hand of the floating left arm until one of its joints is LEAD_RAD from where it was."""
+    start = {name: robot.angles[name] for name in names}
+    robot.push("left_wrist", force, PUSH_LIMIT_S)
+    wait_until(lambda: robot.off(start) > LEAD_RAD, "the arm to give way to %s N" % (force,))
+    robot.release("left_wrist")
 
 
 @check("joint_torque_springs.py")
@@ -173,22 +200,24 @@ def springs(lab):
         settings.update_configuration({joint + "_damping_coefficient": value for joint, value in DAMPING.items()})
 
         def deflection():
-            robot.push("left_wrist", (0.0, 0.0, PUSH_N), 8.0)
-            rospy.sleep(5.0)  # a spring swings: its mean is taken after a fixed time
-            deflected = lab.mean_off(home, 2.0)
+            robot.push("left_wrist", (0.0, 0.0, PUSH_N), PUSH_LIMIT_S)
+            lab.wait_for_off(home, 0.05, "a push of %g N to move the arm" % PUSH_N)
+            deflected = lab.settled_off(home)
             robot.release("left_wrist")
-            return deflected
+            return deflected, lab.settled_off(home)
 
-        soft = deflection()
-        rospy.sleep(6.0)
-        back = lab.mean_off(home, 2.0)
+        soft, back = deflection()
+        robot.push("left_wrist", (0.0, 0.0, KNOCK_N), KNOCK_S)
+        knocked = lab.wait_for_off(home, KNOCKED_RAD, "a knock of %g N to move the arm" % KNOCK_N)
+        returned = lab.time_until_near(home, RETURNED_RAD)
         settings.update_configuration({joint + "_spring_stiffness": value for joint, value in STIFFEST.items()})
-        stiff = deflection()
+        stiff, stiff_back = deflection()
         ended = program.stop()
     assert soft > 0.1 and stiff < 0.8 * soft, "%g N deflect soft springs by %.3f rad, stiff ones by %.3f" % (
         PUSH_N, soft, stiff)
-    assert back < 0.1, "the arm came back to %.3f rad" % back
-    return {"soft_rad": soft, "stiff_rad": stiff, "back_rad": back, "ended_s": ended}
+    assert max(back, stiff_back) < 0.03, "the arm came back to %.3f and %.3f rad" % (back, stiff_back)
+    return {"soft_rad": soft, "stiff_rad": stiff, "back_rad": max(back, stiff_back), "knocked_rad": knocked,
+            "returned_s": returned, "ended_s": ended}
 
 
 @check("joint_recorder.py")

@@ -34,7 +34,7 @@ def gripper_keyboard(lab):
         program.expect("Controlling grippers")
         for side in SIDES:
             def typed(key, side=side):
-                return press_key(program, key if side == "left" else key.upper().translate(SHIFTED), "command: ", 20.0)
+                return press_key(program, key if side == "left" else key.upper().translate(SHIFTED), "command: ")
             lost += typed("r")
             robot.wait_for_flag(side, "calibrated", 0)
             for key, (low, high) in GRIPPER_KEYS:
@@ -51,7 +51,7 @@ def gripper_keyboard(lab):
                 robot.wait_for_gripper(side, 95, 100)
             lost += typed("s")
             robot.wait_for_flag(side, "moving", 0)
-        program.type("\x1b")
+        program.press("\x1b")
         program.finish()
     return {"keys_lost": lost}
 
@@ -104,9 +104,11 @@ def judge_gripper_client(lab, side, program):
     listener.unregister()
     lab.robot.unwatch(watch)
     low, high = min(watch.percents[side]), max(watch.percents[side])
-    reached = sum(r.status.status == GoalStatus.SUCCEEDED and r.result.reached_goal for r in results)
-    assert low < 5 < 95 < high and reached == GRIPPER_GOALS, "%.1f to %.1f %%, %d goals reached" % (low, high, reached)
-    return {"low_percent": low, "high_percent": high, "reached": reached}
+    ends = [(r.status.status, round(r.result.position, 1), r.result.reached_goal, r.result.stalled) for r in results]
+    succeeded = sum(status == GoalStatus.SUCCEEDED for status, *_ in ends)
+    assert low < 5 < 95 < high and succeeded == GRIPPER_GOALS, (
+        "%.1f to %.1f %%; (status, position, reached_goal, stalled) of the goals: %s" % (low, high, ends))
+    return {"low_percent": low, "high_percent": high, "succeeded": succeeded, "ends": ends}
 
 
 @check("gripper_action_client.py")

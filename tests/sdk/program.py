@@ -12,7 +12,7 @@ import time
 from lab_testing.processes import living
 from lab_testing.waiting import wait_until
 
-END_LIMIT_S = 40.0
+END_LIMIT_S = 150.0  # some move both arms to neutral first: seconds of simulated time
 READING_POLL_S = 0.0005  # a program may read keys for 10 ms only
 
 
@@ -67,12 +67,15 @@ class Program:
     def press(self, key, timeout_s=30.0):
         """Type ``key`` while the program reads single keys: setting the terminal to that discards earlier ones.
 
-        Raises AssertionError if the program does not read single keys within ``timeout_s`` [s] of wall time.
+        Returns the length of the output before. Raises AssertionError if the program reads no single keys within
+        ``timeout_s`` [s] of wall time.
         """
         # This side of a pseudo-terminal shows the settings of the other one.
         wait_until(lambda: not termios.tcgetattr(self._terminal)[3] & termios.ICANON, "a program that reads keys",
                    timeout_s, READING_POLL_S)
+        seen = len(self._output)
         self.type(key)
+        return seen
 
     def interrupt(self):
         """Press Ctrl-C: every process of the terminal gets SIGINT."""

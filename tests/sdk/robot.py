@@ -19,7 +19,7 @@ from std_msgs.msg import Bool, Empty
 
 from baxter_model.names import SIDES, joint_names
 from baxter_model.poses import poses
-from lab_testing.waiting import wait_until
+from lab_testing.waiting import DEADLINE_S, wait_until
 
 COMMAND_HZ = 50.0
 NEAR_RAD = 0.01
@@ -120,32 +120,32 @@ class Robot:
     def wait_for_joint(self, name, goal, tolerance):
         """Wait until a joint rests within ``tolerance`` of ``goal`` [rad], and return how far it is off."""
         wait_until(lambda: abs(self.angles[name] - goal) < tolerance and abs(self.speeds[name]) < RESTING_RAD_S,
-                   lambda: "%s at %.3f rad; it is at %.3f" % (name, goal, self.angles[name]), 15.0)
+                   lambda: "%s at %.3f rad; it is at %.3f" % (name, goal, self.angles[name]))
         return abs(self.angles[name] - goal)
 
     def wait_for_way(self, name, start, way):
         """Wait until a joint has moved from ``start`` by at least ``way``, in its direction [rad]."""
         wait_until(lambda: (self.angles[name] - start) / way > 1.0,
-                   lambda: "%s to move by %.2f rad; it moved by %.3f" % (name, way, self.angles[name] - start), 15.0)
+                   lambda: "%s to move by %.2f rad; it moved by %.3f" % (name, way, self.angles[name] - start))
 
     def wait_for_rest(self, name):
-        wait_until(lambda: abs(self.speeds[name]) < RESTING_RAD_S, "%s to rest" % name, 15.0)
+        wait_until(lambda: abs(self.speeds[name]) < RESTING_RAD_S, "%s to rest" % name)
 
     def wait_for_lights(self, side, lit):
         """Wait until both lights of a navigator are on or off."""
         wait_until(lambda: all(self.digital["%s_%s_light" % (side, which)] == lit for which in ("inner", "outer")),
-                   "the %s navigator's lights to be %s" % (side, "on" if lit else "off"), 15.0)
+                   "the %s navigator's lights to be %s" % (side, "on" if lit else "off"))
 
     def wait_for_flag(self, side, flag, value):
         """Wait until a field of a gripper's state has a value."""
         wait_until(lambda: getattr(self.grippers[side], flag) == value,
-                   lambda: "the %s gripper's %s to be %s" % (side, flag, value), 30.0)
+                   lambda: "the %s gripper's %s to be %s" % (side, flag, value))
 
     def wait_for_state(self, enabled, stopped):
         wait_until(lambda: (self.state.enabled, self.state.stopped) == (enabled, stopped),
-                   lambda: "enabled %s, stopped %s; found: %s" % (enabled, stopped, self.state), 5.0)
+                   lambda: "enabled %s, stopped %s; found: %s" % (enabled, stopped, self.state))
 
-    def wait_for_gripper(self, side, low, high, timeout_s=30.0):
+    def wait_for_gripper(self, side, low, high, timeout_s=DEADLINE_S):
         """Wait until a calibrated gripper is between ``low`` and ``high`` [%]."""
         wait_until(lambda: low <= self.grippers[side].position <= high and self.grippers[side].calibrated == 1,
                    lambda: "the %s gripper between %g and %g %%; it is at %.1f %%" % (

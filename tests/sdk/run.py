@@ -35,6 +35,8 @@ STICKS_AT_REST, BUTTONS = (0, 0, 1, 0, 0, 1, 0, 0), 11
 MASTER_LIMIT_S, START_LIMIT_S = 60.0, 120.0
 LAB_END_S = 180.0  # a killed roslaunch leaves its nodes behind
 EFFORT_SHARE = 1.001
+MEAN_S, ALIKE_RAD, STAY_S = 2.0, 0.01, 2.0
+SWING_LIMIT_S = 60.0  # of simulated time
 
 
 class Lab:
@@ -89,15 +91,48 @@ class Lab:
                    lambda: "less than %g rad; it is %.3f" % (tolerance, self.robot.off(angles)), timeout_s)
         return self.robot.off(angles)
 
-    def mean_off(self, angles, seconds):
-        """The largest distance of a joint's mean angle over ``seconds`` of simulated time from ``angles`` [rad]."""
-        sums, count, end = dict.fromkeys(angles, 0.0), 0, rospy.get_time() + seconds
+    def wait_for_off(self, angles, least, what):
+        """Wait until a joint is further than ``least`` from ``angles`` [rad], and return how far one is."""
+        wait_until(lambda: self.robot.off(angles) > least, what, 30.0, 0.001)
+        return self.robot.off(angles)
+
+    def settled_off(self, angles):
+        """How far a swinging arm's mean comes to be from ``angles``: the largest distance of a joint [rad].
+
+        Means over MEAN_S of simulated time, until two of them are alike. Raises AssertionError after SWING_LIMIT_S.
+        """
+        end, last = rospy.get_time() + SWING_LIMIT_S, None
+        while rospy.get_time() < end:
+            mean = self._means(angles)
+            if last is not None and max(abs(mean[name] - last[name]) for name in angles) < ALIKE_RAD:
+                return max(abs(mean[name] - angle) for name, angle in angles.items())
+            last = mean
+        raise AssertionError("the arm does not settle within %g s" % SWING_LIMIT_S)
+
+    def _means(self, angles):
+        """{name: mean angle over MEAN_S of simulated time [rad]}"""
+        sums, count, end = dict.fromkeys(angles, 0.0), 0, rospy.get_time() + MEAN_S
         while rospy.get_time() < end:
             count += 1
             for name in angles:
                 sums[name] += self.robot.angles[name]
             rospy.sleep(0.02)
-        return max(abs(sums[name] / count - angle) for name, angle in angles.items())
+        return {name: total / count for name, total in sums.items()}
+
+    def time_until_near(self, angles, tolerance):
+        """The simulated time until the arm stays within ``tolerance`` of ``angles`` for STAY_S [s].
+
+        Raises AssertionError after SWING_LIMIT_S.
+        """
+        begin = since = rospy.get_time()
+        while (now := rospy.get_time()) < begin + SWING_LIMIT_S:
+            if self.robot.off(angles) > tolerance:
+                since = now
+            elif now - since > STAY_S:
+                return since - begin
+            rospy.sleep(0.01)
+        raise AssertionError("the arm does not stay within %g rad; it is %.3f rad off" % (
+            tolerance, self.robot.off(angles)))
 
     def need_recording(self, record):
         """Make a recording by the vendor's recorder, unless this lab has one."""

@@ -52,8 +52,7 @@ def test_keys_arrive_in_a_terminal_and_the_program_ends(tmp_path):
 def test_a_pressed_key_waits_for_a_program_that_discards_earlier_ones(tmp_path):
     with start(DISCARDS_KEYS, tmp_path) as program:
         program.expect("up")
-        program.press("x")
-        program.expect("key x", timeout_s=20.0)
+        program.expect("key x", timeout_s=20.0, beyond=program.press("x"))
         program.finish()
 
 
