@@ -38,7 +38,7 @@ from lab_web.parts import SCREEN_TOPIC, Parts
 from lab_web.planning import Planning
 from lab_web.playback import Recorder, play
 from lab_web.release_guard import ReleaseGuard
-from lab_web.resting import rest
+from lab_web.resting import OnDemand, rest
 from lab_web.robot import ARM_LINKS, Baxter
 from lab_web.scene import SceneFollower, bodies_of
 from lab_web.serving import Pages, routes, upload_routes
@@ -66,8 +66,8 @@ _LARGEST_PORT = 65535
 #: Period of poses to the pages [s]; of looks at what changes rarely, each some questions to the master [s]; the same
 #: while nobody needs them.
 _POSES_S, _LOOK_S, _LOOK_UNSEEN_S = 0.05, 1.0, 5.0
-# Between reads of the robot's topics, and of the clock, for which other clients may still wait, without a page [s].
-_REST_S, _REST_OF_CLOCK_S = 0.05, 0.02
+# Between reads of the robot's topics without a page, and of the clock without any client [s].
+_REST_S, _REST_OF_CLOCK_S = 0.05, 0.1
 # Between warnings of the same [s].
 _COMPLAIN_S = 60.0
 # How long the comparison with a physical robot waits for the messages of some topics [s].
@@ -158,11 +158,11 @@ def serve(options, page, libraries):
         return len(pages) > 0 or equipment.recorder.is_running
 
     rest(robot.topics, is_needed, _REST_S)
-    rest({"/clock": Clock}, is_needed, _REST_OF_CLOCK_S)
     graph, codec = ros_graph.RosGraph(), Codec(ros_graph.message_class, ros_graph.now)
     bridge = Bridge(graph, codec, loop_thread.later)
     video = VideoServer(Cameras(graph, codec, loop_thread), VideoOptions(access))
     clients = Clients(bridge, loop_thread, SocketOptions(access))
+    rest({"/clock": Clock}, lambda: is_needed() or len(clients) > 0, _REST_OF_CLOCK_S)
     notebooks = _notebooks(options, pages)
     application = clients.application(*routes(pages, page, libraries), *upload_routes(pages, equipment.recorder),
                                       *_notebook_routes(notebooks, access),
@@ -172,7 +172,8 @@ def serve(options, page, libraries):
     except OSError as error:
         raise Failure("port %s cannot be opened: %s; name another one by --port" % (options.port, error)) from None
     threads = [threading.Thread(target=lasting(faults, place, loop), args=(rospy.is_shutdown,)) for place, loop in (
-        ("the arms", pages.lab.run), *equipment.loops.items(), ("the 3D view", partial(_follow, pages)))]
+        ("the grippers", OnDemand(robot.listen, robot.rest, is_needed).run), ("the arms", pages.lab.run),
+        *equipment.loops.items(), ("the 3D view", partial(_follow, pages)))]
     for thread in threads:
         thread.start()
     address = ""

@@ -37,7 +37,8 @@ GRIPPER_STEP_PERCENT = 1.0
 
 
 class Baxter:
-    """Subscribes and advertises at once; what is not known yet is empty. ``told(text)``: an error of a switch."""
+    """Subscribes and advertises at once, but to the grippers with :meth:`listen`; what is not known yet is empty.
+    ``told(text)``: an error of a switch."""
 
     def __init__(self, told):
         self._told = told
@@ -63,13 +64,27 @@ class Baxter:
                                              queue_size=10) for side in SIDES}
         rospy.Subscriber("/robot/joint_states", JointState, self._on_joints, queue_size=1, tcp_nodelay=True)
         rospy.Subscriber("/robot/state", AssemblyState, self._on_state, queue_size=1, tcp_nodelay=True)
-        #: What it reads: {topic: message class}.
+        #: What it always reads: {topic: message class}.
         self.topics = {"/robot/joint_states": JointState, "/robot/state": AssemblyState}
+        self._of_grippers = []
+
+    def listen(self):
+        """Subscribe to the grippers, whose states take a simulator longer than all else here. Called by one thread, as
+        :meth:`rest`."""
+        self.rest()
         for side in SIDES:
-            gripper = "/robot/end_effector/%s_gripper/" % side
-            rospy.Subscriber(gripper + "state", EndEffectorState, self._on_gripper, side, queue_size=1)
-            rospy.Subscriber(gripper + "properties", EndEffectorProperties, self._on_kind, side, queue_size=1)
-            self.topics.update({gripper + "state": EndEffectorState, gripper + "properties": EndEffectorProperties})
+            for topic, kind, callback in (("state", EndEffectorState, self._on_gripper),
+                                          ("properties", EndEffectorProperties, self._on_kind)):
+                self._of_grippers.append(rospy.Subscriber(
+                    "/robot/end_effector/%s_gripper/%s" % (side, topic), kind, _of_kind(kind, callback), side,
+                    queue_size=1))
+
+    def rest(self):
+        """Hear nothing of the grippers until the next :meth:`listen`; their states are forgotten."""
+        subscriptions, self._of_grippers = self._of_grippers, []
+        for subscription in subscriptions:
+            subscription.unregister()
+        self._grippers = {}
 
     @property
     def poses(self):
@@ -200,3 +215,12 @@ class Baxter:
 
     def _on_kind(self, message, side):
         self._grippers_of_kind[side] = message.ui_type
+
+
+def _of_kind(kind, callback):
+    """``callback(message, argument)`` for a topic that a client of rosbridge in this process may have subscribed to
+    first: rospy then gives all of its subscribers the bytes."""
+    def take(message, argument):
+        callback(kind().deserialize(message._buff) if isinstance(message, rospy.AnyMsg) else message, argument)
+
+    return take

@@ -146,6 +146,11 @@ class Hall:
         rows = [json.loads(line) for line in list(self.robot.lines) if line.startswith("[\"")]
         return [values for kind, *values in rows if kind == what]
 
+    def listens_to_grippers(self):
+        """Whether the page's server has subscribed to the grippers' topics."""
+        return any(topic.startswith("/robot/end_effector/") and "/lab_web" in nodes
+                   for topic, nodes in self.master.getSystemState()[1])
+
     def drive(self):
         """A page that has the control of an enabled robot."""
         page = Page(self.port)
@@ -185,8 +190,10 @@ def world(libraries, tmp_path):
 
 
 def test_arms_move_and_parts_follow_and_what_is_missing_is_told(hall):
+    assert not hall.listens_to_grippers()
     page = hall.drive()
     try:
+        assert hall.listens_to_grippers()
         described = page.last("robot")
         assert [joint["name"] for joint in described["joints"]] == lab_arms.JOINTS
         assert described["has_scene"] is False and described["grippers"] == described["cameras"] == []
