@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Baxter as cameras see it, compared with the vendor's meshes at full resolution."""
-from types import SimpleNamespace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import cv2
@@ -14,6 +14,7 @@ from bullet_sim.mesh_loading import load_scene
 from model_files.resources import ResourceFinder
 from sensor_renderer import triangles
 from sensor_renderer.gl_renderer import GlRenderer
+from sensor_renderer.light import Light
 from sensor_renderer.mirror import Body, Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from urdf_model import Mesh, merge_fixed, parse_urdf
@@ -25,6 +26,8 @@ NEAR_M, CLOSE_M = 0.05, 0.003
 # Pixels of a hole: of the robot, and of a link that fills the picture, where a pixel is half a millimetre. The forearm
 # and the wrist have holes of 7 and 4 pixels in 40 views; 2 would be right for them as well.
 MOST_HOLE, MOST_HOLE_OF_LINK = 2, 8
+# The colour of the background, which no link has.
+NOWHERE = (0, 255, 0)
 PINHOLE = Pinhole.from_field_of_view(640, 400, 1.0, NEAR_M, 100.0)
 BASE = (0.0, 0.0, 0.93, 0.0, 0.0, 0.0, 1.0)
 
@@ -77,6 +80,15 @@ def views(random, number, middle, nearest_m, farthest_m):
         yield towards @ pose_matrix((-away, 0.0, 0.0), (0.0, 0.0, 0.0)) @ OPTICAL
 
 
+@dataclass
+class Alone:
+    """A world of the same bodies for ever, for the renderer."""
+
+    bodies: dict
+    light: Light
+    version: int = 0
+
+
 class Robot(NamedTuple):
     """The simplified robot, and triangles (n, 3, 3) [m] of each of its links as the vendor's files have them."""
 
@@ -97,7 +109,7 @@ def robot():
     merged, finder = merge_fixed(parse_urdf(xml, source=path)), ResourceFinder()
     joints = [joint.name for joint in merged.joints.values()]
     mirror = Mirror(DrawingCache(), finder, pytest.fail)
-    mirror.set_scene([{"name": "robot", "urdf": xml, "joints": joints}])
+    mirror.set_scene([{"name": "robot", "urdf": xml, "joints": joints}], {"background": [c / 255.0 for c in NOWHERE]})
     links = full_triangles([merged.links[name] for name in mirror.bodies["robot"].link_names], finder)
     renderer = GlRenderer()
     yield Robot(mirror, joints, links, renderer)
@@ -116,14 +128,20 @@ def largest_hole(true, drawn):
 
 
 def compared(mirror, renderer, placed, pose):
-    """(overlap of the silhouettes, share of the pixels of both whose depth is close, pixels of the largest hole) of a
-    view of ``mirror`` against triangles ``placed`` (n, 3, 3) in the optical frame."""
+    """(overlap of the silhouettes, the same of the picture of colour, share of the pixels of both whose depth is close,
+    pixels of the largest hole) of a view of ``mirror`` against triangles ``placed`` (n, 3, 3) in the optical frame."""
     drawn = renderer.render(mirror, PINHOLE, pose, colour=False, depth=True)[1]
+    coloured = (renderer.render(mirror, PINHOLE, pose)[0] != NOWHERE).any(axis=2)
     true = np.empty((PINHOLE.height, PINHOLE.width))
     depth_of(placed, PINHOLE.fx, PINHOLE.fy, PINHOLE.cx, PINHOLE.cy, true)
     there, seen = np.isfinite(true), np.isfinite(drawn)
-    return ((there & seen).sum() / (there | seen).sum(), (np.abs(true - drawn)[there & seen] < CLOSE_M).mean(),
+    return (overlap(there, seen), overlap(there, coloured), (np.abs(true - drawn)[there & seen] < CLOSE_M).mean(),
             largest_hole(true, drawn))
+
+
+def overlap(there, seen):
+    """Pixels of both masks as a share of those of either."""
+    return (there & seen).sum() / (there | seen).sum()
 
 
 def turned(matrix, triangles):
@@ -131,10 +149,12 @@ def turned(matrix, triangles):
 
 
 def judge(name, results, most_hole):
-    overlap, close, hole = np.array(results).T
-    print("%-28s overlap %.4f, least %.4f; depth %.4f, least %.4f; largest hole %d"
-          % (name, overlap.mean(), overlap.min(), close.mean(), close.min(), hole.max()))
-    assert overlap.min() >= 0.99, name
+    outline, coloured, close, hole = np.array(results).T
+    print("%-28s overlap %.4f, least %.4f, in colour %.4f, %.4f; depth %.4f, least %.4f; largest hole %d"
+          % (name, outline.mean(), outline.min(), coloured.mean(), coloured.min(), close.mean(), close.min(),
+             hole.max()))
+    assert outline.min() >= 0.99, name
+    assert coloured.min() >= 0.99, name
     assert close.min() >= 0.99, name
     assert hole.max() <= most_hole, name
 
@@ -159,7 +179,7 @@ def each_link(robot, number):
         if not parts or key in seen:
             continue
         seen.add(key)
-        alone = SimpleNamespace(bodies={"link": Body([(name, parts)], [])}, light=robot.mirror.light, version=0)
+        alone = Alone({"link": Body([(name, parts)], [])}, robot.mirror.light)
         low, high = full.min(axis=(0, 1)), full.max(axis=(0, 1))
         away = np.linalg.norm(high - low)
         results = [compared(alone, robot.renderer, turned(inverse(pose), full), pose)

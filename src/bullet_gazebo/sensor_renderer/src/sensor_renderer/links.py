@@ -7,9 +7,10 @@ import numpy as np
 
 from world_picture.reduction import reduced
 
-# How far the drawn surface of a link may be from its original, in pixels of the picture; in pictures of depth, whose
-# values are compared with millimetres, also in metres.
-_MOST_PX = 0.5
+# How far the drawn surface of a link may be from its original, in pixels of the picture: a whole one in a live picture
+# of colour, where the half of it would cost a tenth more. In pictures of depth, whose values are compared with
+# millimetres, also in metres.
+_FINE_PX, _LIVE_PX = 0.5, 1.0
 _MOST_IN_DEPTH_M = 0.001
 _NEAREST_M = 0.01
 # Share of the plain triangles that casts a mesh's shadow, and how many at least: half of the cost of a picture would
@@ -36,11 +37,11 @@ class Link:
 class Links:
     """The vertex arrays of one context, one set for each different link."""
 
-    def __init__(self, context, programs, thin_casters):
-        """``programs``: :class:`sensor_renderer.programs.Programs`; ``thin_casters``: whether meshes cast the shadows
-        of fewer triangles."""
+    def __init__(self, context, programs, live):
+        """``programs``: :class:`sensor_renderer.programs.Programs`; ``live``: for pictures at a camera's rate, whose
+        meshes are coarser and cast the shadows of even fewer triangles."""
         self._context = context
-        self._thin_casters = thin_casters
+        self._live = live
         self._programs = programs
         self._links = {}
         self._links_of = weakref.WeakKeyDictionary()
@@ -78,7 +79,7 @@ class Links:
         """The vertex arrays of the level of detail that the link's distance asks for; finer ones for a picture of
         ``depth``."""
         distance = np.linalg.norm((view @ matrix @ [*link.centre, 1.0])[:3]) - link.radius
-        error_m = _MOST_PX * max(distance, _NEAREST_M) / pinhole.fx
+        error_m = (_LIVE_PX if self._live and not depth else _FINE_PX) * max(distance, _NEAREST_M) / pinhole.fx
         return self._level(link, min(error_m, _MOST_IN_DEPTH_M) if depth else error_m)
 
     def _level(self, link, error_m):
@@ -100,7 +101,7 @@ class Links:
             found = self._links[key] = Link(centre, float(np.linalg.norm(rows[:, :3] - centre, axis=1).max()),
                                             any(part.is_floor for part in parts), tuple(parts),
                                             any(part.levels for part in parts))
-            thin = found.is_mesh and self._thin_casters
+            thin = found.is_mesh and self._live
             found.caster = self._caster_of(rows) if thin else self._level(found, _CASTER_M)[1]
         return found
 
