@@ -18,7 +18,7 @@ PACKAGES = {**packages(), "lab_testing": Path("tests/lab_testing"), "workspace_t
 #: Modules whose Debian package has another name: the name in a manifest.
 RENAMED = {"PyKDL": "python3-pykdl", "PyQt5": "python3-pyqt5", "cv2": "python3-opencv", "lxml": "python3-lxml",
            "numpy": "python3-numpy", "h5py": "python3-h5py", "yaml": "python3-yaml", "hypothesis": "python3-hypothesis",
-           "rospkg": "python3-rospkg"}
+           "rospkg": "python3-rospkg", "psutil": "python3-psutil"}
 SHARES = (Path("/usr/share"), Path("/opt/ros/noetic/share"))
 #: Students' programs, which run in the environment of a whole lab.
 NO_PARTS = ("src/rf_labs/rf_checks/exercises/", "src/rf_labs/rf_checks/test/wrong/")

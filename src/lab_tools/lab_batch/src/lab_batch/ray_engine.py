@@ -10,6 +10,8 @@ import tempfile
 from itertools import islice
 from pathlib import Path
 
+import psutil
+
 from .job import JobError, Outcome, load, run_episode
 from .processes import ONE_THREAD, SEEDS_AHEAD, TRIES
 
@@ -18,9 +20,13 @@ REQUIREMENTS = Path(__file__).with_name("requirements-ray.txt")
 # Ray's own limits for the start of its processes (15 to 30 s) are too short for a busy machine. Usage is not reported,
 # and the tokens that Ray asks for by default stay in force for clusters: they are Ray's own setting.
 ENVIRONMENT = {"RAY_agent_register_timeout_ms": "180000", "RAY_worker_register_timeout_seconds": "180",
-               "RAY_raylet_start_wait_time_s": "180", "RAY_USAGE_STATS_ENABLED": "0"}
+               "RAY_raylet_start_wait_time_s": "60", "RAY_USAGE_STATS_ENABLED": "0"}
+# By default Ray's processes have an address of the network, even if 127.0.0.1 is asked for, and listen on every
+# network. Its setting for systems without clusters keeps all of them to loopback.
+LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
 # Ray gives its first process 30 s, which a busy machine may miss.
 STARTS = 3
+END_S = 10.0
 
 
 def ensure_installed(root: Path):
@@ -86,6 +92,8 @@ def map_seeds(spec, seeds, limits, address=None):
     ensure_installed(Path(os.environ.get("LAB_ROOT", Path.cwd())))
     for name, value in ENVIRONMENT.items():
         os.environ.setdefault(name, value)
+    if not address:
+        os.environ.update(LOOPBACK)
     if address and has_token():
         # Ray sends its token only where this says so; to a head that asks for it, it would try without it for ever.
         os.environ.setdefault("RAY_AUTH_MODE", "token")
@@ -99,13 +107,14 @@ def map_seeds(spec, seeds, limits, address=None):
 def _start(ray, limits, address, ending):
     """Connect to a cluster, or start a Ray here; `ending` (contextlib.ExitStack) ends it. Raises JobError."""
     options = {"include_dashboard": False, "log_to_driver": False, "configure_logging": False}
-    tries = STARTS
+    tries, folder = STARTS, None
     if address:
         options["address"], tries = address, 1
     else:
         folder = tempfile.mkdtemp(prefix="ray-")  # for its logs and sockets, which it would keep
         ending.callback(shutil.rmtree, folder, ignore_errors=True)
-        options.update(num_cpus=limits.workers, _node_ip_address="127.0.0.1", _temp_dir=folder)
+        ending.callback(end_processes, folder)
+        options.update(num_cpus=limits.workers, _temp_dir=folder)
     ending.callback(ray.shutdown)
     for left in reversed(range(tries)):
         try:
@@ -113,8 +122,22 @@ def _start(ray, limits, address, ending):
             return
         except Exception as error:  # Ray raises a bare Exception where its processes do not start in time
             ray.shutdown()
+            if folder:
+                end_processes(folder)
             if not left:
                 raise JobError("no Ray at %s: %s" % (address or "this machine", error)) from error
+
+
+def end_processes(folder):
+    """End the processes below this one that have ``folder`` in their command: ray.shutdown leaves those of a Ray whose
+    start failed."""
+    found = []
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            if any(folder in word for word in process.cmdline()):
+                process.kill()
+                found.append(process)
+    psutil.wait_procs(found, END_S)
 
 
 class _Actors:
