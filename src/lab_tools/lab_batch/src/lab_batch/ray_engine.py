@@ -141,16 +141,18 @@ def end_processes(folder):
 
 
 class _Actors:
+    """Actors, each with up to SEEDS_AHEAD seeds. Where one dies, it is not known which of its seeds has killed it: the
+    outcome of a seed that is done may be lost as well. From then on its seeds run one by one."""
+
     def __init__(self, ray, spec, seeds, limits):
         self._ray, self._spec, self._limits = ray, spec, limits
-        self._seeds, self._again, self._tries = iter(seeds), [], {}
+        self._seeds, self._again, self._deaths = iter(seeds), [], {}
         self._kind = ray.remote(num_cpus=1, runtime_env={"env_vars": ONE_THREAD})(_Episodes)
         self._running = {}  # {reference: (actor, seed)}
 
     def outcomes(self):
         for _ in range(self._limits.workers):
-            if not self._start():
-                break
+            self._start()
         while self._running:
             done, _ = self._ray.wait(list(self._running), num_returns=1, timeout=self._limits.episode_s)
             if not done:
@@ -158,47 +160,57 @@ class _Actors:
                 continue
             yield from self._take(done[0])
 
-    def _next(self):
-        return self._again.pop() if self._again else next(self._seeds, None)
-
     def _start(self):
-        """A new actor with its first seeds; False where no seed is left."""
-        first = self._next()
-        if first is None:
-            return False
-        actor = self._kind.remote(self._spec)
-        self._give(actor, first)
-        for seed in islice(iter(self._next, None), SEEDS_AHEAD - 1):
-            self._give(actor, seed)
-        return True
+        """A new actor, where a seed is left for it."""
+        following = self._following([])
+        if following:
+            actor = self._kind.remote(self._spec)
+            self._give(actor, following)
 
-    def _give(self, actor, seed):
-        self._running[actor.run.remote(seed)] = (actor, seed)
+    def _following(self, waiting):
+        """The seeds for an actor that has still those ``waiting``."""
+        if self._again:
+            return [] if waiting else [self._again.pop()]
+        if any(seed in self._deaths for seed in waiting):
+            return []
+        return list(islice(self._seeds, SEEDS_AHEAD - len(waiting)))
+
+    def _give(self, actor, seeds):
+        for seed in seeds:
+            self._running[actor.run.remote(seed)] = (actor, seed)
+
+    def _of(self, actor):
+        """{reference: seed} of what an actor has still to do."""
+        return {reference: seed for reference, (one, seed) in self._running.items() if one is actor}
 
     def _take(self, reference):
-        actor, seed = self._running.pop(reference)
+        actor, _ = self._running[reference]
         errors = self._ray.exceptions
         try:
-            yield self._ray.get(reference)
+            outcome = self._ray.get(reference)
         except errors.RayActorError as error:
-            yield from self._died(actor, seed, error)
+            yield from self._died(actor, error)
             return
         except errors.RayTaskError as error:
             raise JobError(str(error.cause)) from error
-        following = self._next()
-        if following is not None:
-            self._give(actor, following)
+        del self._running[reference]
+        yield outcome
+        self._give(actor, self._following(list(self._of(actor).values())))
 
-    def _died(self, actor, seed, error):
+    def _died(self, actor, error):
         if "JobError" in str(error):
             raise JobError(str(error).strip().splitlines()[-1])
-        lost = [ref for ref, (one, _) in self._running.items() if one is actor]
-        self._again += [self._running.pop(ref)[1] for ref in lost]
-        self._tries[seed] = self._tries.get(seed, 1) + 1
-        if self._tries[seed] <= TRIES:
-            self._again.append(seed)
-        else:
-            yield Outcome(seed, {}, "its worker died twice: %s" % str(error).strip().splitlines()[0], 0.0)
+        for reference, seed in self._of(actor).items():
+            del self._running[reference]
+            try:
+                yield self._ray.get(reference)
+                continue
+            except self._ray.exceptions.RayActorError:
+                self._deaths[seed] = self._deaths.get(seed, 0) + 1
+            if self._deaths[seed] < TRIES:
+                self._again.append(seed)
+            else:
+                yield Outcome(seed, {}, "its worker died twice: %s" % str(error).strip().splitlines()[0], 0.0)
         self._start()
 
     def _stop_all(self):

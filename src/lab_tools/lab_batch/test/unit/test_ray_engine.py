@@ -7,10 +7,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from lab_batch import Spec, ray_engine
+from lab_batch.job import Outcome
 from lab_batch.processes import Limits, map_seeds
 
 HERE = Path(__file__).parent
@@ -20,6 +22,7 @@ ROOT = HERE.parents[4]
 PROGRAM = """
 import contextlib, json, psutil, sys
 from lab_batch import Spec, ray_engine
+from lab_batch.job import Outcome
 from lab_batch.processes import Limits
 spec, addresses = Spec(sys.argv[1], json.loads(sys.argv[2])), set()
 for one in ray_engine.map_seeds(spec, range(int(sys.argv[3])), Limits(2)):
@@ -30,6 +33,45 @@ for one in ray_engine.map_seeds(spec, range(int(sys.argv[3])), Limits(2)):
 print(json.dumps(sorted(addresses)))
 print(json.dumps([child.name() for child in psutil.Process().children(recursive=True)]))
 """
+
+
+class LateRay:
+    """What the engine uses of Ray, at its worst: an actor with the seed ``deadly`` dies before any of its outcomes has
+    arrived. ``first``: the place of what is reported first among all that is ready."""
+
+    class exceptions:  # noqa: N801  Ray's own name
+        class RayActorError(Exception):
+            """An actor has died, before or at this seed."""
+
+        class RayTaskError(Exception):
+            """The actor's method has raised."""
+
+    def __init__(self, deadly, first):
+        self._deadly, self._first, self._of = deadly, first, {}
+
+    def remote(self, **_):
+        return lambda kind: SimpleNamespace(remote=self._actor)
+
+    def _actor(self, _spec):
+        given = []
+
+        def give(seed):
+            given.append(seed)
+            self._of[seed, len(given)] = given
+            return seed, len(given)
+
+        return SimpleNamespace(run=SimpleNamespace(remote=give))
+
+    def wait(self, references, num_returns, timeout):
+        done = references[self._first]
+        return [done], [other for other in references if other != done]
+
+    def get(self, reference):
+        if self._deadly in self._of[reference]:
+            raise self.exceptions.RayActorError("gone")
+        return Outcome(reference[0], {}, "", 0.0)
+
+
 SLEEP = "import sys, time; print(flush=True); time.sleep(600)"
 pytestmark = pytest.mark.once
 
@@ -61,6 +103,14 @@ def test_ray_gives_what_processes_give_and_a_killed_worker_costs_its_episode_onl
     plain = {one.seed: one.result for one in map_seeds(spec, range(8), Limits(2))}
     assert {seed: result for seed, (result, _) in found.items() if seed != 5} == {
         seed: result for seed, result in plain.items() if seed != 5}
+
+
+@pytest.mark.parametrize("first", [0, -1])
+def test_a_killed_worker_costs_its_own_episode_only_whatever_waited_with_it(first):
+    outcomes = ray_engine._Actors(LateRay(5, first), Spec("any:Job"), range(8), Limits(2)).outcomes()
+    errors = {one.seed: one.error for one in outcomes}
+    assert sorted(errors) == list(range(8))
+    assert [seed for seed, error in errors.items() if error] == [5] and "died twice" in errors[5]
 
 
 def test_processes_of_a_start_that_failed_are_ended():
