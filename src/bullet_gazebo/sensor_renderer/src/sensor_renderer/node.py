@@ -18,6 +18,7 @@ from sensor_renderer.errors import SensorError
 from sensor_renderer.labels import Labels, classes_of_parameter
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.moments import Moment, World
+from sensor_renderer.priority import give_way
 from sensor_renderer.sensor_element import SensorEntry
 from world_picture.drawing import DrawingCache
 from world_picture.snapshot import SnapshotError, SnapshotReader
@@ -201,7 +202,7 @@ def _wait_for_end_of_input(ending):
 def main():
     """Draw until a signal or a shutdown request; returns the exit code."""
     # Physics comes first: drawing runs at the lowest priority.
-    os.nice(19)
+    give_way(19)
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())

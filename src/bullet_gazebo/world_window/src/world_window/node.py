@@ -11,6 +11,7 @@ import rosgraph
 import rospy
 
 from rospy_limits.node import limit_ports
+from sensor_renderer.priority import give_way
 
 _PROBE = "from PyQt5.QtWidgets import QApplication; QApplication(['gazebo'])"
 _PROBE_TIMEOUT_S = 30.0
@@ -28,7 +29,7 @@ def main():
     the command line it publishes its pictures and opens no window.
     """
     # Physics comes first: the window runs at the lowest priority.
-    os.nice(19)
+    give_way(19)
     offscreen = bool(rospy.client.load_command_line_node_params(sys.argv).get("offscreen"))
     reason = "" if offscreen else _why_no_screen()
     if reason:
