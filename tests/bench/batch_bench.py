@@ -52,7 +52,12 @@ def run(engine, count):
     threads = dict.fromkeys(("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
     done = subprocess.run(words, stdout=subprocess.PIPE, text=True, timeout=RUN_S, check=True,
                           env={**os.environ, **threads})
-    rows = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("[")]
+    return batch_of(done.stdout, count)
+
+
+def batch_of(output, count):
+    """The Batch of a driver's output. Raises RuntimeError unless all its ``count`` episodes ended well."""
+    rows = [json.loads(line) for line in output.splitlines() if line.startswith("[")]
     if len(rows) != count or any(row[3] for row in rows):
-        raise RuntimeError("%s: %d of %d episodes ended well" % (engine, sum(not row[3] for row in rows), count))
+        raise RuntimeError("%d of %d episodes ended well" % (sum(not row[3] for row in rows), count))
     return Batch((rows[-1][0] - rows[0][0]) / (count - 1), {row[1]: row[2] for row in rows})
