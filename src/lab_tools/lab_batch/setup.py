@@ -3,4 +3,4 @@ from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
 setup(**generate_distutils_setup(packages=["lab_batch"], package_dir={"": "src"},
-                                 package_data={"lab_batch": ["requirements-ray.txt"]}))
+                                 package_data={"lab_batch": ["requirements-*.txt"]}))

@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from . import processes, ray_engine
+from . import parquet, processes, ray_engine
 from .job import JobError, Spec, class_of, parameters_of
 from .records import Records, RecordsError, summary, versions
 from .shipped import JOBS
@@ -80,6 +80,8 @@ def parse(argv):
                         help="a worker is replaced after N episodes (default %(default)s)")
     parser.add_argument("--retry-failed", action="store_true", help="also run seeds again that failed before")
     parser.add_argument("--out", type=Path, metavar="FILE", help="default: .baxter/batch/JOB.jsonl")
+    parser.add_argument("--parquet", type=Path, metavar="FILE",
+                        help="write the results of these seeds as Parquet as well; pyarrow is installed on first use")
     options = parser.parse_args(argv)
     if not options.list and not (options.job and options.seeds):
         parser.error("JOB and --seeds are needed, or --list")
@@ -166,6 +168,8 @@ def run(options):
         _run_left(options, spec, left, records)
         seconds = time.monotonic() - began
         chosen = [records.outcomes[seed] for seed in options.seeds]
+        if options.parquet:
+            parquet.write(options.parquet, records.header, chosen, ROOT)
         return report(options, chosen, path, len(left), seconds)
     finally:
         records.close()

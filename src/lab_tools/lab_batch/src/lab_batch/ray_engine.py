@@ -1,21 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The engine for several machines: Ray (https://ray.io), which is installed on first use."""
 import contextlib
-import importlib.util
 import os
 import shutil
-import subprocess
-import sys
 import tempfile
 from itertools import islice
 from pathlib import Path
 
 import psutil
 
+from . import on_first_use
 from .job import JobError, Outcome, load, run_episode
 from .processes import ONE_THREAD, SEEDS_AHEAD, TRIES
 
-# Beside this file. Ray gets a separate folder, so that the rest of the workspace does not see its dependencies.
 REQUIREMENTS = Path(__file__).with_name("requirements-ray.txt")
 # Ray's own limits for the start of its processes (15 to 30 s) are too short for a busy machine. Usage is not reported,
 # and the tokens that Ray asks for by default stay in force for clusters: they are Ray's own setting.
@@ -31,39 +28,7 @@ END_S = 10.0
 
 def ensure_installed(root: Path):
     """Make Ray importable here and in its workers; install it below root/.baxter on first use. Raises JobError."""
-    if importlib.util.find_spec("ray") is not None:
-        return
-    folder = root / ".baxter" / "ray"
-    if not _is_complete(folder):
-        _install(folder)
-    sys.path.append(str(folder))
-    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [os.environ.get("PYTHONPATH"), str(folder)]))
-    importlib.invalidate_caches()
-
-
-def _is_complete(folder):
-    """Whether all of REQUIREMENTS, as they are now, are installed there."""
-    kept = folder / REQUIREMENTS.name
-    return kept.is_file() and kept.read_bytes() == REQUIREMENTS.read_bytes()
-
-
-def _install(folder):
-    print("batch: Ray is installed into %s (80 MB from PyPI)" % folder, file=sys.stderr)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".ray-", dir=folder.parent) as unfinished:
-            new = Path(unfinished) / "ray"
-            done = subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", str(new),
-                                   "-r", str(REQUIREMENTS)])
-            if done.returncode != 0:
-                raise JobError("pip could not install Ray from %s (exit code %d); the engine `processes` needs nothing"
-                               % (REQUIREMENTS, done.returncode))
-            # Last of all: a folder with it is complete.
-            shutil.copy(REQUIREMENTS, new)
-            shutil.rmtree(folder, ignore_errors=True)
-            new.rename(folder)
-    except OSError as error:
-        raise JobError("Ray cannot be installed into %s: %s" % (folder, error)) from error
+    on_first_use.ensure_installed(root, "ray", REQUIREMENTS)
 
 
 def has_token():

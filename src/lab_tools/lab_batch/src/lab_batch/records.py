@@ -46,7 +46,7 @@ class Records:
     def __init__(self, path: Path, spec: Spec, found_versions: dict):
         self._path = path
         self.outcomes = {}  # {seed: the newest Outcome}
-        header = {"job": spec.name, "parameters": spec.parameters, "versions": found_versions}
+        self.header = header = {"job": spec.name, "parameters": spec.parameters, "versions": found_versions}
         # Of devices, only /dev/null is of use; others may be read without end.
         is_new = not path.is_file() or not self._read(header)
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from baxter_sim_kinematics import reach_commands
-from lab_batch import JobError, Outcome, Spec, command, load, ray_engine, ray_node
+from lab_batch import JobError, Outcome, Spec, command, load, on_first_use, parquet, ray_engine, ray_node
 from lab_batch.processes import Limits, map_seeds
 from lab_batch.records import Records, RecordsError, summary
 from lab_batch.shipped import JOBS, Command
@@ -316,7 +316,7 @@ def test_a_batch_that_is_killed_leaves_no_worker(tmp_path):
 def test_ray_is_installed_whole_or_not_at_all(tmp_path, monkeypatch):
     """pip is a program that writes a part and fails, then one that writes all; then the requirements change."""
     calls = []
-    monkeypatch.setattr(ray_engine.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(on_first_use.importlib.util, "find_spec", lambda name: None)
     monkeypatch.setattr(ray_engine, "REQUIREMENTS", tmp_path / "requirements-ray.txt")
     monkeypatch.setattr(sys, "path", list(sys.path))
     ray_engine.REQUIREMENTS.write_text("ray==1\n")
@@ -327,17 +327,51 @@ def test_ray_is_installed_whole_or_not_at_all(tmp_path, monkeypatch):
         calls.append(target)
         return subprocess.CompletedProcess(words, code)
 
-    monkeypatch.setattr(ray_engine.subprocess, "run", lambda words: run_pip(words, 1))
-    with pytest.raises(JobError, match="pip could not install Ray"):
+    monkeypatch.setattr(on_first_use.subprocess, "run", lambda words: run_pip(words, 1))
+    with pytest.raises(JobError, match="pip could not install ray"):
         ray_engine.ensure_installed(tmp_path)
     assert list((tmp_path / ".baxter").iterdir()) == []
-    monkeypatch.setattr(ray_engine.subprocess, "run", lambda words: run_pip(words, 0))
+    monkeypatch.setattr(on_first_use.subprocess, "run", lambda words: run_pip(words, 0))
     for _ in range(2):
         ray_engine.ensure_installed(tmp_path)
     assert len(calls) == 2 and (tmp_path / ".baxter" / "ray" / "ray").is_dir()
     ray_engine.REQUIREMENTS.write_text("ray==2\n")
     ray_engine.ensure_installed(tmp_path)
     assert len(calls) == 3
+
+
+# -- Parquet
+
+OUTCOMES = [Outcome(3, {"good": True, "error_m": 0.5, "seed": 7, "mixed": 1}, "", 0.25),
+            Outcome(4, {}, "ValueError: seed 4 is bad", 0.5),
+            Outcome(5, {"good": False, "error_m": 2, "mixed": "two", "joints": [1.0, 2.0]}, "", 0.75)]
+
+
+def test_results_become_columns_without_losing_those_of_the_same_name():
+    assert parquet.columns_of(OUTCOMES) == {
+        "seed": [3, 4, 5], "seconds": [0.25, 0.5, 0.75], "error": [None, "ValueError: seed 4 is bad", None],
+        "good": [True, None, False], "error_m": [0.5, None, 2], "result.seed": [7, None, None],
+        "mixed": [1, None, "two"], "joints": [None, None, [1.0, 2.0]]}
+
+
+@pytest.mark.long
+def test_parquet_has_all_results_with_seeds_and_versions(tmp_path):
+    """pyarrow is installed for it."""
+    words = [TROUBLE, "--seeds", "0:4", "--set", "folder=%s" % tmp_path, "--set", "raises=[2]",
+             "--out", tmp_path / "out.jsonl", "--parquet", tmp_path / "new" / "out.parquet"]
+    assert run(*words) == 1
+    from pyarrow import parquet as arrow
+
+    table = arrow.read_table(tmp_path / "new" / "out.parquet")
+    rows = table.to_pylist()
+    assert [row["seed"] for row in rows] == [0, 1, 2, 3]
+    assert "seed 2 is bad" in rows[2]["error"] and rows[2]["good"] is None and rows[1]["good"]
+    header = json.loads(table.schema.metadata[b"batch"])
+    assert header["job"] == TROUBLE and header["versions"]["numpy"] == np.__version__
+    parquet.write(tmp_path / "mixed.parquet", {}, OUTCOMES, command.ROOT)
+    found = arrow.read_table(tmp_path / "mixed.parquet").to_pydict()
+    assert found["mixed"] == ["1", None, '"two"'] and found["error_m"] == [0.5, None, 2.0]
+    assert found["joints"] == [None, None, [1.0, 2.0]]
 
 
 # -- Ray's machines

@@ -82,7 +82,7 @@ def run(name, count, **parameters):
                    "PYTHONPATH": os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run([sys.executable, "-c", PROGRAM, name, json.dumps(parameters), str(count)], env=environment,
                           capture_output=True, text=True, timeout=600)
-    if "pip could not install Ray" in done.stderr:
+    if "pip could not install ray" in done.stderr:
         pytest.skip("Ray could not be installed from PyPI")
     assert done.returncode == 0, done.stderr
     *lines, addresses, left = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("[")]

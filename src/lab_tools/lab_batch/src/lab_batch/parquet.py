@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Results as Parquet (https://parquet.apache.org), which pandas, R and others read. pyarrow is installed on first use.
+"""
+import json
+from pathlib import Path
+
+from . import on_first_use
+
+REQUIREMENTS = Path(__file__).with_name("requirements-pyarrow.txt")
+_FIXED = ("seed", "seconds", "error")
+
+
+def columns_of(outcomes):
+    """{name: [a value or None for each Outcome]}: seed, seconds, error (None where it ended well), then the results.
+
+    A result that is named as one of these three gets the name result.NAME.
+    """
+    columns = {"seed": [one.seed for one in outcomes], "seconds": [one.seconds for one in outcomes],
+               "error": [one.error or None for one in outcomes]}
+    for name in dict.fromkeys(name for one in outcomes for name in one.result):
+        columns["result." + name if name in _FIXED else name] = [one.result.get(name) for one in outcomes]
+    return columns
+
+
+def write(path, header, outcomes, root):
+    """Write outcomes in one file; header: what JSON can hold, kept as the file's metadata ``batch``.
+
+    root: the folder of the workspace, for installing. Values of a result that have different types become JSON texts.
+    Raises JobError, OSError.
+    """
+    on_first_use.ensure_installed(Path(root), "pyarrow", REQUIREMENTS)
+    import pyarrow
+    from pyarrow import parquet
+
+    arrays = {}
+    for name, values in columns_of(outcomes).items():
+        try:
+            arrays[name] = pyarrow.array(values)
+        except (pyarrow.ArrowInvalid, pyarrow.ArrowTypeError, pyarrow.ArrowNotImplementedError, OverflowError):
+            arrays[name] = pyarrow.array([None if value is None else json.dumps(value) for value in values])
+        if name == "error":
+            arrays[name] = arrays[name].cast(pyarrow.string())
+    table = pyarrow.table(arrays).replace_schema_metadata({"batch": json.dumps(header)})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    parquet.write_table(table, path)
