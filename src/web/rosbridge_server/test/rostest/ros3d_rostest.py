@@ -18,7 +18,8 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from interactive_markers.interactive_marker_server import InteractiveMarkerServer
 from nav_msgs.msg import OccupancyGrid
-from sensor_msgs.msg import JointState, LaserScan, PointField
+from octomap_msgs.msg import Octomap
+from sensor_msgs.msg import Image, JointState, LaserScan, PointField
 from sensor_msgs.point_cloud2 import create_cloud
 from visualization_msgs.msg import (
     InteractiveMarker,
@@ -41,6 +42,10 @@ SHELF = (0.25, 0.0, 0.5)
 PLACE_TOLERANCE_M = 0.005
 BENT_RAD = 0.6
 CONTROL_IN_SHELF = (0.25, 0.5, 0.5)
+# Levels of an octree, its cell on the positive side of the middle of all axes, and how its format says that.
+LEVELS, MIDDLE, OCCUPIED, FREE, INNER, LAST_CHILD = 16, 1 << 15, 0b10, 0b01, 0b11, 7
+# A picture of depths: these at the upper left, as a share of the farthest one; below them a mask; then colours.
+DEPTH, HALF = 0.5, 64
 DRAG_M = 0.4
 DRAG_TOLERANCE_M = 0.05
 
@@ -60,6 +65,21 @@ def coloured(kind, frame, position, colour, number=0):
     return marker
 
 
+def octomap():
+    """An occupied cell at the middle, and a free one beside it along x."""
+    nodes = [INNER << 2 * LAST_CHILD, *[INNER] * (LEVELS - 2), OCCUPIED | FREE << 2]
+    data = np.array(nodes, "<u2").view(np.int8).tolist()
+    return Octomap(binary=True, id="OcTree", resolution=0.05, data=data)
+
+
+def depths():
+    """A red wall, encoded as depthcloud_encoder does."""
+    pixels = np.zeros((2 * HALF, 2 * HALF, 3), np.uint8)
+    pixels[:HALF, :HALF] = round(255 * DEPTH)
+    pixels[HALF:, HALF:, 0] = 255
+    return Image(height=2 * HALF, width=2 * HALF, encoding="rgb8", step=6 * HALF, data=pixels.tobytes())
+
+
 class Graph:
     """What the page shows."""
 
@@ -75,7 +95,9 @@ class Graph:
         self._joints = [joint.get("name") for joint in robot.findall("joint") if joint.get("type") != "fixed"]
         self.angle = 0.0
         self._states = rospy.Publisher("/joint_states", JointState, queue_size=1)
-        self._timer = rospy.Timer(rospy.Duration(0.05), self._say_joints)
+        self._depths = rospy.Publisher("/lab/depths", Image, queue_size=1)
+        self._timers = [rospy.Timer(rospy.Duration(0.05), self._say_joints),
+                        rospy.Timer(rospy.Duration(0.2), lambda _event: self._depths.publish(depths()))]
         self._latched = []
         self._publish()
         self.feedback = []
@@ -120,6 +142,7 @@ class Graph:
         grid.info.resolution, grid.info.width, grid.info.height = 0.5, 3, 2
         grid.info.origin.orientation.w = 1.0
         self.latch("/lab/map", grid)
+        self.latch("/lab/octomap", octomap())
 
     def _control(self):
         marker = InteractiveMarker(name="handle", scale=0.3)
@@ -262,6 +285,18 @@ class Ros3dTest(unittest.TestCase):
         self.check_near(found["origin"], SHELF)
         # The upper row first. What is unknown, -1, wraps around in ros3d's picture of bytes.
         self.assertEqual(found["red"], [0, 50, 100, 0, 100, 255])
+
+    def test_an_octree(self):
+        keys = [MIDDLE] * 3, [MIDDLE + 1, MIDDLE, MIDDLE], [MIDDLE - 1] * 3
+        found = self.browser.wait("cells(%s, %s, %s)" % keys)
+        self.assertEqual(found, [1, -1, "unknown"])
+
+    def test_a_depth_cloud_of_a_video_stream(self):
+        address = address_of("web_video_server").replace("ws", "http") + "stream?topic=/lab/depths"
+        self.open("&video=" + quote(address))
+        self.browser.wait("Boolean(shown.depths?.mesh)")
+        red, green, blue = self.colour_at(plus(SHELF, (0.0, 0.0, DEPTH)))
+        self.assertGreater(red, 2 * max(green, blue))
 
     def test_a_frame(self):
         def off():
