@@ -104,6 +104,8 @@ class PageTest(unittest.TestCase):
     def tearDown(self):
         if self.reason:
             return
+        # How the page looked at the end, of a failed test too.
+        self.keep(self.id().rsplit(".", 1)[-1])
         said = self.browser.errors[:10]
         # The next test's page begins as a new one. What a page says that is left while it loads is no error of it.
         self.browser.evaluate("localStorage.clear()")
