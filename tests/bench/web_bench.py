@@ -111,6 +111,7 @@ def measure(report, quick, number):
         if not why_not():
             page(report, web, times)
         vanish(report, lab, web, 2 if quick else 10)
+        comparison(report, lab, web)
         stop(report, web, 3 if quick else 10)
 
 
@@ -238,18 +239,20 @@ def page(report, web, times):
 
 class Operator:
     """A page in control of the robot, as a context manager. ``socket``: its connection; ``goals`` {joint: [rad]} go
-    with each heartbeat, as while a slider is dragged; ``last_s``: the time of the last heartbeat [s].
+    with each heartbeat, as while a slider is dragged; ``heard``: operations that came; ``last_s``: the time of the last
+    heartbeat [s].
     """
 
     def __init__(self, web, goals=None):
         self._web = web
-        self._goals = goals
+        self.goals = goals
+        self.heard = []
         self._beats = threading.Event()
         self._ended = threading.Event()
         self.last_s = 0.0
 
     def __enter__(self):
-        self.socket = Socket(self._web.page, lambda *_: None)
+        self.socket = Socket(self._web.page, lambda operation, _time_s: self.heard.append(operation))
         self._thread = threading.Thread(target=self._beat)
         self.socket.beat()
         self.socket.send(op="take")
@@ -278,8 +281,8 @@ class Operator:
             with contextlib.suppress(OSError, WebSocketException):
                 self.last_s = time.monotonic()
                 self.socket.beat()
-                if self._goals is not None:
-                    self.socket.send(op="move", joints=self._goals)
+                if self.goals is not None:
+                    self.socket.send(op="move", joints=self.goals)
 
 
 class Heard:
@@ -328,6 +331,25 @@ def vanish(report, lab, web, times):
         report.add("an operator who drags a slider %s: last heartbeat to last command, the longest" % how,
                    1000.0 * max(commanded), "ms", samples=times, most=200.0)
         report.add("the same to an arm slower than %g rad/s" % SLOW, 1000.0 * max(rested), "ms", samples=times)
+
+
+def comparison(report, lab, web):
+    """An arm that is dragged while the page compares the robot's interface: how often and how long it gets no command.
+    """
+    def is_compared():
+        operator.goals = GOALS[int(time.monotonic()) % len(GOALS)]
+        states = [one["is_running"] for one in operator.heard if one["op"] == "interface"]
+        return True in states and not states[-1]
+    with Operator(web, GOALS[0]) as operator, Heard(lab, COMMANDS, JointCommand) as commands:
+        wait_until(lambda: len(commands.rows) > 10, "an arm that moves", TIMEOUT_S)
+        begin, before = time.monotonic(), len(operator.heard)
+        operator.socket.send(op="compare")
+        wait_until(is_compared, "a comparison", TIMEOUT_S)
+    times_s = [time_s for time_s, _ in commands.rows if time_s > begin]
+    stops = [one for one in operator.heard[before:] if one.get("code") == "page_silent"]
+    report.add("arms that stop while a page compares the interface", len(stops), "", most=0.0)
+    report.add("the longest time without a command meanwhile",
+               1000.0 * max(b - a for a, b in itertools.pairwise(times_s)), "ms", samples=len(times_s))
 
 
 def fastest(rows):
