@@ -76,8 +76,7 @@ class Baxter:
             for topic, kind, callback in (("state", EndEffectorState, self._on_gripper),
                                           ("properties", EndEffectorProperties, self._on_kind)):
                 self._of_grippers.append(rospy.Subscriber(
-                    "/robot/end_effector/%s_gripper/%s" % (side, topic), kind, _of_kind(kind, callback), side,
-                    queue_size=1))
+                    "/robot/end_effector/%s_gripper/%s" % (side, topic), kind, callback, side, queue_size=1))
 
     def rest(self):
         """Hear nothing of the grippers until the next :meth:`listen`; their states are forgotten."""
@@ -215,12 +214,3 @@ class Baxter:
 
     def _on_kind(self, message, side):
         self._grippers_of_kind[side] = message.ui_type
-
-
-def _of_kind(kind, callback):
-    """``callback(message, argument)`` for a topic that a client of rosbridge in this process may have subscribed to
-    first: rospy then gives all of its subscribers the bytes."""
-    def take(message, argument):
-        callback(kind().deserialize(message._buff) if isinstance(message, rospy.AnyMsg) else message, argument)
-
-    return take

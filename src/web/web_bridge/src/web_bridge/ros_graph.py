@@ -193,14 +193,36 @@ class RosGraph:
             raise BridgeError("the ROS master does not answer: %s" % error) from None
 
 
+class Bytes(rospy.AnyMsg):
+    """A message of any type, as it came, which reads itself when somebody asks for a field.
+
+    All subscribers of a topic in one process get objects of the class that the first one asked for, and others in this
+    process ask for fields: of tf, for instance.
+    """
+
+    __slots__ = ["_read"]
+
+    def __init__(self):
+        super().__init__()
+        self._read = None
+
+    def __getattr__(self, name):
+        # Fields have no such names; copies and headers are asked for before there is anything to read.
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if self._read is None:
+            self._read = message_class(self._connection_header.get("type", "*"))().deserialize(self._buff)
+        return getattr(self._read, name)
+
+
 class _Subscription:
     def __init__(self, topic, arrived):
         self._arrived = arrived
-        self._subscriber = rospy.Subscriber(topic, rospy.AnyMsg, self._on_message, queue_size=_QUEUE, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(topic, Bytes, self._on_message, queue_size=_QUEUE, tcp_nodelay=True)
 
     def _on_message(self, message):
         header, received = message._connection_header, rospy.Time.now()
-        # Under simulated time rospy has subscribed to /clock itself, and delivers its own class to everybody.
+        # Under simulated time rospy has subscribed to /clock itself, and delivers that class to everybody.
         data = message._buff if isinstance(message, rospy.AnyMsg) else serialized(message)
         self._arrived(Arrival(data, header.get("type", "*"), header.get("md5sum", "*"),
                               (received.secs, received.nsecs), header.get("callerid", ""),
