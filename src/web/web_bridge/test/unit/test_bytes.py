@@ -37,5 +37,5 @@ def test_what_is_no_field_is_an_error():
         arrived().positions  # noqa: B018
     with pytest.raises(AttributeError, match="_of_nobody"):
         arrived()._of_nobody  # noqa: B018
-    with pytest.raises(UnknownType, match="nowhere/Nothing is no message type"):
+    with pytest.raises(UnknownType, match="nowhere/Nothing' is not on this machine"):
         arrived("nowhere/Nothing").transforms  # noqa: B018
