@@ -103,7 +103,7 @@ def joystick(lab):
                 assert beyond < 0.3, "a joint went on by %.3f rad after its stick was released" % beyond
                 seen = len(program.output)
                 stick.press(BUMPER[side])
-                program.expect("cycle joint", 15.0, seen)
+                program.expect("cycle joint", beyond=seen)
                 stick.release()
                 order = order[1:] + order[:1]
             stick.push(TRIGGER[side], -1.0)
@@ -124,7 +124,7 @@ def waypoints(lab):
             robot.move_by("left", change)
             seen = len(program.output)
             robot.press("left_button_ok")
-            program.expect("Waypoint Recorded", 15.0, seen)
+            program.expect("Waypoint Recorded", beyond=seen)
             places.append({name: robot.angles[name] for name in joint_names("left")})
         robot.press("left_button_show")
         program.expect("Waypoint playback loop #1")
@@ -142,7 +142,7 @@ def wobbler(lab):
         program.expect("Wobbling. Press Ctrl-C")
         watch = lab.robot.watch()
         wait_until(lambda: all(name in watch.high and watch.span(name) > 0.03 for name in names),
-                   "all joints to swing", 30.0)
+                   "all joints to swing")
         lab.robot.unwatch(watch)
         program.stop()
     least, fastest = min(map(watch.span, names)), max(watch.speed[name] for name in names)
@@ -171,7 +171,7 @@ def puppet(lab):
                     for led, (follows, sign) in names.items() if abs(robot.angles[led] - before[led]) > LED_RAD}
 
         wait_until(lambda: all(0.8 < share < 1.2 for share in shares().values()),
-                   lambda: "the other arm to follow; its shares of the motion: %s" % shares(), 10.0)
+                   lambda: "the other arm to follow; its shares of the motion: %s" % shares())
         ratios, led = shares(), max(abs(robot.angles[name] - before[name]) for name in names)
         program.stop()
     assert len(ratios) >= LED_JOINTS, "only %s moved by more than %g rad" % (", ".join(ratios), LED_RAD)
@@ -195,8 +195,8 @@ def springs(lab):
     with lab.rosrun("baxter_examples", "joint_torque_springs.py", "-l", "left") as program:
         program.expect("Running. Ctrl-c to quit")
         home = {name: lab.neutral[name] for name in joint_names("left")}
-        wait_until(lambda: robot.off(home) < 0.03, "the neutral pose", 60.0)
-        settings = Client("rsdk_joint_torque_springs_left", timeout=30.0)
+        wait_until(lambda: robot.off(home) < 0.03, "the neutral pose")
+        settings = Client("rsdk_joint_torque_springs_left", timeout=90.0)
         settings.update_configuration({joint + "_damping_coefficient": value for joint, value in DAMPING.items()})
 
         def deflection():
@@ -266,7 +266,7 @@ def position_playback(lab):
     lab.need_recording(recorder)
     watch = lab.robot.watch()
     with lab.rosrun("baxter_examples", "joint_position_file_playback.py", "-f", str(lab.recording[0])) as program:
-        program.finish(90.0)
+        program.finish()
     lab.robot.unwatch(watch)
     return judge_playback(lab, watch, 0.03)
 
@@ -277,7 +277,7 @@ def trajectory_playback(lab):
     watch = lab.robot.watch()
     with lab.roslaunch("baxter_examples", "joint_trajectory_file_playback.launch",
                        "file_path:=%s" % lab.recording[0]) as program:
-        program.expect("Exiting - File Playback Complete", 120.0)
+        program.expect("Exiting - File Playback Complete")
         assert "failed or did not finish" not in program.output, program.output[-300:]
         for name in PLAYED:
             lab.robot.wait_for_rest(name)
@@ -298,8 +298,8 @@ def judge_client(lab, side, program, tolerance):
     results = []
     listener = rospy.Subscriber("/robot/limb/%s/follow_joint_trajectory/result" % side,
                                 FollowJointTrajectoryActionResult, results.append)
-    program.expect("Exiting - Joint Trajectory Action Test Complete", 90.0)
-    wait_until(lambda: results, "the goal's result", 10.0)
+    program.expect("Exiting - Joint Trajectory Action Test Complete")
+    wait_until(lambda: results, "the goal's result")
     listener.unregister()
     off = lab.robot.off(last_point(side))
     assert results[-1].status.status == GoalStatus.SUCCEEDED, results[-1]

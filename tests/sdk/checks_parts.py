@@ -64,7 +64,7 @@ def gripper_joystick(lab):
         for side in SIDES:
             seen = len(program.output)
             stick.press(CALIBRATE[side])
-            program.expect(side + ": calibrate", 30.0, seen)
+            program.expect(side + ": calibrate", beyond=seen)
             stick.release()
             robot.wait_for_gripper(side, 90, 100)
             stick.push(TRIGGER[side], -1.0)
@@ -99,8 +99,8 @@ def judge_gripper_client(lab, side, program):
     listener = rospy.Subscriber("/robot/end_effector/%s_gripper/gripper_action/result" % side,
                                 GripperCommandActionResult, results.append)
     watch = lab.robot.watch()
-    program.expect("Exiting - Gripper Action Test Example Complete", 90.0)
-    wait_until(lambda: len(results) >= GRIPPER_GOALS, "the results of all goals", 10.0)
+    program.expect("Exiting - Gripper Action Test Example Complete")
+    wait_until(lambda: len(results) >= GRIPPER_GOALS, "the results of all goals")
     listener.unregister()
     lab.robot.unwatch(watch)
     low, high = min(watch.percents[side]), max(watch.percents[side])
@@ -134,7 +134,7 @@ def gripper_client_launch(lab):
 def head_wobbler(lab):
     watch = lab.robot.watch()
     with lab.rosrun("baxter_examples", "head_wobbler.py") as program:
-        program.finish(120.0)
+        program.finish()
     lab.robot.unwatch(watch)
     assert watch.nodded and watch.span("head_pan") > 0.2, "nodded: %s; panned by %.2f rad" % (
         watch.nodded, watch.span("head_pan"))
@@ -147,7 +147,7 @@ def head_client(lab):
     with lab.rosrun("baxter_interface", "head_action_server.py") as server:
         server.expect("Running. Ctrl-c to quit")
         with lab.rosrun("baxter_examples", "head_action_client.py") as program:
-            program.finish(90.0)
+            program.finish()
         server.stop()
     lab.robot.unwatch(watch)
     most, least, end = watch.high["head_pan"], watch.low["head_pan"], lab.robot.angles["head_pan"]
@@ -159,7 +159,7 @@ def head_client(lab):
 def ik_client(lab):
     for side in SIDES:
         with lab.rosrun("baxter_examples", "ik_service_client.py", "-l", side) as program:
-            program.finish(60.0)
+            program.finish()
             program.expect("SUCCESS - Valid Joint Solution Found", 1.0)
     return {"sides": 2}
 
@@ -168,8 +168,8 @@ def ik_client(lab):
 def analog_ramp(lab):
     watch = lab.robot.watch()
     with lab.rosrun("baxter_examples", "analog_io_rampup.py") as program:
-        program.finish(90.0)
-    wait_until(lambda: lab.robot.analog["torso_fan"] == 0, "a fan at rest", 15.0)
+        program.finish()
+    wait_until(lambda: lab.robot.analog["torso_fan"] == 0, "a fan at rest")
     lab.robot.unwatch(watch)
     values = {state["torso_fan"] for state in watch.analog}
     missing = set(range(0, 101, 10)) - values
@@ -181,7 +181,7 @@ def analog_ramp(lab):
 def digital_blink(lab):
     watch = lab.robot.watch()
     with lab.rosrun("baxter_examples", "digital_io_blink.py") as program:
-        program.finish(60.0)
+        program.finish()
         place = program.expect("New state:  True", 1.0)
         program.expect("Final state: False", 1.0, place)
     lab.robot.unwatch(watch)
@@ -193,7 +193,7 @@ def digital_blink(lab):
 def navigator_blink(lab):
     watch = lab.robot.watch()
     with lab.rosrun("baxter_examples", "navigator_io.py", "-b") as program:
-        program.finish(90.0)
+        program.finish()
     lab.robot.unwatch(watch)
     fewest = min(map(watch.changes, LIGHTS))
     assert fewest >= 50, "a light changed %d times" % fewest
@@ -205,11 +205,11 @@ def navigator_input(lab):
     with lab.rosrun("baxter_examples", "navigator_io.py", "-i") as program:
         program.expect("Press input buttons")
         for number, button in enumerate(("ok", "back", "show")):
-            lab.robot.press("left_button_" + button, partial(program.expect, "Button %d: True" % number, 10.0))
-            program.expect("Button %d: False" % number, 10.0)
+            lab.robot.press("left_button_" + button, partial(program.expect, "Button %d: True" % number))
+            program.expect("Button %d: False" % number)
         lab.robot.turn("left_wheel", 3)
-        program.expect("Wheel Increment: ", 10.0)
-        program.finish(60.0)
+        program.expect("Wheel Increment: ")
+        program.finish()
     return {"buttons": 3}
 
 
@@ -222,8 +222,8 @@ def display(lab):
         def shown(message):
             screen = np.frombuffer(message.data, np.uint8).reshape(message.height, message.width, 3)
             return np.array_equal(screen[:600, :1000, ::-1], pixels)
-        wait_for_message("/robot/sim/screen", Image, shown, 30.0)
-        program.finish(60.0)
+        wait_for_message("/robot/sim/screen", Image, shown)
+        program.finish()
     return {"bytes": pixels.size}
 
 
@@ -234,7 +234,7 @@ def urdf_fragment(lab):
     with lab.rosrun("baxter_examples", "send_urdf_fragment.py", "-f", str(path), "-l", "left_hand", "-j",
                     "left_gripper_base") as program:
         # The robot publishes its own description there.
-        message = wait_for_message("/robot/urdf", URDFConfiguration, lambda message: message.link == "left_hand", 30.0)
+        message = wait_for_message("/robot/urdf", URDFConfiguration, lambda message: message.link == "left_hand")
         assert '<link name="left_gripper_base"/>' in message.urdf, message.urdf
         program.stop()
     return {"characters": len(message.urdf)}

@@ -31,7 +31,7 @@ def tuck(lab):
     offs = []
     for option, pose in TUCKS:
         with lab.rosrun("baxter_tools", "tuck_arms.py", option) as program:
-            program.finish(90.0)
+            program.finish()
         offs.append(lab.at(lab.robot.pose(pose), 0.1))
     return {"off_rad": max(offs), "gripper_percent": min(lab.robot.grippers[side].position for side in SIDES)}
 
@@ -46,7 +46,7 @@ def cameras(lab):
         with lab.rosrun("baxter_tools", "camera_control.py", *options) as program:
             program.finish()
         if options[0] == "-o":
-            wait_for_message(topic, Image, lambda message: (message.width, message.height) == (640, 400), 60.0)
+            wait_for_message(topic, Image, lambda message: (message.width, message.height) == (640, 400))
     return {"width": 640, "height": 400}
 
 

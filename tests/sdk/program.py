@@ -12,7 +12,9 @@ import time
 from lab_testing.processes import living
 from lab_testing.waiting import wait_until
 
-END_LIMIT_S = 150.0  # some move both arms to neutral first: seconds of simulated time
+# [s] of wall time. Programs take up to 20 s of simulated time, of which a busy machine gives 0.1 s a second.
+PATIENCE_S = 300.0
+KILLED_LIMIT_S = 40.0
 READING_POLL_S = 0.0005  # a program may read keys for 10 ms only
 
 
@@ -34,7 +36,7 @@ class Program:
         return self
 
     def __exit__(self, *_):
-        for number, patience_s in ((signal.SIGINT, self._patience_s), (signal.SIGKILL, END_LIMIT_S)):
+        for number, patience_s in ((signal.SIGINT, self._patience_s), (signal.SIGKILL, KILLED_LIMIT_S)):
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self._process.pid, number)
             with contextlib.suppress(AssertionError):
@@ -48,7 +50,7 @@ class Program:
         """Everything printed so far."""
         return self._output
 
-    def expect(self, text, timeout_s=60.0, beyond=0):
+    def expect(self, text, timeout_s=PATIENCE_S, beyond=0):
         """Wait for ``text`` in the output behind its first ``beyond`` characters, and return the place behind it.
 
         Raises AssertionError if it does not come within ``timeout_s`` [s] of wall time, or the program ends without it.
@@ -64,7 +66,7 @@ class Program:
     def type(self, keys):
         os.write(self._terminal, keys.encode())
 
-    def press(self, key, timeout_s=30.0):
+    def press(self, key, timeout_s=PATIENCE_S):
         """Type ``key`` while the program reads single keys: setting the terminal to that discards earlier ones.
 
         Returns the length of the output before. Raises AssertionError if the program reads no single keys within
@@ -81,17 +83,17 @@ class Program:
         """Press Ctrl-C: every process of the terminal gets SIGINT."""
         os.killpg(self._process.pid, signal.SIGINT)
 
-    def end(self, timeout_s=END_LIMIT_S):
+    def end(self, timeout_s=PATIENCE_S):
         """Wait for the program's end and return its exit code. Raises AssertionError after ``timeout_s`` [s]."""
         wait_until(self._is_over, lambda: "the program's end; the last output: %r" % self._output[-300:], timeout_s)
         return self._process.returncode
 
-    def finish(self, timeout_s=END_LIMIT_S):
+    def finish(self, timeout_s=PATIENCE_S):
         """Wait for the program's end. Raises AssertionError unless its exit code is 0."""
         code = self.end(timeout_s)
         assert code == 0, "exit code %d; its last output: %r" % (code, self._output[-300:])
 
-    def stop(self, timeout_s=END_LIMIT_S):
+    def stop(self, timeout_s=PATIENCE_S):
         """Press Ctrl-C, wait for the end and return the time that it took [s]."""
         begin = time.monotonic()
         self.interrupt()

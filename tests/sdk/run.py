@@ -26,7 +26,7 @@ from std_msgs.msg import Empty
 from table import BARE, CHECKS
 
 from lab_testing.fake_joystick import FakeJoystick
-from lab_testing.waiting import wait_for_message, wait_until
+from lab_testing.waiting import DEADLINE_S, wait_for_message, wait_until
 
 WORLD = ("baxter_gazebo", "baxter_world.launch", "gui:=false")
 NO_GRIPPERS = ("left_gripper:=none", "right_gripper:=none")
@@ -85,7 +85,7 @@ class Lab:
         if not self._bare:
             self.robot.move(self.neutral)
 
-    def at(self, angles, tolerance, timeout_s=5.0):
+    def at(self, angles, tolerance, timeout_s=DEADLINE_S):
         """Wait until the arms are within ``tolerance`` of ``angles``, and return how far they are off [rad]."""
         wait_until(lambda: self.robot.off(angles) < tolerance,
                    lambda: "less than %g rad; it is %.3f" % (tolerance, self.robot.off(angles)), timeout_s)
@@ -93,7 +93,7 @@ class Lab:
 
     def wait_for_off(self, angles, least, what):
         """Wait until a joint is further than ``least`` from ``angles`` [rad], and return how far one is."""
-        wait_until(lambda: self.robot.off(angles) > least, what, 30.0, 0.001)
+        wait_until(lambda: self.robot.off(angles) > least, what, interval_s=0.001)
         return self.robot.off(angles)
 
     def settled_off(self, angles):
