@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A message that came as bytes reads itself for those who ask for its fields."""
+"""A message that came as bytes reads itself for a callback that asks for its fields."""
 from io import BytesIO
 
 import pytest
