@@ -21,8 +21,8 @@ from std_msgs.msg import Bool
 
 from rospy_limits.node import limit_ports
 
-# Polling period [wall s].
-_POLL_S = 0.1
+# Polling period, and how long a signal may wait [wall s].
+_POLL_S, _WAKE_S = 0.1, 0.5
 _FAILED_LOAD_PAUSE_S = 1.0
 # Longest delay of the process's end by a paused simulation, for one request and in all [wall s].
 _TAKE_DOWN_S = 2.0
@@ -68,7 +68,7 @@ def run_until_ended(node_name, work, clean_up):
 
     rospy.on_shutdown(asked_to_shut_down)
     threading.Thread(target=run, daemon=True).start()
-    code = events.get()
+    code = _first(events)
     cleaning = threading.Thread(target=clean_up, daemon=True)
     cleaning.start()
     # In a paused simulation nobody answers; controllers that are still loaded stay.
@@ -76,6 +76,17 @@ def run_until_ended(node_name, work, clean_up):
     over.set()
     rospy.signal_shutdown("done")
     return code
+
+
+def _first(events):
+    """Wait for an event of a queue.SimpleQueue. A signal that comes while this thread falls asleep does not wake it,
+    and is handled when it wakes up for another reason: so it does now and then.
+    """
+    while True:
+        try:
+            return events.get(timeout=_WAKE_S)
+        except queue.Empty:
+            pass
 
 
 class ControllerLifetime:
