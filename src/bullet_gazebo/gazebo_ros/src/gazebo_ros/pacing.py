@@ -58,18 +58,23 @@ class Pacer:
         """Forget the delay: time counts from now on. For the start and after a pause."""
         self._due = self._last = self._clock()
 
-    def wait(self):
-        """Sleep until the next tick is due. Called once after every tick."""
+    @property
+    def is_paced(self):
+        """False where ticks follow each other as fast as possible."""
+        return self._period > 0.0
+
+    def wait(self, ticks=1):
+        """Sleep until the next tick is due. Called after every tick, or once after several ``ticks``."""
         now = self._clock()
         if not self._period:
             if now - self._last >= YIELD_PERIOD_S:
                 self._sleep(0)
                 self._last = now
             return
-        self._due += self._period
+        self._due += ticks * self._period
         if now - self._due > MAX_DEBT_S:
             self._due = now - MAX_DEBT_S
-        wake = max(self._due, self._last + self._period / MAX_CATCH_UP)
+        wake = max(self._due, self._last + ticks * self._period / MAX_CATCH_UP)
         if wake > now:
             self._sleep(wake - now)
             now = self._clock()

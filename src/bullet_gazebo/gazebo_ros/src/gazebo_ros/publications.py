@@ -19,6 +19,8 @@ _CLOCK_BYTES = 8
 # often.
 MAX_WALL_CLOCK_RATE = 500.0
 MAX_WALL_SNAPSHOT_RATE = 100.0
+# The ticks of this time at most follow each other at once, where the clock has fewer messages than ticks [s].
+MOST_AT_ONCE_S = 0.004
 # Model and link states and the snapshot go out at this rate, in simulation time [Hz].
 STATES_RATE = 100.0
 # The contacts of the whole world go out at this rate, in simulation time and, faster than real time, at most so often
@@ -59,6 +61,8 @@ class Publications:
         """The length of a tick has changed."""
         tick_rate = 1.0 / self._simulation.step_s
         self._clock_divisor = ticks_between(self._clock_rate, tick_rate)
+        # Who gets the time less often than each tick sees no difference; commands wait a little longer.
+        self._simulation.ticks_at_once = max(1, min(self._clock_divisor, int(MOST_AT_ONCE_S * tick_rate + 1e-6)))
         self._states_divisor = ticks_between(STATES_RATE, tick_rate)
         self._contacts_divisor = ticks_between(CONTACTS_RATE, tick_rate)
 

@@ -63,6 +63,9 @@ class Simulation:
         self.on_turn = self.before_step = self.on_tick = self.on_time_reset = self.read_messages = lambda: None
         #: Called after the length of a tick has changed.
         self.on_step_change = lambda: None
+        #: In a paced world, the ticks up to a multiple of this follow each other at once: fewer wake-ups, which make a
+        #: tick take longer.
+        self.ticks_at_once = 1
         self.world = world
         self.requests = requests
         self.paused = paused
@@ -140,10 +143,18 @@ class Simulation:
                 requests.wait(IDLE_S)
                 self._pacer.restart()
             else:
-                self.do_tick()
-                self._pacer.wait()
+                self._pacer.wait(self._some_ticks())
         if self._advance is not None:
             self._end_advance(AdvanceRefused("the simulator is shutting down"))
+
+    def _some_ticks(self):
+        """The ticks of one turn; returns how many."""
+        count, at_once = 0, self.ticks_at_once if self._pacer.is_paced else 1
+        while True:
+            self.do_tick()
+            count += 1
+            if self.tick % at_once == 0 or self.paused:
+                return count
 
     def do_tick(self):
         """One tick."""

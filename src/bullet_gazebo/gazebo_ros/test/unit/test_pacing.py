@@ -47,6 +47,20 @@ def test_ticks_take_their_own_length(clock):
     assert clock.now == pytest.approx(101.0)
 
 
+def test_ticks_that_follow_each_other_at_once_take_their_length_together(clock):
+    pacer = Pacer(0.002, clock=clock, sleep=clock.sleep)
+    assert pacer.is_paced and not Pacer(0.002, 0.0).is_paced
+    for ticks in (1, 2, 2, 3):
+        clock.now += 0.0003
+        pacer.wait(ticks)
+    assert clock.now == pytest.approx(100.016)
+    clock.now += 0.1
+    after_stall = clock.now
+    for _ in range(10):
+        pacer.wait(2)
+    assert clock.now - after_stall == pytest.approx(9 * 0.004 / MAX_CATCH_UP)
+
+
 def test_late_wakes_do_not_add_up(clock):
     pacer = Pacer(0.002, clock=clock, sleep=lambda seconds: clock.sleep(seconds + 0.0002))
     for _ in range(500):

@@ -14,7 +14,7 @@ TOUCH = Contact("cup", "body", "table", "top", (0.1, 0.2, 0.3), (0.0, 0.0, 1.0),
 class World:
     """What Publications looks at, run at a factor of wall time that the test chooses."""
 
-    def __init__(self, monkeypatch, factor, paused=False, asked=None):
+    def __init__(self, monkeypatch, factor, paused=False, asked=None, clock_rate=500.0):
         self.wall_s, self.factor, self.snapshots, self.clocks = 100.0, factor, [], 0
         monkeypatch.setattr(publications.time, "perf_counter", lambda: self.wall_s)
         self.simulation = SimpleNamespace(step_s=STEP_S, tick=0, time_ns=0, time_s=0.0, paused=paused, is_stepping=True,
@@ -26,7 +26,8 @@ class World:
         ros = SimpleNamespace(publisher=lambda topic, *arguments, **options: (
             self.contacts if topic == "/gazebo/contacts" else publisher))
         self.snapshot = SimpleNamespace(write=self._write, resets=0)
-        self.publications = publications.Publications(self.simulation, ros, self.snapshot, log=None, clock_rate=500.0)
+        self.publications = publications.Publications(self.simulation, ros, self.snapshot, log=None,
+                                                      clock_rate=clock_rate)
         self.clocks = 0
 
     def _count(self, data):
@@ -43,6 +44,15 @@ class World:
             self.simulation.time_ns = self.simulation.tick * 2000000
             self.wall_s += STEP_S / self.factor
             self.publications.on_tick()
+
+
+@pytest.mark.parametrize(("clock_rate", "step_s", "ticks"), [
+    (500.0, 0.002, 1), (250.0, 0.002, 2), (100.0, 0.002, 2), (250.0, 0.001, 4), (1000.0, 0.001, 1), (50.0, 0.01, 1)])
+def test_ticks_follow_each_other_at_once_where_the_clock_has_fewer_messages(monkeypatch, clock_rate, step_s, ticks):
+    world = World(monkeypatch, factor=1.0, clock_rate=clock_rate)
+    world.simulation.step_s = step_s
+    world.publications.step_changed()
+    assert world.simulation.ticks_at_once == ticks
 
 
 def test_in_real_time_every_tick_that_is_due_counts(monkeypatch):

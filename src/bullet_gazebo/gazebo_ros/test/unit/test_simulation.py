@@ -131,6 +131,21 @@ def test_a_tick_is_update_step_publish_at_the_right_times(simulation):
     assert simulation.world.steps == 2
 
 
+def test_ticks_up_to_a_multiple_follow_each_other_at_once_in_a_paced_world_alone(simulation):
+    simulation.paused, simulation.ticks_at_once = False, 4
+    simulation.do_tick()
+    assert [simulation._some_ticks() for _ in range(3)] == [3, 4, 4] and simulation.tick == 12
+
+    def pause():
+        simulation.paused = simulation.tick == 14
+
+    simulation.on_tick = pause
+    assert simulation._some_ticks() == 2
+    simulation.paused, simulation.on_tick = False, lambda: None
+    simulation.real_time_factor = 0.0
+    assert simulation._some_ticks() == 1
+
+
 def test_time_is_exact_after_days(simulation):
     simulation.tick = 3 * 24 * 3600 * 500 + 1
     assert simulation.time_ns == 259200 * 10**9 + 2_000_000
