@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Programs that move arms. A check returns what it measured, {name: number}, and raises AssertionError."""
+import itertools
 from functools import partial
 
 import rospy
@@ -20,7 +21,7 @@ KEY_TRIES = 3  # the programs discard what is typed while they do not read; a us
 STICKS = {"right": (0, 1), "left": (3, 4)}
 BUMPER = {"right": 4, "left": 5}
 TRIGGER = {"right": 2, "left": 5}  # the programs cross them: the left trigger is the right gripper's
-HELP = 6  # function1
+HELP, HELD_S = 6, 0.3  # function1; how long it is held and released [s]
 PUSH_N, PUSH_LIMIT_S = 6.0, 120.0  # [N, s]; a push that is not ended before
 KNOCK_N, KNOCK_S, KNOCKED_RAD, RETURNED_RAD = 15.0, 0.2, 0.1, 0.03
 # Pushes at the wrist of a floating arm, one after the other [N], each until a joint has moved by LEAD_RAD; how far how
@@ -49,15 +50,14 @@ def press_key(program, key, spoken, timeout_s=60.0):
 
 def ask_for_help(stick, program):
     """Press the help button until the program answers: what a joystick sends before it is connected is lost."""
-    seen = len(program.output)
+    seen, turns = len(program.output), itertools.cycle((lambda: stick.press(HELP), stick.release))
 
     def answered():
-        stick.press(HELP)
-        rospy.sleep(0.3)
-        stick.release()
+        next(turns)()
         return "Press Ctrl-C to quit." in program.output[seen:]
 
-    wait_until(answered, "the answer to the joystick's help button", 60.0, 1.0)
+    wait_until(answered, "the answer to the joystick's help button", interval_s=HELD_S)
+    stick.release()
 
 
 @check("joint_position_keyboard.py")
@@ -97,7 +97,6 @@ def joystick(lab):
                     robot.wait_for_way(name, start, 0.1 * way)
                     stick.push(axis, 0.0)
                     at = robot.angles[name]
-                    rospy.sleep(0.5)  # whether it goes on is what is tested
                     robot.wait_for_rest(name)
                     beyond = max(beyond, abs(robot.angles[name] - at))
                 assert beyond < 0.3, "a joint went on by %.3f rad after its stick was released" % beyond
@@ -122,12 +121,9 @@ def waypoints(lab):
         places = []
         for change in (0.25, -0.4):
             robot.move_by("left", change)
-            seen = len(program.output)
-            robot.press("left_button_ok")
-            program.expect("Waypoint Recorded", beyond=seen)
+            robot.press("left_button_ok", partial(program.expect, "Waypoint Recorded", beyond=len(program.output)))
             places.append({name: robot.angles[name] for name in joint_names("left")})
-        robot.press("left_button_show")
-        program.expect("Waypoint playback loop #1")
+        robot.press("left_button_show", partial(program.expect, "Waypoint playback loop #1"))
         for _ in range(2):
             for place in places:
                 offs.append(lab.at(place, 0.02, 60.0))
@@ -232,7 +228,8 @@ def recorder(lab):
         robot.press("left_upper_button", lambda: robot.wait_for_gripper("left", 0, 5))
         robot.press("left_lower_button", lambda: robot.wait_for_gripper("left", 95, 100))
         robot.move({name: lab.neutral[name] + 0.3 * change for name, change in PLAYED.items()})
-        rospy.sleep(1.0)  # a second of rest belongs to the recording
+        for name in PLAYED:
+            robot.wait_for_rest(name)
         seconds = rospy.get_time() - begin
         robot.unwatch(watch)
         program.stop()

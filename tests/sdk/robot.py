@@ -23,7 +23,8 @@ from lab_testing.waiting import DEADLINE_S, wait_until
 
 COMMAND_HZ = 50.0
 NEAR_RAD = 0.01
-RESTING_RAD_S = 0.02
+# A joint rests when it has been slower than this for so long, in simulated time.
+RESTING_RAD_S, RESTING_S = 0.02, 0.5
 
 
 class Robot:
@@ -31,6 +32,7 @@ class Robot:
 
     def __init__(self, with_grippers=True):
         self.angles, self.speeds, self.efforts = {}, {}, {}
+        self._stamp_s, self._moved_s = 0.0, {}  # of the newest joint state; of the last one in which a joint moved
         self.state, self.head, self.grippers, self.digital, self.analog = None, None, {}, {}, {}
         self._watchers = []
         self._arms = {side: rospy.Publisher("/robot/limb/%s/joint_command" % side, JointCommand, queue_size=1)
@@ -98,7 +100,7 @@ class Robot:
         """The largest distance from ``angles``, {name: angle [rad]}, of a joint [rad]."""
         return max(abs(self.angles[name] - angle) for name, angle in angles.items())
 
-    def press(self, component, hold=lambda: rospy.sleep(0.3)):
+    def press(self, component, hold):
         """Press a button, call ``hold``, and release it."""
         self._act(component, "press")
         hold()
@@ -129,7 +131,9 @@ class Robot:
                    lambda: "%s to move by %.2f rad; it moved by %.3f" % (name, way, self.angles[name] - start))
 
     def wait_for_rest(self, name):
-        wait_until(lambda: abs(self.speeds[name]) < RESTING_RAD_S, "%s to rest" % name)
+        """Wait until a joint has rested for RESTING_S from now on."""
+        begin_s = self._stamp_s
+        wait_until(lambda: self._stamp_s - max(begin_s, self._moved_s.get(name, 0.0)) > RESTING_S, "%s to rest" % name)
 
     def wait_for_lights(self, side, lit):
         """Wait until both lights of a navigator are on or off."""
@@ -159,6 +163,9 @@ class Robot:
         self.angles = dict(zip(message.name, message.position, strict=True))
         self.speeds = dict(zip(message.name, message.velocity, strict=True))
         self.efforts = dict(zip(message.name, message.effort, strict=True))
+        self._stamp_s = message.header.stamp.to_sec()
+        self._moved_s.update((name, self._stamp_s) for name, speed in self.speeds.items()
+                             if abs(speed) >= RESTING_RAD_S)
         for watch in tuple(self._watchers):
             watch.take()
 
@@ -179,21 +186,29 @@ class Robot:
 
 
 class Watch:
-    """Lowest and highest angles, highest speeds and efforts since its begin; all values of grippers and components."""
+    """Lowest, highest and mean angles, highest speeds and efforts since its begin; all values of grippers and
+    components."""
 
     def __init__(self, robot):
         self._robot = robot
         self.low, self.high, self.speed, self.effort = {}, {}, {}, {}
+        self._sums, self._count = {}, 0
         self.percents, self.digital, self.analog, self.nodded = {}, [], [], False
 
     def take(self):
         robot = self._robot
+        self._count += 1
         for name, angle in robot.angles.items():
             self.low[name] = min(angle, self.low.get(name, angle))
             self.high[name] = max(angle, self.high.get(name, angle))
+            self._sums[name] = self._sums.get(name, 0.0) + angle
             self.speed[name] = max(abs(robot.speeds[name]), self.speed.get(name, 0.0))
             self.effort[name] = max(abs(robot.efforts[name]), self.effort.get(name, 0.0))
         self.nodded = self.nodded or robot.head.isNodding
+
+    def mean(self, name):
+        """A joint's mean angle [rad]; joint states come at a constant rate of simulated time."""
+        return self._sums[name] / self._count
 
     def span(self, name):
         """How far a joint has moved between its ends [rad]."""

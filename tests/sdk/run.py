@@ -20,7 +20,7 @@ import checks_arms  # noqa: F401  the modules enter their checks into the table
 import checks_parts  # noqa: F401
 import checks_tools  # noqa: F401
 import rospy
-from program import Program
+from program import PATIENCE_S, Program
 from robot import Robot
 from std_msgs.msg import Empty
 from table import BARE, CHECKS
@@ -111,13 +111,10 @@ class Lab:
 
     def _means(self, angles):
         """{name: mean angle over MEAN_S of simulated time [rad]}"""
-        sums, count, end = dict.fromkeys(angles, 0.0), 0, rospy.get_time() + MEAN_S
-        while rospy.get_time() < end:
-            count += 1
-            for name in angles:
-                sums[name] += self.robot.angles[name]
-            rospy.sleep(0.02)
-        return {name: total / count for name, total in sums.items()}
+        watch, end = self.robot.watch(), rospy.get_time() + MEAN_S
+        wait_until(lambda: rospy.get_time() > end, "%g s of simulated time" % MEAN_S)
+        self.robot.unwatch(watch)
+        return {name: watch.mean(name) for name in angles}
 
     def time_until_near(self, angles, tolerance):
         """The simulated time until the arm stays within ``tolerance`` of ``angles`` for STAY_S [s].
@@ -125,14 +122,18 @@ class Lab:
         Raises AssertionError after SWING_LIMIT_S.
         """
         begin = since = rospy.get_time()
-        while (now := rospy.get_time()) < begin + SWING_LIMIT_S:
+
+        def stays():
+            nonlocal since
+            now = rospy.get_time()
             if self.robot.off(angles) > tolerance:
                 since = now
-            elif now - since > STAY_S:
-                return since - begin
-            rospy.sleep(0.01)
-        raise AssertionError("the arm does not stay within %g rad; it is %.3f rad off" % (
-            tolerance, self.robot.off(angles)))
+            assert now < begin + SWING_LIMIT_S, "the arm does not stay within %g rad; it is %.3f rad off" % (
+                tolerance, self.robot.off(angles))
+            return now - since > STAY_S
+
+        wait_until(stays, "the arm to stay within %g rad" % tolerance, PATIENCE_S)
+        return since - begin
 
     def need_recording(self, record):
         """Make a recording by the vendor's recorder, unless this lab has one."""
