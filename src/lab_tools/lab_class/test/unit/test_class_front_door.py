@@ -398,9 +398,12 @@ def test_an_operation_wakes_a_paused_lab_and_a_heartbeat_does_not(tmp_path):
             writer.write(BEAT)
             await writer.drain()
             await asyncio.sleep(0)  # whatever comes next is in a read of its own, or behind the heartbeat
-            while not heard:
+
+            def is_heard():
                 writer.write(OPERATION)
-                await asyncio.sleep(0.02)
+                return heard
+
+            await until(is_heard)
             assert labs["anna"].state is State.RUNNING and len(house.supervisor.requests) > asked
             assert heard.startswith((OPERATION, BEAT + OPERATION))
 
