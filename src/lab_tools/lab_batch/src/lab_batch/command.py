@@ -157,6 +157,8 @@ def run(options):
     settings = options.set
     spec = Spec(JOBS[options.job][0] if options.job in JOBS else options.job, dict(settings))
     class_of(spec.name)  # a wrong name is told before anything starts
+    if options.parquet:
+        parquet.ensure_installed(ROOT)
     path = options.out or ROOT / ".baxter" / "batch" / ("%s.jsonl" % options.job.replace("/", "_").replace(":", "."))
     records = Records(path, spec, versions(ROOT))
     try:
@@ -168,9 +170,10 @@ def run(options):
         _run_left(options, spec, left, records)
         seconds = time.monotonic() - began
         chosen = [records.outcomes[seed] for seed in options.seeds]
+        code = report(options, chosen, path, len(left), seconds)
         if options.parquet:
-            parquet.write(options.parquet, records.header, chosen, ROOT)
-        return report(options, chosen, path, len(left), seconds)
+            parquet.write(options.parquet, records.header, chosen)
+        return code
     finally:
         records.close()
 

@@ -22,24 +22,29 @@ def columns_of(outcomes):
     return columns
 
 
-def write(path, header, outcomes, root):
+def ensure_installed(root: Path):
+    """Make pyarrow importable; install it below root/.baxter on first use. Raises JobError."""
+    on_first_use.ensure_installed(root, "pyarrow", REQUIREMENTS)
+
+
+def write(path, header, outcomes):
     """Write outcomes in one file; header: what JSON can hold, kept as the file's metadata ``batch``.
 
-    root: the folder of the workspace, for installing. Values of a result that have different types become JSON texts.
-    Raises JobError, OSError.
+    Dictionaries, and values of a result that have different types, become JSON texts. :func:`ensure_installed` has been
+    called before. Raises OSError.
     """
-    on_first_use.ensure_installed(Path(root), "pyarrow", REQUIREMENTS)
     import pyarrow
     from pyarrow import parquet
 
     arrays = {}
     for name, values in columns_of(outcomes).items():
         try:
-            arrays[name] = pyarrow.array(values)
-        except (pyarrow.ArrowInvalid, pyarrow.ArrowTypeError, pyarrow.ArrowNotImplementedError, OverflowError):
+            arrays[name] = pyarrow.array(values, pyarrow.string() if name == "error" else None)
+        except (pyarrow.ArrowException, OverflowError):
+            arrays[name] = None
+        # Parquet has no dictionary without entries.
+        if arrays[name] is None or "struct<" in str(arrays[name].type):
             arrays[name] = pyarrow.array([None if value is None else json.dumps(value) for value in values])
-        if name == "error":
-            arrays[name] = arrays[name].cast(pyarrow.string())
     table = pyarrow.table(arrays).replace_schema_metadata({"batch": json.dumps(header)})
     path.parent.mkdir(parents=True, exist_ok=True)
     parquet.write_table(table, path)

@@ -52,7 +52,8 @@ def map_seeds(spec, seeds, limits, address=None):
     """Yield an Outcome for each seed, as processes.map_seeds.
 
     address: HOST:PORT of a cluster's head; None: a Ray of its own on this machine. limits.workers is the number of
-    actors, of one processor each. Raises JobError.
+    actors, of one processor each. Ray reads its settings once, when it is imported: a process should use either a
+    cluster or a Ray of its own, and not import Ray before. Raises JobError.
     """
     ensure_installed(Path(os.environ.get("LAB_ROOT", Path.cwd())))
     for name, value in ENVIRONMENT.items():
@@ -150,17 +151,20 @@ class _Actors:
 
     def _take(self, reference):
         actor, _ = self._running[reference]
-        errors = self._ray.exceptions
         try:
-            outcome = self._ray.get(reference)
-        except errors.RayActorError as error:
+            outcome = self._result(reference)
+        except self._ray.exceptions.RayActorError as error:
             yield from self._died(actor, error)
             return
-        except errors.RayTaskError as error:
-            raise JobError(str(error.cause)) from error
         del self._running[reference]
         yield outcome
         self._give(actor, self._following(list(self._of(actor).values())))
+
+    def _result(self, reference):
+        try:
+            return self._ray.get(reference)
+        except self._ray.exceptions.RayTaskError as error:
+            raise JobError(str(error.cause)) from error
 
     def _died(self, actor, error):
         if "JobError" in str(error):
@@ -168,7 +172,7 @@ class _Actors:
         for reference, seed in self._of(actor).items():
             del self._running[reference]
             try:
-                yield self._ray.get(reference)
+                yield self._result(reference)
                 continue
             except self._ray.exceptions.RayActorError:
                 self._deaths[seed] = self._deaths.get(seed, 0) + 1

@@ -345,6 +345,9 @@ def test_ray_is_installed_whole_or_not_at_all(tmp_path, monkeypatch):
 OUTCOMES = [Outcome(3, {"good": True, "error_m": 0.5, "seed": 7, "mixed": 1}, "", 0.25),
             Outcome(4, {}, "ValueError: seed 4 is bad", 0.5),
             Outcome(5, {"good": False, "error_m": 2, "mixed": "two", "joints": [1.0, 2.0]}, "", 0.75)]
+# What a job may return as well.
+STRANGE = {"none": None, "empty": {}, "nothing": [], "deep": [{"a": []}], "huge": 2**70, "": "", "seconds": "late",
+           "ragged": [1, "a"], "\u00e9": "\U0001f916"}
 
 
 def test_results_become_columns_without_losing_those_of_the_same_name():
@@ -368,10 +371,17 @@ def test_parquet_has_all_results_with_seeds_and_versions(tmp_path):
     assert "seed 2 is bad" in rows[2]["error"] and rows[2]["good"] is None and rows[1]["good"]
     header = json.loads(table.schema.metadata[b"batch"])
     assert header["job"] == TROUBLE and header["versions"]["numpy"] == np.__version__
-    parquet.write(tmp_path / "mixed.parquet", {}, OUTCOMES, command.ROOT)
+    parquet.write(tmp_path / "mixed.parquet", {}, OUTCOMES)
     found = arrow.read_table(tmp_path / "mixed.parquet").to_pydict()
     assert found["mixed"] == ["1", None, '"two"'] and found["error_m"] == [0.5, None, 2.0]
     assert found["joints"] == [None, None, [1.0, 2.0]]
+    parquet.write(tmp_path / "strange.parquet", {}, [Outcome(0, STRANGE, "", 1.0)])
+    found = arrow.read_table(tmp_path / "strange.parquet").to_pylist()[0]
+    assert found == {"seed": 0, "seconds": 1.0, "error": None, "none": None, "empty": "{}", "nothing": [],
+                     "deep": '[{"a": []}]', "huge": str(2**70), "": "", "result.seconds": "late",
+                     "ragged": '[1, "a"]', "\u00e9": "\U0001f916"}
+    parquet.write(tmp_path / "none.parquet", {}, [])
+    assert arrow.read_table(tmp_path / "none.parquet").num_rows == 0
 
 
 # -- Ray's machines
