@@ -11,7 +11,7 @@ import numpy as np
 import rospy
 from baxter_core_msgs.msg import DigitalIOState
 from gazebo_msgs.srv import GetModelState
-from lab_window import NEAR_RAD, SIDE, PageTest, angles, wait_for_rest
+from lab_window import NEAR_RAD, SIDE, PageTest, angles, away, wait_for_rest
 from sensor_msgs.msg import Image
 
 from lab_testing.waiting import wait_for_message, wait_until
@@ -107,6 +107,21 @@ class LabPageParts(PageTest):
         self.browser.click("#delete")
         wait_until(lambda: place_of(THING) is None, "the world without the object")
         self.browser.wait("!lab.simulation.names.includes('%s')" % THING)
+
+    def test_an_arm_goes_on_while_the_interface_is_compared(self):
+        self.browser.evaluate("document.getElementById('interface').open = true")
+
+        def goes_on():
+            """Whether one press of a pose's button was enough."""
+            self.go_to("untucked")
+            self.start_for("neutral")
+            self.browser.click("#interface-compare")
+            self.browser.wait("document.getElementById('interface-compare').disabled")
+            wait_until(lambda: away("neutral") < NEAR_RAD or self.says_silent(), "neutral", 60.0)
+            self.browser.wait("!document.getElementById('interface-compare').disabled")
+            return away("neutral") < NEAR_RAD
+        # A busy machine may be too slow for the heartbeat, once or twice.
+        self.assertTrue(any(goes_on() for _ in range(3)))
 
     def test_the_simulation_is_paused_stepped_and_reset(self):
         def time_s():
