@@ -53,15 +53,17 @@ class Lab:
             wait_until(self._answers, "the master", START_LIMIT_S, 0.02)
             for name, value in self._parameters.items():
                 self.master.setParam("/bench", name, value)
-            begin = time.monotonic()
-            self.start("roslaunch", *self._launch, *("%s:=%s" % pair for pair in self._arguments.items()))
-            wait_until(self._is_ready, "%s of %s" % (self._ready, " ".join(self._launch)), START_LIMIT_S, 0.02)
-            self.started_s = time.monotonic() - begin
+            self._launch_it()
             self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_):
         self._stack.close()
+
+    def restart(self):
+        """End the launch file, as Ctrl-C does, and launch it again on the same master."""
+        _end(self._launched)
+        self._launch_it()
 
     def start(self, *command, **options):
         """Run a command on this lab's master until the lab ends; return its Popen."""
@@ -104,6 +106,13 @@ class Lab:
         simulated, wall = self.now(), time.monotonic()
         time.sleep(seconds)
         return (self.now() - simulated) / (time.monotonic() - wall)
+
+    def _launch_it(self):
+        begin = time.monotonic()
+        self._launched = self.start("roslaunch", *self._launch,
+                                    *("%s:=%s" % pair for pair in self._arguments.items()))
+        wait_until(self._is_ready, "%s of %s" % (self._ready, " ".join(self._launch)), START_LIMIT_S, 0.02)
+        self.started_s = time.monotonic() - begin
 
     def _answers(self):
         try:

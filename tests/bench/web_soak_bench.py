@@ -21,6 +21,8 @@ OUT = Path(__file__).resolve().parents[2] / ".baxter/bench"
 #: Clients at a time, and the time between two that come [s].
 VISITORS, EVERY_S = 50, 0.1
 SAMPLE_S = 1.0
+#: How often the simulator is started anew meanwhile, at even distances.
+RESTARTS = 3
 #: How long a reader stops [s], and the pause between two clients that misbehave.
 STOPPED_S, PAUSE_S = 60.0, 2.0
 SUBSCRIBED = {"op": "subscribe", "topic": JOINTS[0], "type": JOINTS[1]}
@@ -38,10 +40,13 @@ def measure(report, quick, number):
         times_s.clear()
         for thread in crowds:
             thread.start()
-        samples = []
+        samples, restarts = [], []
+        begin = time.monotonic()
+        crowds.append(threading.Thread(target=restart, args=(
+            lab, 60.0 * minutes / (RESTARTS + 1), ended, times_s, restarts)))
+        crowds[-1].start()
         try:
             with kept() as keep:
-                begin = time.monotonic()
                 while (time_s := time.monotonic() - begin) < 60.0 * minutes:
                     samples.append((time_s, *sizes(web.process.pid)))
                     keep(samples[-1])
@@ -62,7 +67,10 @@ def measure(report, quick, number):
     for k, (what, unit, most) in enumerate((("memory", "MB", 10.0), ("threads", "", 2.0), ("descriptors", "", 10.0))):
         report.add("%s: %s, least of the last fifth" % (title, what), late[k], unit)
         report.add("%s: %s, the same less that of the second" % (title, what), late[k] - early[k], unit, most=most)
-    gaps = [1000.0 * (b - a) for a, b in itertools.pairwise(times_s)]
+    report.add(title + ": restarts of the simulator after which another client went on", len(restarts), "",
+               least=RESTARTS)
+    gaps = [1000.0 * (b - a) for a, b in itertools.pairwise(times_s)
+            if not any(begin_s < b and a < end_s for begin_s, end_s in restarts)]
     report.add(title + ": joint states at another client, longest gap", max(gaps), "ms", samples=len(gaps))
     report.add(title + ": the same, 99 %", statistics.quantiles(gaps, n=100)[-1], "ms", samples=len(gaps))
 
@@ -93,6 +101,16 @@ def visits(address, ended, counts):
             gone(here.popleft())
     for socket in here:
         gone(socket)
+
+
+def restart(lab, every_s, ended, times_s, restarts):
+    """Start the simulator anew, RESTARTS times: (begin, end) [s] of each, until a client that stayed hears it."""
+    while len(restarts) < RESTARTS and not ended.wait(every_s):
+        begin_s = time.monotonic()
+        lab.restart()
+        before = len(times_s)
+        wait_until(lambda before=before: len(times_s) > before + 10, "joint states after a restart", TIMEOUT_S)
+        restarts.append((begin_s, time.monotonic()))
 
 
 def rough(address, ended, counts):
