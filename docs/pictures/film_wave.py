@@ -11,6 +11,7 @@ import sys
 import rospy
 from PIL import Image
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Empty
 
 from lab_display import show
 
@@ -32,8 +33,14 @@ def main(path):
     while program.poll() is None and not moves():
         pass
     frames, rate, end = [], rospy.Rate(FRAMES_PER_S), rospy.get_time() + LASTS_S
+    # The robot stands still while it is drawn: so a slow machine films as many frames as a fast one.
+    pause, go_on = (rospy.ServiceProxy("/gazebo/%s_physics" % what, Empty) for what in ("pause", "unpause"))
     while program.poll() is None and rospy.get_time() < end:
-        picture = show.picture(eye=EYE, target=TARGET, size=(FINER * SIZE, FINER * SIZE))
+        pause()
+        try:
+            picture = show.picture(eye=EYE, target=TARGET, size=(FINER * SIZE, FINER * SIZE))
+        finally:
+            go_on()
         frames.append(Image.fromarray(picture.array()).reduce(FINER))
         rate.sleep()
     program.wait()

@@ -186,7 +186,7 @@ def write_picture(address, path, width, height):
     browser = Browser(width, height)
     try:
         browser.open(address)
-        browser.wait("globalThis.lab?.view?.revision !== null && lab.view.pictures > 0 && !lab.view.planned")
+        browser.wait("globalThis.lab?.view && lab.view.revision !== null && lab.view.pictures > 0 && !lab.view.planned")
         if browser.evaluate("document.querySelectorAll('#camera option').length > 1"):
             browser.evaluate("""(() => {
                 const list = document.getElementById("camera");
