@@ -28,6 +28,8 @@ class LoopThread:
 
     def __init__(self, name="web"):
         self.loop = asyncio.new_event_loop()
+        self._lock = threading.Lock()
+        self._calls = []  # what soon() was given and the loop has not yet done
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
@@ -39,11 +41,23 @@ class LoopThread:
 
     def soon(self, function, *arguments):
         """Call a function in the loop; from any thread, nothing where the loop has ended."""
-        try:
-            self.loop.call_soon_threadsafe(function, *arguments)
-        except RuntimeError:
-            if not self.loop.is_closed():
-                raise
+        with self._lock:
+            self._calls.append((function, arguments))
+            is_first = len(self._calls) == 1
+        # A message for ten clients is ten calls: the loop is woken up once.
+        if is_first:
+            try:
+                self.loop.call_soon_threadsafe(self._do)
+            except RuntimeError:
+                if not self.loop.is_closed():
+                    raise
+                self._calls.clear()
+
+    def _do(self):
+        with self._lock:
+            calls, self._calls = self._calls, []
+        for function, arguments in calls:
+            self.loop.call_soon(function, *arguments)
 
     def later(self, delay_s, function):
         """Call a function in the loop after a delay, unless the returned object's ``cancel()`` comes first; from any
