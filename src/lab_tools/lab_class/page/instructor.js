@@ -52,6 +52,10 @@ function verdictsOf(lab) {
   return made;
 }
 
+function megabytes(bytes) {
+  return bytes === null ? "" : `${Math.round(bytes / 2 ** 20)} MB`;
+}
+
 const VERBS = {running: ["pause", "stop"], paused: ["start", "stop"], starting: ["stop"], waiting: ["stop"],
                stopped: ["start"], failed: ["start"]};
 
@@ -64,7 +68,7 @@ function row(lab) {
                  ...VERBS[lab.state].map((verb) => button(lab, verb)));
   made.append(cell(lab.full_name), cell(lab.reason ? `${lab.state}: ${lab.reason}` : lab.state, "state"),
               cell(lab.pages, "number"), cell(lab.factor?.toFixed(2) ?? "", "number factor"),
-              cell(lab.memory_bytes === null ? "" : `${Math.round(lab.memory_bytes / 2 ** 20)} MB`, "number"),
+              cell(megabytes(lab.memory_bytes), "number"), cell(megabytes(lab.disk_bytes), "number"),
               cell(lab.unused_s === null ? "" : `${Math.round(lab.unused_s / 60)} min`, "number"),
               verdictsOf(lab), actions);
   return made;

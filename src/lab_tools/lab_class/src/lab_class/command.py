@@ -12,6 +12,7 @@ from pathlib import Path
 import rospkg
 
 from lab_class import control, control_groups, roster
+from lab_class.disk import room
 from lab_class.labs import ClassError, State
 from lab_class.roster import RosterError
 from lab_class.store import ClassRecord, Options, Store, StoreError
@@ -22,8 +23,9 @@ from lab_web.libraries import LibrariesError, fetched
 #: Time for the supervisor to open the front door, and to end all labs [s].
 OPEN_S, DOWN_S = 30.0, 60.0
 _LOOK_S = 0.2
+_LOG = "supervisor.log"
 _DONE, _FAILED, _WRONG_WORDS, _INTERRUPTED = 0, 1, 2, 130
-_COLUMNS = "%-20s %-9s %5s %6s %8s %8s  %s"
+_COLUMNS = "%-20s %-9s %5s %6s %8s %8s %8s  %s"
 
 
 def main(arguments=None):
@@ -169,7 +171,7 @@ def _up(options, store):
     packages = rospkg.RosPack()
     libraries = fetched(Path(packages.get_path("lab_web")) / "page").parents[1]
     store.write(record)
-    log = store.folder / "supervisor.log"
+    log = store.folder / _LOG
     with open(log, "wb") as output:
         supervisor = subprocess.Popen(
             [*control_groups.way_in(), sys.executable, "-P", "-m", "lab_class.supervisor", str(store.folder),
@@ -183,6 +185,10 @@ def _up(options, store):
         time.sleep(_LOOK_S)
     _print_addresses(record, store)
     print("Limits: %s.\n" % control.call(store, "GET", "/labs")["limits"], flush=True)
+    needed, free = len(record.students) * record.options.disk_bytes, room(store.folder)
+    if free < needed:
+        print("The disk has %.1f GB free, and the students' files may have %.1f GB (--disk). Labs that fill it are "
+              "ended.\n" % (free / 2**30, needed / 2**30), flush=True)
     return _DONE if options.no_wait else _await_labs(store)
 
 
@@ -223,10 +229,11 @@ def _await_labs(store):
 
 def _list(_options, store):
     overview = control.call(store, "GET", "/labs")
-    print(_COLUMNS % ("LAB", "STATE", "PAGES", "FACTOR", "MEMORY", "UNUSED", "NAME"))
+    print(_COLUMNS % ("LAB", "STATE", "PAGES", "FACTOR", "MEMORY", "FILES", "UNUSED", "NAME"))
     for lab in overview["labs"]:
         print((_COLUMNS % (lab["name"], lab["state"], lab["pages"], _shown(lab["factor"], "%.2f"),
-                           _shown(lab["memory_bytes"], "%.0f MB", 2**20), _shown(lab["unused_s"], "%.0f min", 60.0),
+                           _shown(lab["memory_bytes"], "%.0f MB", 2**20), _shown(lab["disk_bytes"], "%.0f MB", 2**20),
+                           _shown(lab["unused_s"], "%.0f min", 60.0),
                            lab["full_name"] + (": " + lab["reason"] if lab["reason"] else ""))).rstrip())
     return _DONE
 
@@ -256,12 +263,13 @@ def _down(options, store):
         while store.running() or is_running(supervisor):
             if time.monotonic() > deadline:
                 raise ClassError("the class did not end within %d s; its log: %s"
-                                 % (DOWN_S, store.folder / "supervisor.log"))
+                                 % (DOWN_S, store.folder / _LOG))
             time.sleep(_LOOK_S)
     except control.NoClass as error:
         _remove_left_over(store)
         if not options.delete:
             print(error)
+    (store.folder / _LOG).unlink(missing_ok=True)
     if options.delete:
         # Nothing is removed under a supervisor that is just starting.
         with store.locked():
@@ -281,7 +289,7 @@ def _remove_left_over(store):
 
 def _logs(options, store):
     if options.name is None:
-        path = store.folder / "supervisor.log"
+        path = store.folder / _LOG
     elif roster.slug(options.name) == options.name:
         path = store.folder / "labs" / options.name / "output.txt"
     else:

@@ -13,10 +13,6 @@ from lab_environment.family import children_of, is_running
 END_S = 12.0
 _ROUNDS = 50
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
-# Of a file or folder without content, on ext4.
-_INODE_BYTES = 256
-# What du says of a folder that it may not read, in the C locale.
-_LOCKED = b"Permission denied"
 #: How low the priority of a lab's processes is, where no control group divides the processors.
 NICENESS = 1
 
@@ -103,45 +99,3 @@ def _share_of_memory(pid):
         words = Path("/proc/%d/statm" % pid).read_text(encoding="ascii").split()
         return (int(words[1]) - int(words[2])) * _PAGE_BYTES
     return 0
-
-
-def disk_bytes(folder):
-    """What the files below a folder occupy, empty ones too; links are followed nowhere. A folder that its student has
-    locked is unlocked. Raises OSError if it cannot be found out."""
-    return _total("--block-size=1", folder) + _INODE_BYTES * _total("--inodes", folder)
-
-
-def _total(unit, folder):
-    done = _summary(unit, folder)
-    if _LOCKED in done.stderr:
-        _unlock(folder)
-        done = _summary(unit, folder)
-    try:
-        # It fails where a file goes away meanwhile, and counts the others.
-        total = int(done.stdout.split(None, 1)[0])
-    except (IndexError, ValueError):
-        total = None
-    if total is None or _LOCKED in done.stderr:
-        raise OSError("du cannot read %s: %s" % (folder, done.stderr.decode(errors="replace").strip()[-200:]))
-    return total
-
-
-def _summary(unit, folder):
-    # du goes into folders of any depth; os.walk ends at the longest path, or with the deepest recursion.
-    return subprocess.run(["du", "--summarize", "--one-file-system", unit, "--", str(folder)], capture_output=True,
-                          check=False, env={**os.environ, "LC_ALL": "C"})
-
-
-def _unlock(folder):
-    # It follows no link that it meets on its way.
-    subprocess.run(["chmod", "--recursive", "--silent", "u+rwX", "--", str(folder)], check=False)
-
-
-def remove(folder):
-    """Remove a folder that a student could write to and lock, of any depth."""
-    for _ in range(2):
-        subprocess.run(["rm", "--recursive", "--force", "--one-file-system", "--", str(folder)],
-                       stderr=subprocess.DEVNULL, check=False)
-        if not os.path.lexists(folder):
-            return
-        _unlock(folder)

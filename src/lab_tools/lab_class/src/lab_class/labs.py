@@ -36,6 +36,7 @@ class Action(enum.Enum):
     PAUSE = "pause"
     WAKE = "wake"
     END = "end"
+    KILL = "kill"
 
 
 class ClassError(Exception):
@@ -164,10 +165,10 @@ class Labs:
         return self._fail(lab, reason, now) if lab.has_processes else []
 
     def exceeded(self, name, reason, now):
-        """A lab is over one of its limits: it is ended, and the instructor decides."""
-        actions = self._fail(self[name], reason, now)
+        """A lab is over one of its limits: it is ended at once, and the instructor decides."""
+        self._fail(self[name], reason, now)
         self[name].failures = MOST_FAILURES
-        return actions
+        return [(Action.KILL, name)]
 
     def due(self, now):
         """Whatever time brings: the next starts, labs to be paused, starts that take too long."""

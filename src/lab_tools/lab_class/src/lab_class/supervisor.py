@@ -19,8 +19,9 @@ from tornado import netutil
 from tornado.httpserver import HTTPServer
 
 from lab_class import control_groups, front_door, launching
+from lab_class.disk import Quota, remove
 from lab_class.factors import Factors
-from lab_class.lab_process import END_S, LabProcess, disk_bytes, remove
+from lab_class.lab_process import END_S, LabProcess
 from lab_class.labs import Action, ClassError, Labs, State
 from lab_class.settling import Settling, demand_s
 from lab_class.store import HOME, Store, StoreError
@@ -28,7 +29,7 @@ from lab_class.verdicts import Verdicts
 from lab_environment.isolation import NotIsolated
 from web_bridge.serving import IDLE_S, LARGEST_BODY, LimitedServer
 
-_TICK_S, _SETTLING_S, _VERDICTS_S, _MEMORY_S, _DISK_S = 0.2, 0.5, 2.0, 5.0, 30.0
+_TICK_S, _SETTLING_S, _VERDICTS_S, _MEMORY_S = 0.2, 0.5, 2.0, 5.0
 _PROBE = b"GET /?token=%s HTTP/1.0\r\nHost: localhost\r\n\r\n"
 _PROBE_S = 5.0
 # Of the processors, while a lab starts; 1 is a running lab's. With much less, a start on a busy machine would take too
@@ -55,6 +56,7 @@ class Supervisor:
         self._runtime = Path(tempfile.mkdtemp(prefix="lab-class-"))
         self._factors = Factors(self.socket_of, record.tokens)
         self._verdicts = {name: Verdicts(store.lab(name), store.lab(name) / HOME) for name in names}
+        self._quota = Quota(options.disk_bytes, store.folder)
         self._class_groups = control_groups.found(self._runtime.name, len(names))
 
     # For the front door.
@@ -97,7 +99,8 @@ class Supervisor:
                 "since_s": round(now - lab.since, 1), "unused_s": round(now - lab.used, 1) if lab.used else None,
                 "pages": lab.pages, "factor": self._factors.of(lab.name) if lab.state is State.RUNNING else None,
                 "memory_bytes": self._memory.get(lab.name) if lab.has_processes else None,
-                "token": tokens.act, "view_token": tokens.view, "verdicts": self._verdicts[lab.name].known})
+                "disk_bytes": self._quota.used.get(lab.name), "token": tokens.act, "view_token": tokens.view,
+                "verdicts": self._verdicts[lab.name].known})
         return {"labs": labs, "idle_s": self._record.options.idle_s, "limits": str(self._class_groups)}
 
     def end(self):
@@ -119,7 +122,7 @@ class Supervisor:
                 self._do(self.labs.start(lab.name, self._now()))
             watches = [asyncio.ensure_future(watch) for watch in (
                 self._every(_TICK_S, self._tick), self._every(_MEMORY_S, self._look_at_memory),
-                self._every(_DISK_S, self._look_at_disk), self._every(_VERDICTS_S, self._look_at_verdicts))]
+                self._every(_TICK_S, self._look_at_disk), self._every(_VERDICTS_S, self._look_at_verdicts))]
             await self._end.wait()
             for watch in watches:
                 watch.cancel()
@@ -179,6 +182,11 @@ class Supervisor:
                 self._go(name, self._start(name))
             elif action is Action.END:
                 self._go(name, self._finish(name))
+            elif action is Action.KILL:
+                # It takes no more of what it has taken too much of, and nobody waits for it to end by itself.
+                if process is not None:
+                    process.pause()
+                self._go(name, self._finish(name, at_once=True))
             elif process is not None:
                 process.pause() if action is Action.PAUSE else process.wake()
 
@@ -244,18 +252,20 @@ class Supervisor:
                     writer.close()
         return False
 
-    async def _finish(self, name):
+    async def _finish(self, name, at_once=False):
         process = self._processes.get(name)
         if process is None:
             return
         self._factors.leave(name)
-        process.ask_to_end()
-        deadline = time.monotonic() + END_S
-        while not process.has_ended and time.monotonic() < deadline:
-            await asyncio.sleep(_TICK_S)
+        if not at_once:
+            process.ask_to_end()
+            deadline = time.monotonic() + END_S
+            while not process.has_ended and time.monotonic() < deadline:
+                await asyncio.sleep(_TICK_S)
         await asyncio.get_running_loop().run_in_executor(None, process.kill)
         del self._processes[name]
         self._memory.pop(name, None)
+        self._quota.ended(name)
         await asyncio.get_running_loop().run_in_executor(None, self._groups.pop(name).remove)
         await asyncio.get_running_loop().run_in_executor(None, remove, self._store.lab(name) / "caches")
 
@@ -302,17 +312,19 @@ class Supervisor:
             self._verdicts[name].look()
 
     async def _look_at_disk(self):
-        most = self._record.options.disk_bytes
-        for name in list(self._processes):
+        start = self._now()
+        if not self._quota.is_due(start):
+            return
+        for name, process in list(self._processes.items()):
             try:
-                used = await asyncio.get_running_loop().run_in_executor(None, disk_bytes, self._store.lab(name))
+                why = await asyncio.get_running_loop().run_in_executor(
+                    None, self._quota.measured, name, self._store.lab(name), process.family())
             except OSError as error:
                 # Files that cannot be measured could be of any size.
                 why = "its files could not be measured: %s" % error
-            else:
-                why = used > most and "its files have %.1f GB; its limit is %.1f GB" % (used / 2**30, most / 2**30)
             if why and self.labs[name].has_processes:
                 self._do(self.labs.exceeded(name, why, self._now()))
+        self._quota.looked(start, self._now())
 
 
 def _end_of(path):

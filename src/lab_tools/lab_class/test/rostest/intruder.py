@@ -61,6 +61,17 @@ def open_queue(key):
         raise OSError(ctypes.get_errno(), "msgget")
 
 
+def reserve_space():
+    """On the disk of all, without writing."""
+    path = Path.home() / "reserved"
+    with open(path, "wb") as stream:
+        try:
+            if ctypes.CDLL(None, use_errno=True).fallocate(stream.fileno(), 0, ctypes.c_long(0), ctypes.c_long(1)) < 0:
+                raise OSError(ctypes.get_errno(), "fallocate")
+        finally:
+            path.unlink()
+
+
 def connect_to_any(folder, pattern):
     found = list(Path(folder).glob(pattern))
     if not found:
@@ -110,7 +121,7 @@ def attempts(targets):
             "setting of Linux": lambda: Path("/proc/sys/kernel/core_pattern").write_text("core"),
             "keys of Linux": lambda: Path("/proc/sysrq-trigger").write_text("h"),
             "control groups": lambda: os.listdir("/sys/fs/cgroup"),
-            "mount": lambda: mount(Path.home())}
+            "space without writing": reserve_space, "mount": lambda: mount(Path.home())}
 
 
 def main():

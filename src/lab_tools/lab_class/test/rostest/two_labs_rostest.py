@@ -186,7 +186,7 @@ class TwoLabs(unittest.TestCase):
             report = self.store.lab(name) / "home" / "report.json"
             wait_until(report.exists, "the intruder's report", _LONG_S)
             results = json.loads(report.read_text())
-            self.assertEqual(len(results), 22, results)
+            self.assertEqual(len(results), 23, results)
             self.assertEqual([attempt for attempt, result in results.items() if result == "reached"], [], results)
 
     def ask(self, path, body=None, **headers):
@@ -290,6 +290,7 @@ class TwoLabs(unittest.TestCase):
         self.assertFalse(runtime.exists())
         self.assertEqual(sorted(path.name for path in self.store.lab(NAMES[0]).iterdir()), ["home"])
         self.assertEqual(note.read_text(), "mine")
+        self.assertEqual(sorted(path.name for path in self.store.folder.iterdir()), ["class.json", "labs"])
 
 
 if __name__ == "__main__":

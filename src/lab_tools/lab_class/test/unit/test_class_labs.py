@@ -144,7 +144,7 @@ def test_a_lab_that_does_not_answer_fails_and_the_next_one_starts(labs):
 
 def test_a_lab_over_its_limits_waits_for_the_instructor(labs):
     run(labs, "anna")
-    assert labs.exceeded("anna", "it used 3 GB", 1.0) == [(Action.END, "anna")]
+    assert labs.exceeded("anna", "it used 3 GB", 1.0) == [(Action.KILL, "anna")]
     labs.request("anna", 2.0)
     assert (labs["anna"].state, labs["anna"].reason) == (State.FAILED, "it used 3 GB")
 

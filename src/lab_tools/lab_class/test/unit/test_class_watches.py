@@ -9,10 +9,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from lab_class import supervisor
-from lab_class.lab_process import disk_bytes, remove
+from lab_class import disk
+from lab_class.disk import Quota, disk_bytes, nameless_bytes, remove
 from lab_class.labs import Labs, State
-from lab_class.store import Options
 from lab_class.supervisor import Supervisor, _end_of
 
 _NOBODY = 65534
@@ -101,24 +100,96 @@ def test_a_locked_folder_is_removed():
 
 
 def test_a_folder_that_cannot_be_measured_ends_its_lab_and_the_others_are_looked_at(tmp_path, monkeypatch):
-    monkeypatch.setattr(supervisor, "disk_bytes", _either)
+    monkeypatch.setattr(disk, "disk_bytes", _either)
     labs = Labs(["anna", "ben", "cleo"], 3, None)
-    watcher = SimpleNamespace(labs=labs, done=[])
-    watcher._record = SimpleNamespace(options=Options(disk_bytes=2**20))
-    watcher._processes, watcher._store = dict.fromkeys(["anna", "ben", "cleo"]), SimpleNamespace(lab=str)
+    watcher = SimpleNamespace(labs=labs, done=[], _quota=Quota(2**20, tmp_path))
+    for name in ("anna", "ben", "cleo"):
+        (tmp_path / name).mkdir()
+    watcher._processes = dict.fromkeys(["anna", "ben", "cleo"], SimpleNamespace(family=set))
+    watcher._store = SimpleNamespace(lab=lambda name: tmp_path / name)
     watcher._now, watcher._do = lambda: 0.0, watcher.done.append
     for lab in labs:
         lab.state = State.RUNNING
     asyncio.run(Supervisor._look_at_disk(watcher))
     assert [lab.state for lab in labs] == [State.FAILED, State.RUNNING, State.FAILED] and len(watcher.done) == 2
     assert labs["anna"].reason == "its files could not be measured: du cannot read anna"
-    assert labs["cleo"].reason.startswith("its files have 0.0 GB")
+    assert labs["cleo"].reason.startswith("its files have 0.00 GB, and may have 0.00 GB")
 
 
-def _either(name):
-    if name == "anna":
+def _either(folder):
+    if folder.name == "anna":
         raise OSError("du cannot read anna")
-    return 2**21 if name == "cleo" else 1
+    return 2**21 if folder.name == "cleo" else 1
+
+
+def test_removed_files_that_are_open_count_once(tmp_path):
+    with open(tmp_path / "hidden", "wb") as stream:
+        stream.write(b"x" * 2**20)
+        stream.flush()
+        (tmp_path / "hidden").unlink()
+        second = os.dup(stream.fileno())
+        assert disk_bytes(tmp_path) < 2**20
+        assert 2**20 <= nameless_bytes([os.getpid()], tmp_path.stat().st_dev) < 2**21
+        assert nameless_bytes([os.getpid()], -1) == 0
+        os.close(second)
+
+
+@pytest.fixture
+def free(monkeypatch):
+    """The free space of the disk, which a test can set."""
+    found = SimpleNamespace(f_bavail=10000, f_frsize=2**20, f_favail=0)
+    monkeypatch.setattr(os, "statvfs", lambda folder: found)
+    return found
+
+
+def test_files_are_measured_as_soon_as_the_disk_fills(free, tmp_path):
+    quota = Quota(1000 * 2**20, tmp_path)
+    assert quota.is_due(0.0)
+    quota.looked(0.0, 1.0)
+    free.f_bavail -= 10
+    assert not quota.is_due(10.0)
+    free.f_bavail -= 100
+    assert quota.is_due(2.0)
+    # As long as the last time took, it waits.
+    assert not quota.is_due(1.5)
+    quota.looked(2.0, 3.0)
+    assert not quota.is_due(10.0) and quota.is_due(33.0)
+
+
+def test_many_empty_files_fill_the_disk_too(free, tmp_path):
+    free.f_favail = 10**7
+    quota = Quota(2**30, tmp_path)
+    quota.looked(0.0, 0.0)
+    free.f_favail -= 10**6
+    assert quota.is_due(1.0)
+
+
+def test_a_lab_with_too_many_files_may_run_again_to_delete_some(free, tmp_path, monkeypatch):
+    used = {"files": 2000}
+    monkeypatch.setattr(disk, "disk_bytes", lambda folder: used["files"])
+    quota = Quota(1000, tmp_path)
+    assert "may have" in quota.measured("anna", tmp_path, ())
+    assert quota.used == {"anna": 2000}
+    assert quota.measured("anna", tmp_path, ()) == ""
+    used["files"] = 2100
+    assert quota.measured("anna", tmp_path, ())
+    used["files"] = 900
+    assert quota.measured("anna", tmp_path, ()) == ""
+    used["files"] = 1100
+    assert quota.measured("anna", tmp_path, ()), "what it had once is forgotten"
+
+
+def test_on_a_disk_that_is_nearly_full_the_lab_that_writes_ends(free, tmp_path, monkeypatch):
+    written = {"writes": 0, "idle": 0}
+    monkeypatch.setattr(disk, "disk_bytes", lambda folder: 0)
+    monkeypatch.setattr(disk, "nameless_bytes", lambda pids, device: 0)
+    monkeypatch.setattr(disk, "written_bytes", lambda name: written[name])
+    limit = 100 * 2**20
+    quota = Quota(limit, tmp_path)
+    written["writes"] = written["idle"] = 2 * limit
+    assert [quota.measured(name, tmp_path, name) for name in written] == ["", ""]
+    free.f_bavail, written["writes"] = 150, 3 * limit
+    assert [bool(quota.measured(name, tmp_path, name)) for name in written] == [True, False]
 
 
 def test_a_loop_outlives_an_error():

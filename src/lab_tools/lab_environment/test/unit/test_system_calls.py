@@ -16,7 +16,10 @@ MACHINES = {"x86_64": (0xC000003E, 0, 56), "aarch64": (0xC00000B7, 63, 220)}
 NEW_USER, NEW_THREAD = 0x10000000, 0x3D0F00
 
 
-def outcome(program, number, architecture, argument=0):
+UNSUPPORTED = 0x00050000 | errno.EOPNOTSUPP
+
+
+def outcome(program, number, architecture, argument=0, second=0):
     steps = [struct.unpack_from("=HBBI", program, place) for place in range(0, len(program), 8)]
     place, word = 0, None
     while True:
@@ -25,7 +28,7 @@ def outcome(program, number, architecture, argument=0):
         if code == 0x06:
             return value
         if code == 0x20:
-            word = {0: number, 4: architecture, 16: argument & 0xFFFFFFFF}[value]
+            word = {0: number, 4: architecture, 16: argument & 0xFFFFFFFF, 24: second & 0xFFFFFFFF}[value]
         else:
             place += if_so if {0x15: word == value, 0x35: word >= value, 0x45: word & value}[code] else if_not
 
@@ -53,6 +56,18 @@ def test_sockets_are_those_that_a_network_namespace_holds_back(machine):
         assert outcome(program, number, architecture, family) == ALLOW
     for family in (socket.AF_VSOCK, socket.AF_ALG, socket.AF_BLUETOOTH, socket.AF_PACKET):
         assert outcome(program, number, architecture, family) == REFUSE
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_no_space_is_reserved_on_disks(machine):
+    architecture, program = MACHINES[machine][0], system_calls.filter_program(machine)
+    numbers = system_calls._MACHINES[machine][1]
+    assert outcome(program, numbers["fallocate"], architecture) == UNSUPPORTED
+    # The command is an int: its upper half does not count.
+    for command in (0x40305828, 0x4030582A, 0x40305839, 0x40305828 + (1 << 32)):
+        assert outcome(program, numbers["ioctl"], architecture, 0, command) == UNSUPPORTED
+    for command in (0x5413, 0x40305829):
+        assert outcome(program, numbers["ioctl"], architecture, 0, command) == ALLOW
 
 
 @pytest.mark.parametrize("machine", MACHINES)

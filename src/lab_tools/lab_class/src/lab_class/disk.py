@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the labs' files occupy on the disk, and which lab is to end for it. No file system's quotas are required.
+
+A program fills gigabytes in seconds, so the free space of the disk is asked for several times a second, which costs
+nothing, and the labs' files are measured whenever it falls. Free of ROS; Linux only.
+"""
+import os
+import stat
+import subprocess
+
+# Of a file or folder without content, on ext4.
+_INODE_BYTES = 256
+# What du says of a folder that it may not read, in the C locale.
+_LOCKED = b"Permission denied"
+#: The files are measured at least this often [s].
+PERIOD_S = 30.0
+# The part of a lab's limit by which the free space falls before the files are measured, and by which a lab that the
+# instructor has started with too many files may exceed what it had.
+_STEP = 1.0 / 16.0
+#: Below this number of limits the free space is nearly used up.
+RESERVE = 2
+
+
+class Quota:
+    """The limit of each lab's files. ``limit_bytes``; ``folder``: one on the disk of the labs' files [Path]."""
+
+    def __init__(self, limit_bytes, folder):
+        self._limit, self._folder = limit_bytes, folder
+        #: What the files of each lab that was measured occupy {name: bytes}.
+        self.used = {}
+        self._allowed, self._written = {}, {}
+        self._free, self._due, self._took = None, 0.0, 0.0
+
+    def is_due(self, now):
+        """Whether the files are to be measured: their time has come, or the disk has filled since."""
+        if now >= self._due or self._free is None:
+            return True
+        # As long as measuring takes on a disk that somebody else fills, half of the time goes to other things.
+        return now >= self._due - PERIOD_S + self._took and self._free - self._space() > self._limit * _STEP
+
+    def looked(self, start, now):
+        """The files of all labs have been measured, from the time ``start`` to ``now`` [s]."""
+        self._due, self._took = now + PERIOD_S, now - start
+        self._free = self._space()
+
+    def _space(self):
+        found = os.statvfs(self._folder)
+        return found.f_bavail * found.f_frsize + found.f_favail * _INODE_BYTES
+
+    def measured(self, name, folder, pids):
+        """Measure one lab; why it is to end, or "".
+
+        folder: of its files; pids: its processes. Its files are those in the folder, and those that its processes hold
+        open after they have removed them. A lab that was ended for files in the folder may have these at its next
+        start, so that its student can delete some. Raises OSError if they cannot be measured.
+        """
+        named = disk_bytes(folder)
+        used = self.used[name] = named + nameless_bytes(pids, os.stat(folder).st_dev)
+        written, before = written_bytes(pids), self._written.get(name, 0)
+        self._written[name] = written
+        if used <= self._limit:
+            self._allowed.pop(name, None)
+        if used > self._allowed.get(name, self._limit):
+            self._allowed[name] = max(self._limit, named + self._limit * _STEP)
+            return ("its files have %.2f GB, and may have %.2f GB. Some of them must be deleted once it runs again"
+                    % (used / 2**30, self._limit / 2**30))
+        # Removed files can be open without a descriptor, by a map of memory alone; what was written shows them.
+        free = room(self._folder)
+        if free < RESERVE * self._limit and written - before > self._limit * _STEP and written > self._limit:
+            return "the disk is nearly full (%.2f GB are free), and this lab has written %.2f GB" % (
+                free / 2**30, written / 2**30)
+        return ""
+
+    def ended(self, name):
+        """Its processes have ended; its files stay."""
+        self._written.pop(name, None)
+
+
+def room(folder):
+    """Free space of a folder's disk for this user [bytes]."""
+    found = os.statvfs(folder)
+    return found.f_bavail * found.f_frsize
+
+
+def nameless_bytes(pids, device):
+    """What files occupy that have been removed and are still open in one of these processes, on a disk (st_dev)."""
+    found = {}
+    for pid in pids:
+        folder = "/proc/%d/fd" % pid
+        try:
+            names = os.listdir(folder)
+        except OSError:
+            continue  # it has ended
+        for name in names:
+            try:
+                one = os.stat(folder + "/" + name)
+            except OSError:
+                continue
+            if one.st_nlink == 0 and one.st_dev == device and stat.S_ISREG(one.st_mode):
+                found[one.st_ino] = 512 * one.st_blocks
+    return sum(found.values())
+
+
+def written_bytes(pids):
+    """What these processes, and children of theirs that have ended, have written to disks (proc_pid_io(5))."""
+    total = 0
+    for pid in pids:
+        try:
+            with open("/proc/%d/io" % pid, encoding="ascii") as stream:
+                rows = dict(line.split(": ") for line in stream)
+        except OSError:
+            continue
+        total += int(rows["write_bytes"]) - int(rows["cancelled_write_bytes"])
+    return total
+
+
+def disk_bytes(folder):
+    """What the files below a folder occupy, empty ones too; links are followed nowhere. A folder that its student has
+    locked is unlocked. Raises OSError if it cannot be found out."""
+    return _total("--block-size=1", folder) + _INODE_BYTES * _total("--inodes", folder)
+
+
+def _total(unit, folder):
+    done = _summary(unit, folder)
+    if _LOCKED in done.stderr:
+        _unlock(folder)
+        done = _summary(unit, folder)
+    try:
+        # It fails where a file goes away meanwhile, and counts the others.
+        total = int(done.stdout.split(None, 1)[0])
+    except (IndexError, ValueError):
+        total = None
+    if total is None or _LOCKED in done.stderr:
+        raise OSError("du cannot read %s: %s" % (folder, done.stderr.decode(errors="replace").strip()[-200:]))
+    return total
+
+
+def _summary(unit, folder):
+    # du goes into folders of any depth; os.walk ends at the longest path, or with the deepest recursion.
+    return subprocess.run(["du", "--summarize", "--one-file-system", unit, "--", str(folder)], capture_output=True,
+                          check=False, env={**os.environ, "LC_ALL": "C"})
+
+
+def _unlock(folder):
+    # It follows no link that it meets on its way.
+    subprocess.run(["chmod", "--recursive", "--silent", "u+rwX", "--", str(folder)], check=False)
+
+
+def remove(folder):
+    """Remove a folder that a student could write to and lock, of any depth."""
+    for _ in range(2):
+        subprocess.run(["rm", "--recursive", "--force", "--one-file-system", "--", str(folder)],
+                       stderr=subprocess.DEVNULL, check=False)
+        if not os.path.lexists(folder):
+            return
+        _unlock(folder)
