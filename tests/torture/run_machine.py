@@ -38,8 +38,8 @@ def machine(lab, watch, options, journal, examples=EXAMPLES, steps=STEPS):
         except Exception as error:  # any error is a result of the round
             error = Machine.first_error or error
             count = journal.sent - first
-            steps = "; ".join(journal.last(min(count, 12)))
-            journal.fail("%s: %s\n  last steps: %s" % (type(error).__name__, error, steps), seed, 0, count)
+            last = "; ".join(journal.last(min(count, 12)))
+            journal.fail("%s: %s\n  last steps: %s" % (type(error).__name__, error, last), seed, 0, count)
             watch.still.disarm()
             watch.stamps.announce_reset()
             relaunches += 1
