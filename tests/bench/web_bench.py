@@ -42,6 +42,8 @@ class Socket:
 
     def __init__(self, address, heard):
         self._socket = create_connection(address, timeout=TIMEOUT_S)
+        # It may be silent for as long as a simulator takes to start.
+        self._socket.settimeout(None)
         self._heard = heard
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
@@ -57,8 +59,10 @@ class Socket:
         self._socket.shutdown()
 
     def close(self):
-        self._socket.close()
+        self._socket.send_close()
+        # The server's answer ends the thread.
         self._thread.join(TIMEOUT_S)
+        self._socket.shutdown()
 
     def _read(self):
         with contextlib.suppress(OSError, WebSocketException):
