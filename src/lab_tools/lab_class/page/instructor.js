@@ -6,6 +6,7 @@ const PERIOD_MS = 2000;
 const SLOW = 0.98;
 const token = new URLSearchParams(location.search).get("token") ?? "";
 const byId = (name) => document.getElementById(name);
+const HEADINGS = [...document.querySelectorAll("th")].map((one) => one.textContent);
 
 async function ask(path, method = "GET") {
   const answer = await fetch(path, {method, headers: {Authorization: `Bearer ${token}`}});
@@ -32,9 +33,10 @@ function button(lab, verb) {
   made.onclick = async () => {
     try {
       await ask(`labs/${lab.name}/${verb}`, "POST");
+      byId("refused").textContent = "";
       await refresh();
     } catch (error) {
-      byId("told").textContent = error.message;
+      byId("refused").textContent = error.message;
     }
   };
   return made;
@@ -71,12 +73,28 @@ function row(lab) {
               cell(megabytes(lab.memory_bytes), "number"), cell(megabytes(lab.disk_bytes), "number"),
               cell(lab.unused_s === null ? "" : `${Math.round(lab.unused_s / 60)} min`, "number"),
               verdictsOf(lab), actions);
+  // Narrow windows have no row of headings.
+  HEADINGS.forEach((text, place) => { made.cells[place].dataset.heading = text; });
   return made;
 }
 
+// Rows by the name of their lab. What has not changed stays, so that a button can be clicked, or have the focus, meanwhile.
+const rows = new Map();
+
 async function refresh() {
   const {labs} = await ask("labs");
-  byId("labs").replaceChildren(...labs.map(row));
+  for (const lab of labs) {
+    const fresh = row(lab), shown = rows.get(lab.name);
+    if (!shown) {
+      rows.set(lab.name, fresh);
+      byId("labs").append(fresh);
+    } else {
+      Object.assign(shown.dataset, fresh.dataset);
+      [...fresh.cells].forEach((one, place) => {
+        if (one.outerHTML !== shown.cells[place].outerHTML) shown.cells[place].replaceWith(one);
+      });
+    }
+  }
   byId("told").textContent = `${labs.filter((lab) => lab.pages).length} of ${labs.length} have a page open`;
 }
 

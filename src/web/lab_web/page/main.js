@@ -98,10 +98,20 @@ function refresh() {
   comparison.allow(acting);
 }
 
+// The front door of a class knows why a lab does not answer: it was stopped, has ended, or is about to start.
+async function sayWhyNot() {
+  const answer = await fetch(`.${location.search}`, {headers: {Accept: "text/plain"}}).catch(() => null);
+  if (answer?.status === 503 && !state.connected) note("not_served", (await answer.text()).trim());
+}
+
 const served = {
   connected({is}) {
     state.connected = is;
-    if (!is) Object.assign(state, {mine: false, free: true, robot: null});
+    if (is) settle("not_served");
+    else {
+      Object.assign(state, {mine: false, free: true, robot: null});
+      sayWhyNot();
+    }
     refresh();
   },
   hello({number, may_act}) {
@@ -327,4 +337,4 @@ send({address: `${sockets}lab${query}`});
 setInterval(() => send({}), ALIVE_MS);
 startTopics();
 // For the console, and for tests.
-globalThis.lab = {view, state, send, hands, controls, simulation, notebook, overlay};
+globalThis.lab = {view, state, send, hands, controls, simulation, notebook, overlay, served};

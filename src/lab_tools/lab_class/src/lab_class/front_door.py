@@ -9,7 +9,7 @@ import json
 
 from tornado import web
 
-from lab_class.labs import MOST_FAILURES, ClassError, Role, State, may
+from lab_class.labs import MOST_FAILURES, ClassError, Kind, Role, State, may
 from web_bridge import http_text
 from web_bridge.passing import PassingHandler, PlainHandler, is_foreign
 
@@ -90,6 +90,13 @@ def is_poll(method, uri):
                                and "type=notebook" not in query)
 
 
+def kind_of(is_upgrade, uri):
+    """The labs.Kind of a connection; uri: path and query below the lab. A page of the lab has one WebSocket /lab."""
+    if not is_upgrade:
+        return Kind.ANSWER
+    return Kind.PAGE if uri.partition("?")[0] == "/lab" else Kind.SOCKET
+
+
 class Passed(PassingHandler):
     """A request for a lab: /NAME/..."""
 
@@ -110,6 +117,7 @@ class Passed(PassingHandler):
             self.redirect(self._prefix + "/" + below)
             return
         self._is_poll = is_poll(self.request.method, below)
+        self._kind = kind_of(self.is_upgrade, below)
         if self._is_poll:
             if self.door.supervisor.is_awake(self._name):
                 await self.pass_to(self.door.supervisor.socket_of(self._name), below)
@@ -120,7 +128,7 @@ class Passed(PassingHandler):
         lab = self.door.supervisor.request(self._name)
         if lab.state is not State.RUNNING:
             self._say_wait(lab)
-        elif lab.busy + lab.pages >= MOST_AT_ONCE:
+        elif lab.busy + lab.sockets >= MOST_AT_ONCE:
             self.refuse(429, "this lab has %d requests and open pages already; close some" % MOST_AT_ONCE)
         else:
             await self.pass_to(self.door.supervisor.socket_of(self._name), below)
@@ -143,11 +151,11 @@ class Passed(PassingHandler):
     def entered(self):
         # A lab that is served must not be paused.
         if not self._is_poll:
-            self.door.supervisor.serving(self._name, self.is_upgrade, 1)
+            self.door.supervisor.serving(self._name, self._kind, 1)
 
     def left(self):
         if not self._is_poll:
-            self.door.supervisor.serving(self._name, self.is_upgrade, -1)
+            self.door.supervisor.serving(self._name, self._kind, -1)
 
     def may_pass(self, chunk):
         if not http_text.is_heartbeat(chunk):
@@ -226,7 +234,7 @@ class InstructorPage(_Handler):
             return
         file, kind = kinds[name]
         self.set_header("Content-Type", kind + "; charset=utf-8")
-        self.set_header("Content-Security-Policy", "default-src 'self'; frame-ancestors 'none'")
+        self.set_header("Content-Security-Policy", "default-src 'self'; img-src data:; frame-ancestors 'none'")
         self.finish((self._page / file).read_text(encoding="utf-8"))
 
 

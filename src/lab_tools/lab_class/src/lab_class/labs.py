@@ -29,6 +29,14 @@ class Role(enum.Enum):
     VIEWER = "viewer"
 
 
+class Kind(enum.Enum):
+    """Of a connection to a lab: an answer that is under way, a page that is open, another WebSocket."""
+
+    ANSWER = "answer"
+    PAGE = "page"
+    SOCKET = "socket"
+
+
 class Action(enum.Enum):
     """What the supervisor is to do with a lab."""
 
@@ -45,15 +53,16 @@ class ClassError(Exception):
 
 @dataclass
 class Lab:
-    """One lab; times are of the clock that the caller passes in [s]. ``busy``: answers that are under way; ``pages``:
-    open WebSockets; ``visited``: a client has asked since the lab was told to start; ``settled``: it has finished
-    starting, of which its first answer is only a part."""
+    """One lab; times are of the clock that the caller passes in [s]. ``busy``: answers that are under way;
+    ``sockets``: open WebSockets, of which ``pages`` are the lab's page; ``visited``: a client has asked since the lab
+    was told to start; ``settled``: it has finished starting, of which its first answer is only a part."""
 
     name: str
     state: State = State.STOPPED
     since: float = 0.0
     used: float = 0.0
     busy: int = 0
+    sockets: int = 0
     pages: int = 0
     reason: str = ""
     failures: int = 0
@@ -138,11 +147,15 @@ class Labs:
         lab.visited = True
         return []
 
-    def answering(self, name, by, now):
-        """The number of answers under way changes ``by`` 1 or -1. An open page alone does not keep a lab awake."""
+    def serving(self, name, kind, by, now):
+        """The number of connections of one Kind changes ``by`` 1 or -1. An open page alone keeps no lab awake."""
         lab = self[name]
-        lab.busy += by
-        lab.used = now
+        if kind is Kind.ANSWER:
+            lab.busy += by
+            lab.used = now
+        else:
+            lab.sockets += by
+            lab.pages += by * (kind is Kind.PAGE)
 
     def answered(self, name, now):
         """A lab that was starting answers requests."""
@@ -157,7 +170,7 @@ class Labs:
         if not lab.is_starting:
             return []
         lab.settled = True
-        return self.pause(name, now) if self._waits_paused and not (lab.visited or lab.busy or lab.pages) else []
+        return self.pause(name, now) if self._waits_paused and not (lab.visited or lab.busy or lab.sockets) else []
 
     def ended(self, name, reason, now):
         """The processes of a lab have ended by themselves; those of a stopped lab are expected to."""

@@ -73,12 +73,9 @@ class Supervisor:
     def is_awake(self, name):
         return self.labs[name].state is State.RUNNING
 
-    def serving(self, name, is_page, by):
-        """The number of a lab's open pages, or of its answers under way, changes ``by`` 1 or -1."""
-        if is_page:
-            self.labs[name].pages += by
-        else:
-            self.labs.answering(name, by, self._now())
+    def serving(self, name, kind, by):
+        """The number of a lab's connections of one labs.Kind changes ``by`` 1 or -1."""
+        self.labs.serving(name, kind, by, self._now())
 
     def change(self, name, verb):
         """Start, stop or pause one lab. Raises ClassError."""

@@ -10,7 +10,7 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
 from lab_class import front_door, roster
-from lab_class.labs import MOST_FAILURES, Labs, State
+from lab_class.labs import MOST_FAILURES, Kind, Labs, State
 from lab_class.store import ClassRecord, Options
 from web_bridge import passing
 
@@ -46,9 +46,8 @@ class Supervisor:
     def is_awake(self, name):
         return self.labs[name].state is State.RUNNING
 
-    def serving(self, name, is_page, by):
-        lab = self.labs[name]
-        lab.pages, lab.busy = lab.pages + is_page * by, lab.busy + (not is_page) * by
+    def serving(self, name, kind, by):
+        self.labs.serving(name, kind, by, 0.0)
 
     def change(self, name, verb):
         getattr(self.labs, verb)(name, 0.0)
@@ -212,7 +211,7 @@ def test_a_dead_lab_costs_its_client_alone(tmp_path, monkeypatch):
             (tmp_path / "anna").unlink(missing_ok=True)
             assert (await house.ask("/anna/", token=house.tokens["anna"].act))[0] == 502
             lab = house.supervisor.labs["anna"]
-            assert (lab.busy, lab.pages) == (0, 0)
+            assert (lab.busy, lab.sockets) == (0, 0)
 
     for lab in (silent, no_http, gone):
         run(check(lab))
@@ -357,12 +356,12 @@ def test_a_websocket_goes_both_ways_and_ends_with_either_side(tmp_path):
         async with House(tmp_path, echo) as house:
             lab = house.supervisor.labs["anna"]
             reader, writer = await opened(house)
-            assert (lab.pages, lab.busy) == (1, 0)
+            assert (lab.sockets, lab.busy) == (1, 0)
             data = OPERATION + bytes(range(256)) * 1000
             writer.write(data)
             assert await reader.readexactly(len(data)) == data
             writer.close()
-            await until(lambda: lab.pages == 0)
+            await until(lambda: lab.sockets == 0)
 
     async def ends(reader, writer):
         await reader.readuntil(b"\r\n\r\n")
@@ -373,7 +372,7 @@ def test_a_websocket_goes_both_ways_and_ends_with_either_side(tmp_path):
         async with House(tmp_path, ends) as house:
             reader, _ = await opened(house)
             assert await reader.read() == b"last"
-            assert house.supervisor.labs["anna"].pages == 0
+            assert house.supervisor.labs["anna"].sockets == 0
 
     run(check())
     (tmp_path / "anna").unlink(missing_ok=True)
@@ -420,7 +419,7 @@ def test_a_lab_has_a_limit_of_connections(tmp_path, monkeypatch):
             status, _, body = await house.ask("/anna/lab", token=house.tokens["anna"].act, **UPGRADE)
             assert status == 429 and b"close some" in body
             clients[0][1].close()
-            await until(lambda: house.supervisor.labs["anna"].pages == 2)
+            await until(lambda: house.supervisor.labs["anna"].sockets == 2)
             await opened(house)
 
     run(check())
@@ -478,7 +477,7 @@ def test_an_open_jupyterlab_that_nobody_touches_wakes_no_lab_and_keeps_none_awak
             token, lab = house.tokens["anna"].act, house.supervisor.labs["anna"]
             for name in polls:
                 assert (await house.ask("/anna/notebook/api/" + name, Cookie="lab_token=" + token))[0] == 200
-            assert house.supervisor.requests == [] and (lab.busy, lab.pages) == (0, 0)
+            assert house.supervisor.requests == [] and (lab.busy, lab.sockets) == (0, 0)
             lab.state = State.PAUSED
             for name in polls:
                 assert (await house.ask("/anna/notebook/api/" + name, Cookie="lab_token=" + token))[0] == 409
@@ -491,3 +490,14 @@ def test_an_open_jupyterlab_that_nobody_touches_wakes_no_lab_and_keeps_none_awak
             assert lab.state is State.RUNNING
 
     run(check())
+
+
+def test_a_page_counts_once_with_all_of_its_connections():
+    kinds = [front_door.kind_of(is_upgrade, uri) for is_upgrade, uri in (
+        (True, "/lab?token=x"), (True, "/rosbridge"), (True, "/notebook/api/kernels/1/channels"), (False, "/lab"))]
+    assert kinds == [Kind.PAGE, Kind.SOCKET, Kind.SOCKET, Kind.ANSWER]
+    labs = Labs(["anna"], 1, None)
+    for kind in kinds:
+        labs.serving("anna", kind, 1, 0.0)
+    lab = labs["anna"]
+    assert (lab.pages, lab.sockets, lab.busy) == (1, 3, 1)

@@ -2,7 +2,7 @@
 """States of labs, and what comes next; time is a number."""
 import pytest
 
-from lab_class.labs import MOST_FAILURES, START_LIMIT_S, Action, ClassError, Labs, Role, State, may
+from lab_class.labs import MOST_FAILURES, START_LIMIT_S, Action, ClassError, Kind, Labs, Role, State, may
 
 IDLE_S = 900.0
 
@@ -49,8 +49,8 @@ def test_a_lab_waits_for_its_first_client_paused(labs):
 
 
 @pytest.mark.parametrize("visit", [
-    lambda labs: labs.request("anna", 0.5), lambda labs: labs.answering("anna", 1, 0.5),
-    lambda labs: setattr(labs["anna"], "pages", 1)])
+    lambda labs: labs.request("anna", 0.5), lambda labs: labs.serving("anna", Kind.ANSWER, 1, 0.5),
+    lambda labs: labs.serving("anna", Kind.PAGE, 1, 0.5)])
 def test_a_lab_with_a_client_is_not_paused_when_it_has_started(labs, visit):
     labs.due(0.0)
     visit(labs)
@@ -104,9 +104,9 @@ def test_an_unused_lab_is_paused_and_woken_by_a_request(labs):
 
 def test_a_lab_is_not_paused_while_it_answers(labs):
     run(labs, "anna")
-    labs.answering("anna", 1, 0.0)
+    labs.serving("anna", Kind.ANSWER, 1, 0.0)
     assert (Action.PAUSE, "anna") not in labs.due(9000.0)
-    labs.answering("anna", -1, 9000.0)
+    labs.serving("anna", Kind.ANSWER, -1, 9000.0)
     assert (Action.PAUSE, "anna") in labs.due(9001.0 + IDLE_S)
 
 

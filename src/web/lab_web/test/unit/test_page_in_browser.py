@@ -89,6 +89,14 @@ def test_a_hint_goes_when_it_has_been_followed(lab, browser):
     browser.wait("lab.state.mine && document.getElementById('told').textContent === ''", timeout_s=10.0)
 
 
+def test_a_lost_connection_says_what_the_front_door_knows(lab, browser):
+    browser.evaluate("window.fetch = async () => ({status: 503, text: async () => 'Stopped by the teacher.\\n'});"
+                     "lab.served.connected({is: false})")
+    browser.wait("document.getElementById('told').textContent === 'No connection: Stopped by the teacher.'")
+    browser.evaluate("lab.served.connected({is: true})")
+    browser.wait("document.getElementById('told').textContent === ''", timeout_s=10.0)
+
+
 def test_a_second_page_asks_for_itself_and_moves_nothing(lab, browser):
     browser.click("#reach-left")
     browser.wait("lab.view.ghosts.size === 1")
