@@ -21,7 +21,7 @@ OUT = Path(__file__).resolve().parents[2] / ".baxter/bench"
 #: Clients at a time, and the time between two that come [s].
 VISITORS, EVERY_S = 50, 0.1
 SAMPLE_S = 1.0
-#: How often the simulator is started anew meanwhile, at even distances.
+#: How often the simulator is restarted meanwhile, at even distances.
 RESTARTS, CALM_S = 3, 30.0
 #: How long a reader stops [s], and the pause between two clients that misbehave.
 STOPPED_S, PAUSE_S = 60.0, 2.0
@@ -107,7 +107,7 @@ def visits(address, ended, counts):
 
 
 def restart(lab, every_s, ended, times_s, restarts):
-    """Start the simulator anew, RESTARTS times: (begin, end) [s] of each, until a client that stayed hears it."""
+    """Restart the simulator RESTARTS times: (begin, end) [s] of each, until a client that stayed hears it."""
     while len(restarts) < RESTARTS and not ended.wait(every_s):
         begin_s = time.monotonic()
         lab.restart()

@@ -177,12 +177,13 @@ def _up(options, store):
             [*control_groups.way_in(), sys.executable, "-P", "-m", "lab_class.supervisor", str(store.folder),
              str(libraries), str(Path(packages.get_path("lab_class")) / "page")],
             stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, start_new_session=True, cwd="/")
-    deadline = time.monotonic() + OPEN_S
-    while not _is_up(store):
-        if supervisor.poll() is not None or time.monotonic() > deadline:
-            last = log.read_text(errors="replace").strip().rpartition("\n")[2]
-            raise ClassError("the class did not start: %s" % (last or "its log is empty, %s" % log))
-        time.sleep(_LOOK_S)
+    try:
+        _await_door(store, supervisor, log)
+    except KeyboardInterrupt:
+        # Nobody knows an address yet.
+        supervisor.terminate()
+        supervisor.wait(DOWN_S)
+        raise
     _print_addresses(record, store)
     print("Limits: %s.\n" % control.call(store, "GET", "/labs")["limits"], flush=True)
     needed, free = len(record.students) * record.options.disk_bytes, room(store.folder)
@@ -190,6 +191,15 @@ def _up(options, store):
         print("The disk has %.1f GB free, and the students' files may have %.1f GB (--disk). Labs that fill it are "
               "ended.\n" % (free / 2**30, needed / 2**30), flush=True)
     return _DONE if options.no_wait else _await_labs(store)
+
+
+def _await_door(store, supervisor, log):
+    deadline = time.monotonic() + OPEN_S
+    while not _is_up(store):
+        if supervisor.poll() is not None or time.monotonic() > deadline:
+            last = log.read_text(errors="replace").strip().rpartition("\n")[2].removeprefix("labs: ")
+            raise ClassError("the class did not start: %s" % (last or "its log is empty, %s" % log))
+        time.sleep(_LOOK_S)
 
 
 def _print_addresses(record, store):

@@ -107,7 +107,7 @@ class Supervisor:
     # The class.
 
     async def run(self):
-        """Until `end`, or a signal. Raises OSError where the port is taken."""
+        """Until `end`, or a signal. Raises StoreError where the port is taken."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, self.end)
@@ -134,7 +134,11 @@ class Supervisor:
 
     def _open(self):
         options = self._record.options
-        door = netutil.bind_sockets(options.port, "" if options.public else "127.0.0.1")
+        try:
+            door = netutil.bind_sockets(options.port, "" if options.public else "127.0.0.1")
+        except OSError as error:
+            raise StoreError("port %d cannot be opened (%s); --port names another one, and students' addresses have it"
+                             % (options.port, error.strerror or error)) from error
         server = LimitedServer(front_door.application(self.door, self._page), idle_connection_timeout=IDLE_S,
                                body_timeout=IDLE_S, max_body_size=LARGEST_BODY)
         server.add_sockets(door)

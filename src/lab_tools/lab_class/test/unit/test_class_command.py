@@ -1,6 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The words of `./baxter.sh labs`."""
+import signal
+import socket
+import subprocess
+from types import SimpleNamespace
+
+import pytest
+
 from lab_class import command
+from lab_class.store import Options, StoreError
+from lab_class.supervisor import Supervisor
 
 
 def test_a_launch_file_of_this_folder_is_found_from_another(tmp_path, monkeypatch):
@@ -8,3 +17,30 @@ def test_a_launch_file_of_this_folder_is_found_from_another(tmp_path, monkeypatc
     (tmp_path / "mine.launch").write_text("<launch/>", encoding="utf-8")
     assert command._launch("mine.launch pose:=tucked") == (str(tmp_path.resolve() / "mine.launch"), "pose:=tucked")
     assert command._launch("baxter_gazebo baxter_world.launch") == ("baxter_gazebo", "baxter_world.launch")
+
+
+def test_ctrl_c_before_there_are_addresses_ends_the_class(tmp_path, monkeypatch):
+    started = []
+
+    def start(*_, **__):
+        started.append(subprocess.Popen(["sleep", "60"]))
+        return started[0]
+
+    def ctrl_c(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "fetched", lambda page: tmp_path / "a" / "b")
+    monkeypatch.setattr(command, "subprocess", SimpleNamespace(Popen=start, DEVNULL=None, STDOUT=None))
+    monkeypatch.setattr(command, "_await_door", ctrl_c)
+    assert command.main(["--folder", str(tmp_path / "class"), "up", "1", "--trusted"]) == 130
+    assert started[0].poll() == -signal.SIGTERM
+
+
+def test_a_port_that_is_taken_is_named():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        supervisor = SimpleNamespace(_record=SimpleNamespace(options=Options(port=port)))
+        with pytest.raises(StoreError, match="port %d cannot be opened .Address already in use.; --port" % port):
+            Supervisor._open(supervisor)
