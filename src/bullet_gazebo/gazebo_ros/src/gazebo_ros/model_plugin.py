@@ -161,18 +161,19 @@ class PluginContext(NodeHandle):
         """Loop thread: the :class:`ModelPlugin` objects that the model has now, in the order of its description."""
         return tuple(self._host.plugins())
 
-    def screen(self, link, place, size_m, pixels, glows=False):
+    def screen(self, link, place, size_m, pixels, glows=False, radius_m=0.0):
         """Make a screen, a rectangle of the model that shows pictures; call it in the constructor.
 
         It is fixed to ``link`` at ``place`` (4, 4): the frame of its centre, with x to the right and y up for a viewer
         in front of it. ``size_m``: width and height; ``pixels``: columns and rows; ``glows``: for lights,
-        whose black pixels show what is behind them. Returns a
-        :class:`world_picture.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
+        whose black pixels show what is behind them; ``radius_m``: of the cylinder around which it is bent: ``place`` is
+        then the frame of the cylinder's centre, y its axis, and the picture's middle is in the direction of z. Returns
+        a :class:`world_picture.shared_picture.PictureWriter`, whose ``show(pixels)`` is for the loop.
         """
         # It belongs to the model and is closed with it.
+        place = np.asarray(place, dtype=float)
         return self._opening(("screen", link, tuple(size_m), tuple(pixels)),
-                             lambda: self._host.add_screen(link, np.asarray(place, dtype=float), size_m, pixels, glows),
-                             closes=False)
+                             lambda: self._host.add_screen(link, place, size_m, pixels, glows, radius_m), closes=False)
 
     def param(self, name, default=None):
         """Value of a ROS parameter as it was when the model was spawned; relative names as in :meth:`resolve`."""

@@ -260,7 +260,7 @@ class Spawner:
             raise
         simulation.host(HostedPlugin(plugin, context, model_name, label))
 
-    def _add_screen(self, prepared, link, place, size_m, pixels, glows):
+    def _add_screen(self, prepared, link, place, size_m, pixels, glows, radius_m):
         frames = merge_fixed(prepared.robot).frames
         if link not in frames:
             raise PluginError("a screen is on link '%s', which '%s' does not have" % (link, prepared.robot.name))
@@ -272,7 +272,7 @@ class Spawner:
             self._log.error(str(error))
             return NoPicture()
         entry = {"link": frames[link].link, "offset": (frames[link].offset @ place).ravel().tolist(),
-                 "size": list(size_m), "picture": str(picture.path), "glows": glows}
+                 "size": list(size_m), "picture": str(picture.path), "glows": glows, "radius": radius_m}
         self._screens.setdefault(prepared.name, []).append((entry, picture))
         return picture
 

@@ -53,13 +53,15 @@ class Screen(NamedTuple):
     """A rectangle that shows a picture. ``offset`` (4, 4) in the frame of ``link``: the frame of its centre, x to the
     right and y up for a viewer in front of it; ``size``: width, height [m]; ``picture``:
     :class:`world_picture.shared_picture.PictureReader`; ``glows``: whether it is a light, whose black pixels show what
-    is behind them."""
+    is behind them; ``radius`` [m]: 0 for a flat one, else it is bent around y of its frame, its middle in the direction
+    of z, and something solid is inside."""
 
     link: str
     offset: np.ndarray
     size: tuple
     picture: PictureReader
     glows: bool = False
+    radius: float = 0.0
 
 
 class Body:
@@ -218,7 +220,7 @@ class Mirror:
             self._warn(str(error))
             return None
         return Screen(listed["link"], np.reshape(listed["offset"], (4, 4)), tuple(listed["size"]), picture,
-                      bool(listed.get("glows")))
+                      bool(listed.get("glows")), float(listed.get("radius", 0.0)))
 
     def _parts_of(self, shape):
         geometry, colour = shape.geometry, shape.colour or DEFAULT_COLOUR

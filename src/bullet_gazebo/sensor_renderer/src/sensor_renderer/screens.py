@@ -5,6 +5,9 @@ import numpy as np
 from sensor_renderer.links import Link, visible
 from sensor_renderer.programs import matrix_bytes
 
+# A bent screen is drawn as so many flat stripes.
+_STRIPES = 72
+
 
 class Screens:
     """The textures of one context."""
@@ -13,39 +16,46 @@ class Screens:
         """``program``: the one that draws a picture on a rectangle."""
         self._context = context
         self._program = program
-        corners = np.array([(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)], dtype=np.float32)
-        self._square = context.vertex_array(program, [(context.buffer(corners.tobytes()), "2f", "corner")])
+        self._flat, self._bent = (self._stripes(count) for count in (1, _STRIPES))
         self._program["picture"].value = 1
         self._pictures = {}
         self._lit = set()  # those with a pixel that is not black
+
+    def _stripes(self, count):
+        edges = np.linspace(-0.5, 0.5, count + 1)
+        corners = np.array([(x, y) for x in edges for y in (0.5, -0.5)], dtype=np.float32)
+        return self._context.vertex_array(self._program, [(self._context.buffer(corners.tobytes()), "2f", "corner")])
 
     def draw(self, screens, to_clip):
         """Draw ``screens``, as :meth:`visible` lists them."""
         if screens:
             self._program["to_clip"].write(matrix_bytes(to_clip))
-        for texture, matrix, glows in screens:
+        for texture, matrix, screen in screens:
             texture.use(1)
             self._program["body"].write(matrix_bytes(matrix))
-            if glows:
+            self._program["shape"].value = (*screen.size, 1.0 / screen.radius if screen.radius else 0.0)
+            if screen.glows:
                 self._context.enable(self._context.BLEND)
                 self._context.blend_func = self._context.ONE, self._context.ONE_MINUS_SRC_ALPHA
-            self._square.render(self._context.TRIANGLE_STRIP)
-            if glows:
+            (self._bent if screen.radius else self._flat).render(self._context.TRIANGLE_STRIP)
+            if screen.glows:
                 self._context.disable(self._context.BLEND)
 
     def visible(self, mirror, pinhole, view):
-        """The screens that show their faces, lights last: (texture, matrix of a square of 1 m, whether it glows)."""
+        """The screens that show their faces, lights last: (texture, matrix of the screen's frame,
+        :class:`sensor_renderer.mirror.Screen`)."""
         found = []
         for body in mirror.bodies.values():
             for screen in body.screens:
                 matrix = body.link_matrix(screen.link) @ screen.offset
-                face = Link(np.zeros(3), float(np.hypot(*screen.size)) / 2.0, False)
+                face = Link(np.zeros(3), float(np.hypot(*screen.size)) / 2.0 + screen.radius, False)
                 local = view @ matrix
-                if local[:3, 2] @ local[:3, 3] < 0.0 and visible([(face, matrix, None)], pinhole, view):
+                if ((screen.radius or local[:3, 2] @ local[:3, 3] < 0.0)
+                        and visible([(face, matrix, None)], pinhole, view)):
                     texture = self._texture(mirror, screen.picture)
                     if not screen.glows or screen.picture in self._lit:
-                        found.append((texture, matrix @ np.diag([*screen.size, 1.0, 1.0]), screen.glows))
-        return sorted(found, key=lambda entry: entry[2])
+                        found.append((texture, matrix, screen))
+        return sorted(found, key=lambda entry: entry[2].glows)
 
     def _texture(self, mirror, picture):
         texture = self._pictures.get(picture)

@@ -236,11 +236,15 @@ void main() { seen = number; }
 SCREEN_VERTEX = _HEAD + """
 uniform mat4 body;
 uniform mat4 to_clip;
+// Width, height, and the curvature around y; 0 for a flat one.
+uniform vec3 shape;
 in vec2 corner;
 out vec2 place;
 void main() {
     place = vec2(0.5 + corner.x, 0.5 - corner.y);
-    gl_Position = to_clip * (body * vec4(corner, 0.0, 1.0));
+    vec3 at = vec3(corner * shape.xy, 0.0);
+    if (shape.z > 0.0) at.xz = vec2(sin(at.x * shape.z), cos(at.x * shape.z)) / shape.z;
+    gl_Position = to_clip * (body * vec4(at, 1.0));
 }
 """
 

@@ -120,9 +120,10 @@ class BaxterPlugin(ModelPlugin):
                        if baxter.actuators is not None else None)
         self._robot.on_disabled += [self._head.stop, self._grippers.stop]
         panel = PanelTopics(context, self._robot.press_estop)
-        senses = SensorTopics(world, model, robot, limb_index, self._dt, hands)
+        senses = SensorTopics(context, limb_index, self._dt, hands)
         for part in (self._grippers, senses):
             part.attach_sensors(panel)
+        self._update_lights = senses.update
         self._collision = CollisionTopics(world, model, baxter, chains, guards_of(robot), self._arms.feel,
                                           panel.cuff_squeezed)
         self._collision.warn = self._warnings.warn
@@ -241,6 +242,7 @@ class BaxterPlugin(ModelPlugin):
 
     def publish(self, time_s):
         self._procedures.update(time_s, self._feel_torques)
+        self._update_lights(time_s)
         if self._publishing.publish(time_s) and not self._has_started:
             self._robot.announce_start()
             self._has_started = True

@@ -31,8 +31,8 @@ NAMESPACE = "/robot"
 
 
 class _Drawn:
-    def __init__(self, link, place, size_m, pixels):
-        self.link, self.place, self.size_m = link, place, size_m
+    def __init__(self, link, place, size_m, pixels, radius_m):
+        self.link, self.place, self.size_m, self.radius_m = link, place, size_m, radius_m
         self.pixels = np.zeros((*pixels[::-1], 3), dtype=np.uint8)
 
     def show(self, pixels):
@@ -86,8 +86,8 @@ class Lab:
         for topic, publisher in self.ros.publishers.items():
             publisher.has_listeners = self._is_heard(topic)
 
-    def _screen(self, link, place, size_m, pixels, glows):
-        drawn = _Drawn(link, place, size_m, pixels)
+    def _screen(self, link, place, size_m, pixels, glows, radius_m):
+        drawn = _Drawn(link, place, size_m, pixels, radius_m)
         if glows:
             self.lights[link] = drawn
         else:

@@ -166,7 +166,8 @@ def test_the_interfaces_page_lists_each_output_that_nothing_follows_from():
 
 def test_a_light_glows_on_its_navigator_alone(make_lab):
     lab = make_lab()
-    assert set(lab.lights) == {"left_arm_itb", "right_arm_itb", "left_torso_itb", "right_torso_itb"}
+    assert set(lab.lights) == {"left_arm_itb", "right_arm_itb", "left_torso_itb", "right_torso_itb", "sonar_ring"}
+    lab.lights.pop("sonar_ring")
     areas = {}
     for light in LIGHTS:
         lab.send("digital_io/command", DigitalOutputCommand("torso_left_%s_light" % light, True))

@@ -8,9 +8,10 @@ from sensor_msgs.msg import ChannelFloat32, Imu, LaserScan, PointCloud, Range
 from std_msgs.msg import Float32, Header, UInt16
 
 from baxter_model import BASE_FRAME, SIDES
-from baxter_sim_hardware.sensing import sensors
+from baxter_sim_hardware.sensing import sensors, sonar_lights
 from baxter_sim_hardware.sensing.panel import RANGE_SENSORS
 from baxter_sim_kinematics import Chain
+from sim_time.pace import Schedule
 from sim_time.stamps import stamp
 
 from .row import STATE_RATE_HZ, Part, Topic
@@ -25,23 +26,38 @@ def accelerometer_frame(side):
 
 
 class SensorTopics(Part):
-    """world, model: of bullet_sim; robot: urdf_model.Robot; limb_index:
-    {side: (7,) indices of its joints in the model's}; dt: length of a tick [s]; hands: `sensing.noise.HandSensors`, or
-    None where sensors are exact.
+    """context: the plugin's PluginContext; limb_index: {side: (7,) indices of its joints in the model's}; dt: length of
+    a tick [s]; hands: `sensing.noise.HandSensors`, or None where sensors are exact.
 
     If the description lacks a sensor's frame, that sensor reports no echo and zero acceleration.
     """
 
-    def __init__(self, world, model, robot, limb_index, dt, hands=None):
+    def __init__(self, context, limb_index, dt, hands=None):
+        world, model, robot = context.world, context.model, context.robot
         self._world, self._model, self._limb_index, self._dt, self._hands = world, model, limb_index, dt, hands
         self._links = set(robot.links)
         self._chains = {side: Chain.from_robot(robot, base=BASE_FRAME, tip=accelerometer_frame(side))
                         for side in SIDES if accelerometer_frame(side) in robot.links}
         self._directions = sensors.sonar_directions()
         self._ring = sensors.SonarRing()
+        band = sonar_lights.around(robot.links[SONAR_FRAME]) if SONAR_FRAME in self._links else None
+        self._drawn = None
+        if band:
+            pose, size, radius = band
+            self._drawn = context.screen(SONAR_FRAME, pose, size, sonar_lights.PIXELS, glows=True, radius_m=radius)
+        self._shown, self._drawing = (0, 0.0, 0.0), Schedule(SONAR_RATE_HZ)
 
     def reset(self):
         self._ring.reset()
+
+    def update(self, time_s):
+        """Show the ring's lights as they are at time_s [s]."""
+        if self._drawn is None or not self._drawing.due(time_s):
+            return
+        lit = (self._lit(time_s), self._ring.levels["red"], self._ring.levels["green"])
+        if lit != self._shown:
+            self._shown = lit
+            self._drawn.show(sonar_lights.picture(*lit))
 
     # -- hands
 
@@ -110,11 +126,15 @@ class SensorTopics(Part):
                     ChannelFloat32("Distance", [float(distance) for _, distance in echoes])]
         return PointCloud(Header(stamp=stamp(time_s), frame_id=SONAR_FRAME), points, channels)
 
-    def _lights(self, time_s, component, snapshot):
+    def _lit(self, time_s):
+        """A bit for each light that is on."""
         mask = self._ring.overridden(time_s)
         if mask is None:
             mask = sum(1 << sensor for sensor, _ in self._ring.echoes(self._distances()))
-        return UInt16(mask)
+        return mask
+
+    def _lights(self, time_s, component, snapshot):
+        return UInt16(self._lit(time_s))
 
     def _sonars_enabled(self, time_s, component, snapshot):
         return UInt16(self._ring.enabled)
