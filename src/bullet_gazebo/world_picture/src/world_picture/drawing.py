@@ -23,7 +23,7 @@ _PLAIN_COLOUR = (0.6, 0.6, 0.6, 1.0)
 _PROCESSOR_S, _WAITING_S = 15, 240.0
 _PROCESS = LimitedProcess(processor_s=_PROCESSOR_S, waiting_s=_WAITING_S)
 # Part of the names of cached files: increase it when the result for the same mesh changes.
-_VERSION = 9
+_VERSION = 10
 
 
 class LevelFile(NamedTuple):
