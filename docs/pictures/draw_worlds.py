@@ -58,13 +58,13 @@ class View(NamedTuple):
 
 VIEWS = {
     "robot": View("baxter", (3.5, 0.55, 1.5), (0.1, 0.0, 0.98), 0.93),
-    "hands": View("table", (1.55, 0.75, 1.25), (0.75, 0.05, 0.92), 0.75),
+    "hands": View("table", (1.95, 0.2, 1.42), (0.7, 0.0, 0.93), 0.8),
     "kinect": View("table", (1.35, -0.35, 1.45), (0.12, 0.0, 1.68), 0.7, robot=WITH_KINECT),
     "hand_camera": View("table", (), (), 1.2, camera="left_hand_camera"),
     "lamp": View("cafe", (1.75, -0.85, 1.3), (0.85, 0.02, 0.86), 0.75),
     "table": View("table", (2.75, 1.55, 1.9), (0.35, 0.05, 1.08), 0.98),
-    "shelf": View("shelf", (-0.15, -2.5, 1.75), (0.62, 0.0, 0.92), 0.95, (SHOWN, SHOWN)),
-    "conveyor": View("conveyor", (3.1, 1.7, 1.8), (0.5, 0.3, 0.72), 0.95, seconds=7.0),
+    "shelf": View("shelf", (-0.15, -2.6, 1.75), (0.62, 0.0, 0.97), 1.02, (SHOWN, SHOWN)),
+    "conveyor": View("conveyor", (3.1, 1.7, 1.9), (0.45, 0.25, 0.9), 1.05, seconds=7.0),
     "cafe": View("cafe", (-1.9, -2.9, 2.1), (2.0, 0.5, 0.75), 1.05),
     "class_room": View("class_room", (5.3, -3.2, 2.2), (0.6, 0.6, 0.85), 1.05),
 }
