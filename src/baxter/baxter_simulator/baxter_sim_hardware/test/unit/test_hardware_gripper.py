@@ -123,6 +123,15 @@ def test_calibration_comes_back_and_a_repeated_command_is_the_same_one(lab):
     assert tell(lab, "reboot", "", "me_reboot", 4).calibrated == 0
 
 
+def test_a_calibration_of_a_disabled_robot_leaves_the_gripper_as_it_was(lab):
+    lab.enable(False)
+    assert tell(lab, "clear_calibration").calibrated == 1  # clients clear first, then calibrate
+    assert tell(lab, "calibrate").calibrated == 1
+    assert any("not enabled" in line for line in lab.log.lines)
+    lab.enable()
+    assert tell(lab, "go", '{"position": 0}', seconds=1.5).position == pytest.approx(0.0, abs=1.0)
+
+
 def test_calibration_that_does_not_find_the_ends_is_an_error_until_reset(lab):
     put_box_between_fingers(lab)
     tell(lab, "calibrate", seconds=2.0)

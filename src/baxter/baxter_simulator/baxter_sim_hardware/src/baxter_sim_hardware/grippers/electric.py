@@ -46,7 +46,7 @@ class ElectricGripper(Gripper):
         "reset": ("_reset_error", False),
         "reboot": ("_reboot", False),
         "calibrate": ("_calibrate", True),
-        "clear_calibration": ("_clear_calibration", False),
+        "clear_calibration": ("_clear_calibration", True),
         "go": ("_go", True),
         "grip": ("_grip", True),
         "prepare_to_grip": ("_open", True),
