@@ -28,6 +28,7 @@ KNOCK_N, KNOCK_S, KNOCKED_RAD, RETURNED_RAD = 15.0, 0.2, 0.1, 0.03
 # many joints have to be from their begin then.
 LEADING_N, LEAD_RAD, LED_RAD, LED_JOINTS = ((0.0, 4.0, 0.0), (0.0, 0.0, 5.0)), 0.4, 0.1, 4
 DAMPING = {"s0": 4.0, "s1": 4.0, "e0": 2.0, "e1": 2.0, "w0": 0.5, "w1": 0.5, "w2": 0.5}  # [Nm s/rad]
+SPRINGS = "/rsdk_joint_torque_springs_left"  # the program and its parameters
 # The largest that the program's settings allow [Nm/rad].
 STIFFEST = {"s0": 30.0, "s1": 30.0, "e0": 15.0, "e1": 15.0, "w0": 9.0, "w1": 4.0, "w2": 4.0}
 PLAYED = {"left_s0": 0.3, "left_w1": -0.3, "right_s0": -0.3, "right_w1": 0.3}
@@ -188,11 +189,14 @@ def springs(lab):
     robot = lab.robot
     rate = rospy.Publisher("/robot/joint_state_publish_rate", UInt16, queue_size=1, latch=True)
     rate.publish(100)  # as the robot starts
+    # What a run sets stays on the master, and the next one starts with it.
+    if rospy.has_param(SPRINGS):
+        rospy.delete_param(SPRINGS)
     with lab.rosrun("baxter_examples", "joint_torque_springs.py", "-l", "left") as program:
         program.expect("Running. Ctrl-c to quit")
         home = {name: lab.neutral[name] for name in joint_names("left")}
         wait_until(lambda: robot.off(home) < 0.03, "the neutral pose")
-        settings = Client("rsdk_joint_torque_springs_left", timeout=90.0)
+        settings = Client(SPRINGS, timeout=90.0)
         settings.update_configuration({joint + "_damping_coefficient": value for joint, value in DAMPING.items()})
 
         def deflection():
