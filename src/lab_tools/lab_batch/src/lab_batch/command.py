@@ -89,8 +89,11 @@ def parse(argv):
 
 
 def repeating_line(job, settings, seed):
-    """The command that runs one episode again."""
-    words = ["./baxter.sh", "batch", job, "--seeds", str(seed)]
+    """The command that runs one episode again, in the folder of this one."""
+    script = "./baxter.sh"
+    if not os.path.exists(script):
+        script = os.path.join(os.environ.get("LAB_ROOT", "."), "baxter.sh")
+    words = [script, "batch", job, "--seeds", str(seed)]
     for name, value in settings:
         words += ["--set", "%s=%s" % (name, value if isinstance(value, str) else repr(value))]
     return shlex.join([*words, "--out", "/dev/null"])

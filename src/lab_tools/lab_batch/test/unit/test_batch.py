@@ -201,7 +201,7 @@ def test_a_batch_says_what_failed_and_how_to_repeat_it_and_continues(tmp_path, c
     assert run(*words, "--seeds", "0:4") == 1
     said = capsys.readouterr().out
     assert "seed 2 failed: ValueError: seed 2 is bad" in said
-    assert ("./baxter.sh batch small_jobs:Trouble --seeds 2 --set 'raises=[2]' --set folder=%s --out /dev/null"
+    assert ("baxter.sh batch small_jobs:Trouble --seeds 2 --set 'raises=[2]' --set folder=%s --out /dev/null"
             % tmp_path in said)
     assert "good: 3 of 3" in said
     assert "3 ended well, 1 failed; 4 run now" in said
@@ -484,3 +484,12 @@ def test_robot_zero_is_the_drawing_and_others_are_not():
     drawing, own = (one("serials", serial, postures=20) for serial in (0, 5))
     assert max(drawing[name] for name in drawing if name.endswith("mm")) < 1e-6
     assert all(0.5 < own[side + "_hand_off_most_mm"] < 60.0 for side in ("left", "right"))
+
+
+def test_a_failure_is_repeated_from_the_folder_of_its_job(tmp_path, monkeypatch):
+    monkeypatch.setenv("LAB_ROOT", "/home/me/lab")
+    monkeypatch.chdir(tmp_path)
+    assert command.repeating_line("mine:Job", [], 2) == (
+        "/home/me/lab/baxter.sh batch mine:Job --seeds 2 --out /dev/null")
+    (tmp_path / "baxter.sh").touch()
+    assert command.repeating_line("mine:Job", [], 2).startswith("./baxter.sh batch")
