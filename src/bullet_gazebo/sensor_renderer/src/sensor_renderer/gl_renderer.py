@@ -3,6 +3,7 @@
 
 Everything here belongs to the thread that made the renderer.
 """
+import math
 import os
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from sensor_renderer.links import Links, visible
 from sensor_renderer.programs import Programs, draw, matrix_bytes
 from sensor_renderer.screens import Screens
 from sensor_renderer.shadows import Shadows
+from sensor_renderer.sides import Sides
 from sensor_renderer.targets import Targets
 
 # The sky's colours are computed at the corners of so many cells along each side of a picture.
@@ -52,9 +54,13 @@ class GlRenderer:
         self.name = self._context.info["GL_RENDERER"]
         software = any(name in self.name.lower() for name in _SOFTWARE)
         quality = STILL if still else LIVE
+        # In software, half of the triangles of meshes are left out.
+        self._one_sided = software and not still
         self._programs = Programs(self._context, quality.shadow_taps, still)
-        self._shadows = Shadows(self._context, self._programs.shadow, quality.shadow_pixels, quality.shadow_taps)
-        self._links = Links(self._context, self._programs, not still)
+        self._shadows = Shadows(self._context, self._programs.shadow, quality.shadow_pixels, quality.shadow_taps,
+                                self._one_sided)
+        self._links = Links(self._context, self._programs, not still,
+                            Sides(self._context) if self._one_sided else None)
         self._screens = Screens(self._context, self._programs.screen)
         self._floor = Floor(self._context, self._programs)
         self._sky = self._context.vertex_array(
@@ -63,6 +69,8 @@ class GlRenderer:
         self._targets = Targets(self._context, 1 if software and not still else min(4, self._context.max_samples))
         self._lit_by = None
         self._context.enable(moderngl.DEPTH_TEST)
+        # A picture's rows go downwards.
+        self._context.front_face = "cw"
         # The sky is at the largest depth.
         self._context.depth_func = "<="
 
@@ -77,8 +85,8 @@ class GlRenderer:
         if mirror.light != self._lit_by:
             self._light_by(mirror.light)
         everything = self._links.everything(mirror)
-        seen = [(self._links.arrays(link, matrix, pinhole, view, depth), matrix, packed, link)
-                for link, matrix, packed in visible(everything, pinhole, view)]
+        seen = [(self._links.arrays(link, distance, pinhole, depth), matrix, packed, link, distance)
+                for link, matrix, packed, distance in visible(everything, pinhole, view)]
         target = self._targets.of(pinhole.width, pinhole.height)
         picture = distance = None
         if colour:
@@ -89,7 +97,7 @@ class GlRenderer:
             target.clear(mirror.light.background)
             self._shadows.use()
             self._programs.look(to_clip, pose[:3, 3])
-            self._draw(seen)
+            self._draw(seen, pinhole)
             self._screens.draw(screens, to_clip)
             if mirror.light.sky:
                 self._programs.sky["from_clip"].write(matrix_bytes(_rays(pinhole, pose)))
@@ -98,7 +106,7 @@ class GlRenderer:
         else:
             target.clear()
             self._programs.shadow["to_clip"].write(matrix_bytes(to_clip))
-            draw(self._programs.shadow, [(arrays[1], packed) for arrays, _, packed, _ in seen])
+            draw(self._programs.shadow, [(arrays.depth, packed) for arrays, _, packed, _, _ in seen])
         if depth:
             distance = pinhole.depth_from_buffer(target.depth())
         return picture, distance
@@ -113,16 +121,17 @@ class GlRenderer:
         view = np.linalg.inv(pose)
         if mirror.light != self._lit_by:
             self._light_by(mirror.light)
-        seen = visible(self._links.named(mirror), pinhole, view)
+        seen = [(self._links.arrays(link, distance, pinhole, True).depth, name, packed)
+                for link, _, (name, packed), distance in visible(self._links.named(mirror), pinhole, view)]
         buffer, depth_texture = self._targets.numbered(pinhole.width, pinhole.height)
         buffer.use()
         buffer.clear(depth=1.0)
         program, links = self._programs.shadow, []
         program["to_clip"].write(matrix_bytes(pinhole.clip_matrix() @ view))
-        for link, matrix, (name, packed) in seen:
+        for array, name, packed in seen:
             links.append(name)
             program["number"].value = len(links)
-            draw(program, [(self._links.arrays(link, matrix, pinhole, view, True)[1], packed)])
+            draw(program, [(array, packed)])
         size = pinhole.height, pinhole.width
         numbers = np.frombuffer(buffer.read(components=1, dtype="u2", alignment=1), np.uint16).reshape(size)
         raw = np.frombuffer(depth_texture.read(alignment=1), np.float32).reshape(size)
@@ -132,13 +141,22 @@ class GlRenderer:
         """Release the context."""
         self._context.release()
 
-    def _draw(self, seen):
-        """Draw ``seen``, (vertex arrays, matrix, packed matrix, :class:`sensor_renderer.links.Link`), the floor last.
-        """
-        for program, is_mesh in ((self._programs.mesh, True), (self._programs.solid, False)):
-            draw(program, [(arrays[0], packed) for arrays, _, packed, link in seen
-                           if link.is_mesh == is_mesh and not link.is_floor])
-        for _, matrix, packed, link in seen:
+    def _draw(self, seen, pinhole):
+        """Draw ``seen``, (:class:`sensor_renderer.links.Arrays`, matrix, packed matrix,
+        :class:`sensor_renderer.links.Link`, distance of its sphere), the floor last."""
+        draw(self._programs.solid, [(arrays.colour, packed) for arrays, _, packed, link, _ in seen
+                                    if not link.is_mesh and not link.is_floor])
+        meshes = [(arrays, packed, distance) for arrays, _, packed, link, distance in seen if link.is_mesh]
+        # From within a link one may see any of its backs.
+        within = pinhole.blind_m if self._one_sided else math.inf
+        draw(self._programs.mesh, [(arrays.colour, packed, arrays.corners) for arrays, packed, distance in meshes
+                                   if distance < within])
+        if self._one_sided:
+            self._context.enable(self._context.CULL_FACE)
+            draw(self._programs.mesh, [(arrays.colour, packed) for arrays, packed, distance in meshes
+                                       if distance >= within])
+            self._context.disable(self._context.CULL_FACE)
+        for _, matrix, packed, link, _ in seen:
             if link.is_floor:
                 self._floor.draw(link.parts[0].colour, matrix, packed, self._shadows.corners)
 

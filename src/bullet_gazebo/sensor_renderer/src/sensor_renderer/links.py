@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Links as vertex arrays, in levels of detail, and which of them a camera sees. ROS-free."""
+import bisect
 import weakref
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
+from sensor_renderer.sides import indexed
 from world_picture.reduction import reduced
 
 # How far the drawn surface of a link may be from its original, in pixels of the picture: a whole one in a live picture
@@ -12,7 +16,6 @@ from world_picture.reduction import reduced
 # millimetres, also in metres.
 _FINE_PX, _LIVE_PX = 0.5, 1.0
 _MOST_IN_DEPTH_M = 0.001
-_NEAREST_M = 0.01
 # Share of the plain triangles that casts a mesh's shadow, and how many at least: half of the cost of a picture would
 # be its shadow map. In pictures that may take their time, how far what casts shadows may be from the original.
 _CASTER_SHARE, _CASTER_LEAST = 0.2, 60
@@ -21,26 +24,46 @@ _CASTER_M = 0.003
 
 @dataclass
 class Link:
-    """The geometry of one draw call: a bounding sphere; its parts; whether it has meshes; the array that casts its
-    shadow. Vertex arrays, for colour and for depth only, are made of a level of detail when it is first needed, by the
-    numbers of the parts' levels."""
+    """The geometry of one draw call: a bounding box, by its centre (3,) and half of its size (3,), and the radius of a
+    sphere about the same centre [m]; its parts; whether it has meshes; the array that casts its
+    shadow. :class:`Arrays` are made of a level of detail when it is first needed, by the numbers of the parts' levels;
+    ``by_step`` finds them by the number of :attr:`steps` that a camera does not see."""
 
     centre: np.ndarray
+    half: np.ndarray
     radius: float
     is_floor: bool
     parts: tuple = ()
     is_mesh: bool = False
     caster: object = None
     by_level: dict = field(default_factory=dict)
+    by_step: dict = field(default_factory=dict)
+
+    @cached_property
+    def steps(self):
+        """The distances from the original [m] of all parts' levels, in order: between two of them the levels to draw
+        are the same."""
+        return sorted({level.error_m for part in self.parts for level in part.levels})
+
+
+class Arrays(NamedTuple):
+    """Vertex arrays of a level of detail, for ``colour`` and for ``depth`` only; how many ``corners`` has the former
+    without the backs that follow."""
+
+    colour: object
+    depth: object
+    corners: int = -1
 
 
 class Links:
     """The vertex arrays of one context, one set for each different link."""
 
-    def __init__(self, context, programs, live):
+    def __init__(self, context, programs, live, sides=None):
         """``programs``: :class:`sensor_renderer.programs.Programs`; ``live``: for pictures at a camera's rate, whose
-        meshes are coarser and cast the shadows of even fewer triangles."""
+        meshes are coarser and cast the shadows of even fewer triangles; ``sides``:
+        :class:`sensor_renderer.sides.Sides` if meshes are to be drawn from the front, None if from both sides."""
         self._context = context
+        self._sides = sides
         self._live = live
         self._programs = programs
         self._links = {}
@@ -49,7 +72,7 @@ class Links:
     def clear(self):
         """Release all arrays."""
         for link in self._links.values():
-            for array in {link.caster, *(array for arrays in link.by_level.values() for array in arrays)}:
+            for array in {link.caster, *(array for arrays in link.by_level.values() for array in arrays[:2])}:
                 if array is not None:
                     array.release()
         self._links = {}
@@ -75,20 +98,23 @@ class Links:
         packed = np.ascontiguousarray(body.matrices.transpose(0, 2, 1), dtype=np.float32)
         return zip(links, body.matrices, packed, strict=True)
 
-    def arrays(self, link, matrix, pinhole, view, depth=False):
-        """The vertex arrays of the level of detail that the link's distance asks for; finer ones for a picture of
-        ``depth``."""
-        distance = np.linalg.norm((view @ matrix @ [*link.centre, 1.0])[:3]) - link.radius
-        error_m = (_LIVE_PX if self._live and not depth else _FINE_PX) * max(distance, _NEAREST_M) / pinhole.fx
+    def arrays(self, link, distance, pinhole, depth=False):
+        """The :class:`Arrays` of the level of detail that the ``distance`` of the link's sphere asks for; finer ones
+        for a picture of ``depth``."""
+        error_m = (_LIVE_PX if self._live and not depth else _FINE_PX) * max(distance, pinhole.near) / pinhole.fx
         return self._level(link, min(error_m, _MOST_IN_DEPTH_M) if depth else error_m)
 
     def _level(self, link, error_m):
-        numbers = tuple(part.level(error_m) for part in link.parts)
-        found = link.by_level.get(numbers)
+        step = bisect.bisect_right(link.steps, error_m)
+        found = link.by_step.get(step)
         if found is None:
-            rows = _rows(link.parts, [part.triangles_of(number)
-                                      for part, number in zip(link.parts, numbers, strict=True)])
-            found = link.by_level[numbers] = self._arrays_of(rows, link)
+            numbers = tuple(part.level(error_m) for part in link.parts)
+            found = link.by_level.get(numbers)
+            if found is None:
+                rows = _rows(link.parts, [part.triangles_of(number)
+                                          for part, number in zip(link.parts, numbers, strict=True)])
+                found = link.by_level[numbers] = self._arrays_of(rows, link)
+            link.by_step[step] = found
         return found
 
     def _link(self, parts):
@@ -98,32 +124,46 @@ class Links:
             rows = _rows(parts, [part.triangles for part in parts])
             low, high = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
             centre = (low + high) / 2.0
-            found = self._links[key] = Link(centre, float(np.linalg.norm(rows[:, :3] - centre, axis=1).max()),
+            # A level may be as far outside of this one.
+            error_m = max((level.error_m for part in parts for level in part.levels), default=0.0)
+            radius = float(np.linalg.norm(rows[:, :3] - centre, axis=1).max()) + error_m
+            found = self._links[key] = Link(centre, (high - low) / 2.0 + error_m, radius,
                                             any(part.is_floor for part in parts), tuple(parts),
                                             any(part.levels for part in parts))
             thin = found.is_mesh and self._live
-            found.caster = self._caster_of(rows) if thin else self._level(found, _CASTER_M)[1]
+            found.caster = self._caster_of(rows, found) if thin else self._level(found, _CASTER_M).depth
         return found
 
     def _arrays_of(self, rows, link):
         depth = self._vertex_array(self._programs.shadow, rows[:, :3], "3f", "position")
         if link.is_floor:
-            return None, depth  # :class:`sensor_renderer.floor.Floor` draws it
+            return Arrays(None, depth)  # :class:`sensor_renderer.floor.Floor` draws it
         program = self._programs.mesh if link.is_mesh else self._programs.solid
-        return self._vertex_array(program, rows, "3f 3f 4f", "position", "normal", "colour"), depth
+        colour = self._vertex_array(program, rows, "3f 3f 4f", "position", "normal", "colour",
+                                    backs=self._backs(rows, link) if link.is_mesh else ())
+        return Arrays(colour, depth, len(rows))
 
-    def _caster_of(self, rows):
+    def _backs(self, rows, link):
+        """The corners of the triangles of ``link`` that show their backs, in the order that makes these fronts."""
+        if self._sides is None:
+            return ()
+        behind = self._sides.from_behind(rows[:, :3], link.centre, link.radius)
+        return np.arange(len(rows)).reshape(-1, 3)[behind, ::-1].ravel()
+
+    def _caster_of(self, rows, link):
         corners = rows[:, :3].astype(float)
         faces = np.arange(len(rows)).reshape(-1, 3)
         vertices, faces = reduced(corners, faces, max(_CASTER_LEAST, round(_CASTER_SHARE * len(faces))))
-        return self._vertex_array(self._programs.shadow, vertices[faces].reshape(-1, 3).astype(np.float32), "3f",
-                                  "position")
+        rows = vertices[faces].reshape(-1, 3).astype(np.float32)
+        return self._vertex_array(self._programs.shadow, rows, "3f", "position", backs=self._backs(rows, link))
 
-    def _vertex_array(self, program, rows, layout, *names):
-        """The GPU processes shared vertices once."""
-        unique, index = np.unique(rows, axis=0, return_inverse=True)
+    def _vertex_array(self, program, rows, layout, *names, backs=()):
+        """Of the corners ``rows``, and after them those numbered ``backs`` again. The GPU processes shared vertices
+        once."""
+        unique, index = indexed(rows)
+        index = np.concatenate((index, index[np.asarray(backs, dtype=int)]))
         context = self._context
-        return context.vertex_array(program, [(context.buffer(np.ascontiguousarray(unique).tobytes()), layout, *names)],
+        return context.vertex_array(program, [(context.buffer(unique.tobytes()), layout, *names)],
                                     context.buffer(index.astype(np.int32).tobytes()))
 
 
@@ -135,8 +175,8 @@ def _rows(parts, triangles):
 
 
 def visible(listed, pinhole, view):
-    """The entries of ``listed``, (:class:`Link`, matrix, anything), whose spheres intersect the view frustum, near
-    ones first."""
+    """The entries of ``listed``, (:class:`Link`, matrix, anything), whose boxes and spheres intersect the view frustum,
+    near ones first; each with the distance of the sphere from the eye [m], negative inside."""
     # Outward normals of the four sides, in the optical frame; all go through the eye.
     left, right = -(pinhole.cx + 0.5) / pinhole.fx, (pinhole.width - 0.5 - pinhole.cx) / pinhole.fx
     top, bottom = -(pinhole.cy + 0.5) / pinhole.fy, (pinhole.height - 0.5 - pinhole.cy) / pinhole.fy
@@ -149,8 +189,14 @@ def visible(listed, pinhole, view):
     radii = np.array([link.radius for link, _, _ in listed])
     world = np.einsum("nij,nj->ni", matrices[:, :3, :3], centres) + matrices[:, :3, 3]
     local = world @ view[:3, :3].T + view[:3, 3]
-    inside = (local @ sides.T < radii[:, None]).all(axis=1)
-    inside &= (local[:, 2] > pinhole.near - radii) & (local[:, 2] < pinhole.far + radii)
+    # How far a box extends from its centre towards each side, and along z.
+    axes = np.vstack((sides, (0.0, 0.0, 1.0))) @ view[:3, :3]
+    halves = np.array([link.half for link, _, _ in listed])
+    extents = np.einsum("nkj,nj->nk", np.abs(axes @ matrices[:, :3, :3]), halves)
+    extents = np.minimum(extents, radii[:, None])
+    inside = (local @ sides.T < extents[:, :4]).all(axis=1)
+    inside &= (local[:, 2] > pinhole.near - extents[:, 4]) & (local[:, 2] < pinhole.far + extents[:, 4])
     # Near ones first: hidden pixels are not shaded.
     order = np.argsort(local[:, 2] - radii, kind="stable")
-    return [listed[k] for k in order if inside[k]]
+    distances = np.linalg.norm(local, axis=1) - radii
+    return [(*listed[k], float(distances[k])) for k in order if inside[k]]

@@ -49,6 +49,14 @@ class Pinhole(NamedTuple):
         return cls(int(width), int(height), focal, focal, (width - 1) / 2.0, (height - 1) / 2.0, float(near),
                    float(far))
 
+    @property
+    def blind_m(self):
+        """How far from the eye something may be and yet be too near to be seen [m]: to the corners of the rectangle at
+        the nearest depth."""
+        x = max(self.cx + 0.5, self.width - 0.5 - self.cx) / self.fx
+        y = max(self.cy + 0.5, self.height - 0.5 - self.cy) / self.fy
+        return self.near * math.sqrt(1.0 + x * x + y * y)
+
     def project(self, points):
         """Pixel coordinates (n, 2) of points (n, 3) [m] in the optical frame."""
         points = np.asarray(points, dtype=float)

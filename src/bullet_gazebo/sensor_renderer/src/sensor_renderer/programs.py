@@ -91,8 +91,8 @@ def matrix_bytes(matrix):
 
 
 def draw(program, listed):
-    """Render ``listed``, (vertex array, matrix of the body as OpenGL reads it)."""
+    """Render ``listed``, (vertex array, matrix of the body as OpenGL reads it, how many corners if not all)."""
     body = program["body"]
-    for array, packed in listed:
+    for array, packed, *corners in listed:
         body.write(packed)
-        array.render()
+        array.render(vertices=corners[0] if corners else -1)

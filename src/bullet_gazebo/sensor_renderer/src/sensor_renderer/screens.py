@@ -48,7 +48,8 @@ class Screens:
         for body in mirror.bodies.values():
             for screen in body.screens:
                 matrix = body.link_matrix(screen.link) @ screen.offset
-                face = Link(np.zeros(3), float(np.hypot(*screen.size)) / 2.0 + screen.radius, False)
+                half = np.array([*screen.size, 0.0]) / 2.0 + screen.radius
+                face = Link(np.zeros(3), half, float(np.linalg.norm(half)), False)
                 local = view @ matrix
                 if ((screen.radius or local[:3, 2] @ local[:3, 3] < 0.0)
                         and visible([(face, matrix, None)], pinhole, view)):

@@ -29,9 +29,10 @@ class Shadows:
     ``margin_m``: how far outside of a surface to compare; ``lamp_matrices``: {number of a spot light: (4, 4) from the
     world to texture coordinates of its map}."""
 
-    def __init__(self, context, program, pixels, taps):
+    def __init__(self, context, program, pixels, taps, one_sided=False):
         """``program``: the one that draws depth alone; ``pixels``: the side of the sun's map; ``taps``: comparisons
-        along one side of a filter's square."""
+        along one side of a filter's square; ``one_sided``: whether casters throw shadows by their fronts alone."""
+        self._one_sided = one_sided
         self._context = context
         self._program = program
         self._pixels, self._taps = pixels, taps
@@ -102,7 +103,14 @@ class Shadows:
         self._buffer.viewport = 0, 0, self._pixels, self._pixels
         self._buffer.clear(depth=1.0)
         self._buffer.viewport = _BORDER, _BORDER, *[self._pixels - 2 * _BORDER] * 2
+        if self._one_sided:
+            # This map is not upside down, as pictures are.
+            self._context.front_face = "ccw"
+            self._context.enable(self._context.CULL_FACE)
         self._draw_from(to_clip, [casters[k] for k in np.flatnonzero(inside)])
+        if self._one_sided:
+            self._context.disable(self._context.CULL_FACE)
+            self._context.front_face = "cw"
         return True
 
     def _region(self, spheres, places, pinhole, pose):

@@ -141,7 +141,7 @@ def test_a_near_mesh_is_drawn_finely_and_a_far_one_coarsely(tmp_path, monkeypatc
     counts = []
     for distance in (20.0, 5.0, 1.0):
         assert roundness(distance) < 1.5
-        drawn = renderer._links.arrays(link, np.eye(4), pinhole, np.linalg.inv(looking_at_origin(distance)))
+        drawn = renderer._links.arrays(link, distance - link.radius, pinhole)
         counts.append(drawn[0].vertices // 3)
     assert counts[0] < counts[1] < counts[2]
     monkeypatch.setattr(renderer._links, "arrays", lambda *_: link.by_level[max(link.by_level)])
