@@ -29,6 +29,9 @@ _LOOK_S, _IDLE_S, _SEEK_S = 0.004, 0.05, 0.25
 # A sensor that fails this many times within this time [s, simulated time] is not restarted again.
 FAILURES, FAILURES_WITHIN_S = 3, 10.0
 
+# The node has ended so long after it was asked to [s]; roslaunch waits for 15 s.
+LEAVES_WITHIN_S = 5.0
+
 # Parameter that groups models into classes for masks.
 CLASSES = "/sensor_renderer/semantic_classes"
 
@@ -199,6 +202,17 @@ def _wait_for_end_of_input(ending):
     ending.set()
 
 
+def leave_anyway(ending, after_s, leave):
+    """Call ``leave()`` so long after ``ending`` [s], on a thread of its own: the shapes of a large world are being made
+    for longer than roslaunch waits, on a busy machine, and it kills what stays.
+    """
+    def wait():
+        ending.wait()
+        time.sleep(after_s)
+        leave()
+    threading.Thread(target=wait, name="leave_anyway", daemon=True).start()
+
+
 def main():
     """Draw until a signal or a shutdown request; returns the exit code."""
     # Physics comes first: drawing runs at the lowest priority.
@@ -208,8 +222,10 @@ def main():
         signal.signal(number, lambda *_: ending.set())
     if "--end-with-input" in rospy.myargv()[1:]:
         threading.Thread(target=_wait_for_end_of_input, args=(ending,), daemon=True).start()
+    leave_anyway(ending, LEAVES_WITHIN_S, lambda: os._exit(0))
     limit_ports()
     rospy.init_node("sensor_renderer", disable_rostime=True, disable_signals=True)
+    rospy.on_shutdown(ending.set)
     path = os.path.join(rospkg.RosPack().get_path("sensor_renderer"), "config", "camera_drivers.yaml")
     with open(path, encoding="utf-8") as file:
         drivers = yaml.safe_load(file)

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The loop of /sensor_renderer: which states of the world a sensor gets."""
 import os
+import threading
 import types
 
 import numpy as np
 import pytest
 
-from sensor_renderer.node import SensorRenderer
+from lab_testing.waiting import wait_until
+from sensor_renderer.node import SensorRenderer, leave_anyway
 from sim_time.pace import Pace
 from world_picture.snapshot import SnapshotReader, SnapshotWriter
 
@@ -116,3 +118,11 @@ def test_a_sensor_that_fails_restarts_and_is_left_out_at_the_third_time_until_a_
     assert len(made) == 5 and renderer._sensors and not failing, "made for the reset, failed once, made again"
     go_on([210])
     assert made[-1].taken
+
+
+def test_a_node_that_makes_shapes_leaves_when_it_is_asked_to():
+    ending, left = threading.Event(), threading.Event()
+    leave_anyway(ending, 0.0, left.set)
+    assert not left.wait(0.1)
+    ending.set()
+    wait_until(left.is_set, "the end")
