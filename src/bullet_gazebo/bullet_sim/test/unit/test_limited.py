@@ -42,8 +42,18 @@ def test_a_function_without_end_ends(process):
 def test_a_function_that_waits_ends():
     process = LimitedProcess(waiting_s=1.0)
     try:
-        with pytest.raises(LimitError, match="more than 1 s"):
+        with pytest.raises(LimitError, match="it did nothing for 1 s"):
             process.call(time.sleep, 1000)
+    finally:
+        process.close()
+
+
+def test_a_function_that_works_may_take_longer_than_one_that_waits():
+    process = LimitedProcess(processor_s=60, waiting_s=0.5)
+    try:
+        begin = time.monotonic()
+        assert process.call(re.fullmatch, "(a+)+b", "a" * 25) is None
+        assert time.monotonic() - begin > 0.5
     finally:
         process.close()
 
