@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The words of `./baxter.sh labs`."""
+import errno
+import os
+import re
 import signal
 import socket
 import subprocess
@@ -42,5 +45,6 @@ def test_a_port_that_is_taken_is_named():
         taken.listen()
         port = taken.getsockname()[1]
         supervisor = SimpleNamespace(_record=SimpleNamespace(options=Options(port=port)))
-        with pytest.raises(StoreError, match="port %d cannot be opened .Address already in use.; --port" % port):
+        with pytest.raises(StoreError, match=re.escape(
+            "port %d cannot be opened (%s); --port" % (port, os.strerror(errno.EADDRINUSE)))):
             Supervisor._open(supervisor)
