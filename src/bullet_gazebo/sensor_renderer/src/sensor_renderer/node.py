@@ -18,7 +18,7 @@ from sensor_renderer.errors import SensorError
 from sensor_renderer.labels import Labels, classes_of_parameter
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.moments import Moment, World
-from sensor_renderer.priority import give_way
+from sensor_renderer.priority import DRAWING, give_way
 from sensor_renderer.sensor_element import SensorEntry
 from world_picture.drawing import DrawingCache
 from world_picture.snapshot import SnapshotError, SnapshotReader
@@ -215,8 +215,8 @@ def leave_anyway(ending, after_s, leave):
 
 def main():
     """Draw until a signal or a shutdown request; returns the exit code."""
-    # Physics comes first: drawing runs at the lowest priority.
-    give_way(19)
+    # Physics comes first.
+    give_way(DRAWING)
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())

@@ -11,7 +11,7 @@ import rosgraph
 import rospy
 
 from rospy_limits.node import limit_ports
-from sensor_renderer.priority import give_way
+from sensor_renderer.priority import DRAWING, give_way
 
 _PROBE = "from PyQt5.QtWidgets import QApplication; QApplication(['gazebo'])"
 _PROBE_TIMEOUT_S = 30.0
@@ -28,8 +28,8 @@ def main():
     Without a screen it prints one line and returns 0: the lab goes on without a window. With ``_offscreen:=true`` on
     the command line it publishes its pictures and opens no window.
     """
-    # Physics comes first: the window runs at the lowest priority.
-    give_way(19)
+    # Physics comes first.
+    give_way(DRAWING)
     offscreen = bool(rospy.client.load_command_line_node_params(sys.argv).get("offscreen"))
     reason = "" if offscreen else _why_no_screen()
     if reason:

@@ -30,6 +30,8 @@ from .trees import Tree
 
 # Longest wait for a message or a picture [s, wall].
 TIMEOUT_S = 30.0
+#: A camera's first picture waits until the renderer, which gives way to all else, has made the shapes of the world.
+PICTURE_TIMEOUT_S = 120.0
 # A shorter wait for a frame, since its name may be wrong.
 TRANSFORM_TIMEOUT_S = 10.0
 JOINT_STATES = "/robot/joint_states"
@@ -65,7 +67,8 @@ def picture(eye=None, target=None, frames=(), size=(640, 480), length=0.12):
 def camera(name):
     """The newest image of a camera, as a Picture. `name`: a topic, or for /cameras/NAME/image: NAME."""
     topic = name if name.startswith("/") else "/cameras/%s/image" % name
-    message = _message(topic, Image, "is the camera open? rosrun baxter_tools camera_control.py -l")
+    message = _message(topic, Image, "is the camera open? rosrun baxter_tools camera_control.py -l",
+                       PICTURE_TIMEOUT_S)
     return Picture.of_array(CvBridge().imgmsg_to_cv2(message, "rgb8"))
 
 
@@ -192,7 +195,7 @@ def _view():
         raise ShowError("no simulator on the master at %s: %s" % (rosgraph.get_master_uri(), error)) from error
 
 
-def _message(topic, message_class, hint):
+def _message(topic, message_class, hint, timeout_s=TIMEOUT_S):
     found, arrived = [], threading.Event()
 
     def take(message):
@@ -201,7 +204,7 @@ def _message(topic, message_class, hint):
 
     subscriber = rospy.Subscriber(topic, message_class, take, queue_size=1, buff_size=1 << 24)
     try:
-        _wait("a message on %s" % topic, arrived.is_set, hint)
+        _wait("a message on %s" % topic, arrived.is_set, hint, timeout_s)
     finally:
         subscriber.unregister()
     return found[-1]
