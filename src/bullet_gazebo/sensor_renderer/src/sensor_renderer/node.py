@@ -203,7 +203,7 @@ def _wait_for_end_of_input(ending):
 
 
 def leave_anyway(ending, after_s, leave):
-    """Call ``leave()`` so long after ``ending`` [s], on a thread of its own: the shapes of a large world are being made
+    """Call ``leave()`` so long after ``ending`` [s], in a separate thread: the shapes of a large world are being made
     for longer than roslaunch waits, on a busy machine, and it kills what stays.
     """
     def wait():
