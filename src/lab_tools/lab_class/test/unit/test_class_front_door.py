@@ -10,7 +10,7 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
 from lab_class import front_door, roster
-from lab_class.labs import MOST_FAILURES, Kind, Labs, State
+from lab_class.labs import MOST_FAILURES, Labs, State
 from lab_class.store import ClassRecord, Options
 from web_bridge import passing
 
@@ -490,14 +490,3 @@ def test_an_open_jupyterlab_that_nobody_touches_wakes_no_lab_and_keeps_none_awak
             assert lab.state is State.RUNNING
 
     run(check())
-
-
-def test_a_page_counts_once_with_all_of_its_connections():
-    kinds = [front_door.kind_of(is_upgrade, uri) for is_upgrade, uri in (
-        (True, "/lab?token=x"), (True, "/rosbridge"), (True, "/notebook/api/kernels/1/channels"), (False, "/lab"))]
-    assert kinds == [Kind.PAGE, Kind.SOCKET, Kind.SOCKET, Kind.ANSWER]
-    labs = Labs(["anna"], 1, None)
-    for kind in kinds:
-        labs.serving("anna", kind, 1, 0.0)
-    lab = labs["anna"]
-    assert (lab.pages, lab.sockets, lab.busy) == (1, 3, 1)

@@ -2,6 +2,7 @@
 """States of labs, and what comes next; time is a number."""
 import pytest
 
+from lab_class.front_door import kind_of
 from lab_class.labs import MOST_FAILURES, START_LIMIT_S, Action, ClassError, Kind, Labs, Role, State, may
 
 IDLE_S = 900.0
@@ -169,3 +170,14 @@ def test_who_may_do_what():
     assert [may(role, "watch") for role in (Role.STUDENT, Role.VIEWER, None)] == [True, True, False]
     assert [may(role, "use") for role in (Role.STUDENT, Role.VIEWER)] == [True, False]
     assert [role for role in Role if may(role, "change")] == [Role.INSTRUCTOR]
+
+
+def test_a_page_counts_once_with_all_of_its_connections():
+    kinds = [kind_of(is_upgrade, uri) for is_upgrade, uri in (
+        (True, "/lab?token=x"), (True, "/rosbridge"), (True, "/notebook/api/kernels/1/channels"), (False, "/lab"))]
+    assert kinds == [Kind.PAGE, Kind.SOCKET, Kind.SOCKET, Kind.ANSWER]
+    labs = Labs(["anna"], 1, None)
+    for kind in kinds:
+        labs.serving("anna", kind, 1, 0.0)
+    lab = labs["anna"]
+    assert (lab.pages, lab.sockets, lab.busy) == (1, 3, 1)
