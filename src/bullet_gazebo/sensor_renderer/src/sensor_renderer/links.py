@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sensor_renderer.sides import indexed
+from sensor_renderer.sides import Sides, indexed
 from world_picture.reduction import reduced
 
 # How far the drawn surface of a link may be from its original, in pixels of the picture: a whole one in a live picture
@@ -140,14 +140,15 @@ class Links:
             return Arrays(None, depth)  # :class:`sensor_renderer.floor.Floor` draws it
         program = self._programs.mesh if link.is_mesh else self._programs.solid
         colour = self._vertex_array(program, rows, "3f 3f 4f", "position", "normal", "colour",
-                                    backs=self._backs(rows, link) if link.is_mesh else ())
+                                    backs=self._backs(rows, link, Sides.from_behind) if link.is_mesh else ())
         return Arrays(colour, depth, len(rows))
 
-    def _backs(self, rows, link):
-        """The corners of the triangles of ``link`` that show their backs, in the order that makes these fronts."""
+    def _backs(self, rows, link, which):
+        """The corners of the triangles of ``link`` that show their backs, in the order that makes these fronts.
+        ``which``: the method of :class:`sensor_renderer.sides.Sides` that finds them."""
         if self._sides is None:
             return ()
-        behind = self._sides.from_behind(rows[:, :3], link.centre, link.radius)
+        behind = which(self._sides, rows[:, :3], link.centre, link.radius)
         return np.arange(len(rows)).reshape(-1, 3)[behind, ::-1].ravel()
 
     def _caster_of(self, rows, link):
@@ -155,7 +156,8 @@ class Links:
         faces = np.arange(len(rows)).reshape(-1, 3)
         vertices, faces = reduced(corners, faces, max(_CASTER_LEAST, round(_CASTER_SHARE * len(faces))))
         rows = vertices[faces].reshape(-1, 3).astype(np.float32)
-        return self._vertex_array(self._programs.shadow, rows, "3f", "position", backs=self._backs(rows, link))
+        return self._vertex_array(self._programs.shadow, rows, "3f", "position",
+                                  backs=self._backs(rows, link, Sides.plainly_from_behind))
 
     def _vertex_array(self, program, rows, layout, *names, backs=()):
         """Of the corners ``rows``, and after them those numbered ``backs`` again. The GPU processes shared vertices

@@ -8,7 +8,7 @@ from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.links import Link, visible
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
-from sensor_renderer.sides import indexed
+from sensor_renderer.sides import Sides, indexed
 from urdf_model.transforms import pose_matrix
 from world_picture.drawing import DrawingCache
 
@@ -20,6 +20,7 @@ PINHOLE = Pinhole.from_field_of_view(320, 320, 1.0, 0.05, 20.0)
 # From above, aslant.
 ABOVE = pose_matrix((-0.6, 0.0, 0.9), (0.0, 0.98, 0.0)) @ OPTICAL
 INSIDE = OPTICAL
+FROM_AFAR = pose_matrix((-2.4, 0.0, 2.0), (0.0, 0.7, 0.0)) @ OPTICAL
 
 
 @pytest.fixture(scope="module")
@@ -41,20 +42,26 @@ def mesh(name):
     return vertices, faces
 
 
-def mirror_of(name, tmp_path):
+def mirror_of(name, tmp_path, above_floor_m=None):
     import trimesh
 
     trimesh.Trimesh(*mesh(name), process=False).export(str(tmp_path / "thing.stl"))
     mirror = Mirror(DrawingCache(tmp_path / "cache"), lambda uri: uri, pytest.fail)
-    mirror.set_scene([{"name": "thing", "urdf": URDF % (tmp_path / "thing.stl"), "joints": []}])
-    mirror.set_state(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    scene = [{"name": "thing", "urdf": URDF % (tmp_path / "thing.stl"), "joints": []}]
+    poses = [0.0, 0.0, above_floor_m or 0.0, 0.0, 0.0, 0.0, 1.0]
+    if above_floor_m is not None:
+        scene.append({"name": "floor", "urdf": None, "joints": []})
+        poses += [0.0] * 6 + [1.0]
+    mirror.set_scene(scene)
+    mirror.set_state(np.array(poses))
     return mirror
 
 
+@pytest.mark.parametrize("which", [Sides.from_behind, Sides.plainly_from_behind], ids=["pictures", "shadows"])
 @pytest.mark.parametrize(("name", "share"), [("ball", 0.0), ("bowl", 1.0), ("inside out", 1.0)])
-def test_a_triangle_is_drawn_from_behind_where_its_back_can_be_seen(renderer, name, share):
+def test_a_triangle_is_drawn_from_behind_where_its_back_can_be_seen(renderer, which, name, share):
     vertices, faces = mesh(name)
-    behind = renderer._links._sides.from_behind(vertices[faces].reshape(-1, 3), np.zeros(3), 0.3)
+    behind = which(renderer._links._sides, vertices[faces].reshape(-1, 3), np.zeros(3), 0.3)
     assert behind.shape == (len(faces),)
     # At the outline, some pixels show backs.
     assert abs(behind.mean() - share) < 0.05
@@ -70,6 +77,26 @@ def test_a_picture_is_that_of_both_sides(renderer, monkeypatch, tmp_path, name, 
     assert (both_sides[..., 0] > both_sides[..., 2] + 50).mean() > 0.1, "the mesh is in the picture"
     differ = np.abs(one_sided.astype(int) - both_sides).max(axis=2) > 8
     assert differ.mean() < 0.001
+
+
+@pytest.mark.parametrize("name", ["ball", "bowl", "inside out"])
+def test_a_shadow_is_that_of_both_sides(renderer, monkeypatch, tmp_path, name):
+    mirror = mirror_of(name, tmp_path, above_floor_m=0.6)
+    one_sided, _ = renderer.render(mirror, PINHOLE, FROM_AFAR)
+    lit = floor_without_shadow(renderer, mirror, monkeypatch)
+    monkeypatch.setattr(renderer._shadows, "_one_sided", False)
+    monkeypatch.setattr(renderer._shadows, "_drawn", None)
+    both_sides, _ = renderer.render(mirror, PINHOLE, FROM_AFAR)
+    dark = np.abs(both_sides.astype(int) - lit).max(axis=2) > 20
+    assert dark.sum() > 500, "the shadow is in the picture"
+    assert (np.abs(one_sided.astype(int) - both_sides).max(axis=2) > 20).sum() < 0.02 * dark.sum()
+
+
+def floor_without_shadow(renderer, mirror, monkeypatch):
+    with monkeypatch.context() as patched:
+        patched.setattr(renderer._shadows, "_draw_from", lambda *_: None)
+        patched.setattr(renderer._shadows, "_drawn", None)
+        return renderer.render(mirror, PINHOLE, FROM_AFAR)[0]
 
 
 def test_fewer_triangles_are_drawn_of_a_closed_mesh(renderer, tmp_path):
