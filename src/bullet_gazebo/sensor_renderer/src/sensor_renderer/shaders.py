@@ -20,12 +20,7 @@ vec3 n, to_eye, there, lit, glint;
 
 // Share of the light that reaches a place in the map: comparisons, each of them between its four nearest texels.
 float reached(sampler2DShadow map, vec3 at) {
-    vec2 texel = 1.0 / vec2(textureSize(map, 0));
-    float sum = 0.0;
-    for (int i = 0; i < TAPS; ++i)
-        for (int j = 0; j < TAPS; ++j)
-            sum += textureLod(map, at + vec3((vec2(i, j) - 0.5 * float(TAPS - 1)) * texel, 0.0), 0.0);
-    return sum / float(TAPS * TAPS);
+    REACHED
 }
 
 // Blinn's highlight ("Models of light reflection for computer synthesized pictures", 1977).
@@ -52,6 +47,15 @@ vec3 toned(vec3 light) {
     return most > 0.8 ? light * ((1.0 - 0.04 / (most - 0.6)) / most) : light;
 }
 """
+
+_REACHED_ONE = "return textureLod(map, at, 0.0);"
+
+_REACHED_SOME = """vec2 texel = 1.0 / vec2(textureSize(map, 0));
+    float sum = 0.0;
+    for (int i = 0; i < TAPS; ++i)
+        for (int j = 0; j < TAPS; ++j)
+            sum += textureLod(map, at + vec3((vec2(i, j) - 0.5 * float(TAPS - 1)) * texel, 0.0), 0.0);
+    return sum / float(TAPS * TAPS);"""
 
 _LAMP_UNIFORMS = """
 uniform vec4 lamp_place_K;
@@ -109,7 +113,7 @@ _POINT_SHADOW = """
 """
 
 # Light per vertex: of meshes, whose triangles are not much larger than pixels, and of the floor under the sun alone.
-# dim is without the sun, bright with it.
+# dim is without the sun, bright what the sun adds.
 _LIT_VERTEX = """
 uniform mat4 body;
 uniform mat4 to_clip;
@@ -132,10 +136,17 @@ void main() {
     lit = glint = vec3(0.0);
     light_from(to_sun, sun, sun_shine, 1.0);
     bright = colour.rgb * lit + colour.a * glint;
+    TONE
     shadow_place = (to_shadow * vec4(there + margin * n, 1.0)).xyz;
     own = colour.rgb;
     gl_Position = to_clip * placed;
 }
+"""
+
+_TONE_VERTEX = """
+    bright = toned(dim + bright);
+    dim = toned(dim);
+    bright -= dim;
 """
 
 _LIT_FRAGMENT = """
@@ -144,7 +155,7 @@ in vec3 dim;
 in vec3 bright;
 in vec3 shadow_place;
 out vec4 seen;
-void main() { seen = vec4(toned(dim + bright * SUNLIT), 1.0); }
+void main() { seen = vec4(dim + bright * SUNLIT, 1.0); }
 """
 
 # Tiles of half a metre, averaged over the pixel: far tiles become one grey instead of a pattern of noise. In the sky's
@@ -164,7 +175,7 @@ void main() {
     even *= clamp(1.5 - wide, 0.0, 1.0);
     vec3 light = dim + bright * SUNLIT;
     LAMPS
-    light = toned(light * (0.96 + 0.04 * even.x * even.y));
+    light *= 0.96 + 0.04 * even.x * even.y;
     HAZE
     seen = vec4(light, 1.0);
 }
@@ -176,7 +187,7 @@ _FLOOR_LAMPS = """
     to_eye = normalize(eye - there);
     lit = glint = vec3(0.0);
     LAMPS
-    light += own * lit;
+    light = toned(light + own * lit);
 """
 
 _HAZE = """
@@ -286,7 +297,7 @@ void main() { seen = vec4(air, 1.0); }
 def lit_shaders(sun_shadow, lamps, taps):
     """(vertex, fragment) shader for light per vertex. ``sun_shadow``: whether the sun casts shadows; ``lamps``: the
     ``kind`` of each :class:`sensor_renderer.light.Lamp`; ``taps``: comparisons along one side of a filter's square."""
-    return _text(_LIT_VERTEX, sun_shadow, lamps, taps), _text(_LIT_FRAGMENT, sun_shadow, (), taps)
+    return _text(_LIT_VERTEX.replace("TONE", _TONE_VERTEX), sun_shadow, lamps, taps), _text(_LIT_FRAGMENT, sun_shadow, (), taps)
 
 
 def placed_shaders(sun_shadow, lamps, taps):
@@ -298,13 +309,15 @@ def floor_shaders(sun_shadow, lamps, taps, haze):
     """(vertex, fragment) shader of the floor, as :func:`lit_shaders`. ``haze``: whether it fades into the horizon. Its
     corners are far apart: lamps light it per pixel."""
     fragment = _FLOOR_FRAGMENT.replace("LAMPS", _FLOOR_LAMPS if lamps else "").replace("HAZE", _HAZE if haze else "")
-    return _text(_LIT_VERTEX, sun_shadow, (), taps), _text(fragment, sun_shadow, lamps, taps)
+    vertex = _LIT_VERTEX.replace("TONE", "" if lamps else _TONE_VERTEX)
+    return _text(vertex, sun_shadow, (), taps), _text(fragment, sun_shadow, lamps, taps)
 
 
 def _text(main, sun_shadow, lamps, taps):
     uniforms = "".join(_LAMP_UNIFORMS.replace("_K", "_%d" % number) for number in range(len(lamps)))
     calls = "".join(_lamp(*kind).replace("_K", "_%d" % number) for number, kind in enumerate(lamps))
-    text = _HEAD + _UNIFORMS + uniforms + main.replace("LAMPS", calls)
+    common = _UNIFORMS.replace("REACHED", _REACHED_ONE if taps == 1 else _REACHED_SOME)
+    text = _HEAD + common + uniforms + main.replace("LAMPS", calls)
     return text.replace("SUNLIT", "reached(shadow, shadow_place)" if sun_shadow else "1.0").replace("TAPS", str(taps))
 
 
