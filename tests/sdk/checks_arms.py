@@ -7,6 +7,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryActionResult
 from dynamic_reconfigure.client import Client
+from robot import wait_until_heard
 from std_msgs.msg import UInt16
 from table import check
 
@@ -66,6 +67,7 @@ def keyboard(lab):
     robot = lab.robot
     with lab.rosrun("baxter_examples", "joint_position_keyboard.py") as program:
         program.expect("Controlling joints")
+        wait_until_heard("/rsdk_joint_position_keyboard", ["/robot/limb/%s/joint_command" % side for side in SIDES])
         lost, errors = 0, []
         for side in SIDES:
             for name, *keys in zip(joint_names(side), *KEYS[side], strict=True):

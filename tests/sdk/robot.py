@@ -2,7 +2,9 @@
 """What a person beside the robot sees and does: joints, grippers, lights; buttons, pushes, arms moved."""
 import itertools
 from xml.etree import ElementTree
+from xmlrpc.client import ServerProxy
 
+import rosgraph
 import rospy
 from baxter_core_msgs.msg import (
     AnalogIOStates,
@@ -25,6 +27,21 @@ COMMAND_HZ = 50.0
 NEAR_RAD = 0.01
 # A joint rests when it has been slower than this for so long, in simulated time.
 RESTING_RAD_S, RESTING_S = 0.02, 0.5
+
+
+def wait_until_heard(node, topics):
+    """Wait until the simulator is connected to what ``node`` publishes on ``topics``.
+
+    That takes up to 0.25 s; a person needs longer to read that a program is ready.
+    """
+    program = ServerProxy(rosgraph.Master("/sdk_checks").lookupNode(node))
+
+    def unheard():
+        _, _, connections = program.getBusInfo("/sdk_checks")
+        return set(topics) - {topic for _, to, direction, _, topic, *_ in connections
+                              if direction == "o" and to == "/gazebo"}
+
+    wait_until(lambda: not unheard(), lambda: "the simulator on %s" % ", ".join(sorted(unheard())))
 
 
 class Robot:
