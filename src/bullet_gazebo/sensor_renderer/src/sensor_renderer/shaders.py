@@ -297,7 +297,8 @@ void main() { seen = vec4(air, 1.0); }
 def lit_shaders(sun_shadow, lamps, taps):
     """(vertex, fragment) shader for light per vertex. ``sun_shadow``: whether the sun casts shadows; ``lamps``: the
     ``kind`` of each :class:`sensor_renderer.light.Lamp`; ``taps``: comparisons along one side of a filter's square."""
-    return _text(_LIT_VERTEX.replace("TONE", _TONE_VERTEX), sun_shadow, lamps, taps), _text(_LIT_FRAGMENT, sun_shadow, (), taps)
+    vertex = _LIT_VERTEX.replace("TONE", _TONE_VERTEX)
+    return _text(vertex, sun_shadow, lamps, taps), _text(_LIT_FRAGMENT, sun_shadow, (), taps)
 
 
 def placed_shaders(sun_shadow, lamps, taps):
