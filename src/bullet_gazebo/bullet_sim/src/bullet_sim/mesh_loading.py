@@ -69,8 +69,7 @@ def load_scene(path):
     content = read_file(path, MOST_BYTES)
     if kind in _HEIGHTS:
         return trimesh.Scene(trimesh.Trimesh(*_terrain(_heights(content)), process=False))
-    if kind == "dae":
-        _refuse_entities(content)
+    unit_m = _unit_m(content) if kind == "dae" else 1.0
     scene = trimesh.load(
         io.BytesIO(content), file_type=kind, force="scene", resolver=_Beside(path.parent), process=False
     )
@@ -81,8 +80,11 @@ def load_scene(path):
         if triangles > MOST_TRIANGLES:
             raise MeshError("it holds more than %d triangles" % MOST_TRIANGLES)
         vertices = np.asarray(mesh.vertices)
-        if len(vertices) and not np.abs(vertices).max() <= bounds.POSITION.high:
-            raise MeshError("a corner is at %g; expected at most %g" % (np.abs(vertices).max(), bounds.POSITION.high))
+        farthest_m = np.abs(vertices).max(initial=0.0) * unit_m
+        if not farthest_m <= bounds.POSITION.high:
+            raise MeshError("a corner is at %g; expected at most %g" % (farthest_m, bounds.POSITION.high))
+    if unit_m != 1.0:
+        scene.apply_transform(np.diag([unit_m, unit_m, unit_m, 1.0]))
     if triangles <= MOST_HOLLOW_TRIANGLES:
         # Merging equal corners takes as long as all the rest; a mesh that is decimated does not need it.
         for mesh in scene.geometry.values():
@@ -113,11 +115,20 @@ def _terrain(heights):
             np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)]))
 
 
-def _refuse_entities(content):
+def _unit_m(content):
+    """The unit of a Collada file [m]; Gazebo and rviz scale by it, and leave the direction of its axes as it is. Files
+    with entities are refused."""
     from lxml import etree
 
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
-    refuse_entities(etree.fromstring(content, parser))
+    root = etree.fromstring(content, parser)
+    refuse_entities(root)
+    unit = root.find("{*}asset/{*}unit")
+    try:
+        metres = float(unit.get("meter"))
+    except (AttributeError, TypeError, ValueError):  # no such element, no such attribute, or no number
+        return 1.0
+    return metres if 0.0 < metres < bounds.POSITION.high else 1.0
 
 
 def to_wavefront(path, target, planes):

@@ -24,7 +24,7 @@ from .quiet_pybullet import pybullet
 
 NO_SHAPE = -1
 # Part of the names of cached files: increase it when the result for the same mesh changes.
-_VERSION = b"3"
+_VERSION = b"4"
 #: Largest number for one body; with more, making it takes the loop more than 50 ms.
 _MOST_SHAPES_OF_BODY = 1000
 # A plane that is tilted, or one of several shapes, becomes a slab of this size [m]: Bullet's own plane must be the only

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from bullet_sim import BulletSimError, MeshCache, MeshFiles, Pose, World
-from bullet_sim.mesh_loading import MOST_HOLLOW_TRIANGLES, MOST_HULL_POINTS, hull_points
+from bullet_sim.mesh_loading import MOST_HOLLOW_TRIANGLES, MOST_HULL_POINTS, MeshError, hull_points, to_wavefront
 from urdf_model import Mesh, parse_urdf
 
 COLLADA = """<?xml version="1.0"?>%s<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
@@ -179,3 +179,31 @@ def test_a_box_rests_on_a_terrain_where_it_is_as_high(tmp_path, monkeypatch):
     assert x == pytest.approx(2.0, abs=0.1)
     # The middle of the box is 0.1 m away from the slope of one in eight.
     assert z == pytest.approx((x + 4.0) / 8.0 + 0.1 * np.hypot(1.0, 1.0 / 8.0), abs=0.01)
+
+
+TRIANGLE = """<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count="9">
+0 0 0 10 0 0 0 20 5</float_array><technique_common><accessor source="#a" count="3" stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor>
+</technique_common></source><vertices id="v">
+<input semantic="POSITION" source="#p"/></vertices><triangles count="1">
+<input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><translate>0 0 1</translate><instance_geometry url="#g"/></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene>"""
+
+
+@pytest.mark.parametrize(("unit", "metres"), [
+    ("", 1.0), ('<unit meter="0.0254" name="inch"/>', 0.0254), ('<unit name="furlong"/>', 1.0),
+    ('<unit meter="many"/>', 1.0), ('<unit meter="-1"/>', 1.0), ('<unit meter="nan"/>', 1.0)])
+def test_a_collada_mesh_is_as_large_as_its_unit_says(tmp_path, unit, metres):
+    path = tmp_path / "triangle.dae"
+    path.write_text((COLLADA % ("", TRIANGLE)).replace("<up_axis>", unit + "<up_axis>"))
+    to_wavefront(str(path), str(tmp_path / "triangle.obj"), ())
+    assert np.ptp(points_of(tmp_path / "triangle.obj")[0], axis=0) == pytest.approx(metres * np.array([10, 20, 5]))
+    assert points_of(tmp_path / "triangle.obj")[0][:, 2].min() == pytest.approx(metres)
+
+
+def test_a_mesh_that_its_unit_makes_too_large_is_refused(tmp_path):
+    path = tmp_path / "triangle.dae"
+    path.write_text((COLLADA % ("", TRIANGLE)).replace("<up_axis>", '<unit meter="1e6"/><up_axis>'))
+    with pytest.raises(MeshError, match="a corner is at 2e[+]07; expected at most 1e[+]07"):
+        to_wavefront(str(path), str(tmp_path / "triangle.obj"), ())
