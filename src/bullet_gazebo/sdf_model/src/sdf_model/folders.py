@@ -31,22 +31,24 @@ class ModelFolders:
         ``uri``: model://NAME, model://NAME/FILE, file://PATH or a path, relative ones to the folder ``base``; a
         folder stands for the description in it.
         """
-        scheme, separator, rest = uri.partition("://")
-        if not separator:
-            candidates = [Path(base or ".") / uri, *(folder / uri for folder in self.folders)]
-        elif scheme == "model":
-            candidates = [folder / rest for folder in self.folders]
-        elif scheme == "file":
-            candidates = [Path(rest)] if rest.startswith("/") else [folder / rest for folder in self.folders]
-        else:
-            candidates = []
-        for path in candidates:
+        for path in self.places(uri, base):
             if path.is_file():
                 return path
             found = description_file(path)
             if found is not None:
                 return found
         return None
+
+    def places(self, uri, base=None):
+        """Return the Paths that ``uri`` may mean, as :meth:`find` has it; the first that exists is meant."""
+        scheme, separator, rest = uri.partition("://")
+        if not separator:
+            return [Path(base or ".") / uri, *(folder / uri for folder in self.folders)]
+        if scheme == "model":
+            return [folder / rest for folder in self.folders]
+        if scheme == "file":
+            return [Path(rest)] if rest.startswith("/") else [folder / rest for folder in self.folders]
+        return []
 
 
 _SHAPES = {"box": "<box><size>%g %g %g</size></box>",

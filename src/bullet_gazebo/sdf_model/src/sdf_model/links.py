@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from urdf_model import Box, Cylinder, Inertial, Link, Mesh, Plane, Shape, Sphere, Surface
-from urdf_model.materials import MATERIALS
 from urdf_model.model import MAY_BE_INFINITE
 from urdf_model.transforms import pose_matrix
 
-from .lights import colour
+from .materials import read_material
 
 # Elements without an effect on motion or looks here.
 _QUIET = ("enable_wind", "must_be_base_link", "laser_retro", "max_contacts", "cast_shadows", "meta", "velocity_decay")
@@ -19,8 +18,8 @@ _INERTIA = (("ixx", 0, 0, 1.0), ("ixy", 0, 1, 0.0), ("ixz", 0, 2, 0.0), ("iyy", 
 _INERTIA += (("izz", 2, 2, 1.0),)
 
 
-def read_link(document, element, name):
-    """Return the urdf_model.Link of a <link>, named ``name``, in its own frame."""
+def read_link(document, element, name, materials):
+    """Return the urdf_model.Link of a <link>, named ``name``, in its own frame. ``materials``: MaterialScripts."""
     document.note_unknown(element, ("pose", "inertial", "collision", "visual", "sensor", "light", "gravity",
                                     "self_collide", "kinematic", *_QUIET))
     if document.flag(element, "self_collide"):
@@ -43,7 +42,7 @@ def read_link(document, element, name):
         document.note_unknown(child, ("pose", "geometry", "material", "transparency", *_QUIET))
         shape = _shape(document, child, name)
         if shape is not None:
-            shape.colour = _material(document, child)
+            shape.colour, shape.finish = read_material(document, child, materials)
             link.visuals.append(shape)
     return link
 
@@ -142,18 +141,3 @@ def _surface(document, collision):
                 raise document.error(part, "<%s> is %g, expected 0 or more" % (tag, value))
             found[name] = value
     return Surface(**found) if found else None
-
-
-def _material(document, visual):
-    """Return rgba of a visual, or None."""
-    element, rgba = visual.find("material"), None
-    if element is not None:
-        script = element.find("script/name")
-        rgba = MATERIALS.get((script.text or "").strip()) if script is not None else None
-        for tag in ("ambient", "diffuse"):
-            rgba = colour(document, element, tag, rgba)
-    clear = document.number(visual, "transparency", 0.0)
-    if clear:
-        rgba = rgba or (0.7, 0.7, 0.7, 1.0)
-        rgba = (*rgba[:3], rgba[3] * min(max(1.0 - clear, 0.0), 1.0))
-    return rgba

@@ -16,6 +16,7 @@ from .folders import ModelFolders
 from .frames import Frames
 from .lights import Light, read_light
 from .links import read_link
+from .materials import MaterialScripts
 from .tree import Parts, SdfJoint, build_robot
 
 _QUIET = ("enable_wind", "allow_auto_disable", "meta")
@@ -70,6 +71,7 @@ class ModelReader:
 
     def __init__(self, folders):
         self._folders = folders
+        self._materials = MaterialScripts(folders)
         self._opened = 0
 
     def model(self, document, element, depth=0, static=None):
@@ -157,7 +159,7 @@ class ModelReader:
             name = document.name(link)
             if name in parts.links:
                 raise document.error(link, "link '%s' appears twice" % name)
-            parts.links[name] = (read_link(document, link, name), frames.where(name, link))
+            parts.links[name] = (read_link(document, link, name, self._materials), frames.where(name, link))
             parts.gazebo += _sensors_and_lights(document, link, name)
         if not parts.links:
             raise document.error(element, "model '%s' has no <link>" % element.get("name"))

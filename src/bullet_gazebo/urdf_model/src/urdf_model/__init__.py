@@ -8,6 +8,7 @@ from .merge import MergedFrame, MergedLink, MergedRobot, merge_fixed
 from .model import (
     Box,
     Cylinder,
+    Finish,
     Inertial,
     Joint,
     Limit,
@@ -28,6 +29,7 @@ from .xml_text import XmlRefused, parse_xml, refuse_entities
 __all__ = [
     "Box",
     "Cylinder",
+    "Finish",
     "Inertial",
     "Joint",
     "Limit",

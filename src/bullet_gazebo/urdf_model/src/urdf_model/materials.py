@@ -16,14 +16,18 @@ _PLAIN = {
     "GreenGlow": (0.1, 1.0, 0.1),
     "Grey": (0.6, 0.6, 0.6),
     "Indigo": (0.33, 0.0, 0.5),
+    "LightOff": (1.0, 0.0, 0.0),
+    "LightOn": (0.0, 1.0, 0.0),
     "LightWood": (0.80, 0.66, 0.46),
     "Orange": (1.0, 0.45, 0.05),
     "Purple": (0.65, 0.1, 0.75),
+    "PurpleGlow": (1.0, 0.0, 1.0),
     "Red": (0.9, 0.1, 0.1),
     "RedBright": (1.0, 0.05, 0.05),
     "RedGlow": (1.0, 0.1, 0.1),
     "SkyBlue": (0.3, 0.65, 0.95),
     "Turquoise": (0.1, 0.85, 0.85),
+    "TurquoiseGlow": (0.0, 1.0, 1.0),
     "White": (1.0, 1.0, 1.0),
     "WhiteGlow": (1.0, 1.0, 1.0),
     "Wood": (0.62, 0.44, 0.26),
@@ -34,5 +38,17 @@ _PLAIN = {
     "ZincYellow": (0.97, 0.95, 0.2),
 }
 
+#: Names of materials that give off light themselves, in these colours: red, green, blue from 0 to 1.
+GLOWS = {"Gazebo/" + name: rgb for name, rgb in {
+    "BlueGlow": (0.0, 0.0, 1.0),
+    "GreenGlow": (0.0, 1.0, 0.0),
+    "LightOff": (1.0, 0.0, 0.0),
+    "LightOn": (0.0, 1.0, 0.0),
+    "PurpleGlow": (1.0, 0.0, 1.0),
+    "RedGlow": (1.0, 0.0, 0.0),
+    "TurquoiseGlow": (0.0, 1.0, 1.0),
+    "WhiteGlow": (1.0, 1.0, 1.0),
+    "YellowGlow": (1.0, 1.0, 0.0),
+}.items()}
 #: "Gazebo/Red" and its like -> rgba.
 MATERIALS = {"Gazebo/" + name: (*rgb, 1.0) for name, rgb in _PLAIN.items()}

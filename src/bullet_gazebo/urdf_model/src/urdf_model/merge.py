@@ -7,7 +7,7 @@ Baxter arm wrong by up to 1.7 Nm; so we merge here, by the parallel-axis theorem
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -92,7 +92,7 @@ def _merge_group(robot, body, members, frames):
         link, offset = robot.links[name], frames[name].offset
         for source, target in ((link.visuals, merged.visuals), (link.collisions, merged.collisions)):
             target.extend(
-                Shape(shape.geometry, offset @ shape.origin, shape.name, shape.colour, name) for shape in source
+                replace(shape, origin=offset @ shape.origin, link=name) for shape in source
             )
         if link.inertial is not None:
             rotation = offset[:3, :3]

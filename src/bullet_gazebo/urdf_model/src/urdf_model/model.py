@@ -47,6 +47,18 @@ class Plane:
     size: tuple[float, float] = (1.0, 1.0)
 
 
+@dataclass(frozen=True)
+class Finish:
+    """How a visual looks besides its colour."""
+
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)  # light that it gives off, red, green, blue from 0 to 1
+    gloss: float | None = None  # strength of highlights from 0 to 1; None: not given
+    texture: str = ""  # a picture's file, as written: package://, file:// or a path
+    repeats: tuple[float, float] = (1.0, 1.0)  # how often the picture lies side by side, and one below the other
+    cut_out: bool = False  # whether transparent pixels of the picture are holes
+    two_sided: bool = False  # whether the picture is also seen from behind
+
+
 @dataclass
 class Shape:
     """One visual or collision element: its geometry at ``origin`` (4x4, in the link's frame)."""
@@ -56,6 +68,7 @@ class Shape:
     name: str = ""
     colour: tuple[float, float, float, float] | None = None  # rgba, visuals only
     link: str = ""  # the link it was written in
+    finish: Finish | None = None  # visuals only
 
 
 @dataclass

@@ -7,12 +7,13 @@ import numpy as np
 
 from . import bounds
 from .errors import UrdfError
-from .materials import MATERIALS
+from .materials import GLOWS, MATERIALS
 from .model import (
     MAY_BE_INFINITE,
     MOVABLE_TYPES,
     Box,
     Cylinder,
+    Finish,
     Inertial,
     Joint,
     Limit,
@@ -72,10 +73,10 @@ class _Reader:
 
     def robot(self):
         name = self.root.get("name") or "robot"
-        colours = self.colours()
+        looks = self.looks()
         links, joints = {}, {}
         for element in self.root.iterchildren("link"):
-            link = self.link(element, colours)
+            link = self.link(element, looks)
             self.add_unique(links, link, element, "link")
         for element in self.root.iterchildren("joint"):
             joint = self.joint(element)
@@ -145,14 +146,14 @@ class _Reader:
 
     # -- elements -----------------------------------------------------------------------------------------------
 
-    def link(self, element, colours):
+    def link(self, element, looks):
         name = self.name(element)
         inertial = element.find("inertial")
         return Link(
             name,
             None if inertial is None else self.inertial(inertial, name),
-            [self.shape(e, colours, name) for e in element.iterchildren("visual")],
-            [self.shape(e, colours, name) for e in element.iterchildren("collision")],
+            [self.shape(e, looks, name) for e in element.iterchildren("visual")],
+            [self.shape(e, looks, name) for e in element.iterchildren("collision")],
             element.sourceline,
         )
 
@@ -186,18 +187,15 @@ class _Reader:
         rotation = origin[:3, :3]
         return Inertial(value, origin[:3, 3].copy(), rotation @ matrix @ rotation.T)
 
-    def shape(self, element, colours, link):
+    def shape(self, element, looks, link):
         geometry = self.child(element, "geometry")
         shapes = [e for e in geometry if isinstance(e.tag, str)]
         if len(shapes) != 1:
             raise self.error(geometry, "<geometry> of link '%s' holds %d shapes, expected one" % (link, len(shapes)))
         material = element.find("material")
+        colour, finish = (None, None) if material is None else self.look(material, looks)
         return Shape(
-            self.geometry(shapes[0], link),
-            self.origin(element),
-            element.get("name", ""),
-            self.colour(material, colours) if material is not None else None,
-            link,
+            self.geometry(shapes[0], link), self.origin(element), element.get("name", ""), colour, link, finish
         )
 
     def geometry(self, element, link):
@@ -315,29 +313,45 @@ class _Reader:
         if found:
             link.surface = Surface(**found)
         link.gravity = not _is_true(element.findtext("turnGravityOff"))
-        colour = MATERIALS.get((element.findtext("material") or "").strip())
-        if colour is not None:
-            for shape in link.visuals:
-                shape.colour = shape.colour or colour
+        name = (element.findtext("material") or "").strip()
+        finish = Finish(emission=GLOWS[name]) if name in GLOWS else None
+        for shape in link.visuals:
+            shape.colour = shape.colour or MATERIALS.get(name)
+            shape.finish = shape.finish or finish
 
     # -- pieces -------------------------------------------------------------------------------------------------
 
-    def colours(self):
+    def looks(self):
+        """Return {name: (rgba or None, Finish or None)} of the materials beside the links."""
         table = {}
         for element in self.root.iterchildren("material"):
-            colour = element.find("color")
-            if element.get("name") and colour is not None:
-                table[element.get("name")] = tuple(self.vector(colour, "rgba", 4, default=(0.5, 0.5, 0.5, 1.0)))
+            look = self.own_look(element)
+            if element.get("name") and look != (None, None):
+                table[element.get("name")] = look
         return table
 
-    def colour(self, element, colours):
-        colour = element.find("color")
-        if colour is not None:
-            value = tuple(self.vector(colour, "rgba", 4, default=(0.5, 0.5, 0.5, 1.0)))
+    def look(self, element, looks):
+        look = self.own_look(element)
+        if look != (None, None):
             # A material may be defined inside the first visual that uses it and be referred to by name afterwards.
-            colours.setdefault(element.get("name", ""), value)
-            return value
-        return colours.get(element.get("name", ""))
+            looks.setdefault(element.get("name", ""), look)
+            return look
+        return looks.get(element.get("name", ""), look)
+
+    def own_look(self, element):
+        colour = element.find("color")
+        rgba = None if colour is None else tuple(self.vector(colour, "rgba", 4, default=(0.5, 0.5, 0.5, 1.0)))
+        texture, emission, gloss = (element.find(tag) for tag in ("texture", "emission", "gloss"))
+        if texture is None and emission is None and gloss is None:
+            return rgba, None
+        none = Finish()
+        return rgba, Finish(
+            tuple(self.vector(emission, "rgb", 3, default=none.emission)),
+            None if gloss is None else self.number(gloss, "value", required=True),
+            "" if texture is None else texture.get("filename", ""),
+            tuple(self.vector(texture, "repeats", 2, default=none.repeats)),
+            *(texture is not None and _is_true(texture.get(key)) for key in ("cut_out", "two_sided")),
+        )
 
     def origin(self, element):
         origin = element.find("origin")

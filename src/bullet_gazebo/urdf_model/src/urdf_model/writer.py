@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Write a merged robot as URDF text, for the renderer: bodies, joints, shapes and colours, nothing else."""
 
+import math
+
 from lxml import etree
 
 from .model import Box, Cylinder, Mesh, Plane, Sphere
@@ -37,7 +39,9 @@ def _add_shape(element, shape):
     geometry, origin = shape.geometry, shape.origin
     if isinstance(geometry, Plane):
         origin = origin @ pose_matrix((0.0, 0.0, -_SHEET_M / 2.0))
-        geometry = Box((*geometry.size, _SHEET_M))
+        # A picture on a plane has x to the right, on the top of a box -y (Gazebo's MeshManager).
+        origin = origin @ pose_matrix(rpy=(0.0, 0.0, math.pi / 2.0))
+        geometry = Box((*geometry.size[::-1], _SHEET_M))
     _add_origin(element, origin)
     holder = etree.SubElement(element, "geometry")
     if isinstance(geometry, Box):
@@ -48,9 +52,24 @@ def _add_shape(element, shape):
         etree.SubElement(holder, "sphere", radius=repr(geometry.radius))
     elif isinstance(geometry, Mesh):
         etree.SubElement(holder, "mesh", filename=geometry.filename, scale=_words(geometry.scale))
+    if shape.colour is None and shape.finish is None:
+        return
+    material = etree.SubElement(element, "material", name="")
     if shape.colour is not None:
-        material = etree.SubElement(element, "material", name="")
         etree.SubElement(material, "color", rgba=_words(shape.colour))
+    if shape.finish is not None:
+        _add_finish(material, shape.finish)
+
+
+def _add_finish(material, finish):
+    """Write what URDF has no element for in elements of our own, which ``parse_urdf`` reads."""
+    if finish.texture:
+        etree.SubElement(material, "texture", filename=finish.texture, repeats=_words(finish.repeats),
+                         cut_out=str(finish.cut_out).lower(), two_sided=str(finish.two_sided).lower())
+    if any(finish.emission):
+        etree.SubElement(material, "emission", rgb=_words(finish.emission))
+    if finish.gloss is not None:
+        etree.SubElement(material, "gloss", value=repr(float(finish.gloss)))
 
 
 def _add_origin(element, matrix):
