@@ -22,8 +22,9 @@ _FORMATS = ("dae", "stl", "obj", "ply", "off", "glb", "gltf")
 # Pictures whose brightness is a height.
 _HEIGHTS = ("png", "jpg", "jpeg")
 _MOST_HEIGHTS = 1025 * 1025  # rows of a power of two and one, as Gazebo wants them
-# Materials and buffers that a mesh may name. Textures are not drawn.
+# Materials and buffers that a mesh may name, and pictures, of which only the names are read.
 _BESIDE = (".mtl", ".bin")
+PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".gif", ".tif", ".tiff")
 
 #: Limits of collision shapes: with more triangles, making the shape of a fixed body takes the loop more than 20 ms; so
 #: does a convex shape with more points.
@@ -41,11 +42,14 @@ class MeshError(ValueError):
 class _Beside:
     """Resolver for trimesh: only files in the mesh's own folder, and only materials and buffers."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, textures):
         self._folder = folder
+        self._textures = textures
 
     def get(self, name):
         name = str(name)
+        if self._textures and name.lower().endswith(PICTURES):
+            return _picture_of(name)
         path = (self._folder / name).resolve()
         if path.suffix.lower() not in _BESIDE or self._folder.resolve() not in path.parents:
             raise FileNotFoundError(name)
@@ -57,9 +61,10 @@ class _Beside:
         return ()
 
 
-def load_scene(path):
+def load_scene(path, textures=False):
     """Return the trimesh.Scene in the file at ``path``; a picture is a terrain of 1 x 1 x 1 m, with its brightness as
-    height. Raises MeshError, OSError, and what libraries raise."""
+    height. With ``textures``, materials have pictures of one pixel, with the name that the file gives as
+    ``picture.info["name"]``. Raises MeshError, OSError, and what libraries raise."""
     import trimesh  # 0.1 s to import, and needed only the first time that a mesh is seen
 
     path = Path(path)
@@ -71,7 +76,7 @@ def load_scene(path):
         return trimesh.Scene(trimesh.Trimesh(*_terrain(_heights(content)), process=False))
     unit_m = _unit_m(content) if kind == "dae" else 1.0
     scene = trimesh.load(
-        io.BytesIO(content), file_type=kind, force="scene", resolver=_Beside(path.parent), process=False
+        io.BytesIO(content), file_type=kind, force="scene", resolver=_Beside(path.parent, textures), process=False
     )
     triangles = 0
     for name in scene.graph.geometry_nodes:
@@ -91,6 +96,17 @@ def load_scene(path):
             if len(getattr(mesh, "faces", ())):
                 mesh.process()
     return scene
+
+
+def _picture_of(name):
+    """A PNG file of one pixel that holds a name: what is made of a mesh does not depend on the pictures beside it."""
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    held, file = PngInfo(), io.BytesIO()
+    held.add_itxt("name", name)
+    Image.new("L", (1, 1)).save(file, "png", pnginfo=held)
+    return file.getvalue()
 
 
 def _heights(content):

@@ -4,6 +4,9 @@
 Edges are collapsed in the order of their quadric error (Garland and Heckbert, "Surface simplification using quadric
 error metrics", 1997), each level from the one before. A level keeps the normals of the original, so that it is shaded
 like it: smooth surfaces show no facets, and creases stay.
+
+A mesh with a picture is cut where the picture is: its seams are borders, and its levels have vertices of the original
+alone, each with its own place in the picture.
 """
 import math
 from typing import NamedTuple
@@ -40,18 +43,23 @@ _COMPARED = 5_000
 _FEWEST = 24
 # A level with more than this share of the triangles of the one before is not worth its place.
 _WORTH = 0.85
+# A place in a picture counts as the same within this share of it; surfaces of less than its square have no picture.
+_SAME_UV = 1e-5
+_LEAST_IN_PICTURE = _SAME_UV ** 2
 # Width of the strips that hold borders, as a share of the mesh's size.
 _STRIP = 0.02
 
 
 class Level(NamedTuple):
     """``vertices`` (n, 3), ``normals`` (n, 3), ``faces`` (m, 3): a vertex at a crease appears once for each side.
-    ``error``: the distance from the original that :data:`COUNTED` of its surface keeps, in the unit of the vertices."""
+    ``error``: the distance from the original that :data:`COUNTED` of its surface keeps, in the unit of the vertices; a
+    picture is shifted on the surface by no more. ``uv`` (n, 2): the vertices' places in the picture, or None."""
 
     vertices: np.ndarray
     normals: np.ndarray
     faces: np.ndarray
     error: float
+    uv: np.ndarray = None
 
 
 class ReductionError(Exception):
@@ -60,29 +68,28 @@ class ReductionError(Exception):
 
 class _Mesh(NamedTuple):
     """``corner_normals`` (m, 3, 3): the normal at each corner of ``faces`` (m, 3). ``of`` (k,): for each vertex of the
-    original the one that is left of it."""
+    original the one that is left of it. ``uv`` (n, 2): places in a picture, or None."""
 
     vertices: np.ndarray
     faces: np.ndarray
     corner_normals: np.ndarray
     of: np.ndarray
+    uv: np.ndarray = None
 
 
-def levels(vertices, faces, size=None):
+def levels(vertices, faces, size=None, uv=None):
     """Return the list of :class:`Level` of a mesh, the finest first: vertices (n, 3) and faces (m, 3).
 
     ``size``: the longest side of the object that the mesh belongs to; by default its own. Borders of open meshes stay
     within the tolerance, too. Triangles without area are left out; a mesh without any other has no levels.
+    ``uv`` (n, 2): the vertices' places in a picture, in widths and heights of it; levels have none if there are too
+    many triangles, or too many loose ones.
     """
     vertices = np.asarray(vertices, dtype=float)
     size = float(np.ptp(vertices, axis=0).max()) if size is None else size
-    points, joined = _welded(vertices, faces, size)
-    if len(joined) > _MANY:
-        points, joined = _welded(*thin_out(points, joined, _MANY), size)
-    joined = joined[_twice_areas(points, joined) > 1e-12 * size ** 2]
-    if not len(joined):
+    original = _original(vertices, faces, size, uv)
+    if not len(original.faces):
         return []
-    original = _Mesh(points, joined, corner_normals(points, joined), np.arange(len(points)))
     found, mesh = [], original
     for number in range(LEVELS):
         mesh = _next(mesh, size * FINEST * COARSER ** number)
@@ -99,6 +106,25 @@ def levels(vertices, faces, size=None):
     return found
 
 
+def _original(vertices, faces, size, uv):
+    """The :class:`_Mesh` without repeated vertices and without triangles that have no area."""
+    points, joined, _ = _welded(vertices, faces, size)
+    if len(joined) > _MANY:
+        points, joined, _ = _welded(*thin_out(points, joined, _MANY), size)
+        uv = None
+    joined = joined[_twice_areas(points, joined) > 1e-12 * size ** 2]
+    if uv is None or not len(joined):
+        return _Mesh(points, joined, corner_normals(points, joined), np.arange(len(points)))
+    uv = np.asarray(uv, dtype=float)
+    cut, faces, first = _welded(vertices, faces, size, uv)
+    faces = faces[_twice_areas(cut, faces) > 1e-12 * size ** 2]
+    # Light is smooth across seams: normals are those of the mesh that is not cut.
+    _, at = _same(cut, size)
+    uncut = np.zeros((at.max() + 1, 3))
+    uncut[at] = cut
+    return _Mesh(cut, faces, corner_normals(uncut, at[faces]), np.arange(len(cut)), uv[first])
+
+
 def reduced(vertices, faces, target):
     """(vertices, faces) with about the same surface as vertices (n, 3) and faces (m, 3) and about ``target`` triangles,
     whatever the distance. Borders may shrink.
@@ -109,7 +135,7 @@ def reduced(vertices, faces, target):
     import fast_simplification
 
     size = float(np.ptp(vertices, axis=0).max())
-    welded, joined = _welded(vertices, faces, size)
+    welded, joined, _ = _welded(vertices, faces, size)
     if len(joined) <= target:
         return welded, joined
     smooth = fast_simplification.simplify(welded.astype(np.float32), joined.astype(np.int32), target_count=int(target),
@@ -188,6 +214,9 @@ def _thinned(mesh):
 
 def _replaced(mesh, moved, replaced_by):
     """``mesh`` with its vertices ``replaced_by`` (n,) others, which are at ``moved``."""
+    uv = None
+    if mesh.uv is not None:
+        moved, uv = _on_vertices(mesh, moved, replaced_by)
     corners = replaced_by[mesh.faces]
     whole = _is_whole(corners)
     whole[whole] = _twice_areas(moved, corners[whole]) > 0.0
@@ -195,20 +224,31 @@ def _replaced(mesh, moved, replaced_by):
     flat = _unit(np.cross(moved[faces[:, 1]] - moved[faces[:, 0]], moved[faces[:, 2]] - moved[faces[:, 0]]))
     weighted = mesh.corner_normals * _twice_areas(mesh.vertices, mesh.faces)[:, None, None]
     normals = _gathered(replaced_by, mesh.faces, weighted, faces, flat)
-    return _Mesh(moved, faces, normals, replaced_by[mesh.of])
+    return _Mesh(moved, faces, normals, replaced_by[mesh.of], uv)
+
+
+def _on_vertices(mesh, moved, replaced_by):
+    """(positions, uv) with each of the ``moved`` vertices at the nearest one of those that it replaces."""
+    away = np.linalg.norm(mesh.vertices - moved[replaced_by], axis=1)
+    order = np.lexsort((away, replaced_by))
+    left, first = np.unique(replaced_by[order], return_index=True)
+    positions, uv = moved.copy(), np.zeros((len(moved), 2))
+    positions[left], uv[left] = mesh.vertices[order[first]], mesh.uv[order[first]]
+    return positions, uv
 
 
 def _level(original, mesh):
     """The :class:`Level` of ``mesh``, with its distance from ``original``."""
     # A hundredth of a unit is a third of a degree; what is nearly equal need not be drawn twice.
-    rows = np.hstack([mesh.vertices[mesh.faces.ravel()], np.round(mesh.corner_normals.reshape(-1, 3), 2)])
+    rows = np.hstack([mesh.vertices[mesh.faces.ravel()], np.round(mesh.corner_normals.reshape(-1, 3), 2),
+                      *([] if mesh.uv is None else [mesh.uv[mesh.faces.ravel()]])])
     rows, corner = np.unique(rows.astype(np.float32), axis=0, return_inverse=True)
-    return Level(rows[:, :3], _unit(rows[:, 3:].astype(float)).astype(np.float32), corner.reshape(-1, 3),
-                 _distance(original, mesh))
+    return Level(rows[:, :3], _unit(rows[:, 3:6].astype(float)).astype(np.float32), corner.reshape(-1, 3),
+                 _distance(original, mesh), None if mesh.uv is None else rows[:, 6:])
 
 
 def _distance(original, mesh):
-    """The distance from the surface of ``mesh`` that :data:`COUNTED` of the original's surface keeps.
+    """The distance from the surface of ``mesh`` that :data:`COUNTED` of the original's surface keeps, with its picture.
 
     Measured at the original's vertices: from the triangles around the vertex that is left of each, on to triangles
     beside the nearest one while these are nearer. The nearest point of the surface may be nearer, never farther. What
@@ -219,6 +259,7 @@ def _distance(original, mesh):
     order = np.argsort(mesh.faces.ravel(), kind="stable")
     place, corners = mesh.faces.ravel()[order], mesh.vertices[mesh.faces]
     away = np.linalg.norm(points - mesh.vertices[left], axis=1)
+    nearest = np.full(len(points), -1)
     point, around = np.arange(len(points)), left
     while len(point):
         mine, which = _pairs(place, around)
@@ -229,13 +270,42 @@ def _distance(original, mesh):
         nearer, first = np.unique(point[mine][ranked], return_index=True)
         face, to_face = face[ranked][first], to_face[ranked][first]
         better = to_face < away[nearer] * (1.0 - 1e-6)
-        away[nearer[better]] = to_face[better]
+        away[nearer[better]], nearest[nearer[better]] = to_face[better], face[better]
         point, around = np.repeat(nearer[better], 3), mesh.faces[face[better]].ravel()
     weight = np.bincount(original.faces.ravel(), np.repeat(_twice_areas(original.vertices, original.faces), 3),
                          len(original.vertices))[few]
+    if mesh.uv is not None:
+        away = np.maximum(away, _shifts(original, mesh, few, nearest))
     ranked = np.argsort(away)
     covered = np.cumsum(weight[ranked])
     return float(away[ranked[min(np.searchsorted(covered, COUNTED * covered[-1]), len(ranked) - 1)]])
+
+
+def _shifts(original, mesh, few, nearest):
+    """How far the picture of ``mesh`` is shifted at the ``few`` vertices of the original: (k,) in the unit of the
+    vertices. ``nearest`` (k,): the face of ``mesh`` at each of them, -1 for the vertex that is left."""
+    uv = mesh.uv[mesh.of[few]]
+    on_face = nearest >= 0
+    corners = mesh.faces[nearest[on_face]]
+    weights = _weights(original.vertices[few][on_face], mesh.vertices[corners])
+    uv[on_face] = np.einsum("ij,ijk->ik", weights, mesh.uv[corners])
+    shift = np.linalg.norm(uv - original.uv[few], axis=1)
+    flat = np.pad(original.uv, ((0, 0), (0, 1)))
+    on_surface, in_picture = (
+        np.bincount(original.faces.ravel(), np.repeat(_twice_areas(points, original.faces), 3), len(points))[few]
+        for points in (original.vertices, flat))
+    return shift * np.sqrt(on_surface / np.maximum(in_picture, _LEAST_IN_PICTURE))
+
+
+def _weights(points, triangles):
+    """The weights (n, 3) of the corners of ``triangles`` (n, 3, 3) at about the nearest point to ``points`` (n, 3)."""
+    a, b, c = (triangles[:, k] for k in range(3))
+    across = np.cross(b - a, c - a)
+    squared = np.maximum(np.einsum("ij,ij->i", across, across), 1e-60)
+    to_b, to_c = (np.einsum("ij,ij->i", np.cross(*pair), across) / squared
+                  for pair in ((points - a, c - a), (b - a, points - a)))
+    weights = np.clip(np.stack([1.0 - to_b - to_c, to_b, to_c], axis=1), 0.0, None)
+    return weights / np.maximum(weights.sum(axis=1), 1e-30)[:, None]
 
 
 def _pairs(ordered, wanted):
@@ -320,10 +390,19 @@ def _twice_areas(vertices, faces):
     return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
 
 
-def _welded(vertices, faces, size):
-    """The mesh with equal vertices merged; triangles that lose a corner, and repeated ones, are left out."""
-    _, first, of = np.unique(np.round(vertices / (_WELD * max(size, 1e-9))).astype(np.int64), axis=0,
-                             return_index=True, return_inverse=True)
-    faces = _whole(of.reshape(-1)[faces])
+def _welded(vertices, faces, size, uv=None):
+    """(vertices, faces, numbers of these vertices in ``vertices``) of the mesh with equal vertices merged, with ``uv``
+    (n, 2) those that are equal there as well; triangles that lose a corner, and repeated ones, are left out."""
+    first, of = _same(vertices, size, uv)
+    faces = _whole(of[faces])
     _, once = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    return vertices[first], faces[np.sort(once)]
+    return vertices[first], faces[np.sort(once)], first
+
+
+def _same(vertices, size, uv=None):
+    """(the first one of each group of equal vertices, the number of its group for each vertex)."""
+    rows = np.round(vertices / (_WELD * max(size, 1e-9))).astype(np.int64)
+    if uv is not None:
+        rows = np.hstack([rows, np.round(uv / _SAME_UV).astype(np.int64)])
+    _, first, of = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return first, of.reshape(-1)

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The content of mesh files, split by what it looks like. ROS-free."""
+from typing import NamedTuple
+
+import numpy as np
+
+from bullet_sim.mesh_loading import load_scene
+
+# Brightness of Collada meshes that name no material: the one of assimp, by which rviz shows them.
+_PLAIN_COLOUR = (0.6, 0.6, 0.6, 1.0)
+# An emission this close to the diffuse colour repeats it.
+_SAME = 0.01
+# A diffuse colour below this would make a picture black; some exporters write it beside each picture.
+_BLACK = 0.05
+
+
+class PieceError(Exception):
+    """A mesh without triangles."""
+
+
+class Piece(NamedTuple):
+    """Triangles that look alike: ``vertices`` (n, 3), ``faces`` (m, 3); ``colour`` (red, green, blue, alpha from 0 to
+    1) or None, with a texture the factor of its colours; ``emission`` (red, green, blue); ``texture``: the name of a
+    picture as the file has it, or ""; ``uv`` (n, 2): the vertices' places in a picture, from its upper left corner to
+    the right and down, in widths and heights of it; None if the file has none."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    colour: tuple
+    emission: tuple = (0.0, 0.0, 0.0)
+    texture: str = ""
+    uv: np.ndarray = None
+
+
+def read_pieces(path):
+    """The list of :class:`Piece` of the mesh file at ``path``, one for each look. Raises :class:`PieceError`, and what
+    ``load_scene`` raises."""
+    import trimesh
+
+    plain = _PLAIN_COLOUR if str(path).lower().endswith(".dae") else None
+    scene = load_scene(path, textures=True)
+    alike = {}
+    for node in scene.graph.nodes_geometry:
+        transform, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if len(getattr(mesh, "faces", ())) == 0:
+            continue
+        uv = _uv(mesh)
+        texture = "" if uv is None else _texture(mesh)
+        colour = _factor(mesh) if texture else _colour(mesh) or plain
+        look = colour, _emission(mesh, colour, texture), texture, uv is not None
+        vertices = trimesh.transform_points(mesh.vertices, transform)
+        alike.setdefault(look, []).append((vertices, np.asarray(mesh.faces), uv))
+    if not alike:
+        raise PieceError("it holds no triangles")
+    return [_joined(*look, meshes) for look, meshes in alike.items()]
+
+
+def _joined(colour, emission, texture, has_uv, meshes):
+    starts = np.cumsum([0] + [len(vertices) for vertices, _, _ in meshes[:-1]])
+    faces = [faces + start for (_, faces, _), start in zip(meshes, starts, strict=True)]
+    return Piece(np.concatenate([vertices for vertices, _, _ in meshes]), np.concatenate(faces), colour, emission,
+                 texture, np.concatenate([uv for _, _, uv in meshes]) if has_uv else None)
+
+
+def _uv(mesh):
+    """The vertices' places in a picture, or None. Files count upwards from the lower left corner."""
+    uv = getattr(mesh.visual, "uv", None)
+    if uv is None or len(uv) != len(mesh.vertices) or not np.isfinite(uv).all():
+        return None
+    return np.asarray(uv, dtype=float)[:, :2] * (1.0, -1.0) + (0.0, 1.0)
+
+
+def _texture(mesh):
+    material = getattr(mesh.visual, "material", None)
+    picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    return getattr(picture, "info", {}).get("name", "")
+
+
+def _factor(mesh):
+    """The factor of a picture's colours: Wavefront's diffuse colour; in Collada a picture is in the place of it."""
+    diffuse = getattr(mesh.visual.material, "kwargs", {}).get("kd")
+    if diffuse is None or np.shape(diffuse) != (3,) or max(diffuse) < _BLACK:
+        return 1.0, 1.0, 1.0, 1.0
+    return (*(round(min(max(float(value), 0.0), 1.0), 3) for value in diffuse), 1.0)
+
+
+def _colour(mesh):
+    """The diffuse colour that the file names, as rviz and Gazebo show it in full light, or None."""
+    material = getattr(mesh.visual, "material", None)
+    colour = getattr(material, "main_color", None)
+    if colour is None and getattr(mesh.visual, "kind", None) in ("face", "vertex"):
+        colour = mesh.visual.main_color
+    if colour is None:
+        return None
+    # The fourth number is ignored: for some exporters it means opacity, for others transparency.
+    return (*(round(int(value) / 255.0, 3) for value in colour[:3]), 1.0)
+
+
+def _emission(mesh, colour, texture):
+    """The light that the file's material gives off, as Gazebo and rviz show it.
+
+    But not where it repeats the diffuse colour, which exporters write that know one colour only: it would shine in the
+    dark and hide all shading. Beside a picture there is no colour to repeat; calibration targets shine on purpose.
+    """
+    material = getattr(mesh.visual, "material", None)
+    emission = getattr(material, "emissiveFactor", None)
+    if emission is None:
+        emission = getattr(material, "kwargs", {}).get("ke")  # of Wavefront files
+    try:
+        emission = [round(min(max(float(value), 0.0), 1.0), 3) for value in emission]
+    except (TypeError, ValueError):
+        return 0.0, 0.0, 0.0
+    repeated = not texture and colour is not None and np.shape(emission) == (3,) and max(
+        abs(one - other) for one, other in zip(emission, colour, strict=False)) <= _SAME
+    return (0.0, 0.0, 0.0) if len(emission) != 3 or repeated else tuple(emission)
