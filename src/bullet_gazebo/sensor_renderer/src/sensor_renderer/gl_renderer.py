@@ -12,11 +12,12 @@ import numpy as np
 from sensor_renderer.errors import RenderingError
 from sensor_renderer.floor import Floor
 from sensor_renderer.links import Links, visible
-from sensor_renderer.programs import Programs, draw, matrix_bytes
+from sensor_renderer.programs import Programs, draw, draw_textured, matrix_bytes
 from sensor_renderer.screens import Screens
 from sensor_renderer.shadows import Shadows
 from sensor_renderer.sides import Sides
 from sensor_renderer.targets import Targets
+from sensor_renderer.textures import Textures
 
 # The sky's colours are computed at the corners of so many cells along each side of a picture.
 _SKY_CELLS = 12
@@ -62,6 +63,7 @@ class GlRenderer:
         self._links = Links(self._context, self._programs, not still,
                             Sides(self._context) if self._one_sided else None)
         self._screens = Screens(self._context, self._programs.screen)
+        self._textures = Textures(self._context)
         self._floor = Floor(self._context, self._programs)
         self._sky = self._context.vertex_array(
             self._programs.sky, [(self._context.buffer(_grid(_SKY_CELLS).tobytes()), "2f", "corner")])
@@ -145,8 +147,9 @@ class GlRenderer:
         """Draw ``seen``, (:class:`sensor_renderer.links.Arrays`, matrix, packed matrix,
         :class:`sensor_renderer.links.Link`, distance of its sphere), the floor last."""
         draw(self._programs.solid, [(arrays.colour, packed) for arrays, _, packed, link, _ in seen
-                                    if not link.is_mesh and not link.is_floor])
-        meshes = [(arrays, packed, distance) for arrays, _, packed, link, distance in seen if link.is_mesh]
+                                    if not link.is_mesh and arrays.colour is not None])
+        meshes = [(arrays, packed, distance) for arrays, _, packed, link, distance in seen
+                  if link.is_mesh and arrays.colour is not None]
         # From within a link one may see any of its backs.
         within = pinhole.blind_m if self._one_sided else math.inf
         draw(self._programs.mesh, [(arrays.colour, packed, arrays.corners) for arrays, packed, distance in meshes
@@ -156,6 +159,10 @@ class GlRenderer:
             draw(self._programs.mesh, [(arrays.colour, packed) for arrays, packed, distance in meshes
                                        if distance >= within])
             self._context.disable(self._context.CULL_FACE)
+        textured = [(array, packed, material) for arrays, _, packed, _, _ in seen
+                    for material, array in arrays.textured]
+        if textured:
+            draw_textured(self._programs.textured(), textured, self._textures)
         for _, matrix, packed, link, _ in seen:
             if link.is_floor:
                 self._floor.draw(link.parts[0].colour, matrix, packed, self._shadows.corners)
@@ -163,6 +170,7 @@ class GlRenderer:
     def _light_by(self, light):
         if not self._programs.fit(light):
             self._links.clear()
+            self._textures.clear()
             self._floor.clear()
             self._programs.compile(light)
             self._floor.build()

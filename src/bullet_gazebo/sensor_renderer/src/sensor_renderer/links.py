@@ -48,11 +48,13 @@ class Link:
 
 class Arrays(NamedTuple):
     """Vertex arrays of a level of detail, for ``colour`` and for ``depth`` only; how many ``corners`` has the former
-    without the backs that follow."""
+    without the backs that follow. ``textured``: (:class:`sensor_renderer.mirror.Material`, vertex array) for each
+    material; ``colour`` is of the parts without one, or None."""
 
     colour: object
     depth: object
     corners: int = -1
+    textured: tuple = ()
 
 
 class Links:
@@ -72,7 +74,9 @@ class Links:
     def clear(self):
         """Release all arrays."""
         for link in self._links.values():
-            for array in {link.caster, *(array for arrays in link.by_level.values() for array in arrays[:2])}:
+            arrays = link.by_level.values()
+            textured = (array for level in arrays for _, array in level.textured)
+            for array in {link.caster, *textured, *(array for level in arrays for array in level[:2])}:
                 if array is not None:
                     array.release()
         self._links = {}
@@ -111,14 +115,12 @@ class Links:
             numbers = tuple(part.level(error_m) for part in link.parts)
             found = link.by_level.get(numbers)
             if found is None:
-                rows = _rows(link.parts, [part.triangles_of(number)
-                                          for part, number in zip(link.parts, numbers, strict=True)])
-                found = link.by_level[numbers] = self._arrays_of(rows, link)
+                found = link.by_level[numbers] = self._arrays_of(link, numbers)
             link.by_step[step] = found
         return found
 
     def _link(self, parts):
-        key = tuple((part.key, part.colour, part.gloss) for part in parts)
+        key = tuple((part.key, part.colour, part.gloss, part.material) for part in parts)
         found = self._links.get(key)
         if found is None:
             rows = _rows(parts, [part.triangles for part in parts])
@@ -134,14 +136,31 @@ class Links:
             found.caster = self._caster_of(rows, found) if thin else self._level(found, _CASTER_M).depth
         return found
 
-    def _arrays_of(self, rows, link):
-        depth = self._vertex_array(self._programs.shadow, rows[:, :3], "3f", "position")
+    def _arrays_of(self, link, numbers):
+        """The :class:`Arrays` of ``link``, with the levels of its parts by their ``numbers``."""
+        levels = [(part, number, part.triangles_of(number)) for part, number in zip(link.parts, numbers, strict=True)]
+        positions = np.concatenate([rows[:, :3] for _, _, rows in levels])
+        depth = self._vertex_array(self._programs.shadow, positions, "3f", "position")
         if link.is_floor:
             return Arrays(None, depth)  # :class:`sensor_renderer.floor.Floor` draws it
+        textured = self._textured([level for level in levels if level[0].material is not None])
+        plain = [(part, rows) for part, _, rows in levels if part.material is None]
+        if not plain:
+            return Arrays(None, depth, textured=textured)
+        rows = _rows(*zip(*plain, strict=True))
         program = self._programs.mesh if link.is_mesh else self._programs.solid
         colour = self._vertex_array(program, rows, "3f 3f 4f", "position", "normal", "colour",
                                     backs=self._backs(rows, link, Sides.from_behind) if link.is_mesh else ())
-        return Arrays(colour, depth, len(rows))
+        return Arrays(colour, depth, len(rows), textured)
+
+    def _textured(self, levels):
+        """One array for each material; ``levels``: (part, number of its level, triangles)."""
+        alike = {}
+        for part, number, rows in levels:
+            alike.setdefault(part.material, []).append(np.hstack([_rows([part], [rows]), part.uv_of(number)]))
+        return tuple((material, self._vertex_array(self._programs.textured(), np.concatenate(rows).astype(np.float32),
+                                                   "3f 3f 4f 2f", "position", "normal", "colour", "uv"))
+                     for material, rows in alike.items())
 
     def _backs(self, rows, link, which):
         """The corners of the triangles of ``link`` that show their backs, in the order that makes these fronts.
@@ -172,8 +191,12 @@ class Links:
 def _rows(parts, triangles):
     """(n, 10) position, normal, colour and gloss of the corners of all parts. One call draws a link: in software a call
     costs as much as some hundred triangles."""
-    return np.concatenate([np.hstack([rows, np.tile(np.float32([*part.colour[:3], part.gloss]), (len(rows), 1))])
+    return np.concatenate([np.hstack([rows, np.tile(np.float32([*_factor(part), part.gloss]), (len(rows), 1))])
                            for part, rows in zip(parts, triangles, strict=True)])
+
+
+def _factor(part):
+    return part.material.factor if part.material is not None else part.colour[:3]
 
 
 def visible(listed, pinhole, view):

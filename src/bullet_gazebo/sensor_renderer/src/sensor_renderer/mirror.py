@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The world for the renderer: the bodies of the snapshot, posed by our own forward kinematics. ROS-free."""
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from sensor_renderer import triangles
 from sensor_renderer.light import Light
-from urdf_model import Mesh, merge_fixed, parse_urdf
+from urdf_model import Finish, Mesh, merge_fixed, parse_urdf
 from urdf_model.transforms import axis_rotation, matrix_from_quaternion, rigid
-from world_picture.drawing import DrawingError, read_level
+from world_picture.drawing import DrawingError, read_level, read_uv
 from world_picture.shared_picture import PictureReader
 from world_picture.snapshot import SnapshotError
+from world_picture.textures import find_texture
 
 DEFAULT_COLOUR = (0.7, 0.7, 0.7, 1.0)
+_WHITE = (1.0, 1.0, 1.0, 1.0)
 #: Gloss of what does not say: paint and plastic.
 GLOSS = 0.3
 #: How far the floor reaches [m]; its colour.
@@ -22,16 +26,33 @@ FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
 
 
 class Level(NamedTuple):
-    """A level of detail of a part: its distance from the original [m]; ``make()`` -> its triangles (3 m, 6)."""
+    """A level of detail of a part: its distance from the original [m]; ``make()`` -> its triangles (3 m, 6);
+    ``uv()`` -> the corners' places in a picture (3 m, 2), for parts with a material."""
 
     error_m: float
     make: Callable
+    uv: Callable = None
+
+
+class Material(NamedTuple):
+    """The look of parts that have more than a colour. ``texture``: the path of a picture, or ""; ``factor`` of its
+    colours, and ``emission``, light of its own: red, green, blue from 0 to 1; ``repeats``: how often the picture lies
+    side by side, and one below the other; ``cut_out``: whether its transparent pixels are holes; ``two_sided``: whether
+    it is seen from behind."""
+
+    texture: str
+    factor: tuple
+    emission: tuple
+    repeats: tuple = (1.0, 1.0)
+    cut_out: bool = False
+    two_sided: bool = True
 
 
 class Part(NamedTuple):
     """Triangles of one colour on one body. ``key`` is the same for equal triangles; rgba from 0 to 1. ``levels``: of
     the same shape, the finest first; none for shapes that have no other. ``gloss``: strength of its highlights, from 0
-    to 1."""
+    to 1. ``material``: None for a colour alone; else ``colour`` is about the mean. ``uv`` (3 m, 2): the corners' places
+    in its picture, if there are no levels."""
 
     key: tuple
     triangles: np.ndarray
@@ -39,6 +60,8 @@ class Part(NamedTuple):
     is_floor: bool = False
     levels: tuple = ()
     gloss: float = GLOSS
+    material: Material = None
+    uv: np.ndarray = None
 
     def level(self, error_m):
         """The number of the coarsest level that is within ``error_m`` [m] of the original; 0, the finest, if none."""
@@ -47,6 +70,12 @@ class Part(NamedTuple):
     def triangles_of(self, number):
         """The triangles of the level of that number."""
         return self.levels[number].make() if self.levels else self.triangles
+
+    def uv_of(self, number):
+        """The places of the corners of the level of that number in the picture of its material (3 m, 2): to the right
+        and down, in widths and heights of it."""
+        uv = self.levels[number].uv() if self.levels else self.uv
+        return uv * self.material.repeats
 
 
 class Screen(NamedTuple):
@@ -158,6 +187,7 @@ class Mirror:
         self._drawings = drawings
         self._find_mesh = find_mesh
         self._warn = warn
+        self._warned = set()  # names of pictures
         self._parts = {}
         self._bodies = {}
         #: Bodies by name, in the scene's order.
@@ -223,36 +253,84 @@ class Mirror:
                       bool(listed.get("glows")), float(listed.get("radius", 0.0)))
 
     def _parts_of(self, shape):
-        geometry, colour = shape.geometry, shape.colour or DEFAULT_COLOUR
+        geometry, colour, finish = shape.geometry, shape.colour or DEFAULT_COLOUR, shape.finish or Finish()
+        texture = self._texture(finish.texture, self._find_mesh(finish.texture)) if finish.texture else None
         if not isinstance(geometry, Mesh):
+            look = _look(finish, colour, shape.colour or _WHITE, texture, finish.emission)
+            if look["material"] is not None:
+                look["uv"] = triangles.uv_on_primitive(geometry, triangles.of_primitive(geometry))
             return [self._placed((geometry,), lambda: _at(shape.origin, triangles.of_primitive(geometry)), shape.origin,
-                                 colour)]
+                                 **look)]
         path = self._find_mesh(geometry.filename)
         if path is None:
             return []  # /gazebo has logged it
         try:
-            found = self._drawings.parts(path)
+            found = self._drawings.parts(path, textured=texture is not None)
         except DrawingError as error:
             self._warn(str(error))
             return []
-        return [self._part_of_mesh(part, shape.origin @ np.diag([*geometry.scale, 1.0]), part.colour or colour)
-                for part in found]
+        return [self._part_of_mesh(part, shape, texture, path) for part in found]
 
-    def _part_of_mesh(self, part, origin, colour):
-        factor = float(np.linalg.norm(origin[:3, :3], axis=0).max())
-        levels = tuple(Level(level.error * factor, lambda path=level.path: _at(origin, _read(path)))
+    def _part_of_mesh(self, part, shape, texture, path):
+        """The :class:`Part` of a ``world_picture.drawing.MeshPart`` in the mesh file at ``path``; ``texture``: the
+        picture that the description lays over it, or None."""
+        colour, factor = part.colour or shape.colour or DEFAULT_COLOUR, shape.colour or _WHITE
+        finish = shape.finish or Finish()
+        # A material that brings a picture replaces the file's own.
+        emission = finish.emission if texture is not None or any(finish.emission) else part.emission
+        if texture is None and part.texture:
+            factor, texture = part.colour, self._texture(part.texture, find_texture(part.texture, Path(path).parent))
+            if texture is None and part.colour == _WHITE:
+                colour = shape.colour or DEFAULT_COLOUR
+        origin = shape.origin @ np.diag([*shape.geometry.scale, 1.0])
+        size = float(np.linalg.norm(origin[:3, :3], axis=0).max())
+        levels = tuple(Level(level.error * size, lambda path=level.path: _at(origin, _read(path)),
+                             lambda path=level.path: _uv(path))
                        for level in part.levels)
-        return self._placed((part.path,), levels[part.plain].make, origin, colour, levels)
+        # A mirrored mesh shows its backs; they are its outside.
+        finish = replace(finish, two_sided=finish.two_sided or np.linalg.det(origin[:3, :3]) < 0.0)
+        return self._placed((part.path,), levels[part.plain].make, origin, levels=levels,
+                            **_look(finish, colour, factor, texture, emission))
 
-    def _placed(self, what, make, origin, colour, levels=()):
+    def _texture(self, name, path):
+        """The ``world_picture.textures.Texture`` of the picture at ``path``, or None, with one warning."""
+        try:
+            if path is None:
+                raise DrawingError("picture %s does not exist; what it should be on is shown in one colour" % name)
+            return self._drawings.texture(path)
+        except DrawingError as error:
+            if name not in self._warned:
+                self._warned.add(name)
+                self._warn(str(error))
+            return None
+
+    def _placed(self, what, make, origin, **look):
         key = (*what, origin.tobytes())
         if key not in self._parts:
             self._parts[key] = make()
-        return Part(key, self._parts[key], tuple(colour), levels=levels)
+        return Part(key, self._parts[key], **look)
+
+
+def _look(finish, colour, factor, texture, emission):
+    """Colour, gloss and material of a :class:`Part`. ``colour``: where ``texture`` is None; ``factor``: of the colours
+    of the texture."""
+    gloss = GLOSS if finish.gloss is None else finish.gloss
+    if texture is not None:
+        material = Material(texture.path, tuple(factor[:3]), tuple(emission), finish.repeats, finish.cut_out,
+                            finish.two_sided)
+        colour = (*(a * b for a, b in zip(texture.colour, factor, strict=False)), factor[3])
+    else:
+        material = Material("", tuple(colour[:3]), tuple(emission)) if any(emission) else None
+    return {"colour": tuple(colour), "gloss": gloss, "material": material}
 
 
 def _read(path):
     return triangles.indexed(*read_level(path))
+
+
+def _uv(path):
+    faces, uv = read_level(path)[2], read_uv(path)
+    return np.zeros((faces.size, 2)) if uv is None else uv[faces.ravel()]
 
 
 def _at(origin, rows):

@@ -11,7 +11,8 @@ _THINNED_M = 0.015
 class Programs:
     """The programs of one context. ``mesh`` computes light per vertex, ``solid`` per pixel; ``floor`` draws the floor,
     ``bare_floor`` the parts of it to which no shadow of the sun reaches; ``shadow`` draws depth alone, or with it a
-    number for each link; ``screen`` a picture on a rectangle, ``sky`` the background."""
+    number for each link; ``screen`` a picture on a rectangle, ``sky`` the background. :meth:`textured` draws what has a
+    picture or light of its own, per pixel."""
 
     def __init__(self, context, shadow_taps, per_pixel):
         """Compiles those that do not depend on the light. ``shadow_taps``: comparisons along one side of the square
@@ -23,7 +24,8 @@ class Programs:
         self.sky = context.program(vertex_shader=shaders.SKY_VERTEX, fragment_shader=shaders.SKY_FRAGMENT)
         self.mesh = self.solid = self.floor = self.bare_floor = None
         self._lit = ()
-        self._kinds = None
+        self._textured = None
+        self._kinds = self._light = self._shadows = None
 
     def fit(self, light):
         """Whether the programs are the ones for ``light`` already."""
@@ -33,6 +35,7 @@ class Programs:
         """Make the programs for ``light``; vertex arrays of the old ones must have been released."""
         for old in self._lit:
             old.release()
+        self._textured = None
         self._kinds = shadow, sky, lamps = _kinds(light)
         meshes = shaders.placed_shaders if self._per_pixel else shaders.lit_shaders
         self.mesh = self._program(meshes(shadow, lamps, self._taps if self._per_pixel else 1))
@@ -41,41 +44,63 @@ class Programs:
         self.bare_floor = self._program(shaders.floor_shaders(False, lamps, self._taps, sky))
         self._lit = self.mesh, self.solid, self.floor, self.bare_floor
 
+    def textured(self):
+        """The program for what has a picture or light of its own. It is made when it is first needed: most worlds do
+        without it, and each program costs time in each picture."""
+        if self._textured is None:
+            shadow, _, lamps = self._kinds
+            self._textured = self._program(shaders.textured_shaders(shadow, lamps, self._taps))
+            self._lit = *self._lit, self._textured
+            self._light_by(self._light, self._textured)
+            if self._shadows is not None:
+                self._shadow_by(self._shadows, self._textured)
+        return self._textured
+
     def light_by(self, light):
         """Set the uniforms of ``light``."""
+        self._light = light
         for program in self._lit:
-            for name in ("ambient", "sun", "sun_shine", "to_sun", "horizon"):
-                _set(program, name, getattr(light, name))
-            for unit, name in enumerate(("shadow", "picture", "lamp_shadow")):
-                _set(program, name, unit)
-            for number, lamp in enumerate(light.lamps):
-                for name, value in lamp.uniforms().items():
-                    _set(program, "%s_%d" % (name, number), value)
+            self._light_by(light, program)
         for name in ("horizon", "zenith", "sun", "to_sun"):
-            _set(self.sky, name, getattr(light, name))
+            set_uniform(self.sky, name, getattr(light, name))
+
+    def _light_by(self, light, program):
+        for name in ("ambient", "sun", "sun_shine", "to_sun", "horizon"):
+            set_uniform(program, name, getattr(light, name))
+        for unit, name in enumerate(("shadow", "picture", "lamp_shadow")):
+            set_uniform(program, name, unit)
+        for number, lamp in enumerate(light.lamps):
+            for name, value in lamp.uniforms().items():
+                set_uniform(program, "%s_%d" % (name, number), value)
 
     def look(self, to_clip, eye):
         """Set the camera: from the world to clip space (4, 4), its place (3)."""
         for program in self._lit:
             program["to_clip"].write(matrix_bytes(to_clip))
-            _set(program, "eye", tuple(eye))
+            set_uniform(program, "eye", tuple(eye))
 
     def shadow_by(self, shadows):
         """Set where the maps of :class:`sensor_renderer.shadows.Shadows` are."""
+        self._shadows = shadows
         for program in self._lit:
-            if "to_shadow" in program:
-                program["to_shadow"].write(matrix_bytes(shadows.to_map))
-            for number, matrix in shadows.lamp_matrices.items():
-                if "lamp_matrix_%d" % number in program:
-                    program["lamp_matrix_%d" % number].write(matrix_bytes(matrix))
-            _set(program, "margin", shadows.margin_m + (_THINNED_M if program is self.mesh else 0.0))
+            self._shadow_by(shadows, program)
+
+    def _shadow_by(self, shadows, program):
+        if "to_shadow" in program:
+            program["to_shadow"].write(matrix_bytes(shadows.to_map))
+        for number, matrix in shadows.lamp_matrices.items():
+            if "lamp_matrix_%d" % number in program:
+                program["lamp_matrix_%d" % number].write(matrix_bytes(matrix))
+        of_meshes = program in (self.mesh, self._textured)
+        set_uniform(program, "margin", shadows.margin_m + (_THINNED_M if of_meshes else 0.0))
 
     def _program(self, vertex_and_fragment):
         vertex, fragment = vertex_and_fragment
         return self._context.program(vertex_shader=vertex, fragment_shader=fragment)
 
 
-def _set(program, name, value):
+def set_uniform(program, name, value):
+    """Set the uniform ``name`` of ``program``, if it has it."""
     # The compiler leaves out what a program does not use.
     if name in program:
         program[name].value = value
@@ -96,3 +121,20 @@ def draw(program, listed):
     for array, packed, *corners in listed:
         body.write(packed)
         array.render(vertices=corners[0] if corners else -1)
+
+
+def draw_textured(program, listed, textures):
+    """Render ``listed``, (vertex array, matrix of the body as OpenGL reads it, its
+    :class:`sensor_renderer.mirror.Material`); ``textures``: :class:`sensor_renderer.textures.Textures`.
+
+    As in Gazebo, pictures are seen from the front: signs have one sheet for each side, in the same place.
+    """
+    body, context = program["body"], textures.context
+    for array, packed, material in sorted(listed, key=lambda entry: entry[2].two_sided):
+        (context.disable if material.two_sided else context.enable)(context.CULL_FACE)
+        textures.of(material.texture).use(1)
+        program["emission"].value = material.emission
+        program["least"].value = 0.5 if material.cut_out else 0.0
+        body.write(packed)
+        array.render()
+    context.disable(context.CULL_FACE)

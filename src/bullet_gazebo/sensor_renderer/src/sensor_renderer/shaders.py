@@ -230,6 +230,52 @@ void main() {
 }
 """
 
+# The same, with a picture and with light of its own.
+_TEXTURED_VERTEX = """
+uniform mat4 body;
+uniform mat4 to_clip;
+in vec3 position;
+in vec3 normal;
+in vec4 colour;
+in vec2 uv;
+out vec3 place;
+out vec3 outward;
+out vec4 own;
+out vec2 uv_there;
+void main() {
+    vec4 placed = body * vec4(position, 1.0);
+    place = placed.xyz;
+    outward = mat3(body) * normal;
+    own = colour;
+    uv_there = uv;
+    gl_Position = to_clip * placed;
+}
+"""
+
+_TEXTURED_FRAGMENT = """
+uniform sampler2DShadow shadow;
+uniform mat4 to_shadow;
+uniform sampler2D picture;
+uniform vec3 emission;
+// Pixels that are more transparent than this are holes.
+uniform float least;
+in vec3 place;
+in vec3 outward;
+in vec4 own;
+in vec2 uv_there;
+out vec4 seen;
+void main() {
+    vec4 texel = texture(picture, uv_there);
+    if (texel.a < least) discard;
+    there = place;
+    begin_light(outward);
+    vec3 shadow_place = (to_shadow * vec4(there + margin * n, 1.0)).xyz;
+    light_from(to_sun, sun, sun_shine, SUNLIT);
+    LAMPS
+    seen = vec4(toned(texel.rgb * (own.rgb * lit + emission) + own.a * glint), 1.0);
+}
+"""
+
 SHADOW_VERTEX = _HEAD + """
 uniform mat4 body;
 uniform mat4 to_clip;
@@ -304,6 +350,12 @@ def lit_shaders(sun_shadow, lamps, taps):
 def placed_shaders(sun_shadow, lamps, taps):
     """(vertex, fragment) shader for light per pixel, as :func:`lit_shaders`."""
     return _HEAD + _PLACED_VERTEX, _text(_PLACED_FRAGMENT, sun_shadow, lamps, taps)
+
+
+def textured_shaders(sun_shadow, lamps, taps):
+    """(vertex, fragment) shader for light per pixel on what has a picture or light of its own, as
+    :func:`lit_shaders`."""
+    return _HEAD + _TEXTURED_VERTEX, _text(_TEXTURED_FRAGMENT, sun_shadow, lamps, taps)
 
 
 def floor_shaders(sun_shadow, lamps, taps, haze):

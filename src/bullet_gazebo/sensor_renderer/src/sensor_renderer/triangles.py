@@ -27,6 +27,32 @@ def of_primitive(geometry):
     raise TypeError("no primitive: %r" % (geometry,))
 
 
+def uv_on_primitive(geometry, rows):
+    """The places of the corners ``rows`` (3 m, 6) of a primitive in a picture, as Gazebo's MeshManager has them:
+    (3 m, 2), to the right and down from its upper left corner, in widths and heights of it.
+
+    Each side of a box shows the whole picture, upright on the four sides; on the top, its upper edge is at +x. It goes
+    once around cylinders and spheres.
+    """
+    points, normals = rows[:, :3].astype(float), rows[:, 3:]
+    if isinstance(geometry, Box):
+        x, y, z = (points / geometry.size).T
+        nx, ny, nz = np.abs(normals).T
+        side_on = np.sign(normals)
+        right = np.select([nx > 0.5, ny > 0.5], [y * side_on[:, 0], -x * side_on[:, 1]], -y)
+        up = np.where(nz > 0.5, x * side_on[:, 2], z)
+        return np.column_stack([0.5 + right, 0.5 - up])
+    if isinstance(geometry, Cylinder):
+        # Upside down: its first row is at the bottom.
+        around, down = np.arctan2(points[:, 0], points[:, 1]), 0.5 + points[:, 2] / geometry.length
+    else:
+        around, down = np.arctan2(points[:, 0], points[:, 2]), np.arccos(points[:, 1] / geometry.radius) / math.pi
+    around = (around / (2.0 * math.pi)).reshape(-1, 3)
+    # A triangle does not go back around the other way.
+    around += (around < around.max(axis=1, keepdims=True) - 0.5)
+    return np.column_stack([around.ravel(), down])
+
+
 def indexed(vertices, normals, faces):
     """Triangles of vertices (n, 3) [m] with normals (n, 3), and faces (m, 3)."""
     return np.hstack([vertices, normals]).astype(np.float32)[faces.ravel()]
