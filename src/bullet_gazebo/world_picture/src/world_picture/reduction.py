@@ -26,6 +26,8 @@ MOST = 40_000
 CREASE_RAD = math.radians(40.0)
 #: The distance of a level from the original is the one that this share of the original's surface keeps.
 COUNTED = 0.99
+#: The same where there is a picture: such models often have few and large triangles, of which one more counts.
+COUNTED_TEXTURED = 0.999
 # A mesh with more triangles is first merged on a grid: the reduction would take too long.
 _MANY = 200_000
 # Vertices within this share of a mesh's size are one: files often have a vertex for each corner of each triangle.
@@ -248,23 +250,25 @@ def _level(original, mesh):
 
 
 def _distance(original, mesh):
-    """The distance from the surface of ``mesh`` that :data:`COUNTED` of the original's surface keeps, with its picture.
+    """The distance from the surface of ``mesh`` that :data:`COUNTED` of the original's surface keeps; with a picture,
+    what :data:`COUNTED_TEXTURED` of it keeps, or how far :data:`COUNTED` of the picture is shifted if that is more.
 
     Measured at the original's vertices: from the triangles around the vertex that is left of each, on to triangles
     beside the nearest one while these are nearer. The nearest point of the surface may be nearer, never farther. What
-    has vanished counts with its distance from where it went.
+    has vanished counts with its distance from where it went. With a picture, measured in the middle of triangles as
+    well: all corners of a triangle that has vanished may be left.
     """
-    few = slice(None, None, -(-len(mesh.of) // _COMPARED))
-    points, left = original.vertices[few], mesh.of[few]
+    samples = _samples(original)
+    left = mesh.of[samples.beside]
     order = np.argsort(mesh.faces.ravel(), kind="stable")
     place, corners = mesh.faces.ravel()[order], mesh.vertices[mesh.faces]
-    away = np.linalg.norm(points - mesh.vertices[left], axis=1)
-    nearest = np.full(len(points), -1)
-    point, around = np.arange(len(points)), left
+    away = np.linalg.norm(samples.points - mesh.vertices[left], axis=1)
+    nearest = np.full(len(away), -1)
+    point, around = np.arange(len(away)), left
     while len(point):
         mine, which = _pairs(place, around)
         face = order[which] // 3
-        to_face = point_triangle_distances(points[point[mine]], corners[face])
+        to_face = point_triangle_distances(samples.points[point[mine]], corners[face])
         # The nearest of each point's triangles comes first.
         ranked = np.lexsort((to_face, point[mine]))
         nearer, first = np.unique(point[mine][ranked], return_index=True)
@@ -272,29 +276,58 @@ def _distance(original, mesh):
         better = to_face < away[nearer] * (1.0 - 1e-6)
         away[nearer[better]], nearest[nearer[better]] = to_face[better], face[better]
         point, around = np.repeat(nearer[better], 3), mesh.faces[face[better]].ravel()
-    weight = np.bincount(original.faces.ravel(), np.repeat(_twice_areas(original.vertices, original.faces), 3),
-                         len(original.vertices))[few]
-    if mesh.uv is not None:
-        away = np.maximum(away, _shifts(original, mesh, few, nearest))
-    ranked = np.argsort(away)
-    covered = np.cumsum(weight[ranked])
-    return float(away[ranked[min(np.searchsorted(covered, COUNTED * covered[-1]), len(ranked) - 1)]])
+    if mesh.uv is None:
+        return _kept_by(COUNTED, away, samples.weights)
+    return max(_kept_by(COUNTED_TEXTURED, away, samples.weights),
+               _kept_by(COUNTED, _shifts(mesh, samples, left, nearest), samples.weights))
 
 
-def _shifts(original, mesh, few, nearest):
-    """How far the picture of ``mesh`` is shifted at the ``few`` vertices of the original: (k,) in the unit of the
-    vertices. ``nearest`` (k,): the face of ``mesh`` at each of them, -1 for the vertex that is left."""
-    uv = mesh.uv[mesh.of[few]]
+class _Samples(NamedTuple):
+    """``points`` (n, 3) of a surface, a vertex ``beside`` each (n,), ``weights`` (n,): the surface around it. With a
+    picture: ``uv`` (n, 2), and the length on the surface of a width of the picture, ``scales`` (n,)."""
+
+    points: np.ndarray
+    beside: np.ndarray
+    weights: np.ndarray
+    uv: np.ndarray = None
+    scales: np.ndarray = None
+
+
+def _samples(mesh):
+    vertices, faces = mesh.vertices, mesh.faces
+    of_faces = _twice_areas(vertices, faces)
+    few = np.arange(0, len(vertices), -(-len(vertices) // _COMPARED))
+    of_vertices = np.bincount(faces.ravel(), np.repeat(of_faces, 3), len(vertices))
+    if mesh.uv is None:
+        return _Samples(vertices[few], few, of_vertices[few])
+    some = np.arange(0, len(faces), -(-len(faces) // _COMPARED))
+    in_picture = _twice_areas(np.pad(mesh.uv, ((0, 0), (0, 1))), faces)
+    of_vertices_there = np.bincount(faces.ravel(), np.repeat(in_picture, 3), len(vertices))
+    on_surface, in_picture = (np.concatenate([at_vertices[few], 3.0 * at_faces[some]]) for at_vertices, at_faces in (
+        (of_vertices, of_faces), (of_vertices_there, in_picture)))
+    corners = faces[some]
+    return _Samples(np.concatenate([vertices[few], vertices[corners].mean(axis=1)]),
+                    np.concatenate([few, corners[:, 0]]), on_surface,
+                    np.concatenate([mesh.uv[few], mesh.uv[corners].mean(axis=1)]),
+                    np.sqrt(on_surface / np.maximum(in_picture, _LEAST_IN_PICTURE)))
+
+
+def _kept_by(share, values, weights):
+    """The value that this share of the surface does not exceed: ``values`` (n,) with ``weights`` (n,)."""
+    ranked = np.argsort(values)
+    covered = np.cumsum(weights[ranked])
+    return float(values[ranked[min(np.searchsorted(covered, share * covered[-1]), len(ranked) - 1)]])
+
+
+def _shifts(mesh, samples, left, nearest):
+    """How far the picture of ``mesh`` is shifted at ``samples`` (n,), in the unit of the vertices. ``left`` (n,): the
+    vertex that is left at each of them; ``nearest`` (n,): its face of ``mesh``, -1 for that vertex."""
+    uv = mesh.uv[left]
     on_face = nearest >= 0
     corners = mesh.faces[nearest[on_face]]
-    weights = _weights(original.vertices[few][on_face], mesh.vertices[corners])
+    weights = _weights(samples.points[on_face], mesh.vertices[corners])
     uv[on_face] = np.einsum("ij,ijk->ik", weights, mesh.uv[corners])
-    shift = np.linalg.norm(uv - original.uv[few], axis=1)
-    flat = np.pad(original.uv, ((0, 0), (0, 1)))
-    on_surface, in_picture = (
-        np.bincount(original.faces.ravel(), np.repeat(_twice_areas(points, original.faces), 3), len(points))[few]
-        for points in (original.vertices, flat))
-    return shift * np.sqrt(on_surface / np.maximum(in_picture, _LEAST_IN_PICTURE))
+    return np.linalg.norm(uv - samples.uv, axis=1) * samples.scales
 
 
 def _weights(points, triangles):

@@ -101,3 +101,18 @@ def test_too_many_triangles_show_one_colour(monkeypatch):
     vertices, faces, uv = barrel(60, 20)
     monkeypatch.setattr(reduction, "_MANY", 1000)
     assert all(level.uv is None for level in reduction.levels(vertices, faces, uv=uv))
+
+
+def test_a_part_that_has_vanished_is_an_error_though_its_corners_are_left():
+    """A frame with a bar across, of 0.7 % of the surface: all corners of the bar belong to the frame as well."""
+    xs, ys = (0.0, 0.1, 0.4985, 0.5015, 0.9, 1.0), (0.0, 0.1, 0.9, 1.0)
+    vertices = np.array([(x, y, 0.0) for x in xs for y in ys])
+    solid = [(i, j) for i in range(5) for j in range(3) if i in (0, 2, 4) or j in (0, 2)]
+    faces = np.array([f for i, j in solid for a in [4 * i + j] for f in ((a, a + 4, a + 5), (a, a + 5, a + 1))])
+    whole = reduction._original(vertices, faces, 1.0, vertices[:, :2])
+    in_bar = np.abs(whole.vertices[whole.faces].mean(axis=1) - (0.5, 0.5, 0.0)).max(axis=1) < 0.3
+    assert in_bar.sum() == 2
+    without = whole._replace(faces=whole.faces[~in_bar], corner_normals=whole.corner_normals[~in_bar])
+    assert reduction._level(whole, whole).error < 1e-9
+    # The middle of each of its triangles is a third of its width from the hole's side.
+    assert reduction._level(whole, without).error > 0.003 / 3.01
