@@ -48,6 +48,11 @@ class MaterialScripts:
                 return _look(materials[name], [*filter(Path.is_dir, places), folder.parent / "textures", folder])
         return None
 
+    def picture(self, uri, base):
+        """Return the path of the picture ``uri``; relative ones begin in the folder ``base``."""
+        places = self._folders.places(uri, base)
+        return str(next((place for place in places if place.is_file()), places[0]).absolute()) if places else uri
+
     def _materials_of(self, script):
         if script not in self._read:
             try:
@@ -88,6 +93,10 @@ def read_material(document, visual, materials):
             finish = replace(finish, emission=tuple(min(max(value, 0.0), 1.0) for value in emission[:3]))
         if specular is not None:
             finish = replace(finish, gloss=min(max(0.0, *specular[:3]), 1.0))
+        # As newer simulators have it.
+        maps = ["", *((found.text or "").strip() for found in element.iterfind("pbr/*/albedo_map"))]
+        if maps[-1] and not finish.texture:
+            finish = replace(finish, texture=materials.picture(maps[-1], document.folder))
         finish = None if finish == Finish() else finish
     clear = document.number(visual, "transparency", 0.0)
     if clear:

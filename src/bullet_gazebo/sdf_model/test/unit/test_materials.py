@@ -104,6 +104,17 @@ def test_what_the_material_says_itself_comes_first(box):
     assert visual("<emissive>0 0 0 1</emissive>", box.parent).finish is None
 
 
+@pytest.mark.parametrize("uri", ["textures/a.png", "model://box/textures/a.png", "file://{folder}/textures/a.png"])
+def test_a_colour_map_of_newer_simulators_is_a_texture(tmp_path, uri):
+    folder = tmp_path / "box"
+    (folder / "textures").mkdir(parents=True)
+    material = "<pbr><metal><albedo_map>%s</albedo_map></metal></pbr>" % uri.format(folder=folder)
+    for _ in range(2):  # missing, then there
+        shape = visual(material, tmp_path if uri.startswith("model") else folder)
+        assert shape.finish == Finish(texture=str(folder / "textures" / "a.png")) and shape.colour is None
+        (folder / "textures" / "a.png").write_bytes(b"")
+
+
 def test_names_of_gazebos_materials_need_no_script(tmp_path):
     shape = visual(script("Gazebo/RedGlow", "file://media/materials/scripts/gazebo.material"), tmp_path)
     assert shape.colour == (1.0, 0.1, 0.1, 1.0) and shape.finish == Finish((1.0, 0.0, 0.0))
