@@ -16,7 +16,7 @@ from .thinning import outermost, thin_out
 #: Limits of what is read.
 MOST_BYTES = 100_000_000
 MOST_TRIANGLES = 2_000_000
-_MOST_BYTES_BESIDE = 10_000_000
+MOST_BYTES_BESIDE = 10_000_000  # of each file that a mesh names
 # The formats of Gazebo and rviz, and some more. No archives: their content may be endless.
 _FORMATS = ("dae", "stl", "obj", "ply", "off", "glb", "gltf")
 # Pictures whose brightness is a height.
@@ -53,7 +53,7 @@ class _Beside:
         path = (self._folder / name).resolve()
         if path.suffix.lower() not in _BESIDE or self._folder.resolve() not in path.parents:
             raise FileNotFoundError(name)
-        return read_file(path, _MOST_BYTES_BESIDE)
+        return read_file(path, MOST_BYTES_BESIDE)
 
     __getitem__ = get
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import shutil
 import tempfile
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bullet_sim.limited import LimitedProcess, LimitError
-from bullet_sim.mesh_loading import MOST_BYTES
+from bullet_sim.mesh_loading import MOST_BYTES, MOST_BYTES_BESIDE
 from urdf_model import read_file
 from world_picture import reduction
 from world_picture.pieces import read_pieces
@@ -24,6 +25,8 @@ _PROCESSOR_S, _WAITING_S = 15, 240.0
 _PROCESS = LimitedProcess(processor_s=_PROCESSOR_S, waiting_s=_WAITING_S)
 # Part of the names of cached files: increase it when the result for the same mesh changes.
 _VERSION = 11
+# The files with the materials of a Wavefront file.
+_MATERIALS = re.compile(rb"^mtllib[ \t]+(\S.*?)[ \t]*\r?$", re.MULTILINE)
 
 
 class LevelFile(NamedTuple):
@@ -93,7 +96,7 @@ class DrawingCache:
             content = read_file(path, MOST_BYTES)
         except OSError as error:
             raise DrawingError("%s %s cannot be read: %s" % (what, path, error.strerror)) from error
-        key = "%s-%d%s" % (hashlib.sha256(content).hexdigest()[:32], _VERSION, kind)
+        key = "%s-%d%s" % (_digest(path, content), _VERSION, kind)
         del content
         index = self._folder / key / name
         if not index.exists():
@@ -120,6 +123,18 @@ class DrawingCache:
         except OSError:
             target = draft if not (target / name).exists() else target  # another process has made it
         return target / name
+
+
+def _digest(path, content):
+    """The hash of a file's content; of a Wavefront file with the materials that it names, which have its colours."""
+    digest = hashlib.sha256(content)
+    if str(path).lower().endswith(".obj"):
+        for name in _MATERIALS.findall(content):
+            try:
+                digest.update(read_file(Path(path).parent / os.fsdecode(name), MOST_BYTES_BESIDE))
+            except (OSError, ValueError):  # the mesh is drawn without; a name may hold a zero byte
+                continue
+    return digest.hexdigest()[:32]
 
 
 def write_parts(path, folder, textured):

@@ -64,6 +64,15 @@ def test_a_collada_mesh_has_the_colours_that_its_file_names(tmp_path):
     assert part.colour == (0.4, 0.2, pytest.approx(0.1, abs=0.003), 1.0)
 
 
+def test_a_wavefront_file_has_the_colours_that_its_materials_have_now(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text("mtllib a b.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    cache = drawing.DrawingCache(tmp_path / "cache")
+    for colour in ((1.0, 0.2, 0.0), (0.0, 0.2, 1.0)):
+        (tmp_path / "a b.mtl").write_text("newmtl m\nKd %g %g %g\n" % colour)
+        assert cache.parts(path)[0].colour[:3] == pytest.approx(colour, abs=0.003)
+
+
 def test_an_unreadable_mesh_names_its_path(tmp_path):
     with pytest.raises(drawing.DrawingError, match="missing.stl"):
         drawing.DrawingCache(tmp_path).parts(tmp_path / "missing.stl")
