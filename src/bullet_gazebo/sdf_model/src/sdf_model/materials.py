@@ -35,7 +35,7 @@ class MaterialScripts:
 
         ``uris`` name scripts, or folders with scripts and with textures; relative ones begin in the folder ``base``.
         """
-        places = [next((place for place in self._folders.places(uri, base) if place.exists()), None) for uri in uris]
+        places = [next(filter(_is_there, self._folders.places(uri, base)), None) for uri in uris]
         places = [place for place in places if place is not None]
         for place in places:
             scripts = sorted(place.glob("*.material"))[:_MOST_SCRIPTS] if place.is_dir() else [place]
@@ -51,7 +51,7 @@ class MaterialScripts:
     def picture(self, uri, base):
         """Return the path of the picture ``uri``; relative ones begin in the folder ``base``."""
         places = self._folders.places(uri, base)
-        return str(next((place for place in places if place.is_file()), places[0]).absolute()) if places else uri
+        return str(next(filter(_is_there, places), places[0]).absolute()) if places else uri
 
     def _materials_of(self, script):
         if script not in self._read:
@@ -66,7 +66,7 @@ class MaterialScripts:
 def _look(material, folders):
     """The Look of an ``ogre_script.Material`` with textures in ``folders``; a texture that is in none of them is named
     in the first one, so that the renderer can say what is missing."""
-    found = [folder / material.texture for folder in folders if (folder / material.texture).is_file()]
+    found = [path for path in (folder / material.texture for folder in folders) if _is_there(path)]
     path = found[0] if found else folders[0] / material.texture
     finish = Finish(material.emission, None if material.specular is None else max(material.specular),
                     str(path.absolute()) if material.texture else "", material.repeats, material.cut_out,
@@ -75,6 +75,13 @@ def _look(material, folders):
     if rgb is None and material.texture:
         rgb = (1.0, 1.0, 1.0)  # Ogre's default, with which a picture is shown as it is
     return Look(None if rgb is None else (*rgb, 1.0), None if finish == Finish() else finish)
+
+
+def _is_there(path):
+    try:
+        return path.exists()
+    except OSError:  # a name that is too long
+        return False
 
 
 def read_material(document, visual, materials):

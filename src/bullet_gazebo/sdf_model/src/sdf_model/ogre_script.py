@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 # A text in quotation marks, a brace or the end of a line (which ends an attribute), or a word.
 _TOKEN = re.compile(r'"([^"\n]*)"|([{}\n])|([^\s{}"]+)')
-_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+# A comment without an end goes on to the end of the text.
+_COMMENT = re.compile(r"/\*.*?(?:\*/|\Z)|//[^\n]*", re.DOTALL)
 _COLOURS = {"ambient": "ambient", "diffuse": "diffuse", "specular": "specular", "emissive": "emission",
             "self_illumination": "emission"}
 

@@ -72,7 +72,7 @@ def test_scripts_are_understood_as_far_as_a_picture_needs():
 
 
 @pytest.mark.parametrize("text", [
-    "", "}", "material", "material {", "{" * 50_000, "a {" * 50_000 + "}", '"', "/*",
+    "", "}", "material", "material {", "{" * 50_000, "a {" * 50_000 + "}", '"', "/* " * 100_000,
     "material A { technique { pass { ambient x } } }",
     "material A { technique { pass { texture_unit { texture\nscale 0 0 } diffuse nan 0 0 } } }"])
 def test_a_broken_script_says_nothing(text):
@@ -95,6 +95,15 @@ def test_a_picture_that_is_missing_is_named_where_it_should_be(box):
     assert shape.finish.texture == str(box / "materials" / "scripts" / "paper side.png")
     assert shape.finish == Finish((0.1, 0.0, 0.0), 0.3, shape.finish.texture, (2.0, 4.0), True, True)
     assert shape.colour == (0.5, 1.0, 0.5, 1.0)
+
+
+def test_names_that_no_file_can_have_are_missing(box):
+    long = "x" * 5000
+    (box / "materials" / "scripts" / "box.material").write_text(SCRIPT.replace("paper side.png", long))
+    assert visual(script("Box/Plain", long), box.parent).finish is None
+    assert visual(script("Box/Paper", "model://box/materials/scripts"), box.parent).finish.texture.endswith(long)
+    material = "<pbr><metal><albedo_map>%s</albedo_map></metal></pbr>" % long
+    assert visual(material, box.parent).finish.texture.endswith(long)
 
 
 def test_what_the_material_says_itself_comes_first(box):
