@@ -226,6 +226,13 @@ def test_collada_glows_but_where_it_repeats_its_colour(renderer, tmp_path, quart
     assert picture[50, 50].max() > 200 and shows_quarters(picture)
 
 
+@pytest.mark.parametrize(("emission", "seen"), [
+    ("Ke 0 0.6 0", (0, 153, 0)), ("Ke much", (0, 0, 0)), ("Ke 1", (0, 0, 0)), ("Ke nan 0 0", (0, 0, 0))])
+def test_wavefront_glows(renderer, tmp_path, emission, seen):
+    mirror = world(tmp_path, wavefront(tmp_path, "Kd 0.2 0.2 0.2\n" + emission), DARK)
+    assert renderer.render(mirror, PINHOLE, looking(x=-1.2))[0][60, 60] == pytest.approx(seen, abs=2)
+
+
 def test_only_pictures_that_say_so_have_holes(renderer, tmp_path):
     pixels = np.full((64, 64, 4), 255, dtype=np.uint8)
     pixels[:, :32, 3] = 0

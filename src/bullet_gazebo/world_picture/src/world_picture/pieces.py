@@ -14,6 +14,9 @@ _SAME = 0.01
 _BLACK = 0.05
 
 
+_DARK = (0.0, 0.0, 0.0)
+
+
 class PieceError(Exception):
     """A mesh without triangles."""
 
@@ -27,7 +30,7 @@ class Piece(NamedTuple):
     vertices: np.ndarray
     faces: np.ndarray
     colour: tuple
-    emission: tuple = (0.0, 0.0, 0.0)
+    emission: tuple = _DARK
     texture: str = ""
     uv: np.ndarray = None
 
@@ -82,7 +85,7 @@ def _factor(mesh):
     diffuse = getattr(mesh.visual.material, "kwargs", {}).get("kd")
     if diffuse is None or np.shape(diffuse) != (3,) or max(diffuse) < _BLACK:
         return 1.0, 1.0, 1.0, 1.0
-    return (*(round(min(max(float(value), 0.0), 1.0), 3) for value in diffuse), 1.0)
+    return (*(round(min(max(0.0, float(value)), 1.0), 3) for value in diffuse), 1.0)
 
 
 def _colour(mesh):
@@ -106,11 +109,11 @@ def _emission(mesh, colour, texture):
     material = getattr(mesh.visual, "material", None)
     emission = getattr(material, "emissiveFactor", None)
     if emission is None:
-        emission = getattr(material, "kwargs", {}).get("ke")  # of Wavefront files
+        emission = getattr(material, "kwargs", {}).get("ke", ())  # of Wavefront files, as words
     try:
-        emission = [round(min(max(float(value), 0.0), 1.0), 3) for value in emission]
-    except (TypeError, ValueError):
-        return 0.0, 0.0, 0.0
-    repeated = not texture and colour is not None and np.shape(emission) == (3,) and max(
-        abs(one - other) for one, other in zip(emission, colour, strict=False)) <= _SAME
-    return (0.0, 0.0, 0.0) if len(emission) != 3 or repeated else tuple(emission)
+        emission = tuple(round(min(max(0.0, float(value)), 1.0), 3) for value in emission)
+    except ValueError:
+        emission = ()
+    if len(emission) != 3 or not texture and colour is not None and np.allclose(emission, colour[:3], atol=_SAME):
+        return _DARK
+    return emission
