@@ -85,7 +85,7 @@ def levels(vertices, faces, size=None, uv=None):
     ``size``: the longest side of the object that the mesh belongs to; by default its own. Borders of open meshes stay
     within the tolerance, too. Triangles without area are left out; a mesh without any other has no levels.
     ``uv`` (n, 2): the vertices' places in a picture, in widths and heights of it; levels have none if there are too
-    many triangles, or too many loose ones.
+    many triangles, or too many loose ones. With them, the finest level is the mesh itself, as seams show first.
     """
     vertices = np.asarray(vertices, dtype=float)
     size = float(np.ptp(vertices, axis=0).max()) if size is None else size
@@ -93,6 +93,8 @@ def levels(vertices, faces, size=None, uv=None):
     if not len(original.faces):
         return []
     found, mesh = [], original
+    if original.uv is not None and len(original.faces) <= MOST:
+        found.append(_level(original, original))
     for number in range(LEVELS):
         mesh = _next(mesh, size * FINEST * COARSER ** number)
         if not len(mesh.faces):
