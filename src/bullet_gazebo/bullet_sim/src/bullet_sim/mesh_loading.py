@@ -26,6 +26,11 @@ _MOST_HEIGHTS = 1025 * 1025  # rows of a power of two and one, as Gazebo wants t
 _BESIDE = (".mtl", ".bin")
 PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".gif", ".tif", ".tiff")
 
+#: The part of a mesh that is all of it, for :func:`load_scene`.
+WHOLE = ("", False)
+# So many names of parts are in a message.
+_MOST_NAMED = 12
+
 #: Limits of collision shapes: with more triangles, making the shape of a fixed body takes the loop more than 20 ms; so
 #: does a convex shape with more points.
 MOST_HOLLOW_TRIANGLES = 12_000
@@ -61,9 +66,10 @@ class _Beside:
         return ()
 
 
-def load_scene(path, textures=False):
+def load_scene(path, part=WHOLE, textures=False):
     """Return the trimesh.Scene in the file at ``path``; a picture is a terrain of 1 x 1 x 1 m, with its brightness as
-    height. With ``textures``, materials have pictures of one pixel, with the name that the file gives as
+    height. ``part``: (the name of the node of a Collada file that is wanted alone, or "" for all; whether its middle is
+    at the origin). With ``textures``, materials have pictures of one pixel, with the name that the file gives as
     ``picture.info["name"]``. Raises MeshError, OSError, and what libraries raise."""
     import trimesh  # 0.1 s to import, and needed only the first time that a mesh is seen
 
@@ -74,7 +80,11 @@ def load_scene(path, textures=False):
     content = read_file(path, MOST_BYTES)
     if kind in _HEIGHTS:
         return trimesh.Scene(trimesh.Trimesh(*_terrain(_heights(content)), process=False))
-    unit_m = _unit_m(content) if kind == "dae" else 1.0
+    unit_m, (name, is_centred) = 1.0, part
+    if kind == "dae":
+        content, unit_m = _collada(content, name)
+    elif name:
+        raise MeshError("it has no part '%s'; only Collada files have parts with names" % name)
     scene = trimesh.load(
         io.BytesIO(content), file_type=kind, force="scene", resolver=_Beside(path.parent, textures), process=False
     )
@@ -90,6 +100,10 @@ def load_scene(path, textures=False):
             raise MeshError("a corner is at %g; expected at most %g" % (farthest_m, bounds.POSITION.high))
     if unit_m != 1.0:
         scene.apply_transform(np.diag([unit_m, unit_m, unit_m, 1.0]))
+    if is_centred and scene.bounds is not None:
+        middle = np.eye(4)
+        middle[:3, 3] = -np.mean(scene.bounds, axis=0)
+        scene.apply_transform(middle)
     if triangles <= MOST_HOLLOW_TRIANGLES:
         # Merging equal corners takes as long as all the rest; a mesh that is decimated does not need it.
         for mesh in scene.geometry.values():
@@ -131,31 +145,49 @@ def _terrain(heights):
             np.concatenate([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)]))
 
 
-def _unit_m(content):
-    """The unit of a Collada file [m]; Gazebo and rviz scale by it, and leave the direction of its axes as it is. Files
-    with entities are refused."""
+def _collada(content, part):
+    """(content, unit [m]) of a Collada file, with the geometry of the nodes named ``part`` alone; "" for all. Gazebo
+    and rviz scale by the unit, and leave the direction of the axes as it is. Files with entities are refused."""
     from lxml import etree
 
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     root = etree.fromstring(content, parser)
     refuse_entities(root)
+    if part:
+        _keep_part(root, part)
+        content = etree.tostring(root)
     unit = root.find("{*}asset/{*}unit")
     try:
         metres = float(unit.get("meter"))
     except (AttributeError, TypeError, ValueError):  # no such element, no such attribute, or no number
-        return 1.0
-    return metres if 0.0 < metres < bounds.POSITION.high else 1.0
+        return content, 1.0
+    return content, metres if 0.0 < metres < bounds.POSITION.high else 1.0
 
 
-def to_wavefront(path, target, planes):
+def _keep_part(root, part):
+    """Take from a Collada document the geometry of all nodes but those named ``part``. A node without a name has that
+    of the one around it."""
+    names = set()
+    for geometry in list(root.iter("{*}instance_geometry")):
+        around = [node.get("name") or node.get("id") for node in geometry.iterancestors("{*}node")]
+        name = next(filter(None, around), "")
+        names.add(name)
+        if name != part:
+            geometry.getparent().remove(geometry)
+    if part not in names:
+        raise MeshError("it has no part '%s'; it has %s" % (part, ", ".join(sorted(names)[:_MOST_NAMED]) or "none"))
+
+
+def to_wavefront(path, target, planes, part=WHOLE):
     """Write the mesh at ``path`` to the Wavefront file ``target``, as bodies collide with it, in metres, z up.
 
-    ``planes``: as for ``convex_parts.cut``; given, there is one object for each part. If the hull has very many points,
-    ``target`` + ".hull" holds one that is as good. Raises MeshError. Returns a remark, "" where there is none.
+    ``part``: as for :func:`load_scene`; ``planes``: as for ``convex_parts.cut``; given, there is one object for each
+    part of it. If the hull has very many points, ``target`` + ".hull" holds one that is as good. Raises MeshError.
+    Returns a remark, "" where there is none.
     """
     from .convex_parts import cut
 
-    scene = load_scene(path)
+    scene = load_scene(path, part)
     mesh = scene.to_geometry() if hasattr(scene, "to_geometry") else scene.dump(concatenate=True)
     faces = np.asarray(getattr(mesh, "faces", ()))
     if len(faces) == 0:

@@ -19,7 +19,7 @@ from urdf_model.transforms import pose_matrix, quaternion_from_matrix
 from .errors import BulletSimError
 from .gathered import Part, gathered, without_margin
 from .limited import MESHES, LimitError
-from .mesh_loading import MOST_BYTES, to_wavefront
+from .mesh_loading import MOST_BYTES, WHOLE, to_wavefront
 from .quiet_pybullet import pybullet
 
 NO_SHAPE = -1
@@ -45,19 +45,21 @@ class MeshCache:
         self.folder = Path(folder or os.path.join(base, "bullet_sim", "meshes"))
         self._known = {}  # (path, size, time of change, planes) -> Wavefront file
 
-    def wavefront(self, path, planes=(), hollow=True):
+    def wavefront(self, path, planes=(), hollow=True, part=WHOLE):
         """Return the path of a Wavefront copy of the mesh at ``path``, in metres, z up.
 
         ``planes``: as for ``convex_parts.cut``; given, the copy holds one object for each part. ``hollow``: True to
-        keep the triangles; False if the convex hull is enough. Raises BulletSimError when the mesh cannot be read.
+        keep the triangles; False if the convex hull is enough. ``part``: as for ``mesh_loading.load_scene``. Raises
+        BulletSimError when the mesh cannot be read.
         """
         try:
             status = os.stat(path)
-            key = (str(path), status.st_size, status.st_mtime_ns, planes)
+            key = (str(path), status.st_size, status.st_mtime_ns, planes, part)
             if key not in self._known or not self._known[key].exists():
-                content = read_file(path, MOST_BYTES) + (repr(planes).encode() if planes else b"") + _VERSION
+                asked = (repr(planes) if planes else "") + (repr(part) if part != WHOLE else "")
+                content = read_file(path, MOST_BYTES) + asked.encode() + _VERSION
                 target = self.folder / (hashlib.sha256(content).hexdigest()[:32] + ".obj")
-                self._known[key] = target if target.exists() else self._convert(path, target, planes)
+                self._known[key] = target if target.exists() else self._convert(path, target, planes, part)
         except OSError as error:
             raise BulletSimError("mesh %s cannot be read: %s" % (path, error.strerror)) from None
         hull = self._known[key].with_suffix(".hull.obj")
@@ -86,19 +88,19 @@ class MeshCache:
         """Return a folder for drafts, which are renamed atomically: another simulator may make the same file."""
         return tempfile.TemporaryDirectory(dir=str(self.folder), prefix="part_")
 
-    def _convert(self, path, target, planes):
+    def _convert(self, path, target, planes, part):
         self._make_folder()
         target = self.folder / target.name
         with self._draft_folder() as draft:
-            part = Path(draft) / "mesh"
+            copy = Path(draft) / "mesh"
             try:
-                remark = MESHES.call(to_wavefront, str(path), str(part), planes)
+                remark = MESHES.call(to_wavefront, str(path), str(copy), planes, part)
             except LimitError as error:
                 raise BulletSimError("mesh %s cannot be used: %s" % (path, error)) from None
-            hull = Path(str(part) + ".hull")
+            hull = Path(str(copy) + ".hull")
             if hull.exists():
                 os.replace(hull, target.with_suffix(".hull.obj"))
-            os.replace(part, target)
+            os.replace(copy, target)
         if remark:
             self._warn("mesh %s: %s" % (path, remark))
         return target
@@ -145,7 +147,7 @@ class MeshFiles:
 
         ``planes``, ``hollow``: as for MeshCache.
         """
-        return self._cache.wavefront(self.path(mesh), planes, hollow)
+        return self._cache.wavefront(self.path(mesh), planes, hollow, (mesh.submesh, mesh.centred))
 
     def parts(self, shapes, concave, mesh_cuts=None):
         """Return what PyBullet makes of ``shapes`` (urdf_model.Shape): a list of at most ``gathered.MOST_SHAPES`` Part.

@@ -207,3 +207,29 @@ def test_a_mesh_that_its_unit_makes_too_large_is_refused(tmp_path):
     path.write_text((COLLADA % ("", TRIANGLE)).replace("<up_axis>", '<unit meter="1e6"/><up_axis>'))
     with pytest.raises(MeshError, match="a corner is at 2e[+]07; expected at most 1e[+]07"):
         to_wavefront(str(path), str(tmp_path / "triangle.obj"), ())
+
+
+TWO_NODES = TRIANGLE.replace("<node><translate>", '<node id="n" name="up"><translate>', 1)
+TWO_NODES = TWO_NODES.replace("</visual_scene>", '<node id="down"><node><translate>0 0 -3</translate>'
+                              '<instance_geometry url="#g"/></node></node></visual_scene>')
+
+
+@pytest.mark.parametrize(("part", "low", "high"), [
+    (("", False), (0, 0, -3), (10, 20, 6)), (("up", False), (0, 0, 1), (10, 20, 6)),
+    (("down", False), (0, 0, -3), (10, 20, 2)), (("up", True), (-5, -10, -2.5), (5, 10, 2.5))])
+def test_a_part_of_a_mesh_is_a_node_of_its_file(tmp_path, cache, part, low, high):
+    path = tmp_path / "two.dae"
+    path.write_text((COLLADA % ("", TWO_NODES)).replace("<up_axis>", '<unit meter="0.1"/><up_axis>'))
+    points, _ = points_of(cache.wavefront(str(path), part=part))
+    assert points.min(axis=0) == pytest.approx(0.1 * np.array(low))
+    assert points.max(axis=0) == pytest.approx(0.1 * np.array(high))
+
+
+def test_a_part_that_is_not_there_is_named_with_those_that_are(tmp_path, cache):
+    path = tmp_path / "two.dae"
+    path.write_text(COLLADA % ("", TWO_NODES))
+    with pytest.raises(BulletSimError, match="it has no part 'left'; it has down, up"):
+        cache.wavefront(str(path), part=("left", False))
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(BulletSimError, match="it has no part 'left'; only Collada files have parts with names"):
+        cache.wavefront(str(tmp_path / "a.obj"), part=("left", False))

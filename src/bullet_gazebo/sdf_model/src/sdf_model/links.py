@@ -88,9 +88,11 @@ def _shape(document, element, link):
         found = Plane(size)
         origin = origin @ _turned_to(document, kind)
     elif kind.tag == "mesh":
-        document.note_unknown(kind, ("uri", "scale"))
+        document.note_unknown(kind, ("uri", "scale", "submesh"))
         scale = document.vector(kind, "scale", (1.0, 1.0, 1.0))
-        found = Mesh(_file(document, document.text(kind, "uri")), scale)
+        submesh = kind.find("submesh")
+        part = () if submesh is None else (document.text(submesh, "name"), document.flag(submesh, "center"))
+        found = Mesh(_file(document, document.text(kind, "uri")), scale, *part)
     elif kind.tag == "heightmap":
         document.note_unknown(kind, ("uri", "size", "pos", "texture", "blend", "sampling", "use_terrain_paging"))
         size = document.vector(kind, "size", (1.0, 1.0, 1.0))

@@ -4,7 +4,7 @@ import pytest
 
 from sdf_model import ModelFolders, parse_sdf_model
 from sdf_model.ogre_script import Material, parse_materials
-from urdf_model import Finish, Plane, drawing_urdf, merge_fixed, parse_urdf
+from urdf_model import Finish, Mesh, Plane, drawing_urdf, merge_fixed, parse_urdf
 
 SCRIPT = """
 // materials of a model
@@ -129,6 +129,15 @@ def test_names_of_gazebos_materials_need_no_script(tmp_path):
     assert shape.colour == (1.0, 0.1, 0.1, 1.0) and shape.finish == Finish((1.0, 0.0, 0.0))
     unknown = visual(script("Other/Thing", "model://nowhere/materials/scripts"), tmp_path)
     assert unknown.colour is None and unknown.finish is None
+
+
+def test_a_part_of_a_mesh_is_drawn_alone(box):
+    text = """<sdf version="1.6"><model name="m"><link name="l"><visual name="v"><geometry><mesh><uri>a.dae</uri>
+    <submesh><name>Leaf</name>%s</submesh></mesh></geometry></visual></link></model></sdf>"""
+    for more, centred in (("", False), ("<center>true</center>", True)):
+        read = parse_sdf_model(text % more, "test", ModelFolders([]), "/f")
+        shape, = parse_urdf(drawing_urdf(merge_fixed(read.robot))).links["l"].visuals
+        assert shape.geometry == Mesh("/f/a.dae", (1.0, 1.0, 1.0), "Leaf", centred) and not read.warning
 
 
 def test_a_picture_on_a_plane_has_x_to_its_right(box):

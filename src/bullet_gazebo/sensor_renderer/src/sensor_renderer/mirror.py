@@ -265,7 +265,7 @@ class Mirror:
         if path is None:
             return []  # /gazebo has logged it
         try:
-            found = self._drawings.parts(path, textured=texture is not None)
+            found = self._drawings.parts(path, texture is not None, (geometry.submesh, geometry.centred))
         except DrawingError as error:
             self._warn(str(error))
             return []

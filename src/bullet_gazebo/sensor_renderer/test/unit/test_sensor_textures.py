@@ -149,6 +149,20 @@ def test_pictures_of_collada_are_where_gazebo_looks_for_them(renderer, tmp_path,
         quarters = place
 
 
+def test_a_part_of_a_mesh_is_shown_alone(renderer, tmp_path, quarters):
+    urdf = collada(tmp_path)
+    path = tmp_path / "meshes" / "square.dae"
+    quarters.replace(path.parent / quarters.name)
+    text = path.read_text()
+    node = text[text.index("<node>"):text.index("</node>") + 7]
+    beside = node.replace("<node>", '<node name="beside"><translate>0 5 0</translate>')
+    path.write_text(text.replace(node, node.replace("<node>", '<node name="here">') + beside))
+    for name, shown in (("here", True), ("beside", False)):
+        part = urdf.replace("<mesh ", '<mesh submesh="%s" ' % name)
+        picture, _ = renderer.render(world(tmp_path, part), PINHOLE, looking(x=-1.2))
+        assert shows_quarters(picture) if shown else picture.max() == 0
+
+
 def test_every_side_of_a_box_shows_the_picture_upright(renderer, tmp_path, quarters):
     """The top has the picture's upper edge at +x; so has the bottom, seen from below, at -x."""
     urdf = robot('<box size="1 1 1"/>', '<texture filename="%s"/>' % quarters)

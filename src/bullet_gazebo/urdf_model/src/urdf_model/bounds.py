@@ -136,7 +136,7 @@ def _check_shape(shape, where):
     for field, value in vars(shape.geometry).items():
         if field == "scale":
             SCALE.check(value, "the scale of the mesh in a %s" % where)
-        elif field != "filename":
+        elif field not in ("filename", "submesh", "centred"):
             LENGTH.check(value, "the %s of the %s in a %s" % (field, kind, where))
 
 

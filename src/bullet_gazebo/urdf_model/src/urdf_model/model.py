@@ -35,6 +35,8 @@ class Sphere:
 class Mesh:
     filename: str  # as written: package://, file:// or a path
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    submesh: str = ""  # the part of that name alone; SDF only
+    centred: bool = False  # whether the middle of that part is at the origin
 
 
 @dataclass(frozen=True)

@@ -210,7 +210,7 @@ class _Reader:
             if not filename:
                 raise self.error(element, "<mesh> of link '%s' has no filename" % link)
             scale = self.vector(element, "scale", 3, default=(1.0, 1.0, 1.0))
-            return Mesh(filename, tuple(scale))
+            return Mesh(filename, tuple(scale), element.get("submesh", ""), _is_true(element.get("centred")))
         raise self.error(
             element, "link '%s' has a <%s>; known shapes are box, cylinder, sphere and mesh" % (link, element.tag)
         )

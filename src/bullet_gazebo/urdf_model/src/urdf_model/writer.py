@@ -51,7 +51,10 @@ def _add_shape(element, shape):
     elif isinstance(geometry, Sphere):
         etree.SubElement(holder, "sphere", radius=repr(geometry.radius))
     elif isinstance(geometry, Mesh):
-        etree.SubElement(holder, "mesh", filename=geometry.filename, scale=_words(geometry.scale))
+        mesh = etree.SubElement(holder, "mesh", filename=geometry.filename, scale=_words(geometry.scale))
+        if geometry.submesh:
+            mesh.set("submesh", geometry.submesh)
+            mesh.set("centred", str(geometry.centred).lower())
     if shape.colour is None and shape.finish is None:
         return
     material = etree.SubElement(element, "material", name="")
@@ -62,7 +65,7 @@ def _add_shape(element, shape):
 
 
 def _add_finish(material, finish):
-    """Write what URDF has no element for in elements of our own, which ``parse_urdf`` reads."""
+    """Write a finish; for what URDF lacks, elements and attributes of our own, which ``parse_urdf`` reads."""
     if finish.texture:
         etree.SubElement(material, "texture", filename=finish.texture, repeats=_words(finish.repeats),
                          cut_out=str(finish.cut_out).lower(), two_sided=str(finish.two_sided).lower())

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bullet_sim.limited import LimitedProcess, LimitError
-from bullet_sim.mesh_loading import MOST_BYTES, MOST_BYTES_BESIDE
+from bullet_sim.mesh_loading import MOST_BYTES, MOST_BYTES_BESIDE, WHOLE
 from urdf_model import read_file
 from world_picture import reduction
 from world_picture.pieces import read_pieces
@@ -74,10 +74,14 @@ class DrawingCache:
         base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
         self._folder = Path(folder or os.path.join(base, "bullet_gazebo", "drawings"))
 
-    def parts(self, path, textured=False):
+    def parts(self, path, textured=False, part=WHOLE):
         """The list of :class:`MeshPart` of the mesh file at ``path``; raises :class:`DrawingError`. ``textured``: for a
-        picture that is not the file's own; all levels have ``uv``, if the file has."""
-        index = self._index("mesh", path, "parts.json", "-textured" if textured else "", write_parts, textured)
+        picture that is not the file's own; all levels have ``uv``, if the file has. ``part``: as for
+        ``bullet_sim.mesh_loading.load_scene``."""
+        kind = "-textured" if textured else ""
+        if part != WHOLE:
+            kind += "-part-" + hashlib.sha256(repr(part).encode()).hexdigest()[:16]
+        index = self._index("mesh", path, "parts.json", kind, write_parts, textured, part)
         listed = json.loads(index.read_text(encoding="utf-8"))
         return [MeshPart(str(index.parent / name), tuple(colour) if colour else None,
                          tuple(LevelFile(str(index.parent / level), error) for level, error in levels), plain,
@@ -137,10 +141,11 @@ def _digest(path, content):
     return digest.hexdigest()[:32]
 
 
-def write_parts(path, folder, textured):
+def write_parts(path, folder, textured, part=WHOLE):
     """Write the mesh at ``path`` into ``folder``, in levels of detail: ``parts.json`` and the files that it lists.
-    ``textured``: whether all levels have ``uv``, if the file has, or only those with a picture."""
-    pieces, folder = read_pieces(path), Path(folder)
+    ``textured``: whether all levels have ``uv``, if the file has, or only those with a picture; ``part``: as for
+    ``load_scene``."""
+    pieces, folder = read_pieces(path, part), Path(folder)
     size = float(np.ptp(np.concatenate([piece.vertices for piece in pieces]), axis=0).max())
     listed = []
     for number, piece in enumerate(pieces):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bullet_sim.mesh_loading import load_scene
+from bullet_sim.mesh_loading import WHOLE, load_scene
 
 # Brightness of Collada meshes that name no material: the one of assimp, by which rviz shows them.
 _PLAIN_COLOUR = (0.6, 0.6, 0.6, 1.0)
@@ -35,13 +35,13 @@ class Piece(NamedTuple):
     uv: np.ndarray = None
 
 
-def read_pieces(path):
-    """The list of :class:`Piece` of the mesh file at ``path``, one for each look. Raises :class:`PieceError`, and what
-    ``load_scene`` raises."""
+def read_pieces(path, part=WHOLE):
+    """The list of :class:`Piece` of the mesh file at ``path``, one for each look; ``part``: as for ``load_scene``.
+    Raises :class:`PieceError`, and what ``load_scene`` raises."""
     import trimesh
 
     plain = _PLAIN_COLOUR if str(path).lower().endswith(".dae") else None
-    scene = load_scene(path, textures=True)
+    scene = load_scene(path, part, textures=True)
     alike = {}
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
