@@ -44,13 +44,18 @@ def uv_on_primitive(geometry, rows):
         return np.column_stack([0.5 + right, 0.5 - up])
     if isinstance(geometry, Cylinder):
         # Upside down: its first row is at the bottom.
-        around, down = np.arctan2(points[:, 0], points[:, 1]), 0.5 + points[:, 2] / geometry.length
+        sideways, forward, down = points[:, 0], points[:, 1], 0.5 + points[:, 2] / geometry.length
     else:
-        around, down = np.arctan2(points[:, 0], points[:, 2]), np.arccos(points[:, 1] / geometry.radius) / math.pi
-    around = (around / (2.0 * math.pi)).reshape(-1, 3)
+        # Corners are rounded to 32 bits, and may be a little outside.
+        down = np.arccos(np.clip(points[:, 1] / geometry.radius, -1.0, 1.0)) / math.pi
+        sideways, forward = points[:, 0], points[:, 2]
+    around = (np.arctan2(sideways, forward) / (2.0 * math.pi)).reshape(-1, 3)
+    # The corners on the axis are at no angle; each triangle has them in its middle.
+    on_axis = (np.hypot(sideways, forward) < 1e-5 * geometry.radius).reshape(-1, 3)
+    around[on_axis] = np.nan
     # A triangle does not go back around the other way.
-    around += (around < around.max(axis=1, keepdims=True) - 0.5)
-    return np.column_stack([around.ravel(), down])
+    around += around < np.nanmax(around, axis=1, keepdims=True) - 0.5
+    return np.column_stack([np.where(on_axis, np.nanmean(around, axis=1, keepdims=True), around).ravel(), down])
 
 
 def indexed(vertices, normals, faces):

@@ -9,6 +9,8 @@ from sensor_renderer.mirror import Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from sensor_renderer.textures import Textures
 from sensor_renderer.tiny_renderer import TinyRenderer
+from sensor_renderer.triangles import of_primitive, uv_on_primitive
+from urdf_model import Cylinder, Sphere
 from urdf_model.transforms import pose_matrix
 from world_picture.drawing import DrawingCache
 
@@ -181,6 +183,13 @@ def test_round_bodies_show_it_once_around(renderer, tmp_path, quarters):
                   for place in ({"x": 1.8}, {"x": -1.8})]
         # Of a cylinder the upper half is seen, of a sphere, whose poles are at y, a half of both rows.
         assert np.abs(middle[0] - middle[1]).max() > 60, shape
+
+
+@pytest.mark.parametrize("geometry", [Sphere(0.045), Sphere(1.0), Sphere(0.3), Cylinder(0.1, 0.3)])
+def test_places_on_round_bodies_are_in_the_picture(geometry):
+    uv = uv_on_primitive(geometry, of_primitive(geometry)).reshape(-1, 3, 2)
+    assert np.isfinite(uv).all() and -1e-6 <= uv[..., 1].min() and uv[..., 1].max() <= 1.0 + 1e-6
+    assert np.ptp(uv[..., 0], axis=1).max() <= 0.5, "no triangle goes around the back"
 
 
 def test_colours_are_those_of_the_picture_times_the_light(renderer, tmp_path, quarters):
