@@ -104,7 +104,7 @@ class CarriedChain:
                 origins.append(frame[:3, 3].copy())
                 axes.append(frame[:3, :3] @ joint.axis)
                 sliding.append(joint.type == "prismatic")
-                frame = frame @ _motion(joint, position[moved])
+                frame = frame @ motion(joint, position[moved])
                 moved += 1
             frame = frame @ joint.child_offset
             if inertial is not None:
@@ -117,8 +117,8 @@ class CarriedChain:
         return efforts
 
 
-def _motion(joint, amount):
-    """(4, 4) of a joint moved by ``amount`` [rad, m]; rotation by Rodrigues' formula."""
+def motion(joint, amount):
+    """Matrix (4, 4) of a joint moved by ``amount`` [rad, m]; rotation by Rodrigues' formula."""
     moved = np.eye(4)
     if joint.type == "prismatic":
         moved[:3, 3] = joint.axis * amount

@@ -11,6 +11,7 @@ from controller_manager import EFFORT, POSITION, VELOCITY, ControlError, Control
 from controller_manager.pid import Gains, Pid
 from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros_control.cascade import CarriedChain, CascadeHardware
+from gazebo_ros_control.point_head import PointHead
 from loop_ros.action_server import ActionServer
 from ros_controllers.diff_drive import DiffDriveController
 from ros_controllers.joint_state import JointStateController
@@ -217,6 +218,10 @@ def _gripper_context(name, host, given):
     return _Context(name, host, given, {"gripper_action": host.resolve(name)})
 
 
+def _point_head_context(name, host, given):
+    return _Context(name, host, given, {"point_head": host.resolve(name)})
+
+
 # The parameters of robot_controllers' vehicle: its name, its default, ros_controllers' name.
 _VEHICLE = (
     ("l_wheel_joint", "l_wheel_joint", "left_wheel"), ("r_wheel_joint", "r_wheel_joint", "right_wheel"),
@@ -244,6 +249,7 @@ def _base_context(name, host, given):
 _TYPES = {
     "robot_controllers/FollowJointTrajectoryController": (_Follower, _follower_context, False),
     "robot_controllers/ParallelGripperController": (_Gripper, _gripper_context, False),
+    "robot_controllers/PointHeadController": (PointHead, _point_head_context, False),
     "robot_controllers/GravityCompensation": (_Weight, _Context, False),
     "robot_controllers/ScaledMimicController": (_Mimic, _Context, False),
     "robot_controllers/DiffDriveBaseController": (_Base, _base_context, True),

@@ -5,16 +5,20 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from actionlib_msgs.msg import GoalStatus
+from actionlib_msgs.msg import GoalID, GoalStatus
 from control_msgs.msg import (
     FollowJointTrajectoryActionGoal,
     FollowJointTrajectoryGoal,
     GripperCommand,
     GripperCommandActionGoal,
     GripperCommandGoal,
+    PointHeadActionGoal,
+    PointHeadGoal,
 )
-from geometry_msgs.msg import Twist, Vector3
-from rospy import Duration
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Twist, Vector3
+from rospy import Duration, Time
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from bullet_sim import Pose, World
@@ -32,14 +36,17 @@ JOINT = """<joint name="%s" type="%s"><parent link="%s"/><child link="%s"/><orig
   <limit lower="%g" upper="%g" velocity="%g" effort="%g"/></joint>"""
 URDF = "<robot name='fetch'><link name='world'/>" + "".join(LINK % row for row in (
     ("base_link", 20, 0), ("torso", 5, 0), ("arm", ARM_KG, ARM_M), ("left", 0.1, 0), ("right", 0.1, 0),
-    ("l_wheel", 1, 0), ("r_wheel", 1, 0))) + "".join(JOINT % row for row in (
+    ("l_wheel", 1, 0), ("r_wheel", 1, 0), ("pan", 2, 0), ("head", 2, 0.05))) + "".join(JOINT % row for row in (
         ("fixed", "fixed", "world", "base_link", "0 0 1", "0 0 1", 0, 0, 1, 1),
         ("torso_joint", "prismatic", "base_link", "torso", "0 0 0.3", "0 0 1", 0, 0.4, 0.5, 450),
         ("arm_joint", "revolute", "torso", "arm", "0.1 0 0.1", "0 1 0", -1.5, 1.5, 2, 30),
         ("l_gripper_finger_joint", "prismatic", "arm", "left", "0.4 0.02 0", "0 1 0", 0, 0.05, 0.05, 60),
         ("r_gripper_finger_joint", "prismatic", "arm", "right", "0.4 -0.02 0", "0 -1 0", 0, 0.05, 0.05, 60),
         ("l_wheel_joint", "continuous", "base_link", "l_wheel", "0 0.19 0", "0 1 0", 0, 0, 17, 9),
-        ("r_wheel_joint", "continuous", "base_link", "r_wheel", "0 -0.19 0", "0 1 0", 0, 0, 17, 9))) + "</robot>"
+        ("r_wheel_joint", "continuous", "base_link", "r_wheel", "0 -0.19 0", "0 1 0", 0, 0, 17, 9),
+        ("head_pan_joint", "revolute", "torso", "pan", "0.05 0 0.6", "0 0 1", -1.57, 1.57, 1.5, 10),
+        ("head_tilt_joint", "revolute", "pan", "head", "0.14 0 0.06", "0 1 0", -0.76, 1.45, 1.5, 50))) + "</robot>"
+HEAD = "head_pan_joint", "head_tilt_joint"
 FOLLOW = "robot_controllers/FollowJointTrajectoryController"
 CONTROLLERS = {
     "arm_controller": {
@@ -50,10 +57,13 @@ CONTROLLERS = {
     "gripper_controller": {"gripper_action": {"type": "robot_controllers/ParallelGripperController",
                                               "centering": {"p": 1000.0}}},
     "base_controller": {"type": "robot_controllers/DiffDriveBaseController", "autostart": True},
+    "head_controller": {"point_head": {"type": "robot_controllers/PointHeadController"},
+                        "follow_joint_trajectory": {"type": FOLLOW, "joints": list(HEAD)}},
 }
 NAMES = ["arm_controller/follow_joint_trajectory", "arm_controller/gravity_compensation",
-         "both_controller/follow_joint_trajectory", "gripper_controller/gripper_action", "base_controller"]
-ARM, _, BOTH, GRIPPER, BASE = ["/" + name for name in NAMES]
+         "both_controller/follow_joint_trajectory", "gripper_controller/gripper_action", "base_controller",
+         "head_controller/point_head", "head_controller/follow_joint_trajectory"]
+ARM, _, BOTH, GRIPPER, BASE, POINT, PAN_TILT = ["/" + name for name in NAMES]
 
 
 class Robot:
@@ -88,6 +98,18 @@ class Robot:
     def grip(self, position, effort):
         goal = GripperCommandGoal(GripperCommand(position, effort))
         return self._send(GRIPPER, GripperCommandActionGoal, goal)
+
+    def look(self, frame, point, seconds=0.0, max_velocity=0.0):
+        goal = PointHeadGoal(min_duration=Duration.from_sec(seconds), max_velocity=max_velocity)
+        goal.target.header.frame_id = frame
+        goal.target.point.x, goal.target.point.y, goal.target.point.z = point
+        return self._send(POINT, PointHeadActionGoal, goal)
+
+    def off_sight(self, point):
+        """The angle between x of the head and the way to ``point`` (3,) in the world [rad]."""
+        pose = self.model.link_pose("head").matrix()
+        way = np.subtract(point, pose[:3, 3])
+        return math.acos(min(1.0, pose[:3, 0] @ way / np.linalg.norm(way)))
 
     def result(self, action, goal):
         """(state, result) of a goal that has ended."""
@@ -245,3 +267,81 @@ def test_the_weight_of_a_chain_of_both_kinds_of_joints():
         weight = ARM_KG * GRAVITY_M_S2
         assert chain.efforts([0.2, angle]) == pytest.approx(
             [5 * GRAVITY_M_S2 + weight, -weight * ARM_M * math.cos(angle)])
+
+
+# base_link is 1 m above the world's origin.
+@pytest.mark.parametrize("point", [(1.5, 0.8, 0.5), (1.0, -0.4, 1.2), (3.0, 0.4, 0.0)])
+def test_the_head_looks_at_a_point_in_a_frame_of_the_robot(robot, point):
+    goal = robot.look("base_link", point, seconds=0.5)
+    robot.run(0.3)
+    assert robot.off_sight(np.add(point, (0, 0, 1))) > 0.02
+    robot.run(2.0)
+    assert robot.result(POINT, goal)[0] == GoalStatus.SUCCEEDED
+    assert robot.off_sight(np.add(point, (0, 0, 1))) < 0.01
+    robot.run(0.5)
+    assert robot.off_sight(np.add(point, (0, 0, 1))) < 0.01
+
+
+def test_a_point_in_the_frame_of_a_link_that_moves(robot):
+    point = robot.model.link_pose("arm").matrix() @ (1.5, 0.3, 0.2, 1.0)
+    goal = robot.look("/arm", (1.5, 0.3, 0.2))
+    robot.run(2.0)
+    assert robot.result(POINT, goal)[0] == GoalStatus.SUCCEEDED
+    assert robot.off_sight(point[:3]) < 0.02
+
+
+def test_a_point_in_another_frame_waits_for_its_transform(robot):
+    goal = robot.look("map", (0.0, 0.0, 0.0), seconds=0.2)
+    robot.run(0.1)
+    for name, parent, child, x in (("/tf_static", "map", "odom", 1.0), ("/tf", "odom", "base_link", -3.0)):
+        placed = Transform(Vector3(x, 0.0, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+        stamped = TransformStamped(Header(frame_id=parent, stamp=Time(1)), child, placed)
+        robot.ros.subscriptions[name].put(TFMessage([stamped]))
+    robot.run(1.5)
+    assert robot.result(POINT, goal)[0] == GoalStatus.SUCCEEDED
+    # The map's origin is 2 m ahead of base_link.
+    assert robot.off_sight((2.0, 0.0, 1.0)) < 0.01
+    assert "/tf" not in robot.ros.subscriptions, "nobody listens to tf any more"
+
+
+def test_a_frame_that_nobody_knows_and_a_point_that_is_none_are_rejected(robot):
+    goal = robot.look("nowhere", (1.0, 0.0, 0.0))
+    robot.run(1.2)
+    assert robot.result(POINT, goal)[0] == GoalStatus.REJECTED
+    assert "frame 'nowhere' is no link of the robot" in robot.ros.publishers[POINT + "/result"].messages[-1].status.text
+    goal = robot.look("base_link", (math.nan, 0.0, 0.0))
+    robot.run(0.01)
+    assert robot.result(POINT, goal)[0] == GoalStatus.REJECTED
+
+
+def test_the_head_stops_at_its_limits_keeps_to_the_speed_and_says_how_far_it_is_off(robot):
+    goal = robot.look("base_link", (-2.0, 0.1, 1.0), max_velocity=1.0)
+    fastest = 0.0
+    for _ in range(300):
+        robot.run(0.01)
+        fastest = max(fastest, *np.abs(robot.model.read_joints()[1][robot.model.index(HEAD)]))
+    assert 0.9 < fastest < 1.05
+    assert robot.result(POINT, goal)[0] == GoalStatus.SUCCEEDED
+    assert robot.at("head_pan_joint")[0] == pytest.approx(1.57, abs=0.01)
+    text = robot.ros.publishers[POINT + "/result"].messages[-1].status.text
+    assert float(text.split()[2]) == pytest.approx(robot.off_sight((-2.0, 0.1, 2.0)), abs=0.01)
+
+
+def test_a_new_goal_a_cancel_and_a_trajectory_take_the_head_over(robot):
+    first = robot.look("base_link", (1.0, 1.0, 0.5), seconds=2.0)
+    robot.run(0.3)
+    second = robot.look("base_link", (1.0, -1.0, 0.5), seconds=0.5)
+    robot.run(0.1)
+    assert robot.result(POINT, first)[0] == GoalStatus.PREEMPTED
+    third = robot.move(PAN_TILT, list(HEAD), [0.0, 0.0], 1.0)
+    robot.run(0.1)
+    assert robot.result(PAN_TILT, third)[0] == GoalStatus.REJECTED
+    robot.ros.subscriptions[POINT + "/cancel"].put(GoalID(id=second))
+    robot.run(0.05)
+    assert robot.result(POINT, second)[0] == GoalStatus.PREEMPTED
+    rested = robot.at(*HEAD)
+    robot.run(0.3)
+    assert robot.at(*HEAD) == pytest.approx(rested, abs=0.02)
+    third = robot.move(PAN_TILT, list(HEAD), [0.3, 0.2], 0.5)
+    robot.run(1.2)
+    assert robot.result(PAN_TILT, third)[0] == GoalStatus.SUCCEEDED
