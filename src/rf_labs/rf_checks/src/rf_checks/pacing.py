@@ -14,6 +14,9 @@ from lab_environment.family import children_of
 #: Processor time per record [s] for which a busy program, and its helpers, delay the world.
 PROGRAM_ALLOWANCE_S = 0.04
 HELPERS_ALLOWANCE_S = 0.4
+#: Time for which waits for a disk delay the world, in a whole run [s, wall]. The kernel shows a thread that waits for a
+#: child's `vfork` in the same way, and that may last for ever.
+DISK_ALLOWANCE_S = 30.0
 _LOOK_AGAIN_S, _LOOK_AGAIN_AT_MOST_S = 0.0002, 0.004
 _LOADAVG = "/proc/loadavg"
 
@@ -42,6 +45,9 @@ class Tree:
         self.roots = tuple(roots)
         #: Processor time that was used since the beginning [s]; for ended processes, the last known value.
         self.used_s = 0.0
+        #: Time in which it did nothing but wait for a disk [s, wall]; `Watch` counts it.
+        self.disk_s = 0.0
+        self.waits_for_disk = False
         self._seen_s = {}
         self._files = {}
         self._renewed_at = None
@@ -76,16 +82,20 @@ class Tree:
         return self.used_s
 
     def runs(self):
-        """Whether any thread runs, waits for a processor, or waits for a disk."""
+        """Whether any thread runs, waits for a processor, or waits for a disk within its allowance."""
+        self.waits_for_disk = False
         for key, file in list(self._files.items()):
             try:
                 text = os.pread(file, 200, 0)
             except OSError:
                 os.close(self._files.pop(key))
                 continue
-            if text[text.rfind(b")") + 2:][:1] in (b"R", b"D"):
+            state = text[text.rfind(b")") + 2:][:1]
+            if state == b"R":
+                self.waits_for_disk = False
                 return True
-        return False
+            self.waits_for_disk |= state == b"D"
+        return self.waits_for_disk and self.disk_s < DISK_ALLOWANCE_S
 
     def rests(self):
         """Whether nothing runs, or ran during this check."""
@@ -124,7 +134,10 @@ class Watch:
                 return True
             if program.count() > until[0] or helpers.count() > until[1] or self.gives_up():
                 return False
+            began, waited = time.monotonic(), program.waits_for_disk
             time.sleep(pause_s)
+            if waited:
+                program.disk_s += time.monotonic() - began
             program.renew()
             helpers.renew()
             pause_s = min(1.2 * pause_s, _LOOK_AGAIN_AT_MOST_S)

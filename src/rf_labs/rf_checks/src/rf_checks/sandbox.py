@@ -29,6 +29,8 @@ ADDRESS_BYTES = 8 << 30
 MEMORY_BYTES = 2 << 30
 FILE_BYTES = 20 << 20
 PROCESSES = 100
+#: Of all processes together: the watch reads the state of each at every record.
+THREADS = 1000
 #: A program that writes more than this is stopped; the first and the last KEPT_BYTES are kept.
 OUTPUT_BYTES = 4 << 20
 KEPT_BYTES = 200_000
@@ -150,12 +152,14 @@ class Student:
         return children_of(roots)
 
     def excess(self):
-        """The limit that the program exceeds: "output", "processes", "memory", or ""."""
+        """The limit that the program exceeds: "output", "processes", "threads", "memory", or ""."""
         if self.wrote_too_much:
             return "output"
         family = self.family()
         if len(family) > PROCESSES:
             return "processes"
+        if _count_threads(family) > THREADS:
+            return "threads"
         return "memory" if _memory_bytes(family) > MEMORY_BYTES else ""
 
     def dump(self):
@@ -197,6 +201,15 @@ class Student:
         with contextlib.suppress(OSError), open("/proc/%d/comm" % self.pid, encoding="utf-8") as file:
             return file.read().strip() == "bwrap"
         return True
+
+
+def _count_threads(pids):
+    count = 0
+    for pid in pids:
+        with contextlib.suppress(OSError):
+            # A link for each thread, besides the two of every folder: listing thousands would take long.
+            count += os.stat("/proc/%d/task" % pid).st_nlink - 2
+    return count
 
 
 def _memory_bytes(pids):

@@ -72,6 +72,7 @@ def test_the_world_stands_still_from_the_end_of_a_run_on():
 @pytest.mark.parametrize(("fields", "words", "ended"), [
     ({"excess": lambda: "output"}, {}, "output"),
     ({"excess": lambda: "processes"}, {}, "processes"),
+    ({"excess": lambda: "threads"}, {}, "threads"),
     ({"excess": lambda: "memory"}, {}, "memory"),
     ({}, {"is_meddled": lambda: True}, "meddled"),
     ({"output": "yes"}, {"is_satisfied": lambda output: output == "yes"}, "satisfied"),

@@ -2,6 +2,7 @@
 """The process that a student's program runs in: its limits, its end, and what it cannot reach. No master."""
 import os
 import subprocess
+import time
 
 import pytest
 
@@ -143,6 +144,13 @@ def test_processes_have_a_limit(start, monkeypatch):
     wait_until(lambda: student.excess() == "processes", "the thirteenth process")
     student.end()
     wait_until(lambda: family.children_of([os.getpid()]) - before == set(), "the end of all of them")
+
+
+def test_threads_have_a_limit(start, monkeypatch):
+    monkeypatch.setattr(sandbox, "THREADS", 10)
+    student = start("import threading\ngate = threading.Event()\nfor _ in range(12):\n"
+                    "    threading.Thread(target=gate.wait).start()\n")
+    wait_until(lambda: student.excess() == "threads", "the eleventh thread")
 
 
 def test_a_program_that_loops_says_where_it_is(start):
@@ -305,6 +313,24 @@ def test_a_watch_tells_work_from_rest(start):
         assert not watch.wait_until_rest()
         # Waiting for a processor does not count: only the used processor time counts.
         assert pacing.cpu_time_s(busy.family()) - before > 0.9 * pacing.PROGRAM_ALLOWANCE_S
+    watch.close()
+
+
+def test_a_wait_that_looks_like_one_for_a_disk_holds_the_world_no_longer_than_its_allowance(start, monkeypatch):
+    monkeypatch.setattr(pacing, "DISK_ALLOWANCE_S", 0.3)
+    # The child opens a pipe that nobody writes to, before it becomes another program: until then its parent waits.
+    student = start("import os\nos.mkfifo('pipe')\nprint('on', flush=True)\n"
+                    "os.posix_spawn('/bin/true', ['true'], {}, file_actions=[(os.POSIX_SPAWN_OPEN, 5, 'pipe', 0, 0)])")
+    wait_until(lambda: student.output, "its first line")
+    watch = pacing.Watch()
+    watch.program.roots = (student.pid,)
+    watch.program.renew()
+    wait_until(lambda: watch.program.runs() and watch.program.waits_for_disk, "the wait")
+    deadline = time.monotonic() + 20.0
+    watch.gives_up = lambda: time.monotonic() > deadline
+    assert watch.wait_until_rest()
+    assert watch.program.disk_s >= 0.3
+    assert watch.wait_until_rest()
     watch.close()
 
 
