@@ -45,7 +45,7 @@ def _view(title, motion, lasts):
 
     width = round((_RIGHT[1] - _RIGHT[0]) * _PIXELS_PER_MM)
     parts = ['<rect x="0" y="%d" width="%d" height="%d" fill="#f6f7f8"/>' % (_TITLE, width, _height(title)),
-             '<text x="2" y="13" font-size="12" fill="#444">%s</text>' % title]
+             '<text x="2" y="13" font-size="12" fill="currentColor">%s</text>' % title]
     parts += ['<polyline points="%s" fill="none" stroke="#b9bec3" stroke-width="5" stroke-linecap="round" '
               'stroke-linejoin="round"/>' % line(motion[side][0]) for side in COLOURS]
     for side, colour in COLOURS.items():

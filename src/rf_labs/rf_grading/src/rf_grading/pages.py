@@ -3,6 +3,7 @@
 import html
 import os
 import shlex
+import statistics
 from urllib.parse import quote
 
 from rf_grading import drawing
@@ -10,14 +11,23 @@ from rf_grading.formats import plain
 from rf_grading.results import GRADED, NOT_GRADED, POINTS
 
 _STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #1c1f22; max-width: 68rem; margin: 2rem auto; padding: 0 1rem; }
+:root { color-scheme: light dark; --text: #1c1f22; --page: #fff; --small: #5b6167; --line: #e3e6e8; --box: #f2f3f4;
+--hint: #fff6d6; --passed: #16703c; --failed: #a12a1c; --open: #85610a; --link: #0b5c80; }
+@media screen and (prefers-color-scheme: dark) { :root { --text: #e4e7ea; --page: #16191c; --small: #a3abb3;
+--line: #363c42; --box: #22272b; --hint: #40371a; --passed: #6fce94; --failed: #f08a7d; --open: #dfb95c;
+--link: #7cc4e6; } }
+body { font: 15px/1.45 system-ui, sans-serif; color: var(--text); background: var(--page); max-width: 68rem;
+margin: 2rem auto; padding: 0 1rem; overflow-wrap: break-word; } a { color: var(--link); }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.2rem; margin-top: 2rem; } h3 { font-size: 1rem; }
-table { border-collapse: collapse; margin: 0.6rem 0; } th, td { text-align: left; padding: 0.2rem 0.8rem 0.2rem 0;
-vertical-align: top; border-bottom: 1px solid #e3e6e8; } td.n, th.n { text-align: right; }
-.passed { color: #16703c; } .failed { color: #a12a1c; } .open { color: #85610a; } .hint { background: #fff6d6;
-padding: 0.6rem 0.8rem; border-radius: 4px; } pre { background: #f2f3f4; padding: 0.6rem; overflow: auto;
-max-height: 24rem; font-size: 13px; } svg { max-width: 100%; height: auto; } .small { color: #5b6167; font-size: 13px; }
-.bar { background: #0b6e99; height: 0.8rem; display: inline-block; }
+table { border-collapse: collapse; margin: 0.6rem 0; display: block; overflow-x: auto; }
+th, td { text-align: left; padding: 0.2rem 0.8rem 0.2rem 0; vertical-align: top; border-bottom: 1px solid var(--line); }
+td.n, th.n { text-align: right; white-space: nowrap; } td.why { min-width: 18rem; }
+.passed { color: var(--passed); } .failed { color: var(--failed); } .open { color: var(--open); }
+.hint { background: var(--hint); padding: 0.6rem 0.8rem; border-radius: 4px; } pre { background: var(--box);
+padding: 0.6rem; overflow: auto; max-height: 16rem; font-size: 13px; } svg { max-width: 100%; height: auto; }
+.small { color: var(--small); font-size: 13px; } .bar { background: #0b6e99; height: 0.8rem; display: inline-block; }
+@media print { body { margin: 0; max-width: none; } pre { max-height: none; white-space: pre-wrap; }
+h2, h3 { break-after: avoid; } tr, svg, .hint { break-inside: avoid; } .bar { print-color-adjust: exact; } }
 """
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -90,7 +100,7 @@ def _exercise(results, exercise, cell, motions):
             yield drawing.of_run(shown[number])
         for title, name in (("It printed", "output"), ("Its errors", "errors")):
             if run.get(name):
-                yield "<details><summary>%s</summary><pre>%s</pre></details>" % (title, _text(run[name]))
+                yield "<details open><summary>%s</summary><pre>%s</pre></details>" % (title, _text(run[name]))
     yield "<p>The same check on your own machine:</p><pre>%s</pre>" % _text(_command(results, exercise, cell))
 
 
@@ -125,7 +135,7 @@ def overview(results, seconds, feedback_of):
         "" if seconds is None else "; this start took %.0f s" % seconds)]
     if graded:
         parts.append("<p>Mean %.1f of %g points, median %.1f.</p>" % (
-            sum(graded) / len(graded), results.most_points, sorted(graded)[len(graded) // 2]))
+            sum(graded) / len(graded), results.most_points, statistics.median(graded)))
         parts.append(_histogram(graded, results.most_points))
     parts.append('<p>Files: <a href="results.csv">results.csv</a>, <a href="results.json">results.json</a>, '
                  '<a href="results.xml">results.xml</a> (JUnit), <a href="nbgrader.csv">nbgrader.csv</a>; '
@@ -160,7 +170,8 @@ def _submissions(results, feedback_of):
         cells = "".join('<td class="n %s">%s</td>' % (_class_of(row.cells[exercise.name]),
                                                       _points(row.cells[exercise.name].points))
                         for exercise in results.exercises)
-        lines.append('<tr><td><a href="%s">%s</a></td><td>%s</td>%s<td class="n">%s</td><td>%s</td></tr>' % (
+        lines.append('<tr><td><a href="%s">%s</a></td><td>%s</td>%s<td class="n">%s</td>'
+                     '<td class="why">%s</td></tr>' % (
             link_to(feedback_of(row)), _text(row.submission.entry), _text(row.submission.name), cells,
             _points(row.points), _text("; ".join(row.sentences))))
     return ('<table><tr><th>submission</th><th>name</th>%s<th class="n">points</th><th>reasons</th></tr>%s</table>'

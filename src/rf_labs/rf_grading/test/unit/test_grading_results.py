@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results in every form, and the pages: right, complete, and harmless whatever a student wrote."""
 import csv
+import dataclasses
 import io
 import json
 from xml.etree import ElementTree
@@ -114,6 +115,24 @@ def test_the_overview_has_everybody_and_who_is_alike(found):
     assert all(row.submission.entry in page for row in found.rows)
     assert 'href="feedback/%3Dcmd%28%29/feedback.html"' in page
     assert "90 % of the first's own code" in page and "SECRET" in page and "roster.csv" in page
+
+
+def test_the_median_of_two_is_between_them(found):
+    page = pages.overview(dataclasses.replace(found, rows=found.rows[:2]), 1.0, lambda row: "a.html")
+    assert "Mean 65.0 of 200 points, median 65.0." in page
+
+
+def test_pages_suit_dark_windows_telephones_and_paper(found):
+    """What is written on a page has no colour but the style's, in which each has a second value for dark windows."""
+    row = found.rows[1]
+    row.cells["wave"].verdict["runs"][0]["output"] = "it said this"
+    page = pages.feedback(found, row, {"b": [motion.of_run(FakeRecording(5), FakeRobot())]})
+    assert '<text x="2" y="13" font-size="12" fill="currentColor">' in page
+    light, dark = page.split("@media screen and (prefers-color-scheme: dark)")
+    names = [part.partition(":")[0] for part in light.split("--")[1:]]
+    assert names and all("--%s: " % name in dark.partition("} }")[0] for name in names)
+    # Closed details are not printed, and half of a wide table is not seen on a telephone that cannot scroll it.
+    assert "<details open>" in page and "@media print" in page and "overflow-x: auto" in page
 
 
 class FakeRobot:
