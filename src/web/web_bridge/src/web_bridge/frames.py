@@ -17,6 +17,11 @@ from web_bridge.values import from_tag
 #: Fragments that are not complete: bytes and messages of one client; beyond, the oldest message is dropped.
 MOST_BYTES_PENDING, MOST_PENDING = 64 << 20, 100
 MOST_FRAGMENTS = 100000
+#: What a fragment takes beside its data [bytes].
+_FRAGMENT_BYTES = 200
+#: The tags that cbor2 itself reads, of which no ROS message needs one. Some take hours for a small frame (fractions and
+#: decimals of large integers), or make a large object of a small frame (references to shared values).
+_CBOR2_TAGS = (0, 1, 2, 3, 4, 5, 25, 28, 29, 30, 35, 36, 37, 43, 52, 54, 100, 256, 258, 260, 261, 1004, 43000)
 _DECODER = json.JSONDecoder()
 _PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -58,13 +63,26 @@ def _read_json(text):
     return found
 
 
+def _refused_tag(number):
+    def refuse(value, _immutable):
+        # It raises: the tag is none of a numeric array.
+        return from_tag(cbor2.CBORTag(number, value))
+    return refuse
+
+
+_REFUSED_TAGS = {number: _refused_tag(number) for number in _CBOR2_TAGS}
+
+
 def _read_cbor(data):
     try:
-        return _operation(cbor2.loads(data, tag_hook=lambda tag, _immutable: from_tag(tag)))
+        return _operation(cbor2.loads(data, tag_hook=lambda tag, _immutable: from_tag(tag),
+                                      semantic_decoders=_REFUSED_TAGS))
     except BridgeError:
         raise
     # A decoder of bytes from any client: whatever it raises is about these bytes.
     except Exception as error:
+        if isinstance(error.__cause__, BridgeError):
+            error = error.__cause__
         raise FrameError("a binary frame of %d bytes is no CBOR object: %s" % (len(data), error)) from None
 
 
@@ -97,16 +115,17 @@ def text_of_png(data, largest):
     FrameError.
     """
     try:
-        packed, (width, height, kind) = b"", (0, 0, ())
+        # Joined once: a picture may have millions of chunks.
+        packed, (width, height, kind) = [], (0, 0, ())
         for name, content in _chunks(data):
             if name == b"IHDR":
                 width, height, *kind = struct.unpack(">IIBBBBB", content)
             elif name == b"IDAT":
-                packed += content
+                packed.append(content)
         size = height * (width * 3 + 1)
         if kind != [8, 2, 0, 0, 0] or size > largest:
             raise ValueError("8-bit RGB up to %d bytes is read" % largest)
-        rows = zlib.decompressobj().decompress(packed, size)
+        rows = zlib.decompressobj().decompress(b"".join(packed), size)
         if len(rows) != size or any(rows[::width * 3 + 1]):
             raise ValueError("it is not complete, or its rows are filtered")
         row = width * 3 + 1
@@ -163,7 +182,7 @@ class Fragments:
             raise FrameError("fragments of %s say total %s and %s" % (shown(name), entry[1], total))
         if num not in entry[2]:
             entry[2][num] = data
-            entry[3] += len(data)
+            entry[3] += len(data) + _FRAGMENT_BYTES
         if len(entry[2]) == total:
             del self._pending[name]
             return "".join(entry[2][i] for i in range(int(total)))

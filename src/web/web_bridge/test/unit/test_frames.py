@@ -2,11 +2,13 @@
 import io
 import json
 import random
+import time
 
 import cbor2
 import pytest
 from PIL import Image
 
+from web_bridge import frames
 from web_bridge.errors import FrameError
 from web_bridge.frames import Fragments, from_base64, packed_png, png_of, read_frame, split, text_of_png
 
@@ -25,6 +27,20 @@ def test_anything_else_is_a_frame_error(frame):
     with pytest.raises(FrameError) as caught:
         read_frame(frame)
     assert len(str(caught.value)) < 400
+
+
+def test_no_tag_but_those_of_numeric_arrays_is_read():
+    # Among the others are fractions, whose numerator and denominator may take hours, and references, by which a small
+    # frame becomes a large object.
+    for number in (*range(64), *range(87, 2000), 43000):
+        for value in (b"1234", "1", 1, [1, 2]):
+            with pytest.raises(FrameError, match=r"CBOR tag \d+ is not read"):
+                read_frame(cbor2.dumps({"a": cbor2.CBORTag(number, value)}))
+
+
+def test_a_large_integer_is_refused_without_a_traceback():
+    with pytest.raises(FrameError, match="CBOR tag 2 is not read"):
+        read_frame(cbor2.dumps({"a": 1 << 100000}))
 
 
 def test_bytes_of_any_kind_only_raise_frame_errors():
@@ -54,6 +70,15 @@ def test_other_pictures_are_refused(data):
         text_of_png(data, 1000)
 
 
+def test_a_picture_of_many_chunks_takes_no_longer():
+    chunk = b"\0\0\0\1IDATa\0\0\0\0"
+    begin = time.process_time()
+    with pytest.raises(FrameError, match="a picture of"):
+        text_of_png(png_of("hello")[:33] + b"\0\x40\0\0IDAT" + bytes((1 << 22) + 4) + 3000 * chunk, 1000)
+    # A copy of the first one for each of the others takes ten times that.
+    assert time.process_time() - begin < 3.0
+
+
 def test_fragments_are_put_together_in_any_order():
     fragments = Fragments(lambda: 0.0, 10.0)
     pieces = [json.loads(piece) for piece in split("0123456789", 3)]
@@ -79,6 +104,15 @@ def test_halves_do_not_pile_up():
     for number in range(500):
         fragments.add({"id": number, "data": "x" * 1000, "num": 0, "total": 2})
     assert len(fragments._pending) <= 101
+
+
+def test_empty_fragments_do_not_pile_up(monkeypatch):
+    # Of 64 MiB it would need too many.
+    monkeypatch.setattr(frames, "MOST_BYTES_PENDING", 10_000)
+    fragments = Fragments(lambda: 0.0, 10.0)
+    for number in range(2000):
+        fragments.add({"id": number // 20, "data": "", "num": number % 20, "total": 21})
+    assert sum(len(entry[2]) for entry in fragments._pending.values()) <= 100
 
 
 @pytest.mark.parametrize("operation", [
