@@ -224,6 +224,7 @@ function buildCameras() {
   byId("camera").replaceChildren(element("option", {value: "", textContent: text("camera_off")}), ...options);
   byId("camera").value = chosen;
   if (byId("camera").value !== chosen) byId("camera").value = "";
+  if (byId("picture-said").textContent) byId("picture-said").textContent = text("picture_awaited");
 }
 
 function startTopics() {
@@ -256,12 +257,14 @@ function startTopics() {
     if (camera) topics.unsubscribe(camera);
     camera = byId("camera").value;
     byId("picture").hidden = true;
+    byId("picture-said").textContent = camera ? text("picture_awaited") : "";
     if (!camera) return;
     const topic = camera;
     byId("picture").alt = text("picture_of", {topic});
     topics.subscribe(topic, "sensor_msgs/CompressedImage", 66, 1, ({format, data}) => {
       byId("picture").src = `data:image/${format.includes("png") ? "png" : "jpeg"};base64,${data}`;
       byId("picture").hidden = false;
+      byId("picture-said").textContent = "";
     });
   };
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The page's texts, from texts/LANGUAGE.json; elements name theirs by data-text, data-title and data-label.
+// The page's texts, from texts/LANGUAGE.json; elements name theirs by data-text, data-title, data-label and data-hint.
 export const LANGUAGES = {en: "English", zh: "中文"};
 let texts = {};
 
@@ -14,6 +14,7 @@ export async function load(language) {
 export function translate(root) {
   for (const element of root.querySelectorAll("[data-text]")) element.textContent = text(element.dataset.text);
   for (const element of root.querySelectorAll("[data-title]")) element.title = text(element.dataset.title);
+  for (const element of root.querySelectorAll("[data-hint]")) element.placeholder = text(element.dataset.hint);
   for (const element of root.querySelectorAll("[data-label]")) {
     element.setAttribute("aria-label", text(element.dataset.label));
   }

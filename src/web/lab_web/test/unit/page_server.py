@@ -29,6 +29,7 @@ from web_bridge.serving import Serving
 from world_picture.snapshot import SnapshotWriter
 
 NUMBERS = "/lab/numbers"
+CAMERA = "/cameras/lab/image/compressed"
 PAGE = Path(__file__).resolve().parents[2] / "page"
 
 
@@ -83,7 +84,7 @@ class Rosbridge(websocket.WebSocketHandler):
         self._sockets.discard(self)
 
 
-async def say(sockets, robot, time_s):
+async def say(sockets, robot, time_s, camera):
     """In the loop: messages of now."""
     joints = list(robot.positions)
     messages = {
@@ -95,6 +96,8 @@ async def say(sockets, robot, time_s):
         NUMBERS: {"header": {"seq": 3, "stamp": {"secs": int(time_s), "nsecs": 0}}, "text": "x", "near": True,
                   "wrench": {"force": {"x": time_s, "y": None}}, "names": ["a", "b"], "values": [1.0, 2.0],
                   "rest": [5]}}
+    if camera:
+        messages[CAMERA] = {"format": "png", "data": camera}
     for socket in list(sockets):
         for topic in socket.topics & messages.keys():
             with contextlib.suppress(websocket.WebSocketClosedError):
@@ -113,6 +116,8 @@ class Server:
 
     def __init__(self, libraries, folder):
         self.robot = Robot()
+        #: Its picture in base64, "" as long as it sends none.
+        self.camera = ""
         self._ended = threading.Event()
         self._sockets = set()
         self.loop = LoopThread()
@@ -147,7 +152,7 @@ class Server:
         self.pages.share("robot", {
             "joints": [{"name": name, "lower": row.lower, "upper": row.upper} for name, row in
                        self.robot.limits.items()],
-            "poses": ["neutral"], "hands": hands.sides, "grippers": SIDES, "cameras": [], "has_scene": True,
+            "poses": ["neutral"], "hands": hands.sides, "grippers": SIDES, "cameras": [CAMERA], "has_scene": True,
             "can_plan": True, "can_press": True, "things": ["block"]})
         application = web.Application([*routes(self.pages, PAGE, libraries), *upload_routes(self.pages, recorder),
                                        (r"/notebook/(?:lab|doc).*", Frame),
@@ -177,7 +182,7 @@ class Server:
             self._write()
             self._follow()
             self._recorder.take(0.02 * self.ticks, self.robot.positions)
-            self.loop.run(say(self._sockets, self.robot, 0.02 * self.ticks))
+            self.loop.run(say(self._sockets, self.robot, 0.02 * self.ticks, self.camera))
 
     def close(self):
         self._ended.set()

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Curves, numbers, points and frames of topics, on the page in Debian's Chromium."""
+import base64
+
+import cv2
 import numpy as np
 import pytest
-from page_server import NUMBERS
+from page_server import CAMERA, NUMBERS
 
 from lab_testing.waiting import wait_until
 from lab_web.clouds import packed
@@ -41,6 +44,20 @@ def test_numbers_of_any_topic_are_drawn(lab, browser):
     assert found[0].startswith("wrench.force.x = ") and found[1] == "values[b] = 2"
     browser.wait(IS_DRAWN % "numbers-canvas")
     browser.evaluate("document.getElementById('numbers').open = false")
+
+
+def test_a_camera_that_sends_nothing_yet_is_awaited_in_words(lab, browser):
+    def choose(topic):
+        browser.evaluate("(() => { const list = document.getElementById('camera'); list.value = '%s'; list.onchange(); })()"
+                         % topic)
+    said = "document.getElementById('picture-said').textContent"
+    choose(CAMERA)
+    assert browser.evaluate(said) == "No picture has come yet …"
+    lab.camera = base64.b64encode(cv2.imencode(".png", np.zeros((20, 30, 3), np.uint8))[1]).decode()
+    browser.wait("document.getElementById('picture').naturalWidth === 30 && !%s" % said)
+    lab.camera = ""
+    choose("")
+    assert browser.evaluate("document.getElementById('picture').hidden") and not browser.evaluate(said)
 
 
 def test_points_and_frames_are_seen_where_they_are(lab, browser):

@@ -159,12 +159,18 @@ def test_foreign_pages_and_wrong_tokens_do_not_connect(server, options):
         server.connect(**options)
 
 
-def upload(server, token, content, origin=None, path="screen"):
+def upload(server, token, content, origin=None, path="screen", page="7"):
     request = urllib.request.Request(
-        "http://127.0.0.1:%d/%s?token=%s&page=7" % (server.serving.port, path, token), content,
+        "http://127.0.0.1:%d/%s?token=%s&page=%s" % (server.serving.port, path, token, page), content,
         {} if origin is None else {"Origin": origin})
     with urllib.request.urlopen(request, timeout=stretched(20)) as answer:
         return answer.status
+
+
+@pytest.mark.parametrize("page", ["", "-1", "x", "9" * 5000, "%C2%B2"])
+def test_a_number_that_no_page_has_is_no_fault_of_the_server(server, page):
+    assert upload(server, "drive", b"x", page=page) == 204
+    assert [client for client, *_ in server.pages.lab.served] == [0]
 
 
 def test_a_picture_for_the_screen_is_an_operation_of_its_page(server):
