@@ -48,8 +48,8 @@ def test_numbers_of_any_topic_are_drawn(lab, browser):
 
 def test_a_camera_that_sends_nothing_yet_is_awaited_in_words(lab, browser):
     def choose(topic):
-        browser.evaluate("(() => { const list = document.getElementById('camera'); list.value = '%s'; list.onchange(); })()"
-                         % topic)
+        browser.evaluate("(() => { const list = document.getElementById('camera'); list.value = '%s';"
+                         "list.onchange(); })()" % topic)
     said = "document.getElementById('picture-said').textContent"
     choose(CAMERA)
     assert browser.evaluate(said) == "No picture has come yet …"

@@ -13,6 +13,8 @@ from web_bridge.frames import cbor, json_text, packed_png, split
 
 #: From the weakest to the strongest.
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
+#: Subscriptions of one client to one topic, which differ in their ids; each change looks at all of them.
+MOST_OF_A_TOPIC = 1000
 #: Bytes of latched messages that are kept for clients that subscribe later, for each publisher.
 LARGEST_LATCHED = 64 << 20
 
@@ -98,7 +100,11 @@ class ClientFeed:
         self._told = ""
 
     def add(self, name, wish):
+        """A subscription; one of the same name is replaced. Raises BridgeError for one too many."""
         with self._lock:
+            if name not in self._wishes and len(self._wishes) >= MOST_OF_A_TOPIC:
+                raise BridgeError("this client has %d subscriptions to %s already; unsubscribe from those that are not "
+                                  "needed any more" % (len(self._wishes), self._topic))
             self._wishes[name] = wish
             self._join()
 

@@ -17,6 +17,6 @@ def field(operation, name, kind, default=_NEEDED):
         return default
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool) \
             or (kind is NUMBER and not abs(value) <= _LARGEST_NUMBER):
-        kinds = kind if isinstance(kind, tuple) else (kind,)
-        raise FieldError("%s is %s; %s is expected" % (name, shown(value), " or ".join(one.__name__ for one in kinds)))
+        wanted = "a number from -%g to %g" % (_LARGEST_NUMBER, _LARGEST_NUMBER) if kind is NUMBER else kind.__name__
+        raise FieldError("%s is %s; %s is expected" % (name, shown(value), wanted))
     return value

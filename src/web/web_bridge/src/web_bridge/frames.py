@@ -17,6 +17,8 @@ from web_bridge.values import from_tag
 #: Fragments that are not complete: bytes and messages of one client; beyond, the oldest message is dropped.
 MOST_BYTES_PENDING, MOST_PENDING = 64 << 20, 100
 MOST_FRAGMENTS = 100000
+#: Operations in one frame. Programs send one; a text of 64 MB can hold millions, which take gigabytes.
+MOST_OPERATIONS = 10000
 #: What a fragment takes beside its data [bytes].
 _FRAGMENT_BYTES = 200
 #: The tags that cbor2 itself reads, of which no ROS message needs one. Some take hours for a small frame (fractions and
@@ -53,6 +55,8 @@ def _read_json(text):
                 at += 1
                 continue
             value, at = _DECODER.raw_decode(text, at)
+            if len(found) == MOST_OPERATIONS:
+                raise FrameError("a frame with more than %d operations" % MOST_OPERATIONS)
             found.append(_operation(value))
     except (ValueError, RecursionError) as error:
         if isinstance(error, FrameError):

@@ -8,7 +8,7 @@ from std_msgs.msg import Int32, String
 
 from web_bridge.codec import Codec
 from web_bridge.errors import BridgeError
-from web_bridge.feeds import Arrival, Feeds, Wish
+from web_bridge.feeds import MOST_OF_A_TOPIC, Arrival, Feeds, Wish
 from web_bridge.outgoing import OutgoingBuffer
 
 TOPIC = "/chatter"
@@ -100,6 +100,21 @@ def test_the_last_client_takes_the_subscription_along(lab):
     assert lab.feeds.unsubscribe(lab.client, TOPIC) and lab.graph.subscribers
     lab.feeds.forget(other)
     assert not lab.graph.subscribers and not lab.feeds.unsubscribe(other, TOPIC)
+
+
+def test_a_client_has_a_limited_number_of_subscriptions_to_a_topic(lab):
+    for number in range(MOST_OF_A_TOPIC):
+        lab.subscribe(str(number))
+    with pytest.raises(BridgeError, match="this client has 1000 subscriptions to .* already; unsubscribe"):
+        lab.subscribe("one more")
+    # Not one more, and another client.
+    lab.subscribe("7", throttle_rate=5)
+    other = Client()
+    lab.subscribe(client=other)
+    lab.feeds.unsubscribe(lab.client, TOPIC, "8")
+    lab.subscribe("one more")
+    lab.say("hello")
+    assert lab.client.texts() == other.texts() == ["hello"]
 
 
 def test_one_of_two_subscriptions_can_end(lab):

@@ -38,6 +38,12 @@ def test_no_tag_but_those_of_numeric_arrays_is_read():
                 read_frame(cbor2.dumps({"a": cbor2.CBORTag(number, value)}))
 
 
+def test_a_frame_of_millions_of_operations_is_refused():
+    assert len(read_frame("{}" * frames.MOST_OPERATIONS)) == frames.MOST_OPERATIONS
+    with pytest.raises(FrameError, match="more than 10000 operations"):
+        read_frame("{}" * (frames.MOST_OPERATIONS + 1))
+
+
 def test_a_large_integer_is_refused_without_a_traceback():
     with pytest.raises(FrameError, match="CBOR tag 2 is not read"):
         read_frame(cbor2.dumps({"a": 1 << 100000}))
