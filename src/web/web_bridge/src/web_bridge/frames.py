@@ -17,6 +17,8 @@ from web_bridge.values import from_tag
 #: Fragments that are not complete: bytes and messages of one client; beyond, the oldest message is dropped.
 MOST_BYTES_PENDING, MOST_PENDING = 64 << 20, 100
 MOST_FRAGMENTS = 100000
+#: Fragments of one message to a client; each takes time and memory beside its data, for all clients.
+MOST_FRAGMENTS_SENT = 10000
 #: Operations in one frame. Programs send one; a text of 64 MB can hold millions, which take gigabytes.
 MOST_OPERATIONS = 10000
 #: What a fragment takes beside its data [bytes].
@@ -152,9 +154,14 @@ _NUMBERS = itertools.count()
 
 
 def split(text, size):
-    """A text as fragments (JSON texts) whose data have ``size`` characters at most; itself where it is not longer."""
+    """A text as fragments (JSON texts) whose data have ``size`` characters at most; itself where it is not longer, or
+    ``size`` is 0. Raises FrameError for too many.
+    """
     if not size or len(text) <= size:
         return [text]
+    if len(text) > size * MOST_FRAGMENTS_SENT:
+        raise FrameError("in fragments of %d characters it would be more than %d; a larger fragment_size is needed"
+                         % (size, MOST_FRAGMENTS_SENT))
     name, total = "fragment:%d" % next(_NUMBERS), math.ceil(len(text) / size)
     return [json_text({"op": "fragment", "id": name, "data": text[i * size:(i + 1) * size], "num": i, "total": total})
             for i in range(total)]

@@ -189,7 +189,7 @@ class Session:
         type_name = field(operation, "type", str, None)
         wish = Wish(max(0, field(operation, "throttle_rate", NUMBER, 0)),
                     max(0, int(field(operation, "queue_length", NUMBER, 0))),
-                    max(0, int(field(operation, "fragment_size", NUMBER, 0))), _compression(operation))
+                    _fragment_size(operation), _compression(operation))
         # "*" is how ROS writes: any type.
         self._bridge.feeds.subscribe(self, name, topic, None if type_name in ("", "*") else type_name, wish)
 
@@ -200,7 +200,7 @@ class Session:
 
     def _call_service(self, operation, name):
         service = field(operation, "service", str)
-        compression, size = _compression(operation), int(field(operation, "fragment_size", NUMBER, 0))
+        compression, size = _compression(operation), _fragment_size(operation)
 
         def answer(values, worked, in_cbor=None):
             response = {"op": "service_response", "service": service, "values": values, "result": worked}
@@ -257,6 +257,10 @@ def _compression(operation):
     if compression not in COMPRESSIONS:
         raise FieldError("compression is %s; %s are known" % (shown(compression), ", ".join(COMPRESSIONS)))
     return compression
+
+
+def _fragment_size(operation):
+    return max(0, int(field(operation, "fragment_size", NUMBER, 0)))
 
 
 def _publisher_options(operation):

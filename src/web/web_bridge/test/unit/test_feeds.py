@@ -194,6 +194,18 @@ def test_fragments_are_whole_together(lab):
     assert json.loads("".join(piece["data"] for piece in pieces))["msg"] == {"data": "hello"}
 
 
+def test_a_message_is_not_sent_in_millions_of_fragments(lab):
+    other = Client()
+    lab.subscribe(fragment_size=1)
+    lab.subscribe(client=other, fragment_size=10)
+    lab.say("x" * 10_000, "y" * 10_001, "z")
+    assert lab.client.told == ["a message of /chatter is not sent: in fragments of 1 characters it would be more than "
+                               "10000; a larger fragment_size is needed"]
+    whole = "".join(json.loads(frame)["data"] for frame in lab.client.frames())
+    assert json.loads(whole)["msg"] == {"data": "z"}
+    assert len(other.frames()) > 2000 and not other.told
+
+
 def test_a_later_client_gets_what_was_latched_unless_its_publisher_has_gone(lab):
     lab.subscribe()
     lab.say("old", publisher="/gone", is_latched=True)

@@ -58,7 +58,8 @@ def test_a_wrong_message_is_not_published_and_its_sender_told(lab):
     ({"op": "subscribe", "topic": "/a", "compression": "zip"}, "compression is 'zip'; none, png, cbor, cbor-raw"),
     ({"op": "subscribe", "topic": "/a", "throttle_rate": "fast"}, "throttle_rate is 'fast'"),
     ({"op": "subscribe", "topic": "/a", "queue_length": 10 ** 400}, "queue_length is 1000"),
-    ({"op": "subscribe", "topic": "/a", "fragment_size": float("nan")}, "fragment_size is nan; a number from -1e+12 to 1e+12 is"),
+    ({"op": "subscribe", "topic": "/a", "fragment_size": float("nan")},
+     "fragment_size is nan; a number from -1e+12 to 1e+12 is"),
     ({"op": "advertise", "topic": "/a", "type": "nobody/Thing"}, "nobody/Thing"),
     ({"op": "set_level", "level": "loud"}, "level is 'loud'"), ({"op": "auth"}, "does not use rosauth"),
     ({"op": "publish", "id": {}, "topic": "/a"}, "id is {}"),
@@ -115,6 +116,8 @@ def test_a_call_of_a_service(lab):
     assert client.receive()["values"]["success"] is False
     client.send("call_service", service="/enable", compression="png")
     assert client.receive()["op"] == "png"
+    client.send("call_service", service="/enable", fragment_size=-1)
+    assert client.receive()["result"] is True
     client.send("call_service", service="/enable", args={"date": True})
     answer = client.receive()
     assert answer["result"] is False and "has no field 'date'" in answer["values"]
