@@ -82,7 +82,8 @@ function refresh() {
   const kind = !state.robot || !state.connected ? "unknown"
     : state.robot.stopped ? "stopped" : state.robot.enabled ? "enabled" : "disabled";
   light("robot-state", kinds[kind], text(`robot_${kind}`));
-  byId("factor").textContent = state.factor === null ? "" : text("factor", {value: state.factor.toFixed(2)});
+  byId("factor").textContent = simulation.paused ? text("paused")
+    : state.factor === null ? "" : text("factor", {value: state.factor.toFixed(2)});
   byId("enable").textContent = text(kind === "enabled" ? "disable" : "enable");
   byId("enable").disabled = !state.mine || kind === "unknown";
   byId("control").textContent = text(!state.may_act ? "watching" : state.mine ? "release" : state.free ? "take" : "take_over");
@@ -139,6 +140,7 @@ const served = {
   },
   simulation(is) {
     simulation.show(is);
+    refresh();
   },
   topics({types}) {
     numbers.list(types);

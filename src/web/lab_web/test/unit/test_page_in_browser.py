@@ -156,7 +156,7 @@ def test_an_exercises_verdict_is_beside_the_robot(lab, browser):
         "exercise": "wave", "passed": False, "points": 62.5, "due": 80.0, "why": "", "hint": "the sine is too short",
         "runs": [{"call": "", "criteria": [{"name": "path", "points": 20.0, "of": 40.0, "found": "1.5 periods"}]}]})
     browser.wait("document.getElementById('exercise-verdict').textContent"
-                 " === 'wave: not passed, 62.5 of 100 points; 80 are due'")
+                 " === 'wave: not passed, 62.5 of 100 points; 80 are needed'")
     assert browser.evaluate("document.getElementById('exercise-hint').textContent") == "Hint: the sine is too short"
     assert browser.evaluate("[...document.querySelectorAll('#exercise-runs td')].map((cell) => cell.textContent)") == [
         "path", "20 / 40", "1.5 periods"]
@@ -189,6 +189,14 @@ def test_a_picture_fills_the_screen_as_far_as_its_shape_lets_it(lab, browser, tm
     wait_until(lambda: lab.shown, "the picture")
     rows = np.frombuffer(lab.shown[0], np.uint8).reshape(600, 1024, 3)
     assert rows[300, 512].tolist() == [255, 128, 0] and rows[300, 100].tolist() == [0, 0, 0]
+
+
+def test_a_paused_simulation_is_seen_in_the_first_line(lab, browser):
+    said = "document.getElementById('factor').textContent"
+    lab.pages.share("simulation", {"paused": True})
+    browser.wait(said + " === 'Simulation paused'")
+    lab.pages.share("simulation", {"paused": False})
+    browser.wait(said + " !== 'Simulation paused'")
 
 
 def test_a_motion_is_recorded_and_played(lab, browser):
