@@ -6,11 +6,13 @@ import socket
 import statistics
 import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 import pybullet
 import rospkg
 from labs import Lab
+from PIL import Image as PillowImage
 from sensor_msgs.msg import Image, PointCloud2
 
 import xacro
@@ -30,10 +32,14 @@ CAMERAS = ("head_camera", "left_hand_camera", "right_hand_camera")
 # Camera poses: the whole robot seen from the front left; its hand camera, which looks at the floor.
 OUTSIDE = pose_matrix((2.6, 1.2, 1.6), (0.0, 0.25, np.pi + 0.45)) @ OPTICAL
 CWRU = ("cwru_baxter_sim", "baxter_world.launch")
+BOXES = """<robot name="boxes"><link name="link"><visual><origin xyz="0 0 -0.05"/><geometry><box size="60 60 0.1"/>
+</geometry><material name="floor">{0}</material></visual><visual><origin xyz="0 0 0.5"/><geometry><box size="1 1 1"/>
+</geometry><material name="block">{0}</material></visual></link></robot>"""
 
 
 def measure(report, quick, number):
     pictures(report, 4 if quick else PICTURES, 1 if quick else NAIVE_PICTURES)
+    textures(report, 4 if quick else PICTURES)
     for pace in ("1.0", "0"):
         streams(report, 2.0 if quick else SECONDS, pace)
 
@@ -70,6 +76,32 @@ def pictures(report, count, naive_count):
                    ("vendor meshes, TinyRenderer", statistics.median(theirs)), ratio_most=0.1)
     renderer.close()
     naive.close()
+
+
+def textures(report, count):
+    """A world of two boxes that fill the picture, with a texture and, in turns, in one colour."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "noise.png"
+        pixels = np.random.default_rng(1).integers(0, 255, (1024, 1024, 3), dtype=np.uint8)
+        PillowImage.fromarray(pixels).save(path)
+        cache, drawn = DrawingCache(folder), []
+        for material in ('<texture filename="%s" repeats="20 20"/>' % path, '<color rgba="0.5 0.5 0.5 1"/>'):
+            mirror = Mirror(cache, lambda name: name, print)
+            mirror.set_scene([{"name": "boxes", "urdf": BOXES.format(material), "joints": []}])
+            mirror.set_state(np.array([0, 0, 0, 0, 0, 0, 1.0]))
+            drawn.append((GlRenderer(), mirror, []))
+        pinhole = Pinhole.from_field_of_view(*SIZE, FIELD_RAD, 0.06, 100.0)
+        for step in range(-2, count):
+            for renderer, mirror, spent in drawn:
+                begin = time.process_time()
+                renderer.render(mirror, pinhole, OUTSIDE)
+                if step >= 0:
+                    spent.append(1e3 * (time.process_time() - begin))
+        (_, _, ours), (_, _, plain) = drawn
+        report.add("CPU of a picture of %d x %d, all textured" % SIZE, statistics.median(ours), "ms",
+                   ("in one colour", statistics.median(plain)), ratio_most=1.2)
+        for renderer, _, _ in drawn:
+            renderer.close()
 
 
 class Naive:
