@@ -35,6 +35,8 @@ def find_texture(name, folder):
     folder = Path(folder)
     url = urlparse(name)
     text = unquote(url.path) if url.scheme == "file" else unquote(name)
+    if text.startswith("-"):  # options of a Wavefront material
+        text = text.split()[-1]
     for candidate in dict.fromkeys((text, text.replace("\\", "/"), PureWindowsPath(text).name)):
         for place in (folder, folder.parent / "materials" / "textures"):
             try:

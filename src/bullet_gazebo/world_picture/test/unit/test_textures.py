@@ -10,7 +10,8 @@ from world_picture import drawing, reduction, textures
 @pytest.mark.parametrize(("name", "place"), [
     ("a.png", "meshes"), ("a.png", "materials/textures"), ("../textures/a.png", "textures"),
     ("file:///home/me/a.png", "meshes"), ("C:\\models\\a.png", "materials/textures"), ("a%20b.png", "meshes"),
-    ("sub/a.png", "meshes"), ("/home/me/a.png", "materials/textures")])
+    ("sub/a.png", "meshes"), ("-s 2 2 1 a.png", "meshes"), ("sub\\a.png", "meshes/sub"),
+    ("/home/me/a.png", "materials/textures")])
 def test_a_picture_is_found_where_gazebo_finds_it(tmp_path, name, place):
     (tmp_path / "meshes").mkdir()
     (tmp_path / place).mkdir(parents=True, exist_ok=True)
