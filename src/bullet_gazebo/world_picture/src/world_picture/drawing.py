@@ -24,7 +24,7 @@ PLAIN = 0.01
 _PROCESSOR_S, _WAITING_S = 15, 240.0
 _PROCESS = LimitedProcess(processor_s=_PROCESSOR_S, waiting_s=_WAITING_S)
 # Part of the names of cached files: increase it when the result for the same mesh changes.
-_VERSION = 11
+_VERSION = 12
 # The files with the materials of a Wavefront file.
 _MATERIALS = re.compile(rb"^mtllib[ \t]+(\S.*?)[ \t]*\r?$", re.MULTILINE)
 
@@ -145,12 +145,11 @@ def write_parts(path, folder, textured, part=WHOLE):
     """Write the mesh at ``path`` into ``folder``, in levels of detail: ``parts.json`` and the files that it lists.
     ``textured``: whether all levels have ``uv``, if the file has, or only those with a picture; ``part``: as for
     ``load_scene``."""
-    pieces, folder = read_pieces(path, part), Path(folder)
+    pieces, folder = read_pieces(path, part, textured), Path(folder)
     size = float(np.ptp(np.concatenate([piece.vertices for piece in pieces]), axis=0).max())
     listed = []
     for number, piece in enumerate(pieces):
-        uv = piece.uv if textured or piece.texture else None
-        levels, files = reduction.levels(piece.vertices, piece.faces, size, uv), []
+        levels, files = reduction.levels(piece.vertices, piece.faces, size, piece.uv), []
         for step, level in enumerate(levels):
             files.append(("part%d_%d.npz" % (number, step), level.error))
             arrays = {} if level.uv is None else {"uv": level.uv}

@@ -35,9 +35,10 @@ class Piece(NamedTuple):
     uv: np.ndarray = None
 
 
-def read_pieces(path, part=WHOLE):
+def read_pieces(path, part=WHOLE, textured=False):
     """The list of :class:`Piece` of the mesh file at ``path``, one for each look; ``part``: as for ``load_scene``.
-    Raises :class:`PieceError`, and what ``load_scene`` raises."""
+    ``textured``: whether all pieces have ``uv``, if the file has, or only those with a picture. Raises
+    :class:`PieceError`, and what ``load_scene`` raises."""
     import trimesh
 
     plain = _PLAIN_COLOUR if str(path).lower().endswith(".dae") else None
@@ -50,6 +51,8 @@ def read_pieces(path, part=WHOLE):
             continue
         uv = _uv(mesh)
         texture = "" if uv is None else _texture(mesh)
+        if not texture and not textured:
+            uv = None  # meshes of one colour are one piece
         colour = _factor(mesh) if texture else _colour(mesh) or plain
         look = colour, _emission(mesh, colour, texture), texture, uv is not None
         vertices = trimesh.transform_points(mesh.vertices, transform)

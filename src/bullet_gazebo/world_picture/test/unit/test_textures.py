@@ -5,6 +5,7 @@ import pytest
 from PIL import Image
 
 from world_picture import drawing, reduction, textures
+from world_picture.pieces import read_pieces
 
 
 @pytest.mark.parametrize(("name", "place"), [
@@ -38,6 +39,16 @@ def test_a_large_picture_is_reduced_once(tmp_path):
     with Image.open(cache.texture(path.with_suffix(".png")).path) as small:
         assert small.mode == "RGBA" and small.getpixel((0, 0)) == (0, 0, 255, 10)
     assert cache.texture(path) == found
+
+
+def test_meshes_of_one_colour_are_one_piece_whether_they_have_places_in_a_picture_or_not(tmp_path):
+    path = tmp_path / "two.obj"
+    (tmp_path / "two.mtl").write_text("newmtl a\nKd 1 0 0\nnewmtl b\nKd 1 0 0\n")
+    path.write_text("mtllib two.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+                    "usemtl b\nv 0 0 1\nv 1 0 1\nv 0 1 1\nf 4 5 6\n")
+    piece, = read_pieces(path)
+    assert len(piece.faces) == 2 and piece.uv is None
+    assert sorted(piece.uv is None for piece in read_pieces(path, textured=True)) == [False, True]
 
 
 def test_what_is_no_picture_is_named(tmp_path, monkeypatch):
