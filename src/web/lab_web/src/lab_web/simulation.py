@@ -123,5 +123,7 @@ class Simulation:
 def _called(name, service, *arguments):
     try:
         return call(name, service, *arguments, timeout_s=_TIMEOUT_S)
-    except (GazeboInterfaceError, rosgraph.MasterException, OSError) as error:
+    except (GazeboInterfaceError, rosgraph.MasterException) as error:
         raise RobotError(str(error)) from None
+    except OSError as error:
+        raise RobotError("the ROS master does not answer (%s): start the lab again" % error.strerror) from None
