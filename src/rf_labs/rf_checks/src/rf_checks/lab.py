@@ -358,6 +358,7 @@ class Lab:
                 if self.run_clock is not None:
                     self.run_clock.advance(RECORD_S)
                 record["rested"] = self.watch.wait_until_rest()
+                record["helpers_s"] = self.watch.helpers.used_s
                 self.on_record(record)
                 left_s = came_at + (_SHORTEST_RECORD_S if self.is_hurried else RECORD_S) - time.monotonic()
                 if left_s > 0.0:

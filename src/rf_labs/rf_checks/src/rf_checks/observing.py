@@ -11,6 +11,9 @@ from rf_checks.recording import RECORD_S
 #: A program that is almost never idle for this much processor time counts as an endless computation [s]; "almost never"
 #: is this share of the records.
 BUSY_S, BUSY_SHARE = 8.0, 0.3
+#: Processor time [s] that the lab's nodes may use in a run, and what is added for each simulated second. The world
+#: waits for them: a program that only waits for requests without end would hold it up to the wall limit.
+HELPERS_S, HELPERS_PER_S = 60.0, 5.0
 # After a program's end the robot is observed until it has rested for QUIET_S, at most SETTLE_S [sim s].
 SETTLE_S, QUIET_S, STILL_RAD = 1.5, 0.3, 1e-4
 # Period of expensive checks, in records.
@@ -86,6 +89,9 @@ class Observer:
             if np.mean([past["rested"] for past in self.records[self._busy_since:]]) < BUSY_SHARE:
                 return "busy"
             self._busy_since, self._busy_cpu_s = count, cpu_s
+        helpers_s = record["helpers_s"] - self.records[0]["helpers_s"]
+        if helpers_s > HELPERS_S + HELPERS_PER_S * count * RECORD_S:
+            return "requests"
         if count * RECORD_S > self._call.limit_s:
             return "sim time"
         return "satisfied" if self._is_satisfied(self.student.output) else ""

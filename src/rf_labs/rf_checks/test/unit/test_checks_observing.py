@@ -17,8 +17,9 @@ def student(**fields):
     return SimpleNamespace(**{**usual, **fields})
 
 
-def record(k, q=0.0, commands=0, rested=True):
-    return {"t": round(100.0 + 0.01 * k, 4), "q": [q], "counts": {"left": commands * k, "right": 0}, "rested": rested}
+def record(k, q=0.0, commands=0, rested=True, helpers_s=0.0):
+    return {"t": round(100.0 + 0.01 * k, 4), "q": [q], "counts": {"left": commands * k, "right": 0}, "rested": rested,
+            "helpers_s": 7.0 + helpers_s * k}
 
 
 @pytest.fixture
@@ -74,6 +75,8 @@ def test_the_world_stands_still_from_the_end_of_a_run_on():
     ({"excess": lambda: "processes"}, {}, "processes"),
     ({"excess": lambda: "threads"}, {}, "threads"),
     ({"excess": lambda: "memory"}, {}, "memory"),
+    ({}, {"make_record": lambda k: record(k, helpers_s=0.4)}, "requests"),
+    ({}, {"make_record": lambda k: record(k, helpers_s=0.04)}, "sim time"),
     ({}, {"is_meddled": lambda: True}, "meddled"),
     ({"output": "yes"}, {"is_satisfied": lambda output: output == "yes"}, "satisfied"),
     ({}, {"make_record": lambda k: record(k, commands=11)}, "flood"),
