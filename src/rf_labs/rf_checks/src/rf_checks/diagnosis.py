@@ -138,6 +138,9 @@ def behaviour(run, sides, limit_s):
         return Fault("processes", "the program started more and more processes and was stopped", 0.0)
     if run.ended == "threads":
         return Fault("threads", "the program started more and more threads and was stopped", 0.0)
+    if run.ended == "sockets":
+        return Fault("sockets", "the program opened more and more connections and was stopped: make publishers, "
+                     "subscribers and service proxies once, before the loop", 0.0)
     if run.ended == "requests":
         return Fault("requests", "the program asked the lab's nodes, as the IK service, for more than a minute of "
                      "computing and was stopped: ask for the poses that are needed, each once", 0.0)
@@ -253,6 +256,6 @@ def diagnose(run, exercise, call, robot, share):
 def behaviour_that_hides(run, sides, limit_s):
     """Faults of behaviour that make every measurement meaningless: they come before the exercise's own."""
     fault = behaviour(run, sides, limit_s)
-    first = ("output", "processes", "threads", "requests", "memory", "flood", "busy", "crashed", "not_enabled",
-             "wrong_arm", "repeated_names", "lengths", "degrees")
+    first = ("output", "processes", "threads", "sockets", "requests", "memory", "flood", "busy", "crashed",
+             "not_enabled", "wrong_arm", "repeated_names", "lengths", "degrees")
     return fault if fault and fault.key in first else None

@@ -31,6 +31,10 @@ FILE_BYTES = 20 << 20
 PROCESSES = 100
 #: Of all processes together: the watch reads the state of each at every record.
 THREADS = 1000
+# Of all processes together, one that several share counted once: the kernel keeps megabytes for what waits in each,
+# which no process's memory shows. A ROS program has some dozens.
+SOCKETS = 400
+FILES = 1024  # open in a process
 #: A program that writes more than this is stopped; the first and the last KEPT_BYTES are kept.
 OUTPUT_BYTES = 4 << 20
 KEPT_BYTES = 200_000
@@ -114,7 +118,8 @@ class Student:
             folder = _STARTUP_FOLDER if walls else startup.folder
             own.update(startup.environment,
                        PYTHONPATH=startup.python_path(folder, environment.get("PYTHONPATH", "")))
-        limits = ["prlimit", "--cpu=%d" % CPU_S, "--as=%d" % ADDRESS_BYTES, "--fsize=%d" % FILE_BYTES, "--core=0", "--"]
+        limits = ["prlimit", "--cpu=%d" % CPU_S, "--as=%d" % ADDRESS_BYTES, "--fsize=%d" % FILE_BYTES, "--core=0",
+                  "--nofile=%d" % FILES, "--"]
         return subprocess.Popen([*enter, *limits, python(), "%s/%s" % (home, program.name), *arguments], env=own,
                                 cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                 stderr=subprocess.PIPE, start_new_session=True,
@@ -152,7 +157,7 @@ class Student:
         return children_of(roots)
 
     def excess(self):
-        """The limit that the program exceeds: "output", "processes", "threads", "memory", or ""."""
+        """The limit that the program exceeds: "output", "processes", "threads", "sockets", "memory", or ""."""
         if self.wrote_too_much:
             return "output"
         family = self.family()
@@ -160,6 +165,8 @@ class Student:
             return "processes"
         if _count_threads(family) > THREADS:
             return "threads"
+        if _count_sockets(family) > SOCKETS:
+            return "sockets"
         return "memory" if _memory_bytes(family) > MEMORY_BYTES else ""
 
     def dump(self):
@@ -210,6 +217,16 @@ def _count_threads(pids):
             # A link for each thread, besides the two of every folder: listing thousands would take long.
             count += os.stat("/proc/%d/task" % pid).st_nlink - 2
     return count
+
+
+def _count_sockets(pids):
+    found = set()
+    for pid in pids:
+        with contextlib.suppress(OSError), os.scandir("/proc/%d/fd" % pid) as files:
+            for file in files:
+                with contextlib.suppress(OSError):
+                    found.add(os.readlink(file.path))
+    return sum(name.startswith("socket:") for name in found)
 
 
 def _memory_bytes(pids):

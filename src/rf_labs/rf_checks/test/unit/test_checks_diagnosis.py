@@ -89,6 +89,7 @@ def test_a_recording_knows_who_commanded_the_arms():
     (run(records(), ended="output"), "output", ["megabytes"]),
     (run(records(), ended="processes"), "processes", []),
     (run(records(), ended="threads"), "threads", []),
+    (run(records(), ended="sockets"), "sockets", ["once, before the loop"]),
     (run(records(), ended="requests"), "requests", ["IK service"]),
     (run(records(), ended="memory"), "memory", ["2 GB"]),
     (run(records(left=1.0, commands=20)), "flood", ["rospy.Rate"]),

@@ -74,6 +74,7 @@ def test_the_world_stands_still_from_the_end_of_a_run_on():
     ({"excess": lambda: "output"}, {}, "output"),
     ({"excess": lambda: "processes"}, {}, "processes"),
     ({"excess": lambda: "threads"}, {}, "threads"),
+    ({"excess": lambda: "sockets"}, {}, "sockets"),
     ({"excess": lambda: "memory"}, {}, "memory"),
     ({}, {"make_record": lambda k: record(k, helpers_s=0.4)}, "requests"),
     ({}, {"make_record": lambda k: record(k, helpers_s=0.04)}, "sim time"),

@@ -153,6 +153,16 @@ def test_threads_have_a_limit(start, monkeypatch):
     wait_until(lambda: student.excess() == "threads", "the eleventh thread")
 
 
+@pytest.mark.parametrize(("pairs", "excess"), [(4, ""), (6, "sockets")])
+def test_sockets_have_a_limit_and_those_that_processes_share_count_once(start, monkeypatch, pairs, excess):
+    monkeypatch.setattr(sandbox, "SOCKETS", 10)
+    student = start("import os, resource, signal, socket\nheld = [socket.socketpair() for _ in range(%d)]\n"
+                    "for _ in range(3):\n    if os.fork() == 0: signal.pause()\n"
+                    "print(resource.getrlimit(resource.RLIMIT_NOFILE)[1], flush=True)\nsignal.pause()\n" % pairs)
+    wait_until(lambda: student.output, "its first line")
+    assert (student.output.strip(), student.excess()) == ("1024", excess)
+
+
 def test_a_program_that_loops_says_where_it_is(start):
     student = start("print('on', flush=True)\nn = 0\nwhile True:\n    n += 1\n")
     wait_until(lambda: student.output, "its first line")
