@@ -124,7 +124,7 @@ class Judge:
         texts = submission.texts(program)
         fault = diagnosis.check_syntax(texts[program.name], program.name)
         results, not_graded = [], ""
-        not_run = (Criterion("not run", 0.0, 100.0, "for the fault below"),)
+        not_run = (Criterion("not run", 0.0, 100.0, "because of the fault"),)
         for call in calls:
             if fault is not None:
                 results.append(RunResult(call.arguments, not_run, fault))
@@ -142,7 +142,7 @@ class Judge:
             # Such a fault repeats and costs time: the other runs count as this one.
             if found and (found.cap < 0.9 or (found.key in REPEATED and share < 0.5)):
                 fault = found
-                not_run = (Criterion("as the run before", share, 100.0, "not run, for the fault below"),)
+                not_run = (Criterion("as the run before", share, 100.0, "not run, because of the fault"),)
         walls = "bubblewrap" if self.has_walls else "none: trusted"
         return Result(exercise, str(program), seed, tuple(results), walls, time.monotonic() - began, not_graded,
                       tuple(Library(_workspace()).notes(texts)), self._which)
