@@ -21,6 +21,12 @@ MOST_FRAGMENTS = 100000
 MOST_FRAGMENTS_SENT = 10000
 #: Operations in one frame. Programs send one; a text of 64 MB can hold millions, which take gigabytes.
 MOST_OPERATIONS = 10000
+#: Lists and objects in one frame: an empty one is a byte or two of the frame, and a hundred times that in memory. A
+#: marker with a point for each of a million places has as many.
+MOST_CONTAINERS = 1000000
+# Values in a binary frame that may have more of them: they are counted one by one.
+_MOST_COUNTED = 2000000
+_CONTAINER_HEADS = bytes(range(0x80, 0xC0))
 #: What a fragment takes beside its data [bytes].
 _FRAGMENT_BYTES = 200
 #: The tags that cbor2 itself reads, of which no ROS message needs one. Some take hours for a small frame (fractions and
@@ -50,6 +56,8 @@ def read_frame(frame):
 
 
 def _read_json(text):
+    if text.count("[") + text.count("{") > MOST_CONTAINERS:
+        raise FrameError("a frame with more than %d lists and objects" % MOST_CONTAINERS)
     found, at = [], 0
     try:
         while at < len(text):
@@ -80,6 +88,7 @@ _REFUSED_TAGS = {number: _refused_tag(number) for number in _CBOR2_TAGS}
 
 
 def _read_cbor(data):
+    _limit_containers(data)
     try:
         return _operation(cbor2.loads(data, tag_hook=lambda tag, _immutable: from_tag(tag),
                                       semantic_decoders=_REFUSED_TAGS))
@@ -90,6 +99,26 @@ def _read_cbor(data):
         if isinstance(error.__cause__, BridgeError):
             error = error.__cause__
         raise FrameError("a binary frame of %d bytes is no CBOR object: %s" % (len(data), error)) from None
+
+
+def _limit_containers(data):
+    """Raise FrameError where CBOR ``data`` has too many lists and objects; else leave everything to the decoder."""
+    if len(data) - len(data.translate(None, _CONTAINER_HEADS)) <= MOST_CONTAINERS:
+        return  # so many bytes at most begin one
+    at = values = containers = 0
+    while at < len(data):
+        kind, extra = data[at] >> 5, data[at] & 31
+        at += 1
+        size = 1 << (extra - 24) if 24 <= extra <= 27 else 0
+        number = int.from_bytes(data[at:at + size], "big") if size else extra
+        at += size
+        values += 1
+        containers += kind in (4, 5)
+        if kind in (2, 3) and extra < 28:
+            at += number
+        if containers > MOST_CONTAINERS or values > _MOST_COUNTED:
+            raise FrameError("a frame with more than %d lists and objects, or %d values"
+                             % (MOST_CONTAINERS, _MOST_COUNTED))
 
 
 def _operation(value):

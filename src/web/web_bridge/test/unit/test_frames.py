@@ -85,6 +85,29 @@ def test_a_picture_of_many_chunks_takes_no_longer():
     assert time.process_time() - begin < 3.0
 
 
+@pytest.mark.parametrize("encode", [json.dumps, cbor2.dumps], ids=["json", "cbor"])
+@pytest.mark.parametrize("thing", [{}, []], ids=["objects", "lists"])
+def test_lists_and_objects_in_a_frame_have_a_limit(monkeypatch, encode, thing):
+    monkeypatch.setattr(frames, "MOST_CONTAINERS", 1000)
+    assert read_frame(encode({"a": [thing] * 998}))
+    with pytest.raises(FrameError, match="more than 1000 lists and objects"):
+        read_frame(encode({"a": [thing] * 999}))
+
+
+@pytest.mark.parametrize("size", [10, 200, 60000, 70000])
+def test_only_lists_and_objects_of_cbor_count_not_bytes_like_theirs(monkeypatch, size):
+    monkeypatch.setattr(frames, "MOST_CONTAINERS", 6)
+    found = {"data": b"\xa0" * size, "name": "\u0080" * size, "n": [2 ** 60, -2 ** 20, 200.5, None],
+             "o": {"p": []}}
+    assert read_frame(cbor2.dumps(found)) == [found]
+    monkeypatch.setattr(frames, "MOST_CONTAINERS", 3)
+    with pytest.raises(FrameError, match="more than 3 lists"):
+        read_frame(cbor2.dumps(found))
+    monkeypatch.setattr(frames, "_MOST_COUNTED", 12)
+    with pytest.raises(FrameError, match="or 12 values"):
+        read_frame(cbor2.dumps({"data": b"\xa0" * size, "n": list(range(20))}))
+
+
 def test_fragments_are_put_together_in_any_order():
     fragments = Fragments(lambda: 0.0, 10.0)
     pieces = [json.loads(piece) for piece in split("0123456789", 3)]
