@@ -198,6 +198,7 @@ class DiffDrive(_Wheels):
     """
 
     torque_tag = "wheelTorque"
+    named_after_model = True
 
     def sides(self):
         names = [self.joint("leftJoint", "left_joint")], [self.joint("rightJoint", "right_joint")]

@@ -34,6 +34,9 @@ class ModelPlugin:
     #: Whether a model is not spawned when this plugin refuses it. If False, as for sensors, the plugin is left out,
     #: with a warning.
     required = True
+    #: Whether its names begin with the model's in a world file where it has no ``robotNamespace``, as Gazebo's drive by
+    #: two wheels has it. A spawned model's begin with the namespace that it was spawned with.
+    named_after_model = False
 
     @classmethod
     def spawn_options(cls, robot, element):

@@ -290,6 +290,7 @@ class JointStatePublisher(PacedSensor):
 
     message_class = JointState
     default_topic = "joint_states"
+    named_after_model = True
 
     def __init__(self, context):
         super().__init__(context)

@@ -6,6 +6,7 @@ bodies.
 """
 import gc
 import itertools
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -133,12 +134,12 @@ class Spawner:
     def prepare_robot(self, name, xml, robot, namespace, parameters, drawing=None):
         """Any thread but the loop's: the same for a ``urdf_model.Robot`` that has been read from ``xml``.
 
-        ``drawing``: URDF text for viewers where there is one already.
+        ``namespace``: None for a model of a world file; ``drawing``: URDF text for viewers where there is one already.
         """
         self._check_name(name)
         try:
             start = urdf_extras.start_configuration(robot)
-            plugins, sensors, options = self._plugins(robot, namespace)
+            plugins, sensors, options = self._plugins(name, robot, namespace)
         except (urdf_extras.ExtrasError, PluginError) as error:
             raise SpawnRefused(str(error)) from error
         for warning in robot.warnings:
@@ -203,7 +204,7 @@ class Spawner:
         """Loop thread, before it runs: make the models of a world (``sdf_model.SdfModel``); logs those that fail."""
         for found in models:
             try:
-                prepared = self.prepare_robot(found.name, "", found.robot, "", dict)
+                prepared = self.prepare_robot(found.name, "", found.robot, None, dict)
                 self.spawn(prepared, Pose.from_matrix(found.pose))
             except SURVIVED as error:
                 why = str(error) if isinstance(error, SpawnRefused) else described(error)
@@ -276,7 +277,7 @@ class Spawner:
         self._screens.setdefault(prepared.name, []).append((entry, picture))
         return picture
 
-    def _plugins(self, robot, spawn_namespace):
+    def _plugins(self, name, robot, spawn_namespace):
         found, sensors, options = [], [], {}
         for element in (*urdf_extras.plugins(robot), *urdf_extras.sensor_plugins(robot, self._log.warn)):
             filename = element.get("filename") or ""
@@ -285,7 +286,10 @@ class Spawner:
                 self._log.warn("model plugin '%s' is not known here and is left out; known plugins: %s"
                                % (filename, ", ".join(self._library.plugins.known)))
                 continue
-            namespace = urdf_extras.namespace_of(element, spawn_namespace)
+            own = ""
+            if spawn_namespace is None and plugin_class.named_after_model and re.fullmatch(r"[A-Za-z]\w*", name):
+                own = name
+            namespace = urdf_extras.namespace_of(element, spawn_namespace or own)
             if issubclass(plugin_class, DrawnSensor):
                 try:
                     sensors.append(_drawn(robot, element, namespace))

@@ -3,12 +3,15 @@
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from gazebo_ros import urdf_extras, world_file
-from gazebo_ros.spawning import is_floor
+from gazebo_ros.model_plugin import ModelPlugin
+from gazebo_ros.spawning import Spawner, is_floor
 from gazebo_ros.urdf_extras import ExtrasError
+from loop_ros.testing import FakeLog
 from model_files.resources import model_folders
 from sdf_model import ModelFolders
 from urdf_model import parse_urdf
@@ -36,6 +39,29 @@ def test_a_plugin_without_namespace_gets_the_one_it_is_spawned_with():
     assert urdf_extras.namespace_of(none, "lab//one/") == "/lab/one"
     assert urdf_extras.namespace_of(none, "/") == ""
     assert urdf_extras.namespace_of(none, "") == ""
+
+
+class Plain(ModelPlugin):
+    pass
+
+
+class NamedAfterModel(ModelPlugin):
+    named_after_model = True
+
+
+@pytest.mark.parametrize(("plugin_class", "model", "spawned_in", "own", "expected"), [
+    (NamedAfterModel, "pioneer2dx", None, None, "/pioneer2dx"), (NamedAfterModel, "pioneer2dx", "", None, ""),
+    (NamedAfterModel, "pioneer2dx", "/lab", None, "/lab"), (NamedAfterModel, "pioneer2dx", None, "/", ""),
+    (NamedAfterModel, "pioneer2dx", None, "robot", "/robot"), (NamedAfterModel, "my robot", None, None, ""),
+    (Plain, "pioneer2dx", None, None, "")])
+def test_in_a_world_file_some_plugins_are_named_after_their_model(plugin_class, model, spawned_in, own, expected):
+    element = "" if own is None else "<robotNamespace>%s</robotNamespace>" % own
+    robot = parse_urdf('<robot name="r"><link name="l"/><gazebo><plugin name="p" filename="libp.so">%s</plugin>'
+                       "</gazebo></robot>" % element)
+    plugins = SimpleNamespace(find=lambda filename: plugin_class)
+    spawner = SimpleNamespace(_library=SimpleNamespace(plugins=plugins), _log=FakeLog())
+    (found,), _, _ = Spawner._plugins(spawner, model, robot, spawned_in)
+    assert (found[0], found[2]) == (plugin_class, expected)
 
 
 def test_a_start_configuration_comes_back_as_it_was_given():
