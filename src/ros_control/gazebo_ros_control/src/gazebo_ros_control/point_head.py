@@ -8,9 +8,9 @@ from rospy import Duration, Time
 from tf2_msgs.msg import TFMessage
 from tf2_py import BufferCore, TransformException
 
-from controller_manager import POSITION, VELOCITY, Controller, ControllerError
+from controller_manager import POSITION, VELOCITY, ControllerError
 from gazebo_ros_control.cascade import motion
-from loop_ros.action_server import ActionServer
+from gazebo_ros_control.goal_controller import GoalController
 from sim_time.pace import Pace
 from urdf_model import UrdfError
 from urdf_model.transforms import inverse, matrix_from_quaternion, rigid
@@ -20,6 +20,8 @@ FEEDBACK_HZ = 50.0
 ARRIVED_RAD, LATE_S = 0.02, 1.0
 # Of joints whose description has no limit [rad/s].
 SPEED_RAD_S = 1.0
+# Of a target's coordinates [m] and the velocity [rad/s]; squares of larger numbers may be infinite.
+LARGEST = 1e9
 # Transforms that are kept, and messages with transforms between two ticks.
 TF_CACHE_S, TF_DEPTH = 10.0, 100
 
@@ -90,14 +92,14 @@ class TransformSource:
             topic.close()
 
 
-class PointHead(Controller):
+class PointHead(GoalController):
     """A goal starts it. Its motion is a cubic from where the joints are: at least ``min_duration`` long, no faster than
     ``max_velocity`` or the joints' limits. Parameters: ``pan_joint``, ``tilt_joint``. As on Fetch, the goal's
     pointing frame and axis do not count: x of the tilted link points at the target.
     """
 
     def __init__(self, name, hardware, context, crew):
-        super().__init__(name, hardware, context)
+        super().__init__(name, hardware, context, crew)
         joints = context.param("pan_joint", "head_pan_joint"), context.param("tilt_joint", "head_tilt_joint")
         self._index = self.claim(POSITION, joints)
         try:
@@ -110,30 +112,20 @@ class PointHead(Controller):
         self._upper = np.array([math.inf if limit.upper is None else limit.upper for limit in limits])
         self._speed = np.minimum(hardware.velocity_limit[self._index], np.where(
             np.isfinite(hardware.velocity_limit[self._index]), math.inf, SPEED_RAD_S))
-        self._crew, self._runs, self._time_s = crew, False, 0.0
-        self._goal = self._waiting = self._tf = None
+        self._waiting = self._tf = None
         self._asked_s = 0.0
         self._from = self._to = np.zeros(2)
         self._begin_s, self._length_s, self._point = 0.0, 0.0, np.zeros(3)
         self._pace = Pace(FEEDBACK_HZ)
-        self._server = ActionServer(context, "point_head", PointHeadAction, self._on_goal, self._on_cancel)
-
-    @property
-    def busy(self):
-        return self._goal is not None
+        self.serve("point_head", PointHeadAction)
 
     def starting(self, time_s):
-        self._runs = True
+        super().starting(time_s)
         self._from = self._to = self.hardware.position[self._index].copy()
         self._length_s = 0.0
 
-    def stopping(self, time_s):
-        self._runs = False
-        self._end("the controller was stopped")
-
     def idle(self, time_s):
-        self._time_s = time_s
-        self._server.spin(time_s)
+        super().idle(time_s)
         if self._waiting is not None:
             self._begin()
 
@@ -156,8 +148,9 @@ class PointHead(Controller):
         wanted = handle.goal
         point = wanted.target.point
         numbers = point.x, point.y, point.z, wanted.max_velocity
-        if not all(map(math.isfinite, numbers)):
-            handle.reject(text="the target's point and max_velocity are %r, %r, %r and %r: not all finite" % numbers)
+        if not all(abs(number) < LARGEST for number in numbers):
+            handle.reject(text="the target's point and max_velocity are %r, %r, %r and %r; each must be below %g"
+                               % (*numbers, LARGEST))
             return
         self._forget_waiting("another goal took its place")
         self._waiting, self._asked_s = handle, self._time_s
@@ -187,7 +180,7 @@ class PointHead(Controller):
             return
         self._waiting = None
         self._stop_listening()
-        refusal = None if self._runs else self._crew.start(self)
+        refusal = self._start()
         if refusal is not None:
             handle.reject(text=refusal)
             return
@@ -236,11 +229,6 @@ class PointHead(Controller):
 
     def _error(self):
         return self._geometry.error(self._point, self._positions())
-
-    def _end(self, why):
-        handle, self._goal = self._goal, None
-        if handle is not None:
-            handle.cancel(text=why)
 
     def _forget_waiting(self, why):
         handle, self._waiting = self._waiting, None

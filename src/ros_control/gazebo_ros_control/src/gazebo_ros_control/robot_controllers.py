@@ -11,8 +11,8 @@ from controller_manager import EFFORT, POSITION, VELOCITY, ControlError, Control
 from controller_manager.pid import Gains, Pid
 from gazebo_ros.model_plugin import ModelPlugin
 from gazebo_ros_control.cascade import CarriedChain, CascadeHardware
+from gazebo_ros_control.goal_controller import GoalController
 from gazebo_ros_control.point_head import PointHead
-from loop_ros.action_server import ActionServer
 from ros_controllers.diff_drive import DiffDriveController
 from ros_controllers.joint_state import JointStateController
 from ros_controllers.joint_trajectory_controller import JointTrajectoryController
@@ -70,7 +70,7 @@ class _Follower(JointTrajectoryController):
         self.hardware.command[POSITION][self._index], self.hardware.command[VELOCITY][self._index] = self._next[:2]
 
 
-class _Gripper(Controller):
+class _Gripper(GoalController):
     """robot_controllers/ParallelGripperController: two fingers with a common effort, held in the middle.
 
     Parameters: ``l_gripper_joint``, ``r_gripper_joint``; ``max_position`` (0.1 m), ``max_effort`` (10 N);
@@ -78,21 +78,16 @@ class _Gripper(Controller):
     """
 
     def __init__(self, name, hardware, context, crew):
-        super().__init__(name, hardware, context)
+        super().__init__(name, hardware, context, crew)
         self._index = self.claim(POSITION, [context.param(side + "_gripper_joint", side + "_gripper_finger_joint")
                                             for side in ("l", "r")])
         self._most_m, self._most_n = context.number("max_position", 0.1), context.number("max_effort", 10.0)
         centering = context.param("centering") is not None
         self._centering = Pid(Gains.from_params(context.entry, ["centering"])) if centering else None
-        self._crew, self._goal, self._runs = crew, None, False
         self._target, self._effort = self._most_m, self._most_n
-        self._time_s, self._last, self._moved_s = 0.0, 0.0, 0.0
+        self._last, self._moved_s = 0.0, 0.0
         self._pace = Pace(FEEDBACK_HZ)
-        self._server = ActionServer(context, "gripper_action", GripperCommandAction, self._on_goal, self._on_cancel)
-
-    @property
-    def busy(self):
-        return self._goal is not None
+        self.serve("gripper_action", GripperCommandAction)
 
     @property
     def _opening(self):
@@ -100,15 +95,8 @@ class _Gripper(Controller):
         return float(self.hardware.position[self._index].sum())
 
     def starting(self, time_s):
-        self._runs, self._target, self._effort = True, self._opening, self._most_n
-
-    def stopping(self, time_s):
-        self._runs = False
-        self._end("the controller was stopped")
-
-    def idle(self, time_s):
-        self._time_s = time_s
-        self._server.spin(time_s)
+        super().starting(time_s)
+        self._target, self._effort = self._opening, self._most_n
 
     def update(self, time_s, dt):
         self.idle(time_s)
@@ -126,8 +114,9 @@ class _Gripper(Controller):
 
     def _on_goal(self, handle):
         command = handle.goal.command
-        refusal = None if self._runs else self._crew.start(self)
-        if not (math.isfinite(command.position) and math.isfinite(command.max_effort)):
+        if math.isfinite(command.position) and math.isfinite(command.max_effort):
+            refusal = self._start()
+        else:
             refusal = "position %r and max_effort %r must be finite" % (command.position, command.max_effort)
         if refusal is not None:
             handle.reject(text=refusal)
@@ -143,11 +132,6 @@ class _Gripper(Controller):
     def _on_cancel(self, handle):
         if handle is self._goal:
             self._end("")
-
-    def _end(self, why):
-        handle, self._goal = self._goal, None
-        if handle is not None:
-            handle.cancel(text=why)
 
     def _watch(self, time_s):
         opening, effort = self._opening, float(self.hardware.effort[self._index].sum())

@@ -309,9 +309,17 @@ def test_a_frame_that_nobody_knows_and_a_point_that_is_none_are_rejected(robot):
     robot.run(1.2)
     assert robot.result(POINT, goal)[0] == GoalStatus.REJECTED
     assert "frame 'nowhere' is no link of the robot" in robot.ros.publishers[POINT + "/result"].messages[-1].status.text
-    goal = robot.look("base_link", (math.nan, 0.0, 0.0))
+    for x in (math.nan, -math.inf, 1e308):
+        goal = robot.look("base_link", (x, 0.0, 0.0))
+        robot.run(0.01)
+        assert robot.result(POINT, goal)[0] == GoalStatus.REJECTED
+
+
+def test_a_gripper_goal_that_is_no_number_is_rejected_and_starts_nothing(robot):
+    goal = robot.grip(math.nan, 1.0)
     robot.run(0.01)
-    assert robot.result(POINT, goal)[0] == GoalStatus.REJECTED
+    assert robot.result(GRIPPER, goal)[0] == GoalStatus.REJECTED
+    assert not any(controller.name in GRIPPER for controller in robot.plugin._crew._running)
 
 
 def test_the_head_stops_at_its_limits_keeps_to_the_speed_and_says_how_far_it_is_off(robot):
