@@ -35,11 +35,14 @@ class Pace:
         return time_s >= self._next_s - _TOLERANCE_S or time_s < self._last_s
 
     def took(self, time_s):
-        """Note that the work was done at ``time_s`` [s]. A late caller does not catch up."""
-        following = self._next_s + self.period_s
-        latest = time_s + self.period_s
-        self._next_s = following if time_s < following <= latest + _TOLERANCE_S else latest
-        self._last_s = time_s
+        """Note that the work was done at ``time_s`` [s]. A late caller does not catch up: periods that have passed are
+        left out, and the others begin when they would have begun."""
+        begin = self._next_s
+        if math.isinf(begin) or time_s < max(self._last_s, begin - _TOLERANCE_S):
+            begin = time_s
+        if self.period_s:
+            begin += self.period_s * (math.floor((time_s - begin + _TOLERANCE_S) / self.period_s) + 1)
+        self._last_s, self._next_s = time_s, begin
 
     def take(self, time_s):
         """Whether it is due at ``time_s`` [s]; if so, it counts as done."""

@@ -30,6 +30,15 @@ def test_who_was_late_does_not_catch_up():
     assert taken(pace, [0.0, 5.0, 5.05, 5.1]) == [0.0, 5.0, 5.1]
 
 
+def test_who_was_late_loses_no_more_than_the_periods_that_have_passed():
+    # A camera of 60 Hz that sees the world at each 0.01 s, and was busy for 0.04 s once.
+    times = [round(0.01 * k, 2) for k in range(30)]
+    del times[6:9]
+    late = taken(Pace(60.0), times)
+    assert late[:7] == [0.0, 0.02, 0.04, 0.05, 0.09, 0.1, 0.12]
+    assert len(late) == len(taken(Pace(60.0), [0.01 * k for k in range(30)])) - 1
+
+
 def test_time_that_goes_back_restarts():
     pace = Pace(10.0)
     assert taken(pace, [5.0, 5.05, 0.02, 0.05, 0.12]) == [5.0, 0.02, 0.12]
