@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sensor_renderer.sides import Sides, indexed
+from sensor_renderer.sides import indexed
 from world_picture.reduction import reduced
+from world_picture.results import ResultCache
 
 # How far the drawn surface of a link may be from its original, in pixels of the picture: a whole one in a live picture
 # of colour, where the half of it would cost a tenth more. In pictures of depth, whose values are compared with
@@ -20,6 +21,8 @@ _MOST_IN_DEPTH_M = 0.001
 # be its shadow map. In pictures that may take their time, how far what casts shadows may be from the original.
 _CASTER_SHARE, _CASTER_LEAST = 0.2, 60
 _CASTER_M = 0.003
+# Part of the names of cached results: increase it when what casts a shadow, or shows its back, changes for the same mesh.
+_VERSION = 1
 
 
 @dataclass
@@ -68,6 +71,7 @@ class Links:
         self._sides = sides
         self._live = live
         self._programs = programs
+        self._results = ResultCache()
         self._links = {}
         self._links_of = weakref.WeakKeyDictionary()
 
@@ -150,7 +154,7 @@ class Links:
         rows = _rows(*zip(*plain, strict=True))
         program = self._programs.mesh if link.is_mesh else self._programs.solid
         colour = self._vertex_array(program, rows, "3f 3f 4f", "position", "normal", "colour",
-                                    backs=self._backs(rows, link, Sides.from_behind) if link.is_mesh else ())
+                                    backs=self._backs(rows, link, "from_behind") if link.is_mesh else ())
         return Arrays(colour, depth, len(rows), textured)
 
     def _textured(self, levels):
@@ -164,19 +168,19 @@ class Links:
 
     def _backs(self, rows, link, which):
         """The corners of the triangles of ``link`` that show their backs, in the order that makes these fronts.
-        ``which``: the method of :class:`sensor_renderer.sides.Sides` that finds them."""
+        ``which``: the name of the method of :class:`sensor_renderer.sides.Sides` that finds them."""
         if self._sides is None:
             return ()
-        behind = which(self._sides, rows[:, :3], link.centre, link.radius)
+        # It takes up to a tenth of a second, and a camera waits.
+        looked_at = rows[:, :3], link.centre, link.radius
+        behind = self._results.array("%s-%d" % (which, _VERSION), looked_at,
+                                     lambda: getattr(self._sides, which)(*looked_at))
         return np.arange(len(rows)).reshape(-1, 3)[behind, ::-1].ravel()
 
     def _caster_of(self, rows, link):
-        corners = rows[:, :3].astype(float)
-        faces = np.arange(len(rows)).reshape(-1, 3)
-        vertices, faces = reduced(corners, faces, max(_CASTER_LEAST, round(_CASTER_SHARE * len(faces))))
-        rows = vertices[faces].reshape(-1, 3).astype(np.float32)
+        rows = self._results.array("caster-%d" % _VERSION, (rows[:, :3],), lambda: _thinned(rows))
         return self._vertex_array(self._programs.shadow, rows, "3f", "position",
-                                  backs=self._backs(rows, link, Sides.plainly_from_behind))
+                                  backs=self._backs(rows, link, "plainly_from_behind"))
 
     def _vertex_array(self, program, rows, layout, *names, backs=()):
         """Of the corners ``rows``, and after them those numbered ``backs`` again. The GPU processes shared vertices
@@ -186,6 +190,13 @@ class Links:
         context = self._context
         return context.vertex_array(program, [(context.buffer(unique.tobytes()), layout, *names)],
                                     context.buffer(index.astype(np.int32).tobytes()))
+
+
+def _thinned(rows):
+    """The corners (3 m, 3) of the triangles that cast the shadow of a mesh."""
+    faces = np.arange(len(rows)).reshape(-1, 3)
+    vertices, faces = reduced(rows[:, :3].astype(float), faces, max(_CASTER_LEAST, round(_CASTER_SHARE * len(faces))))
+    return vertices[faces].reshape(-1, 3).astype(np.float32)
 
 
 def _rows(parts, triangles):

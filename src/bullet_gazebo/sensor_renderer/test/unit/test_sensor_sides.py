@@ -24,8 +24,11 @@ FROM_AFAR = pose_matrix((-2.4, 0.0, 2.0), (0.0, 0.7, 0.0)) @ OPTICAL
 
 
 @pytest.fixture(scope="module")
-def renderer():
-    with_gl = GlRenderer()
+def renderer(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patched:
+        # Nothing that an earlier run found.
+        patched.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        with_gl = GlRenderer()
     if not with_gl._one_sided:
         pytest.skip("a graphics card draws both sides")
     yield with_gl
@@ -90,6 +93,17 @@ def test_a_shadow_is_that_of_both_sides(renderer, monkeypatch, tmp_path, name):
     dark = np.abs(both_sides.astype(int) - lit).max(axis=2) > 20
     assert dark.sum() > 500, "the shadow is in the picture"
     assert (np.abs(one_sided.astype(int) - both_sides).max(axis=2) > 20).sum() < 0.02 * dark.sum()
+
+
+def test_the_backs_of_a_link_are_looked_for_once(renderer, monkeypatch, tmp_path):
+    def first_picture():
+        return renderer.render(mirror_of("bowl", tmp_path, above_floor_m=0.6), PINHOLE, FROM_AFAR)[0]
+
+    before = first_picture()
+    renderer._links.clear()
+    for name in ("from_behind", "plainly_from_behind"):
+        monkeypatch.setattr(Sides, name, lambda *_: pytest.fail("looked again"))
+    assert np.array_equal(first_picture(), before)
 
 
 def floor_without_shadow(renderer, mirror, monkeypatch):

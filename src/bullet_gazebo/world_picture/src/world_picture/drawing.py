@@ -16,6 +16,7 @@ from bullet_sim.mesh_loading import MOST_BYTES, MOST_BYTES_BESIDE, WHOLE
 from urdf_model import read_file
 from world_picture import reduction
 from world_picture.pieces import read_pieces
+from world_picture.results import cache_folder
 from world_picture.textures import Texture, write_texture
 
 #: Where one level must do: the coarsest whose distance from the original is at most this share of the mesh's size.
@@ -71,8 +72,7 @@ class DrawingCache:
 
     def __init__(self, folder=None):
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/drawings``."""
-        base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-        self._folder = Path(folder or os.path.join(base, "bullet_gazebo", "drawings"))
+        self._folder = Path(folder or cache_folder("drawings"))
 
     def parts(self, path, textured=False, part=WHOLE):
         """The list of :class:`MeshPart` of the mesh file at ``path``; raises :class:`DrawingError`. ``textured``: for a

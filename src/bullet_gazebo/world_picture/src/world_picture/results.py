@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Results of long calculations, kept on disk. ROS-free."""
+import contextlib
+import hashlib
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+
+def cache_folder(name):
+    """The path of a folder below ``$XDG_CACHE_HOME/bullet_gazebo``, by default ``~/.cache/bullet_gazebo``."""
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base) / "bullet_gazebo" / name
+
+
+class ResultCache:
+    """Arrays on disk, under a hash of what they were calculated from. Several processes may use a folder at a time; a
+    folder that cannot be written to keeps nothing."""
+
+    def __init__(self, folder=None):
+        """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/results``."""
+        self._folder = Path(folder or cache_folder("results"))
+
+    def array(self, calculation, inputs, calculate):
+        """The array that ``calculate()`` returns, from the disk if it is there. ``calculation``: a name, with a number
+        to be increased when the result for the same inputs changes; ``inputs``: arrays and numbers, on which alone it
+        depends."""
+        path = self._folder / ("%s-%s.npy" % (calculation, _digest(inputs)))
+        # Missing, cut short, or of something else: it is calculated again.
+        with contextlib.suppress(OSError, ValueError, EOFError):
+            return np.load(path, allow_pickle=False)
+        found = calculate()
+        with contextlib.suppress(OSError):
+            self._write(path, found)
+        return found
+
+    def _write(self, path, found):
+        self._folder.mkdir(parents=True, exist_ok=True)
+        number, draft = tempfile.mkstemp(dir=self._folder, prefix=".draft")
+        try:
+            with os.fdopen(number, "wb") as file:
+                np.save(file, found, allow_pickle=False)
+            os.replace(draft, path)
+        except BaseException:
+            os.unlink(draft)
+            raise
+
+
+def _digest(inputs):
+    digest = hashlib.sha256()
+    for value in inputs:
+        value = np.ascontiguousarray(value)
+        digest.update(("%s %s " % (value.dtype.str, value.shape)).encode())
+        digest.update(value.tobytes())
+    return digest.hexdigest()[:32]

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Results of calculations on disk."""
+import numpy as np
+import pytest
+
+from world_picture.results import ResultCache
+
+
+class Counted:
+    def __init__(self, result):
+        self.result, self.calls = result, 0
+
+    def __call__(self):
+        self.calls += 1
+        return self.result
+
+
+@pytest.fixture
+def calculate():
+    return Counted(np.array([True, False, True]))
+
+
+def test_a_result_is_calculated_once(tmp_path, calculate):
+    for _ in range(3):
+        found = ResultCache(tmp_path / "a" / "b").array("sum-1", (np.eye(3), 2.0), calculate)
+        assert found.dtype == bool and found.tolist() == [True, False, True]
+    assert calculate.calls == 1
+
+
+@pytest.mark.parametrize(("name", "inputs"), [
+    ("sum-2", (np.eye(3), 2.0)), ("sum-1", (np.eye(3), 2.5)), ("sum-1", (2.0 * np.eye(3), 2.0)),
+    ("sum-1", (np.eye(3),)), ("sum-1", (np.eye(3).reshape(9), 2.0)), ("sum-1", (np.eye(3).astype(np.float32), 2.0)),
+])
+def test_another_calculation_has_another_result(tmp_path, calculate, name, inputs):
+    cache, other = ResultCache(tmp_path), Counted(np.array([7]))
+    cache.array("sum-1", (np.eye(3), 2.0), calculate)
+    assert cache.array(name, inputs, other).tolist() == [7]
+
+
+@pytest.mark.parametrize("content", [b"", b"\x93NUMPY", b"not an array", None])
+def test_a_damaged_file_is_replaced(tmp_path, calculate, content):
+    cache = ResultCache(tmp_path)
+    cache.array("sum-1", (), calculate)
+    path, = tmp_path.iterdir()
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-1] if content is None else content)
+    assert cache.array("sum-1", (), calculate).tolist() == [True, False, True]
+    assert calculate.calls == 2 and path.read_bytes() == whole
+
+
+def test_without_a_folder_it_is_calculated_each_time(tmp_path, calculate):
+    (tmp_path / "file").write_text("")
+    cache = ResultCache(tmp_path / "file")
+    for _ in range(2):
+        assert cache.array("sum-1", (), calculate) is calculate.result
+    assert calculate.calls == 2
+
+
+def test_an_array_that_cannot_be_kept_leaves_no_draft(tmp_path):
+    with pytest.raises(ValueError, match="allow_pickle"):
+        ResultCache(tmp_path).array("sum-1", (), Counted(np.array([{}], dtype=object)))
+    assert list(tmp_path.iterdir()) == []
