@@ -21,7 +21,7 @@ _MOST_IN_DEPTH_M = 0.001
 # be its shadow map. In pictures that may take their time, how far what casts shadows may be from the original.
 _CASTER_SHARE, _CASTER_LEAST = 0.2, 60
 _CASTER_M = 0.003
-# Part of the names of cached results: increase it when what casts a shadow, or shows its back, changes for the same mesh.
+# Part of the names of cached results: increase it when other triangles cast shadows or show their backs.
 _VERSION = 1
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from sensor_renderer import triangles
 from sensor_renderer.light import Light
 from urdf_model import Finish, Mesh, merge_fixed, parse_urdf
-from urdf_model.transforms import axis_rotation, matrix_from_quaternion, rigid
+from urdf_model.transforms import matrix_from_quaternion, rigid
 from world_picture.drawing import DrawingError, read_level, read_uv
 from world_picture.shared_picture import PictureReader
 from world_picture.snapshot import SnapshotError
@@ -106,6 +106,13 @@ class Body:
         self._lights = lights
         self._joints = joints
         self._index = {name: number for number, (name, _) in enumerate(links)}
+        self._parents = [self._index[joint.parent] for joint in joints]
+        self._origins = np.array([joint.origin for joint in joints]).reshape(-1, 4, 4)
+        turning = np.array([joint.type != "prismatic" for joint in joints], dtype=float)
+        axes = np.array([joint.axis for joint in joints]).reshape(-1, 3)
+        # v -> axis x v, as matrices, and what a prismatic joint shifts by.
+        self._crosses = np.cross(np.eye(3), axes[:, None] * turning[:, None, None]).reshape(-1, 3, 3)
+        self._squares, self._shifts = self._crosses @ self._crosses, axes * (1.0 - turning)[:, None]
         self.parts = [parts for _, parts in links]
         self.matrices = np.tile(np.eye(4), (len(links), 1, 1))
         self._shown = None
@@ -135,23 +142,33 @@ class Body:
         if self._shown is not None and np.array_equal(values, self._shown):
             return False
         self._shown = values.copy()
-        matrices = self.matrices
-        matrices[0] = rigid(matrix_from_quaternion(values[3:7]), values[:3])
-        for number, (joint, position) in enumerate(zip(self._joints, values[7:].tolist(), strict=True), 1):
-            matrices[number] = matrices[self._index[joint.parent]] @ joint.origin @ _motion(joint, position)
+        self.matrices[0] = rigid(matrix_from_quaternion(values[3:7]), values[:3])
+        for number, (parent, step) in enumerate(zip(self._parents, self._steps(values[7:]), strict=True), 1):
+            np.dot(self.matrices[parent], step, out=self.matrices[number])
         return True
+
+    def _steps(self, positions):
+        """Poses (n, 4, 4) of the joints' children in their parents, at ``positions`` (n,) [rad or m]: all at once, by
+        Rodrigues' formula."""
+        sines, cosines = np.sin(positions)[:, None, None], np.cos(positions)[:, None, None]
+        motions = np.zeros((len(positions), 4, 4))
+        motions[:, :3, :3] = np.eye(3) + sines * self._crosses + (1.0 - cosines) * self._squares
+        motions[:, :3, 3] = self._shifts * positions[:, None]
+        motions[:, 3, 3] = 1.0
+        return self._origins @ motions
 
     def moved(self, positions):
         """Poses in the world if the joints ``positions`` {name: [rad or m]} stood there, and the others as shown.
 
         Returns {link's number: pose (4, 4)} of the links that these joints move. Any thread may call it.
         """
-        values, matrices, found = self._shown, self.matrices.copy(), {}
-        for number, joint in enumerate(self._joints, 1):
-            parent = self._index[joint.parent]
+        matrices, found = self.matrices.copy(), {}
+        shown = np.zeros(self.size) if self._shown is None else self._shown
+        steps = self._steps(np.array([positions.get(joint.name, value)
+                                      for joint, value in zip(self._joints, shown[7:], strict=True)]))
+        for number, (joint, parent) in enumerate(zip(self._joints, self._parents, strict=True), 1):
             if joint.name in positions or parent in found:
-                position = positions.get(joint.name, 0.0 if values is None else values[6 + number])
-                found[number] = matrices[number] = matrices[parent] @ joint.origin @ _motion(joint, position)
+                found[number] = matrices[number] = matrices[parent] @ steps[number - 1]
         return found
 
     def is_fixed(self, name):
@@ -167,15 +184,6 @@ class Body:
     def link_matrix(self, name):
         """Pose (4, 4) of a body link's frame in the world; ``KeyError`` for an unknown one."""
         return self.matrices[self._index[name]]
-
-
-def _motion(joint, position):
-    motion = np.eye(4)
-    if joint.type == "prismatic":
-        motion[:3, 3] = joint.axis * position
-    else:
-        motion[:3, :3] = axis_rotation(joint.axis, position)
-    return motion
 
 
 class Mirror:

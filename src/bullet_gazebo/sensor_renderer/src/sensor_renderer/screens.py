@@ -44,19 +44,18 @@ class Screens:
     def visible(self, mirror, pinhole, view):
         """The screens that show their faces, lights last: (texture, matrix of the screen's frame,
         :class:`sensor_renderer.mirror.Screen`)."""
-        found = []
+        faces = []
         for body in mirror.bodies.values():
             for screen in body.screens:
                 matrix = body.link_matrix(screen.link) @ screen.offset
-                half = np.array([*screen.size, 0.0]) / 2.0 + screen.radius
-                face = Link(np.zeros(3), half, float(np.linalg.norm(half)), False)
                 local = view @ matrix
-                if ((screen.radius or local[:3, 2] @ local[:3, 3] < 0.0)
-                        and visible([(face, matrix, None)], pinhole, view)):
-                    texture = self._texture(mirror, screen.picture)
-                    if not screen.glows or screen.picture in self._lit:
-                        found.append((texture, matrix, screen))
-        return sorted(found, key=lambda entry: entry[2].glows)
+                if screen.radius or local[:3, 2] @ local[:3, 3] < 0.0:
+                    half = np.array([*screen.size, 0.0]) / 2.0 + screen.radius
+                    faces.append((Link(np.zeros(3), half, float(np.linalg.norm(half)), False), matrix, screen))
+        seen = [(self._texture(mirror, screen.picture), matrix, screen)
+                for _, matrix, screen, _ in visible(faces, pinhole, view)]
+        return sorted((entry for entry in seen if not entry[2].glows or entry[2].picture in self._lit),
+                      key=lambda entry: entry[2].glows)
 
     def _texture(self, mirror, picture):
         texture = self._pictures.get(picture)
