@@ -16,6 +16,7 @@ from rospy_limits.node import limit_ports
 from sensor_renderer.best import best_renderer
 from sensor_renderer.errors import SensorError
 from sensor_renderer.labels import Labels, classes_of_parameter
+from sensor_renderer.memory import keep_freed_memory
 from sensor_renderer.mirror import Mirror
 from sensor_renderer.moments import Moment, World
 from sensor_renderer.priority import DRAWING, give_way
@@ -217,6 +218,7 @@ def main():
     """Draw until a signal or a shutdown request; returns the exit code."""
     # Physics comes first.
     give_way(DRAWING)
+    keep_freed_memory()
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
