@@ -22,6 +22,16 @@ class Frames:
             default = self._document.relative_to(element) or default
         self._given[name] = (default, pose, element)
 
+    def add_joint(self, name, element, child):
+        """Add the frame of a joint, by default in that of its ``child``; return the name of the frame.
+
+        A joint may have the name of a link, as in SDF before 1.7: then the name alone means the link.
+        """
+        if name in self._given:
+            name = "joint %s" % name
+        self.add(name, element, child)
+        return name
+
     def __contains__(self, name):
         return name in OWN or name in self._given
 

@@ -153,8 +153,8 @@ class ModelReader:
             frames.add(document.name(link), link)
         for frame in element.iterchildren("frame"):
             frames.add(document.name(frame), frame, frame.get("attached_to", ""))
-        for joint in element.iterchildren("joint"):
-            frames.add(document.name(joint), joint, _end(document, joint, "child"))
+        frame_of = {joint: frames.add_joint(document.name(joint), joint, _end(document, joint, "child"))
+                    for joint in element.iterchildren("joint")}
         for link in element.iterchildren("link"):
             name = document.name(link)
             if name in parts.links:
@@ -165,7 +165,7 @@ class ModelReader:
             raise document.error(element, "model '%s' has no <link>" % element.get("name"))
         names = {joint.name for joint in parts.joints}
         for joint in element.iterchildren("joint"):
-            read = _joint(document, joint, frames)
+            read = _joint(document, joint, frames, frame_of[joint])
             if read.name in names:
                 raise document.error(joint, "joint '%s' appears twice" % read.name)
             names.add(read.name)
@@ -257,11 +257,11 @@ def _end(document, joint, role):
     return document.text(joint, role)
 
 
-def _joint(document, element, frames):
+def _joint(document, element, frames, own_frame):
     name, kind = document.name(element), element.get("type", "")
     document.note_unknown(element, ("parent", "child", "pose", "axis", "physics", "meta"))
     axis, limit, damping, friction = np.array([0.0, 0.0, 1.0]), Limit(), 0.0, 0.0
-    frame = frames.where(name, element)
+    frame = frames.where(own_frame, element)
     if kind in _MOVABLE:
         given = element.find("axis")
         if given is None:

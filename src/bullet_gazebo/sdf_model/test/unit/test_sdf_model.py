@@ -320,6 +320,17 @@ def test_a_model_folder_may_lack_its_config(tmp_path, shelf):
     assert shelf.find("can").parent.name == "can" and shelf.find("http://can") is None
 
 
+def test_a_joint_may_have_the_name_of_a_link():
+    model = read('<link name="base"><pose>1 0 0 0 0 0</pose></link><link name="wheel"><pose>0 2 0 0 0 0</pose></link>'
+                 '<link name="cap"><pose relative_to="wheel">0 0 3 0 0 0</pose></link>'
+                 + joint("wheel", "base", "wheel", pose="0 0 0.5 0 0 0") + joint("cap", "wheel", "cap", "fixed"))
+    assert set(model.robot.joints) == {"wheel", "cap"} and model.robot.joints["wheel"].child == "wheel"
+    at_rest = where(model.robot)
+    np.testing.assert_allclose(at_rest["wheel"][:3, 3], (0, 2, 0), atol=1e-12)
+    np.testing.assert_allclose(at_rest["cap"][:3, 3], (0, 2, 3), atol=1e-12)
+    np.testing.assert_allclose(model.robot.joints["wheel"].origin[:3, 3], (-1, 2, 0.5), atol=1e-12)
+
+
 # -- errors ----------------------------------------------------------------------------------------
 
 
