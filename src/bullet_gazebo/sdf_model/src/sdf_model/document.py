@@ -71,8 +71,8 @@ class Document:
             self.notes.mend(what, self.source, line)
         self.version = self._version()
 
-    def _repaired(self, error):
-        self.notes.mend("missing end tag (%s)" % error, self.source, "of the error")
+    def _repaired(self, what):
+        self.notes.mend(what, self.source, "of the error")
 
     def _version(self):
         text = self.root.get("version", "1.6")

@@ -53,6 +53,30 @@ def test_an_element_goes_before_the_attribute_of_its_name_and_plugins_are_left_a
     assert len(model.robot.gazebo[0].find("plugin/limit")) == 0 and model.warning == ""
 
 
+@pytest.mark.parametrize("text", [
+    "<!-- licence\n-->\n<?xml version='1.0'?>\n" + sdf(LINK % ""),
+    sdf("<!-- m = 2 <!-- once more --- -->" + LINK % ""),
+    sdf(LINK % '<visual name=v><geometry><sphere radius=0.3/></geometry></visual>'),
+    sdf("<!-- a -- b -->" + LINK % '<visual name="v"><geometry><box><size>1 1 1</size></geometry></visual>')])
+def test_comments_and_attributes_that_xml_does_not_allow(text):
+    model = parse_sdf_model(text, "m.sdf")
+    assert set(model.robot.links) == {"l"}
+    assert "not as SDF has it, but read" in model.warning
+
+
+def test_a_tidied_text_keeps_values_in_quotation_marks_and_lines():
+    text = sdf('<!-- a -- \n b -->\n<link name="l r=s">\n<audio_sink/></link>')
+    model = parse_sdf_model(text, "m.sdf")
+    assert set(model.robot.links) == {"l r=s"} and "audio_sink (m.sdf line 6)" in model.warning
+
+
+@pytest.mark.parametrize("text", [sdf(LINK % "")[:-9], "<!-- a -- b " + sdf(LINK % ""), sdf(LINK % "<a b=>"),
+                                  "<!-- a -- -->" + '<!DOCTYPE sdf [<!ENTITY a "b">]>' + sdf(LINK % "&a;")])
+def test_what_cannot_be_mended_is_refused(text):
+    with pytest.raises(SdfError):
+        parse_sdf_model(text, "m.sdf")
+
+
 def test_a_missing_end_tag_ends_with_its_parent():
     text = sdf(LINK % '<collision name="c"><geometry><sphere><radius>0.3</radius></geometry></collision>')
     model = parse_sdf_model(text, "m.sdf")

@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parse untrusted XML: no entities, no network, a limited size."""
 
+import re
+
 from lxml import etree
 
 from . import bounds
+
+_TAG = re.compile(rb"<[A-Za-z_][^<>]*>")
+# In a tag: a value in quotation marks, or one without.
+_VALUE = re.compile(rb"""("[^"]*"|'[^']*')|(=\s*)([^\s"'<>=]+?)(?=\s|/?>)""")
 
 
 class XmlRefused(ValueError):
@@ -13,8 +19,10 @@ class XmlRefused(ValueError):
 def parse_xml(text, most_bytes=bounds.DESCRIPTION_BYTES, repaired=None):
     """Return the root element of ``text`` (str or bytes), without comments; None where it holds none.
 
-    ``repaired``: function called for an element whose end tag is missing, which then ends where its parent does;
-    without it such a text is refused. A text that breaks off is always refused.
+    ``repaired``: function called with a description of what was mended, as Gazebo's reader takes it: an element whose
+    end tag is missing, which then ends where its parent does; comments before the declaration, or with two hyphens in
+    them; attributes without quotation marks. Without it such a text is refused. A text that breaks off is always
+    refused.
 
     Raises XmlRefused for a text that is not well-formed, declares entities, or is too large.
     """
@@ -25,10 +33,10 @@ def parse_xml(text, most_bytes=bounds.DESCRIPTION_BYTES, repaired=None):
     try:
         root = etree.fromstring(data.strip(), parser)
     except etree.XMLSyntaxError as error:
-        root = None if repaired is None else _with_end_tags(data.strip(), parser)
+        root, what = (None, "") if repaired is None else _repaired(data.strip(), parser)
         if root is None:
             raise XmlRefused("is not well-formed XML: %s" % error) from None
-        repaired(str(error))
+        repaired("%s (%s)" % (what, error))
     if root is not None:
         refuse_entities(root)
         count, most = sum(1 for _ in root.iter()), most_bytes // bounds.BYTES_PER_ELEMENT
@@ -40,6 +48,37 @@ def parse_xml(text, most_bytes=bounds.DESCRIPTION_BYTES, repaired=None):
 def _parser(recover):
     return etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, huge_tree=False,
                            recover=recover)
+
+
+def _repaired(data, parser):
+    """Return (the root element of ``data`` (bytes), on which ``parser`` failed, what was mended); (None, "") if it has
+    other errors."""
+    root = _with_end_tags(data, parser)
+    if root is not None:
+        return root, "missing end tag"
+    tidied = _TAG.sub(_quoted, _without_comments(data)).strip()
+    parser = _parser(recover=False)
+    try:
+        return etree.fromstring(tidied, parser), "a comment or an attribute that XML does not allow"
+    except etree.XMLSyntaxError:
+        root = _with_end_tags(tidied, parser)
+    return root, "" if root is None else "missing end tag"
+
+
+def _without_comments(data):
+    """``data`` with the line breaks of its comments alone, so that numbers of lines stay."""
+    parts, start = [], 0
+    while True:
+        begin = data.find(b"<!--", start)
+        end = data.find(b"-->", begin + 4)
+        if begin < 0 or end < 0:
+            return b"".join([*parts, data[start:]])
+        parts += [data[start:begin], b"\n" * data.count(b"\n", begin, end)]
+        start = end + 3
+
+
+def _quoted(tag):
+    return _VALUE.sub(lambda value: value[1] or b'%s"%s"' % (value[2], value[3]), tag[0])
 
 
 def _with_end_tags(data, parser):
