@@ -22,6 +22,8 @@ _FORMATS = ("dae", "stl", "obj", "ply", "off", "glb", "gltf")
 # Pictures whose brightness is a height.
 _HEIGHTS = ("png", "jpg", "jpeg")
 _MOST_HEIGHTS = 1025 * 1025  # rows of a power of two and one, as Gazebo wants them
+# Rows of a terrain to look at: simplifying one of 513 rows takes a minute of processor time, one of 201 some seconds.
+_MOST_DRAWN_ROWS = 201
 # Materials and buffers that a mesh may name, and pictures, of which only the names are read.
 _BESIDE = (".mtl", ".bin")
 PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".bmp", ".gif", ".tif", ".tiff")
@@ -68,9 +70,10 @@ class _Beside:
 
 def load_scene(path, part=WHOLE, textures=False):
     """Return the trimesh.Scene in the file at ``path``; a picture is a terrain of 1 x 1 x 1 m, with its brightness as
-    height. ``part``: (the name of the node of a Collada file that is wanted alone, or "" for all; whether its middle is
-    at the origin). With ``textures``, materials have pictures of one pixel, with the name that the file gives as
-    ``picture.info["name"]``. Raises MeshError, OSError, and what libraries raise."""
+    height. ``part``: (the name of the node of a Collada file, or of the group or object of a Wavefront file, that is
+    wanted alone, or "" for all; whether its middle is at the origin). With ``textures``, for drawing, materials have
+    pictures of one pixel, with the name that the file gives as ``picture.info["name"]``, and terrains fewer rows.
+    Raises MeshError, OSError, and what libraries raise."""
     import trimesh  # 0.1 s to import, and needed only the first time that a mesh is seen
 
     path = Path(path)
@@ -79,12 +82,15 @@ def load_scene(path, part=WHOLE, textures=False):
         raise MeshError("it is in the format '%s'; expected one of %s" % (kind, ", ".join(_FORMATS)))
     content = read_file(path, MOST_BYTES)
     if kind in _HEIGHTS:
-        return trimesh.Scene(trimesh.Trimesh(*_terrain(_heights(content)), process=False))
+        heights = _with_fewer_rows(_heights(content)) if textures else _heights(content)
+        return trimesh.Scene(trimesh.Trimesh(*_terrain(heights), process=False))
     unit_m, (name, is_centred) = 1.0, part
     if kind == "dae":
         content, unit_m = _collada(content, name)
+    elif name and kind == "obj":
+        content = _group(content, name)
     elif name:
-        raise MeshError("it has no part '%s'; only Collada files have parts with names" % name)
+        raise MeshError("it has no part '%s'; only Collada and Wavefront files have parts with names" % name)
     scene = trimesh.load(
         io.BytesIO(content), file_type=kind, force="scene", resolver=_Beside(path.parent, textures), process=False
     )
@@ -134,6 +140,12 @@ def _heights(content):
     return values / (values.max() or 1.0)
 
 
+def _with_fewer_rows(heights):
+    """At most :data:`_MOST_DRAWN_ROWS` of the rows and columns, with the first and the last of them."""
+    chosen = [np.linspace(0, count - 1, min(count, _MOST_DRAWN_ROWS)).round().astype(int) for count in heights.shape]
+    return heights[np.ix_(*chosen)]
+
+
 def _terrain(heights):
     """Corners (n, 3) and triangles (m, 3) of a square of side 1 about the origin, the first row of ``heights`` at its
     side of greatest y."""
@@ -147,7 +159,8 @@ def _terrain(heights):
 
 def _collada(content, part):
     """(content, unit [m]) of a Collada file, with the geometry of the nodes named ``part`` alone; "" for all. Gazebo
-    and rviz scale by the unit, and leave the direction of the axes as it is. Files with entities are refused."""
+    and rviz scale by the unit, and leave the direction of the axes as it is. Files with entities are refused. Geometry
+    stays if its material is broken, as there."""
     from lxml import etree
 
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
@@ -155,6 +168,7 @@ def _collada(content, part):
     refuse_entities(root)
     if part:
         _keep_part(root, part)
+    if _mend_materials(root) or part:
         content = etree.tostring(root)
     unit = root.find("{*}asset/{*}unit")
     try:
@@ -162,6 +176,27 @@ def _collada(content, part):
     except (AttributeError, TypeError, ValueError):  # no such element, no such attribute, or no number
         return content, 1.0
     return content, metres if 0.0 < metres < bounds.POSITION.high else 1.0
+
+
+def _mend_materials(root):
+    """Name a file for pictures of a Collada document that have none, and leave out references to materials that do not
+    exist; pycollada would leave out the geometry. Returns whether there were any."""
+    from lxml import etree
+
+    broken = [image for image in root.iter("{*}image") if not (image.findtext("{*}init_from") or "").strip()]
+    for image in broken:
+        name = image.find("{*}init_from")
+        if name is None:
+            name = etree.SubElement(image, etree.QName(etree.QName(image).namespace, "init_from"))
+        name.text = image.get("id") or "picture"
+    effects = {effect.get("id") for effect in root.iter("{*}effect")}
+    materials = {material.get("id") for material in root.iter("{*}material")
+                 if (material.find("{*}instance_effect") is not None
+                     and material.find("{*}instance_effect").get("url", "")[1:] in effects)}
+    lost = [instance for instance in root.iter("{*}instance_material") if instance.get("target", "")[1:] not in materials]
+    for instance in lost:
+        instance.getparent().remove(instance)
+    return bool(broken or lost)
 
 
 def _keep_part(root, part):
@@ -175,7 +210,27 @@ def _keep_part(root, part):
         if name != part:
             geometry.getparent().remove(geometry)
     if part not in names:
-        raise MeshError("it has no part '%s'; it has %s" % (part, ", ".join(sorted(names)[:_MOST_NAMED]) or "none"))
+        raise _no_part(part, names)
+
+
+def _group(content, part):
+    """Take from a Wavefront file (bytes) the faces of all groups and objects but those named ``part``."""
+    names, kept, is_wanted = set(), [], False
+    for line in content.splitlines():
+        kind, _, rest = line.strip().partition(b" ")
+        if kind in (b"g", b"o"):
+            name = rest.strip().decode("utf-8", "replace")
+            names.add(name)
+            is_wanted = name == part
+        elif kind != b"f" or is_wanted:
+            kept.append(line)
+    if part not in names:
+        raise _no_part(part, names)
+    return b"\n".join(kept)
+
+
+def _no_part(part, names):
+    return MeshError("it has no part '%s'; it has %s" % (part, ", ".join(sorted(names)[:_MOST_NAMED]) or "none"))
 
 
 def to_wavefront(path, target, planes, part=WHOLE):

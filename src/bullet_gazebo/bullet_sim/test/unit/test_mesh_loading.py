@@ -231,5 +231,41 @@ def test_a_part_that_is_not_there_is_named_with_those_that_are(tmp_path, cache):
     with pytest.raises(BulletSimError, match="it has no part 'left'; it has down, up"):
         cache.wavefront(str(path), part=("left", False))
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    with pytest.raises(BulletSimError, match="it has no part 'left'; only Collada files have parts with names"):
+    with pytest.raises(BulletSimError, match="it has no part 'left'; it has none"):
         cache.wavefront(str(tmp_path / "a.obj"), part=("left", False))
+    path = write_stl(tmp_path / "a.stl", np.eye(3), np.array([[0, 1, 2]]))
+    with pytest.raises(BulletSimError, match="it has no part 'left'; only Collada and Wavefront files have parts"):
+        cache.wavefront(path, part=("left", False))
+
+
+@pytest.mark.parametrize(("part", "low", "high"), [
+    (("", False), (0, 0, 0), (1, 1, 5)), (("low", False), (0, 0, 0), (1, 1, 0)),
+    (("a high one", False), (0, 0, 5), (1, 1, 5)), (("a high one", True), (-0.5, -0.5, 0), (0.5, 0.5, 0))])
+def test_a_part_of_a_wavefront_file_is_a_group_or_an_object(tmp_path, cache, part, low, high):
+    path = tmp_path / "two.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\no low\nf 1 2 3\nv 0 0 5\nv 1 0 5\nv 0 1 5\ng a high one\nf 4 5 6\n")
+    points, triangles = points_of(cache.wavefront(str(path), part=part))
+    assert points.min(axis=0) == pytest.approx(low) and points.max(axis=0) == pytest.approx(high)
+    assert triangles == (1 if part[0] else 2)
+
+
+MATERIAL = """<library_images><image id="i">%s</image></library_images><library_effects><effect id="e"><profile_COMMON>
+<newparam sid="s"><surface type="2D"><init_from>i</init_from></surface></newparam>
+<newparam sid="t"><sampler2D><source>s</source></sampler2D></newparam><technique sid="c"><phong><diffuse>
+<texture texture="t" texcoord="UV"/></diffuse></phong></technique></profile_COMMON></effect></library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>"""
+BOUND = """<instance_geometry url="#g"><bind_material><technique_common><instance_material symbol="x" target="#m"/>
+</technique_common></bind_material></instance_geometry>"""
+
+
+@pytest.mark.parametrize("broken", [
+    lambda text: text, lambda text: text.replace("<image id", "<image name='n' id"),
+    lambda text: text.replace('url="#e"', 'url="#f"'), lambda text: text.replace('target="#m"', 'target="#n"'),
+    lambda text: text.replace('target="#m"', "")])
+def test_geometry_stays_where_its_material_is_broken(tmp_path, broken):
+    text = broken(COLLADA % ("", MATERIAL % "<!-- a.png -->" + TRIANGLE.replace(
+        '<instance_geometry url="#g"/>', BOUND).replace('<triangles count', '<triangles material="x" count')))
+    path = tmp_path / "triangle.dae"
+    path.write_text(text)
+    to_wavefront(str(path), str(tmp_path / "triangle.obj"), ())
+    assert points_of(tmp_path / "triangle.obj")[1] == 1
