@@ -17,7 +17,7 @@ from urdf_model import read_file
 from world_picture import reduction
 from world_picture.pieces import read_pieces
 from world_picture.results import cache_folder
-from world_picture.textures import Texture, write_texture
+from world_picture.textures import Texture, save_reduced, write_texture
 
 #: Where one level must do: the coarsest whose distance from the original is at most this share of the mesh's size.
 PLAIN = 0.01
@@ -25,7 +25,7 @@ PLAIN = 0.01
 _PROCESSOR_S, _WAITING_S = 15, 240.0
 _PROCESS = LimitedProcess(processor_s=_PROCESSOR_S, waiting_s=_WAITING_S)
 # Part of the names of cached files: increase it when the result for the same mesh changes.
-_VERSION = 12
+_VERSION = 13
 # The files with the materials of a Wavefront file.
 _MATERIALS = re.compile(rb"^mtllib[ \t]+(\S.*?)[ \t]*\r?$", re.MULTILINE)
 
@@ -40,7 +40,8 @@ class LevelFile(NamedTuple):
 
 class MeshPart(NamedTuple):
     """One look of a mesh: its ``levels``, the finest first; the number of the ``plain`` one, and the same as a
-    Wavefront file, in metres; colour, emission and texture as :class:`world_picture.pieces.Piece` has them."""
+    Wavefront file, in metres; colour, emission and texture as :class:`world_picture.pieces.Piece` has them, but for
+    pictures inside of the mesh file: of these, ``texture`` is a path."""
 
     path: str
     colour: tuple
@@ -85,8 +86,8 @@ class DrawingCache:
         listed = json.loads(index.read_text(encoding="utf-8"))
         return [MeshPart(str(index.parent / name), tuple(colour) if colour else None,
                          tuple(LevelFile(str(index.parent / level), error) for level, error in levels), plain,
-                         tuple(emission), texture)
-                for name, colour, levels, plain, emission, texture in listed]
+                         tuple(emission), str(index.parent / own_picture) if own_picture else texture)
+                for name, colour, levels, plain, emission, texture, own_picture in listed]
 
     def texture(self, path):
         """The :class:`world_picture.textures.Texture` of the picture file at ``path``; raises
@@ -159,7 +160,10 @@ def write_parts(path, folder, textured, part=WHOLE):
             plain = max(step for step, level in enumerate(levels) if level.error <= PLAIN * size or step == 0)
             name = "part%d.obj" % number
             (folder / name).write_text(_wavefront(levels[plain]), encoding="ascii")
-            listed.append((name, piece.colour, files, plain, piece.emission, piece.texture))
+            own_picture = "" if piece.picture is None else "picture%s.png" % piece.texture
+            if own_picture:
+                save_reduced(piece.picture, folder / own_picture)
+            listed.append((name, piece.colour, files, plain, piece.emission, piece.texture, own_picture))
     (folder / "parts.json").write_text(json.dumps(listed), encoding="utf-8")
 
 

@@ -25,7 +25,8 @@ class Piece(NamedTuple):
     """Triangles that look alike: ``vertices`` (n, 3), ``faces`` (m, 3); ``colour`` (red, green, blue, alpha from 0 to
     1) or None, with a texture the factor of its colours; ``emission`` (red, green, blue); ``texture``: the name of a
     picture as the file has it, or ""; ``uv`` (n, 2): the vertices' places in a picture, from its upper left corner to
-    the right and down, in widths and heights of it; None if the file has none."""
+    the right and down, in widths and heights of it; None if the file has none. ``picture``: the picture itself (of
+    Pillow), if it is inside of the file; then ``texture`` is a number in it."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -33,6 +34,7 @@ class Piece(NamedTuple):
     emission: tuple = _DARK
     texture: str = ""
     uv: np.ndarray = None
+    picture: object = None
 
 
 def read_pieces(path, part=WHOLE, textured=False):
@@ -43,30 +45,32 @@ def read_pieces(path, part=WHOLE, textured=False):
 
     plain = _PLAIN_COLOUR if str(path).lower().endswith(".dae") else None
     scene = load_scene(path, part, textures=True)
-    alike = {}
+    alike, inside = {}, {}
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
         mesh = scene.geometry[name]
         if len(getattr(mesh, "faces", ())) == 0:
             continue
         uv = _uv(mesh)
-        texture = "" if uv is None else _texture(mesh)
+        texture = "" if uv is None else _texture(mesh, inside)
         if not texture and not textured:
             uv = None  # meshes of one colour are one piece
         colour = _factor(mesh) if texture else _colour(mesh) or plain
         look = colour, _emission(mesh, colour, texture), texture, uv is not None
-        vertices = trimesh.transform_points(mesh.vertices, transform)
-        alike.setdefault(look, []).append((vertices, np.asarray(mesh.faces), uv))
+        vertices, faces = trimesh.transform_points(mesh.vertices, transform), np.asarray(mesh.faces)
+        if np.linalg.det(transform[:3, :3]) < 0.0:
+            faces = faces[:, ::-1]  # a mirrored surface is seen from outside, too
+        alike.setdefault(look, []).append((vertices, faces, uv))
     if not alike:
         raise PieceError("it holds no triangles")
-    return [_joined(*look, meshes) for look, meshes in alike.items()]
+    return [_joined(*look, meshes, inside.get(look[2])) for look, meshes in alike.items()]
 
 
-def _joined(colour, emission, texture, has_uv, meshes):
+def _joined(colour, emission, texture, has_uv, meshes, picture):
     starts = np.cumsum([0] + [len(vertices) for vertices, _, _ in meshes[:-1]])
     faces = [faces + start for (_, faces, _), start in zip(meshes, starts, strict=True)]
     return Piece(np.concatenate([vertices for vertices, _, _ in meshes]), np.concatenate(faces), colour, emission,
-                 texture, np.concatenate([uv for _, _, uv in meshes]) if has_uv else None)
+                 texture, np.concatenate([uv for _, _, uv in meshes]) if has_uv else None, picture)
 
 
 def _uv(mesh):
@@ -77,15 +81,28 @@ def _uv(mesh):
     return np.asarray(uv, dtype=float)[:, :2] * (1.0, -1.0) + (0.0, 1.0)
 
 
-def _texture(mesh):
+def _texture(mesh, inside):
+    """The name of the mesh's picture, or "". Pictures inside of the file are added to ``inside``, by their names."""
     material = getattr(mesh.visual, "material", None)
     picture = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    return getattr(picture, "info", {}).get("name", "")
+    if picture is None:
+        return ""
+    name = getattr(picture, "info", {}).get("name", "")
+    if name:
+        return name
+    name = next((name for name, other in inside.items() if other is picture), "%d" % len(inside))
+    inside[name] = picture
+    return name
 
 
 def _factor(mesh):
-    """The factor of a picture's colours: Wavefront's diffuse colour; in Collada a picture is in the place of it."""
-    diffuse = getattr(mesh.visual.material, "kwargs", {}).get("kd")
+    """The factor of a picture's colours: that of glTF, Wavefront's diffuse colour; in Collada a picture is in the place
+    of it."""
+    material = mesh.visual.material
+    factor = getattr(material, "baseColorFactor", None)
+    if factor is not None:
+        return (*(round(int(value) / 255.0, 3) for value in factor[:3]), 1.0)
+    diffuse = getattr(material, "kwargs", {}).get("kd")
     if diffuse is None or np.shape(diffuse) != (3,) or max(diffuse) < _BLACK:
         return 1.0, 1.0, 1.0, 1.0
     return (*(round(min(max(0.0, float(value)), 1.0), 3) for value in diffuse), 1.0)

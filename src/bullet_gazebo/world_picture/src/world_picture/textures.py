@@ -57,12 +57,18 @@ def write_texture(path, folder):
             if picture.width * picture.height > _MOST_READ:
                 raise TextureError("it has %d x %d pixels; expected at most %d million"
                                    % (*picture.size, _MOST_READ // 1_000_000))
-            has_holes = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
-            reduced = picture.convert("RGBA" if has_holes else "RGB")
+            reduced = save_reduced(picture, Path(folder) / "picture.png")
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise TextureError("it is no picture in one of the formats %s: %s" % (", ".join(_FORMATS), error)) from None
-    reduced.thumbnail((MOST_PIXELS, MOST_PIXELS))
     pixels = np.asarray(reduced, dtype=float)[..., :3]
-    reduced.save(Path(folder) / "picture.png", compress_level=1)
     colour = (pixels.mean(axis=(0, 1)) / 255.0).round(3).tolist()
     (Path(folder) / "picture.json").write_text(json.dumps(colour), encoding="utf-8")
+
+
+def save_reduced(picture, path):
+    """Write ``picture``, of Pillow, to the PNG file at ``path`` with at most :data:`MOST_PIXELS` a side; return it."""
+    has_holes = picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
+    reduced = picture.convert("RGBA" if has_holes else "RGB")
+    reduced.thumbnail((MOST_PIXELS, MOST_PIXELS))
+    reduced.save(path, compress_level=1)
+    return reduced

@@ -4,10 +4,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from lab_testing.meshes import sphere
 from world_picture import drawing
+from world_picture.pieces import read_pieces
 
 
 def test_a_mesh_is_simplified_once_and_then_found_again(tmp_path):
@@ -71,6 +74,24 @@ def test_a_wavefront_file_has_the_colours_that_its_materials_have_now(tmp_path):
     for colour in ((1.0, 0.2, 0.0), (0.0, 0.2, 1.0)):
         (tmp_path / "a b.mtl").write_text("newmtl m\nKd %g %g %g\n" % colour)
         assert cache.parts(path)[0].colour[:3] == pytest.approx(colour, abs=0.003)
+
+
+def test_a_mirrored_node_is_seen_from_outside(tmp_path):
+    path = tmp_path / "mirrored.dae"
+    path.write_text(COLLADA.replace("<instance_geometry", "<scale>-1 1 1</scale><instance_geometry"), encoding="utf-8")
+    piece, = read_pieces(path)
+    corners = piece.vertices[piece.faces[0]]
+    # As in the file, its front looks up.
+    assert np.cross(corners[1] - corners[0], corners[2] - corners[0])[2] > 0.0 > corners[:, 0].min()
+
+
+def test_a_terrain_has_fewer_rows_to_look_at_and_keeps_its_size(tmp_path):
+    heights = np.tile(np.arange(1025, dtype=np.uint16) * 60, (1025, 1))
+    Image.fromarray(heights).save(tmp_path / "slope.png")
+    piece, = read_pieces(tmp_path / "slope.png")
+    assert len(piece.faces) == 2 * 200 * 200
+    np.testing.assert_allclose((piece.vertices.min(axis=0), piece.vertices.max(axis=0)), ((-0.5, -0.5, 0), (0.5, 0.5, 1)))
+    np.testing.assert_allclose(piece.vertices[:, 2], piece.vertices[:, 0] + 0.5, atol=0.003)
 
 
 def test_an_unreadable_mesh_names_its_path(tmp_path):

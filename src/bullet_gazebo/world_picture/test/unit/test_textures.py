@@ -51,6 +51,28 @@ def test_meshes_of_one_colour_are_one_piece_whether_they_have_places_in_a_pictur
     assert sorted(piece.uv is None for piece in read_pieces(path, textured=True)) == [False, True]
 
 
+def test_a_picture_inside_of_a_file_is_kept_beside_the_parts(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    pixels = np.zeros((8, 8, 3), dtype=np.uint8)
+    pixels[:4], pixels[4:] = (200, 0, 0), (0, 0, 200)
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(pixels),
+                                                   baseColorFactor=[255, 128, 51, 255])
+    uv = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)  # upwards, as trimesh has them
+    mesh = trimesh.Trimesh([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)], process=False,
+                           visual=trimesh.visual.TextureVisuals(uv=uv, material=material))
+    mesh.export(str(tmp_path / "board.glb"))
+    cache = drawing.DrawingCache(tmp_path / "cache")
+    part, = cache.parts(tmp_path / "board.glb")
+    assert part.colour == pytest.approx((1.0, 0.5, 0.2, 1.0), abs=0.01)
+    with Image.open(textures.find_texture(part.texture, tmp_path)) as found:
+        assert found.getpixel((0, 0)) == (200, 0, 0) and found.getpixel((0, 7)) == (0, 0, 200)
+    # The upper edge of the board has the upper edge of the picture.
+    np.testing.assert_allclose(drawing.read_uv(part.levels[0].path)[:, 1],
+                               1.0 - drawing.read_level(part.levels[0].path)[0][:, 1])
+    assert cache.texture(part.texture).colour == pytest.approx((0.392, 0.0, 0.392), abs=0.01)
+    assert cache.parts(tmp_path / "board.glb") == [part]
+
+
 def test_what_is_no_picture_is_named(tmp_path, monkeypatch):
     path = tmp_path / "a.png"
     path.write_bytes(b"no picture")
