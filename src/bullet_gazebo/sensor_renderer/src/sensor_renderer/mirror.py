@@ -287,7 +287,10 @@ class Mirror:
         # A material that brings a picture replaces the file's own.
         emission = finish.emission if texture is not None or any(finish.emission) else part.emission
         if texture is None and part.texture:
-            factor, texture = part.colour, self._texture(part.texture, find_texture(part.texture, Path(path).parent))
+            # Some meshes name pictures of other models.
+            found = self._find_mesh(part.texture) if "://" in part.texture else None
+            texture = self._texture(part.texture, found or find_texture(part.texture, Path(path).parent))
+            factor = part.colour
             if texture is None and part.colour == _WHITE:
                 colour = shape.colour or DEFAULT_COLOUR
         origin = shape.origin @ np.diag([*shape.geometry.scale, 1.0])

@@ -151,6 +151,17 @@ def test_pictures_of_collada_are_where_gazebo_looks_for_them(renderer, tmp_path,
         quarters = place
 
 
+def test_a_mesh_may_name_the_picture_of_another_model(renderer, tmp_path, quarters):
+    urdf = collada(tmp_path)
+    path = tmp_path / "meshes" / "square.dae"
+    path.write_text(path.read_text().replace(quarters.name, "model://other/materials/textures/a.png"))
+    mirror = Mirror(DrawingCache(tmp_path / "cache"), lambda name: (
+        str(quarters) if name.startswith("model://other/") else name.replace("file://", "")), pytest.fail)
+    mirror.set_scene([{"name": "thing", "urdf": urdf, "joints": []}], EVEN)
+    mirror.set_state(np.array(UPRIGHT, dtype=float))
+    assert shows_quarters(renderer.render(mirror, PINHOLE, looking(x=-1.2))[0])
+
+
 def test_a_part_of_a_mesh_is_shown_alone(renderer, tmp_path, quarters):
     urdf = collada(tmp_path)
     path = tmp_path / "meshes" / "square.dae"
