@@ -191,9 +191,9 @@ def _mend_materials(root):
         name.text = image.get("id") or "picture"
     effects = {effect.get("id") for effect in root.iter("{*}effect")}
     materials = {material.get("id") for material in root.iter("{*}material")
-                 if (material.find("{*}instance_effect") is not None
-                     and material.find("{*}instance_effect").get("url", "")[1:] in effects)}
-    lost = [instance for instance in root.iter("{*}instance_material") if instance.get("target", "")[1:] not in materials]
+                 for made in material.iterfind("{*}instance_effect") if made.get("url", "")[1:] in effects}
+    lost = [instance for instance in root.iter("{*}instance_material")
+            if instance.get("target", "")[1:] not in materials]
     for instance in lost:
         instance.getparent().remove(instance)
     return bool(broken or lost)

@@ -90,7 +90,8 @@ def test_a_terrain_has_fewer_rows_to_look_at_and_keeps_its_size(tmp_path):
     Image.fromarray(heights).save(tmp_path / "slope.png")
     piece, = read_pieces(tmp_path / "slope.png")
     assert len(piece.faces) == 2 * 200 * 200
-    np.testing.assert_allclose((piece.vertices.min(axis=0), piece.vertices.max(axis=0)), ((-0.5, -0.5, 0), (0.5, 0.5, 1)))
+    low, high = piece.vertices.min(axis=0), piece.vertices.max(axis=0)
+    np.testing.assert_allclose((low, high), ((-0.5, -0.5, 0), (0.5, 0.5, 1)))
     np.testing.assert_allclose(piece.vertices[:, 2], piece.vertices[:, 0] + 0.5, atol=0.003)
 
 
