@@ -112,7 +112,8 @@ class ReachMap:
 
         /Poses/poses_dataset: float32 rows, centre of a cell (x y z), then a pose (x y z, qx qy qz qw).
         /Spheres/sphere_dataset: rows, centre of a cell and its reached percentage; its attribute Resolution [m].
-        Cells in which nothing is reached have no row. Written in portions, however large the map is.
+        Cells in which nothing is reached have no row. Reuleaux finds the poses of a sphere by comparing both centres
+        exactly, so those of the spheres are rounded to float32 as well. Written in portions, however large the map is.
         """
         import h5py
 
@@ -120,7 +121,7 @@ class ReachMap:
         unfinished = path.with_name(".%s.%d.h5" % (path.stem, os.getpid()))
         quaternions = np.array([quaternion_from_matrix(rotation) for rotation in self.rotations])
         flat = self.reached.reshape(-1, len(self.rotations))
-        centres = self.centres.reshape(-1, 3)
+        centres = self.centres.reshape(-1, 3).astype(np.float32)
         with h5py.File(unfinished, "w") as file:
             poses = file.create_dataset("Poses/poses_dataset", (0, 10), "float32", maxshape=(None, 10),
                                         chunks=(4096, 10))
