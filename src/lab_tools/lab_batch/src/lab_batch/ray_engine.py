@@ -4,6 +4,7 @@ import contextlib
 import os
 import shutil
 import tempfile
+import time
 from itertools import islice
 from pathlib import Path
 
@@ -44,6 +45,9 @@ class _Episodes:
     def __init__(self, spec):
         self._job = load(spec)
 
+    def started(self):
+        """Return when the job has started."""
+
     def run(self, seed):
         return run_episode(self._job, seed)
 
@@ -80,7 +84,8 @@ def _start(ray, limits, address, ending):
         folder = tempfile.mkdtemp(prefix="ray-")  # for its logs and sockets, which it would keep
         ending.callback(shutil.rmtree, folder, ignore_errors=True)
         ending.callback(end_processes, folder)
-        options.update(num_cpus=limits.workers, _temp_dir=folder)
+        # Ray opens its own folder to everybody; the one around it stays closed.
+        options.update(num_cpus=limits.workers, _temp_dir=os.path.join(folder, "ray"))
     ending.callback(ray.shutdown)
     for left in reversed(range(tries)):
         try:
@@ -106,6 +111,19 @@ def end_processes(folder):
     psutil.wait_procs(found, END_S)
 
 
+class _Actor:
+    """handle: Ray's; began: when the episode that it runs began, None while its job starts."""
+
+    def __init__(self, handle):
+        self.handle, self.began = handle, None
+
+    def deadline(self, limits):
+        """When the episode that runs must have ended, on the monotonic clock [s]."""
+        if self.began is None or limits.episode_s is None:
+            return float("inf")
+        return self.began + limits.episode_s
+
+
 class _Actors:
     """Actors, each with up to SEEDS_AHEAD seeds. Where one dies, it is not known which of its seeds has killed it: the
     outcome of a seed that is done may be lost as well. From then on its seeds run one by one."""
@@ -114,23 +132,27 @@ class _Actors:
         self._ray, self._spec, self._limits = ray, spec, limits
         self._seeds, self._again, self._deaths = iter(seeds), [], {}
         self._kind = ray.remote(num_cpus=1, runtime_env={"env_vars": ONE_THREAD})(_Episodes)
+        self._starting = {}  # {reference: actor}
         self._running = {}  # {reference: (actor, seed)}
 
     def outcomes(self):
         for _ in range(self._limits.workers):
             self._start()
         while self._running:
-            done, _ = self._ray.wait(list(self._running), num_returns=1, timeout=self._limits.episode_s)
-            if not done:
-                yield from self._stop_all()
-                continue
-            yield from self._take(done[0])
+            deadline = min(actor.deadline(self._limits) for actor, _ in self._running.values())
+            left = None if deadline == float("inf") else max(0.0, deadline - time.monotonic())
+            done, _ = self._ray.wait([*self._starting, *self._running], num_returns=1, timeout=left)
+            if done:
+                yield from self._take(done[0])
+            else:
+                yield from self._stop_late()
 
     def _start(self):
         """A new actor, where a seed is left for it."""
         following = self._following([])
         if following:
-            actor = self._kind.remote(self._spec)
+            actor = _Actor(self._kind.remote(self._spec))
+            self._starting[actor.handle.started.remote()] = actor
             self._give(actor, following)
 
     def _following(self, waiting):
@@ -143,19 +165,24 @@ class _Actors:
 
     def _give(self, actor, seeds):
         for seed in seeds:
-            self._running[actor.run.remote(seed)] = (actor, seed)
+            self._running[actor.handle.run.remote(seed)] = (actor, seed)
 
     def _of(self, actor):
-        """{reference: seed} of what an actor has still to do."""
+        """{reference: seed} of what an actor has still to do, the one that it runs first."""
         return {reference: seed for reference, (one, seed) in self._running.items() if one is actor}
 
     def _take(self, reference):
-        actor, _ = self._running[reference]
+        actor = self._starting[reference] if reference in self._starting else self._running[reference][0]
         try:
             outcome = self._result(reference)
         except self._ray.exceptions.RayActorError as error:
             yield from self._died(actor, error)
             return
+        if self._starting.pop(reference, None):
+            # Its first outcome may have been reported before.
+            actor.began = actor.began or time.monotonic()
+            return
+        actor.began = time.monotonic()
         del self._running[reference]
         yield outcome
         self._give(actor, self._following(list(self._of(actor).values())))
@@ -166,11 +193,17 @@ class _Actors:
         except self._ray.exceptions.RayTaskError as error:
             raise JobError(str(error.cause)) from error
 
+    def _forget(self, actor):
+        """Take away what an actor has still to do; returns {reference: seed}."""
+        seeds = self._of(actor)
+        self._running = {reference: one for reference, one in self._running.items() if reference not in seeds}
+        self._starting = {reference: one for reference, one in self._starting.items() if one is not actor}
+        return seeds
+
     def _died(self, actor, error):
         if "JobError" in str(error):
             raise JobError(str(error).strip().splitlines()[-1])
-        for reference, seed in self._of(actor).items():
-            del self._running[reference]
+        for reference, seed in self._forget(actor).items():
             try:
                 yield self._result(reference)
                 continue
@@ -182,15 +215,14 @@ class _Actors:
                 yield Outcome(seed, {}, "its worker died twice: %s" % str(error).strip().splitlines()[0], 0.0)
         self._start()
 
-    def _stop_all(self):
-        """Nothing ended within the limit of an episode: the actors hang."""
-        actors = {id(actor): (actor, seed) for actor, seed in reversed(self._running.values())}
-        text = "took more than the limit of %g s" % self._limits.episode_s
-        failed = {seed for _, seed in actors.values()}
-        self._again += [seed for _, seed in self._running.values() if seed not in failed]
-        self._running.clear()
-        for actor, seed in actors.values():
-            self._ray.kill(actor)
-            yield Outcome(seed, {}, text, self._limits.episode_s)
-        for _ in actors:
+    def _stop_late(self):
+        """Stop the actors whose episode takes too long."""
+        now = time.monotonic()
+        late = {id(actor): actor for actor, _ in self._running.values() if actor.deadline(self._limits) <= now}
+        for actor in late.values():
+            seed, *waiting = self._forget(actor).values()
+            self._again += waiting
+            self._ray.kill(actor.handle)
+            yield Outcome(seed, {}, "took more than the limit of %g s" % self._limits.episode_s,
+                          self._limits.episode_s)
             self._start()

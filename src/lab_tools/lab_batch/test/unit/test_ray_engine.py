@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -37,7 +38,8 @@ print(json.dumps([child.name() for child in psutil.Process().children(recursive=
 
 class LateRay:
     """What the engine uses of Ray, at its worst: an actor with the seed ``deadly`` dies before any of its outcomes has
-    arrived. ``first``: the place of what is reported first among all that is ready."""
+    arrived, and one at the seed ``hanging`` never ends it. ``first``: the place of what is reported first among all
+    that is ready. ``start_s``: how long the start of a job takes, which does not count as an episode."""
 
     class exceptions:  # noqa: N801  Ray's own name
         class RayActorError(Exception):
@@ -46,8 +48,9 @@ class LateRay:
         class RayTaskError(Exception):
             """The actor's method has raised."""
 
-    def __init__(self, deadly, first):
-        self._deadly, self._first, self._of = deadly, first, {}
+    def __init__(self, deadly=None, first=0, hanging=None, start_s=0.0):
+        self._deadly, self._first, self._hanging, self._start_s = deadly, first, hanging, start_s
+        self._of, self._began, self.killed = {}, {}, []
 
     def remote(self, **_):
         return lambda kind: SimpleNamespace(remote=self._actor)
@@ -57,14 +60,29 @@ class LateRay:
 
         def give(seed):
             given.append(seed)
-            self._of[seed, len(given)] = given
-            return seed, len(given)
+            # Several actors may get the same seed, one after the other.
+            self._of[seed, len(self._of)] = given
+            return seed, len(self._of) - 1
 
-        return SimpleNamespace(run=SimpleNamespace(remote=give))
+        self._began[id(given)] = time.monotonic()
+        return SimpleNamespace(run=SimpleNamespace(remote=give), started=SimpleNamespace(remote=lambda: give("start")))
+
+    def kill(self, handle):
+        self.killed.append(handle)
+
+    def _is_ready(self, reference):
+        given = self._of[reference]
+        if self._hanging in given[:given.index(reference[0]) + 1]:
+            return False
+        return time.monotonic() - self._began[id(given)] >= self._start_s
 
     def wait(self, references, num_returns, timeout):
-        done = references[self._first]
-        return [done], [other for other in references if other != done]
+        end = time.monotonic() + (60.0 if timeout is None else timeout)
+        while not (ready := [one for one in references if self._is_ready(one)]):
+            if time.monotonic() > end:
+                return [], references
+            time.sleep(0.005)
+        return [ready[self._first]], references
 
     def get(self, reference):
         if self._deadly in self._of[reference]:
@@ -111,6 +129,26 @@ def test_a_killed_worker_costs_its_own_episode_only_whatever_waited_with_it(firs
     errors = {one.seed: one.error for one in outcomes}
     assert sorted(errors) == list(range(8))
     assert [seed for seed, error in errors.items() if error] == [5] and "died twice" in errors[5]
+
+
+def test_a_start_is_no_part_of_an_episode_and_a_late_one_fails_alone():
+    """Meanwhile other actors go on, so something always ends within the limit."""
+    ray = LateRay(hanging=2, start_s=0.3)
+    outcomes = list(ray_engine._Actors(ray, Spec("any:Job"), range(200), Limits(2, episode_s=0.2)).outcomes())
+    assert sorted(one.seed for one in outcomes) == list(range(200))
+    assert [one.error for one in outcomes if one.error] == ["took more than the limit of 0.2 s"]
+    assert len(ray.killed) == 1
+
+
+def test_other_users_cannot_open_the_folder_of_a_ray():
+    """Ray itself lets everybody in."""
+    options = {}
+    ray = SimpleNamespace(init=options.update, shutdown=lambda: None)
+    with contextlib.ExitStack() as ending:
+        ray_engine._start(ray, Limits(1), None, ending)
+        around = Path(options["_temp_dir"]).parent
+        assert around.stat().st_mode & 0o077 == 0 and around.name.startswith("ray-")
+    assert not around.exists()
 
 
 def test_processes_of_a_start_that_failed_are_ended():
