@@ -88,14 +88,17 @@ def parse(argv):
     return options
 
 
-def repeating_line(job, settings, seed):
+def repeating_line(options, seed):
     """The command that runs one episode again, in the folder of this one."""
     script = "./baxter.sh"
     if not os.path.exists(script):
         script = os.path.join(os.environ.get("LAB_ROOT", "."), "baxter.sh")
-    words = [script, "batch", job, "--seeds", str(seed)]
-    for name, value in settings:
-        words += ["--set", "%s=%s" % (name, value if isinstance(value, str) else repr(value))]
+    words = [script, "batch", options.job, "--seeds", str(seed)]
+    for name, value in options.set:
+        text = "%s=%s" % (name, value)
+        words += ["--set", text if setting_of(text) == (name, value) else "%s=%r" % (name, value)]
+    if options.time_limit:
+        words += ["--time-limit", "%g" % options.time_limit]
     return shlex.join([*words, "--out", "/dev/null"])
 
 
@@ -162,6 +165,8 @@ def run(options):
     class_of(spec.name)  # a wrong name is told before anything starts
     if options.parquet:
         parquet.ensure_installed(ROOT)
+    if options.engine == "ray":
+        ray_engine.ensure_installed(ROOT)  # its version is one of those in the file
     path = options.out or ROOT / ".baxter" / "batch" / ("%s.jsonl" % options.job.replace("/", "_").replace(":", "."))
     records = Records(path, spec, versions(ROOT))
     try:
@@ -169,6 +174,9 @@ def run(options):
         left = [seed for seed in options.seeds if seed not in known]
         if len(left) < len(options.seeds):
             print("%d of %d seeds have results in %s" % (len(options.seeds) - len(left), len(options.seeds), path))
+        for earlier in records.header.get("earlier versions", ()):
+            print("batch: some of them are of other versions: %s" % changes(earlier, records.header["versions"]),
+                  file=sys.stderr)
         began = time.monotonic()
         _run_left(options, spec, left, records)
         seconds = time.monotonic() - began
@@ -179,6 +187,12 @@ def run(options):
         return code
     finally:
         records.close()
+
+
+def changes(earlier, now):
+    """Say which versions ({name: text}) are others now."""
+    return ", ".join("%s %s (now %s)" % (name, earlier.get(name, "absent"), now.get(name, "absent"))
+                     for name in sorted({**earlier, **now}) if earlier.get(name) != now.get(name))
 
 
 def _run_left(options, spec, left, records):
@@ -197,7 +211,7 @@ def report(options, outcomes, path, count, seconds):
     for line in summary(outcomes):
         print(line)
     for one in failed:
-        print("seed %d failed: %s\n  %s" % (one.seed, one.error, repeating_line(options.job, options.set, one.seed)))
+        print("seed %d failed: %s\n  %s" % (one.seed, one.error, repeating_line(options, one.seed)))
     print("%d ended well, %d failed; %d run now in %.1f s; results in %s" % (
         len(outcomes) - len(failed), len(failed), count, seconds, path))
     return 1 if failed else 0

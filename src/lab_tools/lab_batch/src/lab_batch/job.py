@@ -2,12 +2,19 @@
 """A job: a class of which each instance runs episodes, one for each seed."""
 import importlib
 import inspect
+import json
 import time
 import traceback
 from dataclasses import dataclass, field
 
 # sys.exit() in a job, or in a library that it calls, ends an episode and not its worker.
 _OF_JOBS = (Exception, SystemExit)
+# Of an array of NumPy that becomes a list: all results of a batch are in memory.
+MOST_NUMBERS = 1_000_000
+
+
+class ResultError(Exception):
+    """run() returned what no file of results can hold; the text says what, and what would have been right."""
 
 
 class JobError(Exception):
@@ -27,6 +34,7 @@ class Job:
     def run(self, seed):
         """Run one episode; return its results as {name: value that JSON can hold}. seed: int >= 0.
 
+        Numbers and arrays of NumPy count as numbers and lists.
         An exception makes the episode a failed one; the worker continues with the next seed.
         """
         raise NotImplementedError
@@ -102,14 +110,45 @@ def run_episode(job, seed):
     """Return the Outcome of one episode; an exception of the job is its error, with the line where it was raised."""
     started = time.monotonic()
     try:
-        result = job.run(seed)
-        if not isinstance(result, dict):
-            raise TypeError("run() returned %s; a dictionary of results was expected" % type(result).__name__)
-        return Outcome(seed, result, "", time.monotonic() - started)
+        result, text = plain(job.run(seed)), ""
+    except ResultError as error:
+        result, text = {}, str(error)
     except _OF_JOBS as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
-        text = "%s (%s, line %d)" % (_text_of(error), where.filename, where.lineno)
-        return Outcome(seed, {}, text, time.monotonic() - started)
+        result, text = {}, "%s (%s, line %d)" % (_text_of(error), where.filename, where.lineno)
+    return Outcome(seed, result, text, time.monotonic() - started)
+
+
+def plain(result):
+    """Return what run() returned as JSON gives it back: tuples are lists, arrays of NumPy as well.
+
+    So a batch that was interrupted has the same results as one that was not. Raises ResultError.
+    """
+    if not isinstance(result, dict):
+        raise ResultError("run() returned %s; a dictionary of results was expected" % type(result).__name__)
+    return {name: _plain(name, value) for name, value in result.items()}
+
+
+def _plain(name, value):
+    if not isinstance(name, str):
+        raise ResultError("run() named a result %r; names are texts, such as 'error_m'" % (name,))
+    try:
+        return json.loads(json.dumps(value, allow_nan=False, default=_of_numpy))
+    except (TypeError, RecursionError) as error:
+        text = str(error)
+    except ValueError as error:
+        text = "%s; None can stand for a number that is NaN or infinite" % error
+    raise ResultError("result %r cannot be written as JSON: %s" % (name, text))
+
+
+def _of_numpy(value):
+    if getattr(value, "size", 0) > MOST_NUMBERS:
+        raise TypeError("it is an array of %d numbers; the most is %d, so write it to a file and return the file's name"
+                        % (value.size, MOST_NUMBERS))
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError("it has an object of type %s; numbers, texts, None, lists and dictionaries were expected"
+                    % type(value).__name__)
 
 
 def _text_of(error):

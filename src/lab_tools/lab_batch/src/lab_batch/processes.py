@@ -7,13 +7,15 @@ import signal
 import sys
 import time
 from collections import deque
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection
 
+import psutil
+
 from .job import JobError, Outcome, load, run_episode
 
-_PR_SET_PDEATHSIG = 1
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 # A worker has its next seed while the answer to the last one is on its way.
 SEEDS_AHEAD = 2
 # An episode gets a second worker where its first one died, which may have been killed for another reason.
@@ -144,7 +146,9 @@ class _Pool:
 
 def _cause(code):
     if code is not None and code < 0:
-        return "signal %s" % signal.Signals(-code).name
+        # The kernel sends it where memory has run out.
+        more = "; from outside, or because memory had run out" if code == -signal.SIGKILL else ""
+        return "signal %s%s" % (signal.Signals(-code).name, more)
     return "exit code %s" % code
 
 
@@ -186,6 +190,7 @@ class _Worker:
 
     def kill(self):
         """End it and all processes that it has started."""
+        family = _children(self.process.pid)
         if self.process.pid is not None and self.process.exitcode is None:
             for sign in (signal.SIGTERM, signal.SIGKILL):
                 _signal_group(self.process.pid, sign)
@@ -194,6 +199,7 @@ class _Worker:
                     break
         if self.process.pid is not None:
             _signal_group(self.process.pid, signal.SIGKILL)  # children that outlived it
+            _end(family)  # those in groups of their own
             self.process.join(STOP_TIMEOUT_S)
         self.link.close()
 
@@ -210,6 +216,20 @@ def _signal_group(pid, sign):
         os.killpg(pid, sign)
     except (ProcessLookupError, PermissionError):
         pass
+
+
+def _children(pid):
+    """The psutil.Process of each process below ``pid``."""
+    try:
+        return psutil.Process(pid).children(recursive=True)
+    except psutil.Error:
+        return []
+
+
+def _end(processes):
+    for process in processes:
+        with suppress(psutil.Error):
+            process.kill()
 
 
 @contextmanager
@@ -229,7 +249,9 @@ def _environment(values):
 def _work(spec, link, parent):
     """A worker's program: episodes until a None or the end of the link."""
     os.setpgid(0, 0)  # a job's own processes end with it, and Ctrl-C goes to the parent alone
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    prctl = ctypes.CDLL(None).prctl
+    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)  # children of its children stay below it
     if os.getppid() != parent:
         return
     # What jobs print is no result: it goes to the error output.
@@ -239,6 +261,8 @@ def _work(spec, link, parent):
         _episodes(spec, link)
     except _Stopped:
         sys.exit(1)
+    finally:
+        _end(_children(os.getpid()))
 
 
 def _episodes(spec, link):

@@ -2,12 +2,15 @@
 """Results as JSON lines: a header with job, parameters and versions, then a line for each episode.
 
 A file that exists is continued: seeds with a result are not run again, and a last line that a crash cut off is dropped.
+Where versions have changed meanwhile, another header stands before the lines of the new ones.
 """
+import fcntl
 import json
 import math
 import os
 import platform
 import subprocess
+import sys
 from importlib import metadata
 from pathlib import Path
 
@@ -41,41 +44,64 @@ def line_of(outcome):
 
 
 class Records:
-    """The file of one batch. Raises RecordsError, OSError."""
+    """The file of one batch, which no other batch can use meanwhile. Raises RecordsError, OSError.
+
+    header: job, parameters and versions, as they stand in the file; "earlier versions" (a list) where some of its
+    results are of others.
+    """
 
     def __init__(self, path: Path, spec: Spec, found_versions: dict):
         self._path = path
         self.outcomes = {}  # {seed: the newest Outcome}
         self.header = header = {"job": spec.name, "parameters": spec.parameters, "versions": found_versions}
-        # Of devices, only /dev/null is of use; others may be read without end.
-        is_new = not path.is_file() or not self._read(header)
         path.parent.mkdir(parents=True, exist_ok=True)
         self._stream = path.open("a", encoding="utf-8")
-        if is_new:
+        try:
+            self._take_over(header)
+        except BaseException:
+            self._stream.close()
+            raise
+
+    def _take_over(self, header):
+        # Of devices, only /dev/null is of use; others may be read without end.
+        there = []
+        if self._path.is_file():
+            try:
+                fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise RecordsError("another batch is writing to %s; wait for its end, or name another file with --out"
+                                   % self._path) from None
+            there = self._read(header)
+        if header["versions"] not in there[-1:]:
             self._write(json.dumps({"batch": header}))
+        if earlier := [one for one in there if one != header["versions"]]:
+            self.header = {**header, "earlier versions": earlier}
 
     def _read(self, header):
-        """Take over what the file has; return whether it has a header."""
+        """Take over what the file has; return the versions of its headers."""
         data = self._path.read_bytes()
         whole = data.rfind(b"\n") + 1
         lines = data[:whole].decode("utf-8", "replace").splitlines()
-        if not lines:
-            self._truncate(0)
-            return False
+        rows, headers = [], []
         try:
-            there = json.loads(lines[0])["batch"]
-            rows = [json.loads(line) for line in lines[1:]]
+            for line in lines:
+                row = json.loads(line)
+                (headers if "batch" in row else rows).append(row.get("batch", row))
+            if lines and "batch" not in json.loads(lines[0]):
+                raise ValueError("it does not begin with a header")
+            versions_there = [one.get("versions") for one in headers]
             outcomes = [Outcome(row["seed"], row.get("result", {}), row.get("error", ""), row["seconds"])
                         for row in rows]
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise RecordsError("%s is no file of results: %s; name another with --out" % (self._path, error)) from error
         for what in ("job", "parameters"):
-            if there.get(what) != header[what]:
-                raise RecordsError("%s has results of %s %s, not %s; name another file with --out" % (
-                    self._path, what, there.get(what), header[what]))
+            for there in headers:
+                if there.get(what) != header[what]:
+                    raise RecordsError("%s has results of %s %s, not %s; name another file with --out" % (
+                        self._path, what, there.get(what), header[what]))
         self._truncate(whole)
         self.outcomes = {one.seed: one for one in outcomes}
-        return True
+        return versions_there
 
     def _truncate(self, size):
         if self._path.stat().st_size != size:
@@ -86,13 +112,8 @@ class Records:
         self._stream.flush()
 
     def add(self, outcome):
-        """Write one outcome; a result that JSON cannot hold makes it a failed one. Returns what was written."""
-        try:
-            line = line_of(outcome)
-        except (TypeError, ValueError) as error:
-            outcome = Outcome(outcome.seed, {}, "its results cannot be written as JSON: %s" % error, outcome.seconds)
-            line = line_of(outcome)
-        self._write(line)
+        """Write one outcome, whose result is as job.plain() returns it. Returns the outcome."""
+        self._write(line_of(outcome))
         self.outcomes[outcome.seed] = outcome
         return outcome
 
@@ -108,7 +129,8 @@ def summary(outcomes):
         values = [result[name] for result in done if name in result]
         if all(isinstance(value, bool) for value in values):
             lines.append("%s: %d of %d" % (name, sum(values), len(values)))
-        elif all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
+        elif all(isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+                 for value in values):
             lines.append("%s: mean %.6g, from %.6g to %.6g (%d)" % (
                 name, math.fsum(values) / len(values), min(values), max(values), len(values)))
     return lines

@@ -58,6 +58,21 @@ class Trouble(Job):
         return {"good": True, "drawn": random.Random(seed).random()}
 
 
+class Leaves(Job):
+    """Leaves a process that has a session of its own and whose parent has ended."""
+
+    def __init__(self, folder="", hangs=()):
+        self._folder, self._hangs = Path(folder), hangs
+
+    def run(self, seed):
+        forking = "setsid sleep 600 > /dev/null 2>&1 & echo $!"
+        done = subprocess.run(["sh", "-c", forking], stdout=subprocess.PIPE, text=True, check=True)
+        (self._folder / ("left-%d" % seed)).write_text(done.stdout)
+        if seed in self._hangs:
+            signal.pause()
+        return {}
+
+
 class Mute(Exception):
     """Has no text."""
 

@@ -4,6 +4,7 @@ import argparse
 import io
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import pytest
 
 from baxter_sim_kinematics import reach_commands
 from lab_batch import JobError, Outcome, Spec, command, load, on_first_use, parquet, ray_engine, ray_node
+from lab_batch.job import ResultError, plain
 from lab_batch.processes import Limits, map_seeds
 from lab_batch.records import Records, RecordsError, summary
 from lab_batch.shipped import JOBS, Command
@@ -59,6 +61,37 @@ def test_an_exception_fails_its_episode_alone():
     assert sorted(seed for seed, one in found.items() if one.is_done) == [0, 3]
 
 
+ARRAY = np.array([1.5, 2.5])
+
+
+@pytest.mark.parametrize("value, expected", [
+    ((1, 2), [1, 2]), ({3: "a"}, {"3": "a"}), (np.float32(0.5), 0.5), (np.int64(3), 3), (np.bool_(True), True),
+    (ARRAY, [1.5, 2.5]), ([{"deep": ARRAY}], [{"deep": [1.5, 2.5]}])])
+def test_results_are_what_their_file_gives_back(value, expected):
+    found = plain({"value": value})["value"]
+    assert found == expected and type(found) is type(expected)
+
+
+ITSELF = []
+ITSELF.append(ITSELF)
+
+
+@pytest.mark.parametrize("result, text", [
+    ({"share": float("nan")}, "'share' cannot .* None can stand for a number that is NaN"),
+    ({"share": np.array([np.inf])}, "'share' cannot .* None can stand"), ({"pose": object()}, "'pose' .* type object;"),
+    ({"f": lambda: 1}, "type function;"), ({"x": ITSELF}, "'x' .*Circular"), ({("a",): 1}, r"named a result \('a',\)"),
+    ({"grid": np.zeros(1_000_001)}, "array of 1000001 numbers.* write it to a file"),
+    (None, "run.. returned NoneType; a dictionary")])
+def test_results_that_no_file_can_hold_are_named(result, text):
+    with pytest.raises(ResultError, match=text):
+        plain(result)
+
+
+def test_a_result_that_is_no_json_fails_its_episode():
+    found = outcomes(TROUBLE, range(2), unwritable=(1,))
+    assert found[0].is_done and "result 'value' cannot be written as JSON" in found[1].error
+
+
 def test_whatever_a_job_raises_is_told(tmp_path, capsys):
     assert run("small_jobs:OddErrors", "--seeds", "0:4", "--out", tmp_path / "results.jsonl", "--workers", 1) == 1
     said = capsys.readouterr().out
@@ -91,6 +124,14 @@ def test_an_episode_over_its_time_is_stopped_with_its_children(tmp_path):
     assert found[0].is_done and found[2].is_done
     child = int((tmp_path / "child").read_text())
     wait_until(lambda: not is_alive(child), "the episode's own process has ended")
+
+
+def test_processes_in_sessions_of_their_own_end_with_their_worker(tmp_path):
+    """One worker ends by itself, one is stopped; a child of each has left its group, and its parent."""
+    found = outcomes("small_jobs:Leaves", range(2), Limits(2, episode_s=4.0), hangs=(1,), folder=str(tmp_path))
+    assert found[0].is_done and "limit of 4 s" in found[1].error
+    children = [int((tmp_path / ("left-%d" % seed)).read_text()) for seed in range(2)]
+    wait_until(lambda: not any(map(is_alive, children)), "the processes that episodes left have ended")
 
 
 def test_closing_the_iterator_stops_the_workers(tmp_path):
@@ -157,17 +198,35 @@ def test_other_files_are_not_touched(tmp_path, text, message):
     assert path.read_text() == text
 
 
-def test_a_result_that_is_no_json_fails_its_episode(tmp_path):
+def test_a_file_that_another_batch_writes_is_refused(tmp_path):
     records = Records(tmp_path / "results.jsonl", SPEC, {})
-    assert "cannot be written as JSON" in records.add(Outcome(1, {"value": float("nan")})).error
-    assert "cannot be written as JSON" in records.add(Outcome(2, {"value": object()})).error
+    with pytest.raises(RecordsError, match="another batch is writing to .*results.jsonl"):
+        Records(tmp_path / "results.jsonl", SPEC, {})
     records.close()
+    Records(tmp_path / "results.jsonl", SPEC, {}).close()
+
+
+def test_results_of_earlier_versions_are_told_apart(tmp_path, capsys):
+    out = tmp_path / "results.jsonl"
+    records = Records(out, SPEC, {"python": "2.7", "numpy": "1"})
+    records.add(Outcome(0, {"square": 0.0}))
+    records.close()
+    assert run(SQUARE, "--set", "factor=2.0", "--seeds", "0:1", "--out", out) == 0
+    said = capsys.readouterr().err
+    assert "of other versions: " in said and "python 2.7 (now 3." in said
+    rows = [json.loads(line) for line in out.read_text().splitlines()]
+    assert [row["batch"]["versions"]["numpy"] for row in rows if "batch" in row] == ["1", np.__version__]
+    again = Records(out, SPEC, {"python": "4"})
+    again.close()
+    assert again.header["versions"] == {"python": "4"} and len(again.header["earlier versions"]) == 2
+    assert list(again.outcomes) == [0]
 
 
 def test_summary():
     found = summary([Outcome(0, {"good": True, "size": 1.0, "name": "a"}), Outcome(1, {"good": False, "size": 3}),
                      Outcome(2, {}, "failed")])
     assert found == ["good: 1 of 2", "size: mean 2, from 1 to 3 (2)"]
+    assert summary([Outcome(0, {"huge": 10**400}), Outcome(1, {"huge": 2})]) == []  # no float holds it
 
 
 # -- the command
@@ -489,7 +548,16 @@ def test_robot_zero_is_the_drawing_and_others_are_not():
 def test_a_failure_is_repeated_from_the_folder_of_its_job(tmp_path, monkeypatch):
     monkeypatch.setenv("LAB_ROOT", "/home/me/lab")
     monkeypatch.chdir(tmp_path)
-    assert command.repeating_line("mine:Job", [], 2) == (
-        "/home/me/lab/baxter.sh batch mine:Job --seeds 2 --out /dev/null")
+    options = command.parse(["mine:Job", "--seeds", "0:3"])
+    assert command.repeating_line(options, 2) == "/home/me/lab/baxter.sh batch mine:Job --seeds 2 --out /dev/null"
     (tmp_path / "baxter.sh").touch()
-    assert command.repeating_line("mine:Job", [], 2).startswith("./baxter.sh batch")
+    assert command.repeating_line(options, 2).startswith("./baxter.sh batch")
+
+
+def test_a_failure_is_repeated_with_the_same_parameters_and_limit():
+    settings = ("--set", "a='5'", "--set", "b=it's 5", "--set", "c=(1,)")
+    options = command.parse(["mine:Job", "--seeds", "0:3", "--time-limit", "2.5", *settings])
+    line = shlex.split(command.repeating_line(options, 2))
+    again = command.parse(line[line.index("batch") + 1:])
+    assert again.set == options.set == [("a", "5"), ("b", "it's 5"), ("c", (1,))]
+    assert again.time_limit == 2.5 and again.seeds == [2]
