@@ -8,11 +8,13 @@ import threading
 import traceback
 
 import rosgraph
+import rosnode
 import rospy
 
 from rospy_limits.node import limit_ports
 from sensor_renderer.priority import DRAWING, give_way
 
+_NAME = "gazebo_gui"
 _PROBE = "from PyQt5.QtWidgets import QApplication; QApplication(['gazebo'])"
 _PROBE_TIMEOUT_S = 30.0
 # While Python's signal handlers wait for Qt's loop: how often they get their turn [ms].
@@ -39,12 +41,24 @@ def main():
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
     limit_ports()
-    rospy.init_node("gazebo_gui", disable_rostime=True, disable_signals=True)
+    # A window beside another one; a name on the command line, as roslaunch gives it, stays.
+    anonymous = not any(word.startswith("__name:=") for word in sys.argv) and _is_there(_NAME)
+    rospy.init_node(_NAME, anonymous=anonymous, disable_rostime=True, disable_signals=True)
     (_publish if offscreen else _show)(ending)
     rospy.signal_shutdown("the window is closed")
     sys.stdout.flush()
     # A call to a simulator that does not answer must not keep the process alive.
     os._exit(0)
+
+
+def _is_there(name):
+    """Whether a node of this name answers; one that was killed is still listed."""
+    name = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), name)
+    try:
+        rosgraph.Master(name).lookupNode(name)
+    except (OSError, rosgraph.MasterException):
+        return False
+    return rosnode.rosnode_ping(name, max_count=1)
 
 
 def _why_no_screen():

@@ -67,6 +67,21 @@ class WorldWindow(unittest.TestCase):
         window.terminate()
         self.assertEqual(window.wait(DEADLINE_S), 0)
 
+    def test_a_second_window_leaves_the_first_one_open(self):
+        def windows():
+            return {name.rpartition("/")[0] for name, _ in rospy.get_published_topics() if "/gazebo_gui" in name}
+
+        opened = []
+        for count in (1, 2):
+            window = subprocess.Popen(["rosrun", "gazebo_ros", "gzclient", "_offscreen:=true"])
+            self.addCleanup(window.wait)
+            self.addCleanup(window.terminate)
+            opened.append(window)
+            wait_until(lambda count=count: len(windows()) == count, "%d windows: %s" % (count, windows()))
+        for name in windows():
+            rospy.wait_for_message(name + "/image", Image, DEADLINE_S)
+        self.assertEqual([window.poll() for window in opened], [None, None])
+
     def red(self):
         """Rows and columns of the red pixels on the screen."""
         return red_of(self._screen.picture())
