@@ -92,18 +92,22 @@ class GlRenderer:
         target = self._targets.of(pinhole.width, pinhole.height)
         picture = distance = None
         if colour:
-            casters = [entry for entry in everything if not entry[0].is_floor]
+            casters = [entry for entry in everything if entry[0].caster is not None]
             if self._shadows.draw(mirror, casters, pinhole, pose):
                 self._programs.shadow_by(self._shadows)
             screens = self._screens.visible(mirror, pinhole, view)
             target.clear(mirror.light.background)
             self._shadows.use()
             self._programs.look(to_clip, pose[:3, 3])
-            self._draw(seen, pinhole)
+            textured = [(array, packed, material) for arrays, _, packed, _, _ in seen
+                        for material, array in arrays.textured]
+            self._draw(seen, [entry for entry in textured if entry[2].opacity >= 1.0], pinhole)
             self._screens.draw(screens, to_clip)
             if mirror.light.sky:
                 self._programs.sky["from_clip"].write(matrix_bytes(_rays(pinhole, pose)))
                 target.draw_behind(self._sky)
+            # Far ones first.
+            self._draw_textured([entry for entry in reversed(textured) if entry[2].opacity < 1.0])
             picture = target.picture()
         else:
             target.clear()
@@ -143,9 +147,10 @@ class GlRenderer:
         """Release the context."""
         self._context.release()
 
-    def _draw(self, seen, pinhole):
+    def _draw(self, seen, textured, pinhole):
         """Draw ``seen``, (:class:`sensor_renderer.links.Arrays`, matrix, packed matrix,
-        :class:`sensor_renderer.links.Link`, distance of its sphere), the floor last."""
+        :class:`sensor_renderer.links.Link`, distance of its sphere), ``textured`` as
+        :func:`sensor_renderer.programs.draw_textured` takes them, and the floor last."""
         draw(self._programs.solid, [(arrays.colour, packed) for arrays, _, packed, link, _ in seen
                                     if not link.is_mesh and arrays.colour is not None])
         meshes = [(arrays, packed, distance) for arrays, _, packed, link, distance in seen
@@ -159,13 +164,14 @@ class GlRenderer:
             draw(self._programs.mesh, [(arrays.colour, packed) for arrays, packed, distance in meshes
                                        if distance >= within])
             self._context.disable(self._context.CULL_FACE)
-        textured = [(array, packed, material) for arrays, _, packed, _, _ in seen
-                    for material, array in arrays.textured]
-        if textured:
-            draw_textured(self._programs.textured(), textured, self._textures)
+        self._draw_textured(textured)
         for _, matrix, packed, link, _ in seen:
             if link.is_floor:
                 self._floor.draw(link.parts[0].colour, matrix, packed, self._shadows.corners)
+
+    def _draw_textured(self, listed):
+        if listed:
+            draw_textured(self._programs.textured(), listed, self._textures)
 
     def _light_by(self, light):
         if not self._programs.fit(light):

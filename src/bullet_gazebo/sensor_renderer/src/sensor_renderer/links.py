@@ -136,8 +136,7 @@ class Links:
             found = self._links[key] = Link(centre, (high - low) / 2.0 + error_m, radius,
                                             any(part.is_floor for part in parts), tuple(parts),
                                             any(part.levels for part in parts))
-            thin = found.is_mesh and self._live
-            found.caster = self._caster_of(rows, found) if thin else self._level(found, _CASTER_M).depth
+            found.caster = self._caster_of(found)
         return found
 
     def _arrays_of(self, link, numbers):
@@ -177,7 +176,18 @@ class Links:
                                      lambda: getattr(self._sides, which)(*looked_at))
         return np.arange(len(rows)).reshape(-1, 3)[behind, ::-1].ravel()
 
-    def _caster_of(self, rows, link):
+    def _caster_of(self, link):
+        """The array that casts the shadow of ``link``; None for floors, and for what one can see through."""
+        opaque = [part for part in link.parts if not part.is_floor and (part.material is None
+                                                                        or part.material.opacity >= 1.0)]
+        if not opaque:
+            return None
+        if not (link.is_mesh and self._live):
+            if len(opaque) == len(link.parts):
+                return self._level(link, _CASTER_M).depth
+            rows = np.concatenate([part.triangles_of(part.level(_CASTER_M))[:, :3] for part in opaque])
+            return self._vertex_array(self._programs.shadow, rows, "3f", "position")
+        rows = _rows(opaque, [part.triangles for part in opaque])
         rows = self._results.array("caster-%d" % _VERSION, (rows[:, :3],), lambda: _thinned(rows))
         return self._vertex_array(self._programs.shadow, rows, "3f", "position",
                                   backs=self._backs(rows, link, "plainly_from_behind"))

@@ -38,7 +38,7 @@ class Material(NamedTuple):
     """The look of parts that have more than a colour. ``texture``: the path of a picture, or ""; ``factor`` of its
     colours, and ``emission``, light of its own: red, green, blue from 0 to 1; ``repeats``: how often the picture lies
     side by side, and one below the other; ``cut_out``: whether its transparent pixels are holes; ``two_sided``: whether
-    it is seen from behind."""
+    it is seen from behind; ``opacity``: how much of what is behind it is covered, 1 being all."""
 
     texture: str
     factor: tuple
@@ -46,6 +46,7 @@ class Material(NamedTuple):
     repeats: tuple = (1.0, 1.0)
     cut_out: bool = False
     two_sided: bool = True
+    opacity: float = 1.0
 
 
 class Part(NamedTuple):
@@ -261,6 +262,8 @@ class Mirror:
                       bool(listed.get("glows")), float(listed.get("radius", 0.0)))
 
     def _parts_of(self, shape):
+        if shape.colour is not None and shape.colour[3] <= 0.0:
+            return []  # nobody sees it
         geometry, colour, finish = shape.geometry, shape.colour or DEFAULT_COLOUR, shape.finish or Finish()
         texture = self._texture(finish.texture, self._find_mesh(finish.texture)) if finish.texture else None
         if not isinstance(geometry, Mesh):
@@ -283,6 +286,7 @@ class Mirror:
         """The :class:`Part` of a ``world_picture.drawing.MeshPart`` in the mesh file at ``path``; ``texture``: the
         picture that the description lays over it, or None."""
         colour, factor = part.colour or shape.colour or DEFAULT_COLOUR, shape.colour or _WHITE
+        opacity = factor[3]
         finish = shape.finish or Finish()
         # A material that brings a picture replaces the file's own.
         emission = finish.emission if texture is not None or any(finish.emission) else part.emission
@@ -301,7 +305,7 @@ class Mirror:
         # A mirrored mesh shows its backs; they are its outside.
         finish = replace(finish, two_sided=finish.two_sided or np.linalg.det(origin[:3, :3]) < 0.0)
         return self._placed((part.path,), levels[part.plain].make, origin, levels=levels,
-                            **_look(finish, colour, factor, texture, emission))
+                            **_look(finish, (*colour[:3], opacity), (*factor[:3], opacity), texture, emission))
 
     def _texture(self, name, path):
         """The ``world_picture.textures.Texture`` of the picture at ``path``, or None, with one warning."""
@@ -324,14 +328,17 @@ class Mirror:
 
 def _look(finish, colour, factor, texture, emission):
     """Colour, gloss and material of a :class:`Part`. ``colour``: where ``texture`` is None; ``factor``: of the colours
-    of the texture."""
+    of the texture; the fourth number of both: the opacity."""
     gloss = GLOSS if finish.gloss is None else finish.gloss
+    opacity = min(colour[3] if texture is None else factor[3], 1.0)
     if texture is not None:
         material = Material(texture.path, tuple(factor[:3]), tuple(emission), finish.repeats, finish.cut_out,
-                            finish.two_sided)
+                            finish.two_sided, opacity)
         colour = (*(a * b for a, b in zip(texture.colour, factor, strict=False)), factor[3])
+    elif any(emission) or opacity < 1.0:
+        material = Material("", tuple(colour[:3]), tuple(emission), two_sided=opacity >= 1.0, opacity=opacity)
     else:
-        material = Material("", tuple(colour[:3]), tuple(emission)) if any(emission) else None
+        material = None
     return {"colour": tuple(colour), "gloss": gloss, "material": material}
 
 

@@ -125,16 +125,23 @@ def draw(program, listed):
 
 def draw_textured(program, listed, textures):
     """Render ``listed``, (vertex array, matrix of the body as OpenGL reads it, its
-    :class:`sensor_renderer.mirror.Material`); ``textures``: :class:`sensor_renderer.textures.Textures`.
+    :class:`sensor_renderer.mirror.Material`), whose materials are all opaque or all transparent; the latter are drawn
+    over what is behind them, in their order. ``textures``: :class:`sensor_renderer.textures.Textures`.
 
     As in Gazebo, pictures are seen from the front: signs have one sheet for each side, in the same place.
     """
     body, context = program["body"], textures.context
-    for array, packed, material in sorted(listed, key=lambda entry: entry[2].two_sided):
+    if listed[0][2].opacity < 1.0:
+        context.enable(context.BLEND)
+        context.blend_func = context.SRC_ALPHA, context.ONE_MINUS_SRC_ALPHA
+    else:
+        listed = sorted(listed, key=lambda entry: entry[2].two_sided)
+    for array, packed, material in listed:
         (context.disable if material.two_sided else context.enable)(context.CULL_FACE)
         textures.of(material.texture).use(1)
         program["emission"].value = material.emission
         program["least"].value = 0.5 if material.cut_out else 0.0
+        program["opacity"].value = material.opacity
         body.write(packed)
         array.render()
-    context.disable(context.CULL_FACE)
+    context.disable(context.CULL_FACE | context.BLEND)

@@ -36,7 +36,7 @@ void begin_light(vec3 outward) {
     // Thinned meshes are not closed everywhere: both sides of a triangle are outside.
     n = normalize(dot(outward, to_eye) < 0.0 ? -outward : outward);
     to_eye = normalize(to_eye);
-    float close = there.z > -0.01 ? exp2(-6.0 * there.z) : 0.0;
+    float close = exp2(-6.0 * abs(there.z));
     lit = ambient * ((1.1 + 0.3 * n.z) * (1.0 - (0.25 - 0.25 * n.z) * close));
     glint = vec3(0.0);
 }
@@ -259,6 +259,7 @@ uniform sampler2D picture;
 uniform vec3 emission;
 // Pixels that are more transparent than this are holes.
 uniform float least;
+uniform float opacity;
 in vec3 place;
 in vec3 outward;
 in vec4 own;
@@ -272,7 +273,7 @@ void main() {
     vec3 shadow_place = (to_shadow * vec4(there + margin * n, 1.0)).xyz;
     light_from(to_sun, sun, sun_shine, SUNLIT);
     LAMPS
-    seen = vec4(toned(texel.rgb * (own.rgb * lit + emission) + own.a * glint), 1.0);
+    seen = vec4(toned(texel.rgb * (own.rgb * lit + emission) + own.a * glint), opacity);
 }
 """
 

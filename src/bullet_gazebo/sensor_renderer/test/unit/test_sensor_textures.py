@@ -151,6 +151,52 @@ def test_pictures_of_collada_are_where_gazebo_looks_for_them(renderer, tmp_path,
         quarters = place
 
 
+def glass(opacity, more=""):
+    """A red pane of a box at the origin, across x; a green box behind it, at negative x."""
+    return ('<robot name="r"><link name="link"><visual><geometry><box size="0.01 1 1"/></geometry><material name="m">'
+            '<color rgba="1 0 0 %g"/>%s</material></visual><visual><origin xyz="-1 0 0"/><geometry><box size="0.1 9 9"/>'
+            '</geometry><material name="n"><color rgba="0 1 0 1"/></material></visual></link></robot>' % (opacity, more))
+
+
+@pytest.mark.parametrize("opacity", [0.75, 0.5, 0.25, 0.0])
+def test_a_pane_covers_what_is_behind_it_by_its_opacity(renderer, tmp_path, opacity):
+    (covered, near), (seen, far), (picture, depth) = (
+        renderer.render(world(tmp_path, text), PINHOLE, looking(x=1.2), depth=True)
+        for text in (glass(1.0), glass(1.0).replace("0.01 1 1", "0.01 0.001 0.001"), glass(opacity)))
+    covered, seen = (pixels[50, 50].astype(float) for pixels in (covered, seen))
+    assert covered[0] > 50 and seen[1] > 50
+    np.testing.assert_allclose(picture[50, 50], opacity * covered + (1.0 - opacity) * seen, atol=2)
+    assert depth[50, 50] == pytest.approx((near if opacity else far)[50, 50], abs=1e-3)
+
+
+def test_panes_and_the_sky_behind_them_are_seen_through_each_other(renderer, tmp_path):
+    """Blended from far to near, whatever their order; in front of nothing, the background shines through."""
+    pane = ('<link name="%s"><visual><origin xyz="%g 0 0"/><geometry><box size="0.01 9 9"/></geometry><material name="%s">'
+            '<color rgba="%s 0.5"/></material></visual></link>')
+    fixed = '<joint name="j" type="prismatic"><parent link="a"/><child link="b"/><limit effort="1" velocity="1"/></joint>'
+    light = {**EVEN, "background": [0, 0, 1]}
+    for near, far in (("a", "b"), ("b", "a")):
+        places = {near: (0.5, near, "1 0 0"), far: (-0.5, far, "0 1 0")}
+        urdf = '<robot name="r">%s%s</robot>' % ("".join(pane % (name, *places[name]) for name in "ab"), fixed)
+        mirror = Mirror(DrawingCache(tmp_path / "cache"), str, pytest.fail)
+        mirror.set_scene([{"name": "thing", "urdf": urdf, "joints": ["j"]}], light)
+        mirror.set_state(np.array([*UPRIGHT, 0.0], dtype=float))
+        red, green, blue = renderer.render(mirror, PINHOLE, looking(x=1.2))[0][60, 60].astype(float)
+        assert red / green == pytest.approx(2.0, abs=0.1) and blue == pytest.approx(255 / 4, abs=3)
+
+
+def test_a_pane_casts_no_shadow(renderer, tmp_path):
+    light = {"ambient": [0.2, 0.2, 0.2], "background": [0, 0, 0], "shadows": True, "lights": [
+        {"name": "sun", "type": "directional", "cast_shadows": True, "diffuse": [1, 1, 1], "specular": [0, 0, 0],
+         "direction": [-1.0, 0.0, -0.001], "place": [0, 0, 10]}]}
+    behind = {}
+    for opacity in (1.0, 0.5):
+        pose = looking(x=1.0)
+        pose[0, 3] = -0.2
+        behind[opacity] = int(renderer.render(world(tmp_path, glass(opacity), light), PINHOLE, pose)[0][60, 60, 1])
+    assert behind[0.5] > 1.5 * behind[1.0] > 0
+
+
 def test_a_mesh_may_name_the_picture_of_another_model(renderer, tmp_path, quarters):
     urdf = collada(tmp_path)
     path = tmp_path / "meshes" / "square.dae"
