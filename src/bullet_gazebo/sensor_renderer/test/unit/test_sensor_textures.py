@@ -151,18 +151,21 @@ def test_pictures_of_collada_are_where_gazebo_looks_for_them(renderer, tmp_path,
         quarters = place
 
 
-def glass(opacity, more=""):
+BOX = ('<visual><origin xyz="%g 0 0"/><geometry><box size="%s"/></geometry><material name="%s"><color rgba="%s"/>'
+       "</material></visual>")
+
+
+def glass(opacity, size="0.01 1 1"):
     """A red pane of a box at the origin, across x; a green box behind it, at negative x."""
-    return ('<robot name="r"><link name="link"><visual><geometry><box size="0.01 1 1"/></geometry><material name="m">'
-            '<color rgba="1 0 0 %g"/>%s</material></visual><visual><origin xyz="-1 0 0"/><geometry><box size="0.1 9 9"/>'
-            '</geometry><material name="n"><color rgba="0 1 0 1"/></material></visual></link></robot>' % (opacity, more))
+    return '<robot name="r"><link name="link">%s%s</link></robot>' % (
+        BOX % (0, size, "m", "1 0 0 %g" % opacity), BOX % (-1, "0.1 9 9", "n", "0 1 0 1"))
 
 
 @pytest.mark.parametrize("opacity", [0.75, 0.5, 0.25, 0.0])
 def test_a_pane_covers_what_is_behind_it_by_its_opacity(renderer, tmp_path, opacity):
     (covered, near), (seen, far), (picture, depth) = (
         renderer.render(world(tmp_path, text), PINHOLE, looking(x=1.2), depth=True)
-        for text in (glass(1.0), glass(1.0).replace("0.01 1 1", "0.01 0.001 0.001"), glass(opacity)))
+        for text in (glass(1.0), glass(1.0, "0.01 0.001 0.001"), glass(opacity)))
     covered, seen = (pixels[50, 50].astype(float) for pixels in (covered, seen))
     assert covered[0] > 50 and seen[1] > 50
     np.testing.assert_allclose(picture[50, 50], opacity * covered + (1.0 - opacity) * seen, atol=2)
@@ -171,13 +174,12 @@ def test_a_pane_covers_what_is_behind_it_by_its_opacity(renderer, tmp_path, opac
 
 def test_panes_and_the_sky_behind_them_are_seen_through_each_other(renderer, tmp_path):
     """Blended from far to near, whatever their order; in front of nothing, the background shines through."""
-    pane = ('<link name="%s"><visual><origin xyz="%g 0 0"/><geometry><box size="0.01 9 9"/></geometry><material name="%s">'
-            '<color rgba="%s 0.5"/></material></visual></link>')
-    fixed = '<joint name="j" type="prismatic"><parent link="a"/><child link="b"/><limit effort="1" velocity="1"/></joint>'
+    joint = '<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>'
     light = {**EVEN, "background": [0, 0, 1]}
     for near, far in (("a", "b"), ("b", "a")):
-        places = {near: (0.5, near, "1 0 0"), far: (-0.5, far, "0 1 0")}
-        urdf = '<robot name="r">%s%s</robot>' % ("".join(pane % (name, *places[name]) for name in "ab"), fixed)
+        panes = {near: BOX % (0.5, "0.01 9 9", near, "1 0 0 0.5"), far: BOX % (-0.5, "0.01 9 9", far, "0 1 0 0.5")}
+        urdf = '<robot name="r"><link name="a">%s</link><link name="b">%s</link>%s</robot>' % (
+            panes["a"], panes["b"], joint)
         mirror = Mirror(DrawingCache(tmp_path / "cache"), str, pytest.fail)
         mirror.set_scene([{"name": "thing", "urdf": urdf, "joints": ["j"]}], light)
         mirror.set_state(np.array([*UPRIGHT, 0.0], dtype=float))
