@@ -125,7 +125,8 @@ def _students(who):
     try:
         return roster.read(Path(who).read_text(encoding="utf-8"))
     except UnicodeDecodeError as error:
-        raise RosterError("%s is not UTF-8 (%s)" % (who, error.reason)) from error
+        raise RosterError('%s is not UTF-8 (line %d); in a spreadsheet, save it as "CSV UTF-8"'
+                          % (who, 1 + error.object.count(b"\n", 0, error.start))) from error
     except OSError as error:
         raise RosterError("%s is neither a number of students nor a file that can be read: %s"
                           % (who, error.strerror)) from error

@@ -21,6 +21,10 @@ LINGER = Path("/var/lib/systemd/linger")
 CONTROLLERS = ("cpu", "memory", "pids")
 #: The front door's weight at the processors, in labs.
 DOOR_WEIGHT = 10
+#: Version 1 counts buffers of network sockets beside the memory, and only where they have a limit. Beyond it, Linux gives
+#: each socket little, but something, so thousands of them may hold more [bytes].
+SOCKET_BYTES = 128 << 20
+_SOCKETS_USED = "memory.kmem.tcp.usage_in_bytes"
 #: Time for a group's last process to go [s].
 REMOVAL_S = 5.0
 # By version: the file, and the weight of a lab, which is the kernel's default; the largest weight.
@@ -69,12 +73,14 @@ class Group:
                 _write(folder / file, round(share * weight))
 
     def memory_bytes(self):
-        """Memory that its processes have written to, files in memory included; None without the controller."""
+        """Memory that its processes have written to, files in memory and buffers of network sockets included; None
+        without the controller."""
         version, folder = self._of("memory")
         if folder is None:
             return None
-        names = ("total_rss", "total_shmem") if version == 1 else ("anon", "shmem")
-        return sum(int(value) for name, _, value in _rows(folder / "memory.stat") if name in names)
+        names = ("total_rss", "total_shmem") if version == 1 else ("anon", "shmem", "sock")
+        sockets = sum(map(int, _words(folder / _SOCKETS_USED)))  # of version 1
+        return sockets + sum(int(value) for name, _, value in _rows(folder / "memory.stat") if name in names)
 
     def has_run_out(self):
         """Whether Linux has ended a process of it that had no memory left within the limit."""
@@ -124,8 +130,9 @@ class ControlGroups:
                 folder.mkdir()
             made.append((home, folder))
             for file, value in _limits(home, memory_bytes, tasks):
-                # Swap is not counted on every machine.
-                with contextlib.suppress(FileNotFoundError) if "sw" in file else contextlib.nullcontext():
+                # Swap and sockets are not counted on every machine.
+                optional = "sw" in file or "tcp" in file
+                with contextlib.suppress(FileNotFoundError) if optional else contextlib.nullcontext():
                     _write(folder / file, value)
         return Group(made)
 
@@ -255,7 +262,8 @@ def _weigh(home, labs, problems):
 def _limits(home, memory_bytes, tasks):
     if "memory" in home.controllers:
         if home.version == 1:
-            yield from (("memory.limit_in_bytes", memory_bytes), ("memory.memsw.limit_in_bytes", memory_bytes))
+            yield from (("memory.limit_in_bytes", memory_bytes), ("memory.memsw.limit_in_bytes", memory_bytes),
+                        ("memory.kmem.tcp.limit_in_bytes", min(SOCKET_BYTES, memory_bytes)))
         else:
             yield from (("memory.max", memory_bytes), ("memory.swap.max", 0), ("memory.oom.group", 1))
     if "pids" in home.controllers:

@@ -48,3 +48,9 @@ def test_a_port_that_is_taken_is_named():
         with pytest.raises(StoreError, match=re.escape(
             "port %d cannot be opened (%s); --port" % (port, os.strerror(errno.EADDRINUSE)))):
             Supervisor._open(supervisor)
+
+
+def test_a_roster_of_another_encoding_says_where_and_what_to_do(tmp_path, capsys):
+    (tmp_path / "roster.csv").write_bytes("name\nAnna\nJürgen\n".encode("latin-1"))
+    assert command.main(["--folder", str(tmp_path / "class"), "up", str(tmp_path / "roster.csv")]) == 2
+    assert 'roster.csv is not UTF-8 (line 3); in a spreadsheet, save it as "CSV UTF-8"' in capsys.readouterr().err

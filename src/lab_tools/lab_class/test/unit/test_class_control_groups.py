@@ -9,10 +9,23 @@ from pathlib import Path
 import pytest
 
 from lab_class import control_groups
-from lab_class.control_groups import found, remove_left_over, way_in
+from lab_class.control_groups import SOCKET_BYTES, found, remove_left_over, way_in
 from lab_testing.waiting import wait_until
 
 GB = 1 << 30
+# Connections whose other ends do not read; prints how many bytes they hold.
+FILL_SOCKETS = """
+import contextlib, socket
+server, ends, held = socket.create_server(("127.0.0.1", 0)), [], 0
+while held < 50 << 20:
+    ends += [socket.create_connection(server.getsockname()), server.accept()[0]]
+    ends[-1].setblocking(False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            held += ends[-1].send(bytes(1 << 16))
+print(held, flush=True)
+input()
+"""
 MEMORY, MEMORY_LIMIT, TASKS, TASK_LIMIT = 128 << 20, 64 << 20, 100, 200
 # As many processes as told, in turns on each processor: Linux shares every processor by the groups' weights, but two
 # processes of one lab that it leaves on one of two processors get 2/3 of that one and nothing of the other.
@@ -73,7 +86,8 @@ def test_version_1_has_a_folder_for_each_controller_below_our_own(kernel, tmp_pa
     assert [str(path.relative_to(tree.mount)) for path in lab.entrances] == [
         "cpu,cpuacct/class/anna/cgroup.procs", "memory/service/class/anna/cgroup.procs", "pids/class/anna/cgroup.procs"]
     assert written(tree, "memory/service/class/anna") == {"memory.limit_in_bytes": str(2 * GB),
-                                                          "memory.memsw.limit_in_bytes": str(2 * GB)}
+                                                          "memory.memsw.limit_in_bytes": str(2 * GB),
+                                                          "memory.kmem.tcp.limit_in_bytes": str(SOCKET_BYTES)}
     assert written(tree, "pids/class/anna") == {"pids.max": "4096"}
     lab.share_processors(0.5)
     assert written(tree, "cpu,cpuacct/class/anna") == {"cpu.shares": "512"}
@@ -190,6 +204,16 @@ def test_a_lab_that_takes_too_much_memory_ends_alone(groups):
     assert (greedy.has_run_out(), modest.has_run_out()) == (True, False)
     greedy.remove()
     assert not groups.lab("greedy", MEMORY_LIMIT, TASK_LIMIT).has_run_out()
+
+
+def test_buffers_of_sockets_are_memory_of_a_lab(groups):
+    needs(groups, "memory")
+    lab = groups.lab("talkative", GB, TASK_LIMIT)
+    process = start(lab, FILL_SOCKETS)
+    held = int(process.stdout.readline())
+    used = lab.memory_bytes()
+    process.communicate(timeout=60.0)
+    assert held > 40 << 20 and used > held
 
 
 def test_a_lab_that_computes_in_a_hundred_processes_takes_its_share_alone(groups):
