@@ -20,6 +20,8 @@ from pathlib import Path
 HOME = "/home/student"
 #: This variable says that a process is in the sandbox of its user's lab already: the user's own programs need no other.
 WALLED = "LAB_WALLED"
+#: The writable folders of a sandbox; of the first two a lab may have larger ones.
+FOLDERS = ("/dev/shm", "/tmp", "/var/tmp", "/run", HOME)
 #: Size limit of a writable folder of a sandbox [bytes].
 FOLDER_BYTES = 64 << 20
 # Files of /etc that programs need to start; none with passwords.
@@ -152,8 +154,8 @@ def _base(scratch_bytes=FOLDER_BYTES):
         options += ["--ro-bind-try", path, path]
     # The settings of Linux belong to the superuser, who needs no privilege to write them, and may run a class.
     options += ["--proc", "/proc", "--ro-bind", "/proc/sys", "/proc/sys", "--dev", "/dev"]
-    for path in ("/dev/shm", "/tmp", "/var/tmp", "/run", HOME):
-        options += _folder(path, scratch_bytes if path in ("/dev/shm", "/tmp") else FOLDER_BYTES)
+    for path in FOLDERS:
+        options += _folder(path, scratch_bytes if path in FOLDERS[:2] else FOLDER_BYTES)
     return options
 
 

@@ -38,8 +38,8 @@ def test_calls_that_hide_memory_are_refused_and_others_allowed(machine):
     architecture, read, clone = MACHINES[machine]
     program = system_calls.filter_program(machine)
     numbers = system_calls._MACHINES[machine][1]
-    for name in ("memfd_create", "memfd_secret", "shmget", "io_uring_setup", "clone3", "setns", "add_key",
-                 "request_key", "keyctl"):
+    for name in ("memfd_create", "memfd_secret", "shmget", "semget", "msgget", "io_uring_setup", "clone3", "setns",
+                 "add_key", "request_key", "keyctl"):
         assert outcome(program, numbers[name], architecture) == REFUSE, name
     assert outcome(program, read, architecture) == ALLOW
     for name in ("clone", "unshare"):

@@ -38,6 +38,8 @@ def check_syntax(text, name):
         return Fault("syntax", "line %s cannot be read by Python: %s%s" % (error.lineno or "?", error.msg, hint), 0.0)
     except ValueError as error:  # null bytes
         return Fault("syntax", "the file is not a Python program: %s" % error, 0.0)
+    except (RecursionError, MemoryError):
+        return Fault("syntax", "Python cannot read the file: an expression in it is nested too deeply", 0.0)
     return None
 
 
@@ -65,7 +67,7 @@ def _loops_around(program, line):
     """First lines of the loops that a line is in, the outermost first."""
     try:
         tree = ast.parse(program.read_bytes())
-    except (OSError, SyntaxError, ValueError):
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):
         return []
     return sorted(node.lineno for node in ast.walk(tree)
                   if isinstance(node, (ast.While, ast.For)) and node.lineno <= line <= node.end_lineno)
@@ -141,6 +143,8 @@ def behaviour(run, sides, limit_s):
     if run.ended == "sockets":
         return Fault("sockets", "the program opened more and more connections and was stopped: make publishers, "
                      "subscribers and service proxies once, before the loop", 0.0)
+    if run.ended == "files":
+        return Fault("files", "the program made more and more files and was stopped", 0.0)
     if run.ended == "requests":
         return Fault("requests", "the program asked the lab's nodes, as the IK service, for more than a minute of "
                      "computing and was stopped: ask for the poses that are needed, each once", 0.0)
@@ -256,6 +260,6 @@ def diagnose(run, exercise, call, robot, share):
 def behaviour_that_hides(run, sides, limit_s):
     """Faults of behaviour that make every measurement meaningless: they come before the exercise's own."""
     fault = behaviour(run, sides, limit_s)
-    first = ("output", "processes", "threads", "sockets", "requests", "memory", "flood", "busy", "crashed",
+    first = ("output", "processes", "threads", "sockets", "files", "requests", "memory", "flood", "busy", "crashed",
              "not_enabled", "wrong_arm", "repeated_names", "lengths", "degrees")
     return fault if fault and fault.key in first else None

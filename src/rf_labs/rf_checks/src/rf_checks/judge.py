@@ -30,8 +30,8 @@ _LOOK_S = 0.05
 #: End of a run -> its text in the report; other values are used as they are.
 ENDS = {"sim time": "simulated time limit", "satisfied": "seen enough", "output": "wrote too much",
         "processes": "too many processes", "threads": "too many threads", "sockets": "too many connections",
-        "memory": "too much memory", "flood": "flood of commands", "requests": "too many requests",
-        "busy": "computed without end", "paused": "simulation paused",
+        "files": "too many files", "memory": "too much memory", "flood": "flood of commands",
+        "requests": "too many requests", "busy": "computed without end", "paused": "simulation paused",
         "meddled": "lab meddled with"}
 MASTER = "/rosout and with it the ROS master"
 

@@ -107,9 +107,9 @@ class Run:
     """One run of a program.
 
     ended: how the run ended: "exited", "satisfied" (the judge had seen enough), "sim time", "busy", "flood",
-    "output", "processes", "threads", "sockets", "memory", "paused", "simulator gone", "meddled", "requests". changes:
-    Changes of the lab. stuck_at: the program's line when the judge ended it. cpu_s: its processor time; wall_s: its
-    wall time.
+    "output", "processes", "threads", "sockets", "files", "memory", "paused", "simulator gone", "meddled", "requests".
+    changes: Changes of the lab. stuck_at: the program's line when the judge ended it. cpu_s: its processor time;
+    wall_s: its wall time.
     """
 
     arguments: list

@@ -35,6 +35,9 @@ THREADS = 1000
 # which no process's memory shows. A ROS program has some dozens.
 SOCKETS = 400
 FILES = 1024  # open in a process
+#: Files and folders that it makes: the kernel keeps a kilobyte for each, even empty ones, which no process's memory and
+#: no folder's size shows.
+ENTRIES = 20_000
 #: A program that writes more than this is stopped; the first and the last KEPT_BYTES are kept.
 OUTPUT_BYTES = 4 << 20
 KEPT_BYTES = 200_000
@@ -157,7 +160,7 @@ class Student:
         return children_of(roots)
 
     def excess(self):
-        """The limit that the program exceeds: "output", "processes", "threads", "sockets", "memory", or ""."""
+        """The limit that the program exceeds: "output", "processes", "threads", "sockets", "files", "memory", or ""."""
         if self.wrote_too_much:
             return "output"
         family = self.family()
@@ -167,6 +170,8 @@ class Student:
             return "threads"
         if _count_sockets(family) > SOCKETS:
             return "sockets"
+        if self._has_walls and _count_entries(family) > ENTRIES:
+            return "files"
         return "memory" if _memory_bytes(family) > MEMORY_BYTES else ""
 
     def dump(self):
@@ -227,6 +232,19 @@ def _count_sockets(pids):
                 with contextlib.suppress(OSError):
                     found.add(os.readlink(file.path))
     return sum(name.startswith("socket:") for name in found)
+
+
+def _count_entries(pids):
+    """Files and folders in the writable folders of the sandbox that these processes are in."""
+    outside = os.stat("/")
+    for pid in pids:
+        root = "/proc/%d/root" % pid
+        with contextlib.suppress(OSError):
+            # Bubblewrap itself stays outside.
+            if not os.path.samestat(os.stat(root), outside):
+                found = [os.statvfs(root + folder) for folder in isolation.FOLDERS]
+                return sum(one.f_files - one.f_ffree for one in found)
+    return 0
 
 
 def _memory_bytes(pids):

@@ -13,7 +13,7 @@ class BadSubmission(Exception):
     """The program is refused; the text says why."""
 
 
-def read(path):
+def read(path, most_bytes=LARGEST_BYTES):
     """The bytes of a regular file that is not a link. Raises BadSubmission, OSError."""
     # Never wait for a pipe; and a link could lead to a file that only the judge may read.
     if os.path.islink(path):
@@ -23,9 +23,9 @@ def read(path):
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
             raise BadSubmission("%s is not a file" % path)
-        if status.st_size > LARGEST_BYTES:
-            raise BadSubmission("%s has %d bytes; no more than %d are taken" % (path, status.st_size, LARGEST_BYTES))
-        return file.read(LARGEST_BYTES)
+        if status.st_size > most_bytes:
+            raise BadSubmission("%s has %d bytes; no more than %d are taken" % (path, status.st_size, most_bytes))
+        return file.read(most_bytes)
 
 
 def files(program):

@@ -90,6 +90,7 @@ def test_a_recording_knows_who_commanded_the_arms():
     (run(records(), ended="processes"), "processes", []),
     (run(records(), ended="threads"), "threads", []),
     (run(records(), ended="sockets"), "sockets", ["once, before the loop"]),
+    (run(records(), ended="files"), "files", ["more files"]),
     (run(records(), ended="requests"), "requests", ["IK service"]),
     (run(records(), ended="memory"), "memory", ["2 GB"]),
     (run(records(left=1.0, commands=20)), "flood", ["rospy.Rate"]),
@@ -132,6 +133,8 @@ def test_an_arm_left_on_its_way_is_told():
     ("try:\n    pass\nexcept OSError, e:\n    pass\n", ["line 3", "except Error as e"]),
     ("def f(:\n", ["line 1"]),
     ("x = '\0'", ["Python"]),
+    ("x = " + "-" * 100_000 + "1", ["nested too deeply"]),
+    ("x" + "()" * 100_000, ["nested too deeply"]),
 ])
 def test_what_python_cannot_read_is_told(text, words):
     fault = diagnosis.check_syntax(text, "me.py")

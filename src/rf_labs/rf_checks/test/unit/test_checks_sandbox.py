@@ -122,8 +122,9 @@ def test_memory_outside_of_processes_is_refused(walled):
         "try:\n    os.memfd_create('a')\n"
         "except OSError as error:\n    print(errno.errorcode[error.errno])\n"
         "libc = ctypes.CDLL(None, use_errno=True)\n"
-        "print(libc.shmget(0, 4096, 0o1600), errno.errorcode[ctypes.get_errno()])"))
-    assert student.output == "ENOSYS\n-1 ENOSYS\n", student.errors
+        "for get in (libc.shmget, libc.semget, libc.msgget):\n"
+        "    print(get(0, 4096, 0o1600), errno.errorcode[ctypes.get_errno()])"))
+    assert student.output == "ENOSYS\n" + 3 * "-1 ENOSYS\n", student.errors
 
 
 def test_no_namespace_in_which_it_may_mount(walled):
@@ -161,6 +162,16 @@ def test_sockets_have_a_limit_and_those_that_processes_share_count_once(start, m
                     "print(resource.getrlimit(resource.RLIMIT_NOFILE)[1], flush=True)\nsignal.pause()\n" % pairs)
     wait_until(lambda: student.output, "its first line")
     assert (student.output.strip(), student.excess()) == ("1024", excess)
+
+
+def test_files_and_folders_have_a_limit_even_empty_ones(walled, monkeypatch):
+    monkeypatch.setattr(sandbox, "ENTRIES", 100)
+    text = ("import os, signal\nfor number in range(%d):\n    for top in ('/tmp', '/run', os.path.expanduser('~')):\n"
+            "        os.mkdir('%%s/%%d' %% (top, number))\nprint('on', flush=True)\nsignal.pause()")
+    for count, excess in ((10, ""), (50, "files")):
+        student = walled(text % count)
+        wait_until(lambda student=student: student.output or student.exit_code is not None, "its folders")
+        assert student.excess() == excess, student.errors
 
 
 def test_a_program_that_loops_says_where_it_is(start):
