@@ -20,6 +20,8 @@ SUFFIXES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2", ".tbz")
 OTHER_SUFFIXES = (".7z", ".rar", ".tar.xz", ".txz", ".tar.zst", ".gz", ".bz2", ".xz")
 #: Most programs of a submission, and their most bytes.
 MOST_FILES, MOST_TAKEN_BYTES = 200, 16 << 20
+#: Most bytes of an archive inside a submission: students pack their reports and films, too.
+MOST_ARCHIVE_BYTES = 256 << 20
 _DAMAGED = (zipfile.BadZipFile, tarfile.TarError, zlib.error, lzma.LZMAError, EOFError, ValueError, OSError,
             NotImplementedError, RuntimeError, UnicodeError)
 # Entries of a tar file that describe the next one, such as a long name; tarfile reads them whole.
@@ -71,6 +73,13 @@ def is_litter(name):
                for part in parts) or parts[-1] in (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
+def most_bytes(name):
+    """How large a file of this name may be. Notebooks hold pictures, which are not judged."""
+    if is_archive(name):
+        return MOST_ARCHIVE_BYTES
+    return MOST_TAKEN_BYTES if name.lower().endswith(".ipynb") else LARGEST_BYTES
+
+
 def safe_name(name):
     """The normal form of a path in an archive. Raises BadArchive if it leads out of the archive's folder."""
     plain = name.replace("\\", "/")
@@ -79,22 +88,23 @@ def safe_name(name):
     return posixpath.normpath(plain)
 
 
-def read(source, name, is_wanted, bounds=OF_A_STUDENT):
+def read(source, name, is_wanted, bounds=OF_A_STUDENT, refused=None):
     """{path in the archive: bytes} of the wanted files, and the list of the other files' paths.
 
     source: path, or bytes. name: its name, which tells the kind. is_wanted: function of a path. bounds:
-    Bounds. Raises BadArchive.
+    Bounds. refused: a dict that gets {path: sentence} of files that are too large; None: such an archive is refused.
+    Raises BadArchive.
     """
     try:
         with (io.BytesIO(source) if isinstance(source, bytes) else open(source, "rb")) as stream:
             entries = _zip_entries(stream) if name.lower().endswith(".zip") else _tar_entries(
                 stream, name.lower(), bounds)
-            return _take(entries, is_wanted, bounds)
+            return _take(entries, is_wanted, bounds, refused)
     except _DAMAGED as error:
         raise BadArchive("is damaged and cannot be unpacked: %s" % (error or type(error).__name__)) from error
 
 
-def _take(entries, is_wanted, bounds):
+def _take(entries, is_wanted, bounds, refused):
     taken, others, seen, size = {}, [], set(), 0
     for count, (path, read_it) in enumerate(entries, 1):
         if count > bounds.entries:
@@ -109,8 +119,12 @@ def _take(entries, is_wanted, bounds):
             others.append(path)
             continue
         content = read_it()
-        if len(content) > LARGEST_BYTES and not is_archive(path):
-            raise BadArchive("holds %s with more than %d bytes" % (path, LARGEST_BYTES))
+        if len(content) > most_bytes(path):
+            sentence = "holds %s with more than %d bytes" % (path, most_bytes(path))
+            if refused is None:
+                raise BadArchive(sentence)
+            refused[path] = sentence
+            continue
         size += len(content)
         if len(taken) >= bounds.files or size > bounds.taken_bytes:
             raise BadArchive("holds more than %d programs, or %d MiB of them" % (
@@ -132,12 +146,12 @@ def _zip_entries(stream):
                 raise BadArchive("holds %s, which is not a file" % path)
             if info.flag_bits & _ENCRYPTED_FLAG:
                 raise BadArchive("is encrypted")
-            yield path, lambda info=info: _zip_content(archive, info)
+            yield path, lambda info=info, path=path: _zip_content(archive, info, most_bytes(path) + 1)
 
 
-def _zip_content(archive, info):
+def _zip_content(archive, info, most):
     with archive.open(info) as file:
-        return file.read(MOST_TAKEN_BYTES + 1)
+        return file.read(most)
 
 
 def _zip_name(info):
@@ -191,4 +205,4 @@ def _tar_entries(stream, name, bounds):
                 raise BadArchive("holds a link, %s to %s; links are not followed" % (info.name, info.linkname))
             if not info.isreg():
                 raise BadArchive("holds %s, which is not a file" % info.name)
-            yield info.name, lambda info=info: archive.extractfile(info).read(MOST_TAKEN_BYTES + 1)
+            yield info.name, lambda info=info: archive.extractfile(info).read(most_bytes(info.name) + 1)

@@ -91,12 +91,15 @@ def as_junit(results):
 
 
 def as_gradescope(row):
-    """One student's results.json: a test for each criterion of each run, with the points that count.
+    """One student's results.json: a test for each run, with the points that count.
 
-    Has no notes for the instructor: students read it.
+    Has no notes for the instructor: students read it. One that is not graded has no score anywhere: else Gradescope
+    would add up the tests' scores.
     """
     tests = []
     for number, (name, cell) in enumerate(row.cells.items(), 1):
+        if cell.status == NOT_GRADED:
+            continue
         if cell.status != GRADED:
             tests.append({"number": str(number), "name": name, "score": 0.0, "max_score": POINTS, "status": "failed",
                           "output": plain(cell.sentence)})
@@ -110,7 +113,9 @@ def as_gradescope(row):
     found = {"output": plain("\n".join(row.sentences)), "output_format": "text", "test_output_format": "text",
              "visibility": "visible", "stdout_visibility": "hidden", "tests": tests,
              "execution_time": round(sum((cell.verdict or {}).get("wall_s", 0.0) for cell in row.cells.values()))}
-    # Without a score Gradescope reports that the autograder failed.
-    if row.points is not None:
+    if row.points is None:
+        for test in tests:
+            del test["score"], test["max_score"]
+    else:
         found["score"] = round(row.points, 2)
     return json.dumps(found, indent=1) + "\n"

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rf_checks import submission as files_of_programs
-from rf_grading import keys, programs
+from rf_grading import keys, programs, reading
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,10 @@ def make(submissions, exercises, version, conditions, folder, only_used=False):
     conditions: {"seed", "profile", ...} of every verdict. folder: an empty one for the programs. only_used: leave out
     exercises for which no submission has a program. Raises OSError.
     """
+    for one in submissions:
+        sentence = reading.problem(one.files, exercises)
+        if sentence:
+            one.refuse(sentence)
     assigned = {one.entry: programs.assign(one.files, exercises) if one.files else {} for one in submissions}
     if only_used:
         exercises = [exercise for exercise in exercises if any(

@@ -103,7 +103,7 @@ def _sort_in(top, name, collected, left_out, exercise_names):
             entry = next(one for one in numbered if one not in taken)
         one = collected[key] = Submission(entry, student, full_name)
     try:
-        files, others = top.read(name)
+        files, others = _unpacked(*top.read(name))
     except archives.BadArchive as error:
         one.refuse("%s %s" % (name, error))
         return
@@ -128,17 +128,33 @@ def _without_exercise(stem, exercise_names):
     return stem
 
 
-def _finish(one, assignment):
-    """Unpack archives in the submission, and refuse one without programs."""
-    for path in [path for path in one.files if archives.is_archive(path)]:
+def _unpacked(files, others):
+    """(files, others) with what the archives among the files hold in their places. Raises BadSubmission."""
+    found, others = {}, list(others)
+    for path, content in files.items():
+        if not archives.is_archive(path):
+            found[path] = content
+            continue
         try:
-            files, others = archives.read(one.files.pop(path), path, is_program)
+            packed, further = archives.read(content, path, is_program)
         except archives.BadArchive as error:
-            one.refuse("%s %s" % (path, error))
-            return
+            raise files_of_programs.BadSubmission("%s %s" % (path, error)) from None
         folder = archives.stem(path)
-        one.files.update({"%s/%s" % (folder, name): content for name, content in files.items()})
-        one.others += ["%s/%s" % (folder, name) for name in others]
+        found.update({"%s/%s" % (folder, name): packed[name] for name in packed})
+        others += ["%s/%s" % (folder, name) for name in further]
+        _limit(found)
+    return found, others
+
+
+def _limit(files):
+    """Raises BadSubmission where {path: bytes} of programs are too many or too large."""
+    if len(files) > archives.MOST_FILES or sum(map(len, files.values())) > archives.MOST_TAKEN_BYTES:
+        raise files_of_programs.BadSubmission("holds more than %d programs, or %d MiB of them" % (
+            archives.MOST_FILES, archives.MOST_TAKEN_BYTES >> 20))
+
+
+def _finish(one, assignment):
+    """Keep what belongs to the assignment, and refuse a submission without programs."""
     if assignment:
         one.files = {path: content for path, content in one.files.items() if path.startswith(assignment + "/")}
     if one.problem or one.files:
@@ -202,7 +218,7 @@ class _Folder:
 
 def _walk(top):
     """(files, others) of a folder on disk; a link in it is refused."""
-    files, others, size = {}, [], 0
+    files, packed, others = {}, {}, []
 
     def give_up(error):
         raise error
@@ -218,26 +234,28 @@ def _walk(top):
                 raise files_of_programs.BadSubmission("%s is a link, to %s; links are not followed" % (
                     relative, os.readlink(path)))
             elif name in names:
-                if is_program(name) or archives.is_archive(name):
+                if archives.is_archive(name):
+                    packed[relative] = _content(path, relative)
+                elif is_program(name):
                     files[relative] = _content(path, relative)
-                    size += len(files[relative])
                 else:
                     others.append(relative)
-        if len(files) > archives.MOST_FILES or size > archives.MOST_TAKEN_BYTES:
-            raise files_of_programs.BadSubmission("holds more than %d programs, or %d MiB of them" % (
-                archives.MOST_FILES, archives.MOST_TAKEN_BYTES >> 20))
+        _limit(files)
+        if sum(map(len, packed.values())) > archives.MOST_ARCHIVE_BYTES:
+            raise files_of_programs.BadSubmission("holds archives of more than %d MiB" % (
+                archives.MOST_ARCHIVE_BYTES >> 20))
         below.sort()
-    return files, others
+    return {**files, **packed}, others
 
 
 def _content(path, relative):
     if archives.is_archive(path.name):
-        if not stat.S_ISREG(path.lstat().st_mode) or path.stat().st_size > archives.MOST_TAKEN_BYTES:
+        if not stat.S_ISREG(path.lstat().st_mode) or path.stat().st_size > archives.MOST_ARCHIVE_BYTES:
             raise files_of_programs.BadSubmission("%s is no archive of at most %d MiB" % (
-                relative, archives.MOST_TAKEN_BYTES >> 20))
+                relative, archives.MOST_ARCHIVE_BYTES >> 20))
         return path.read_bytes()
     try:
-        return files_of_programs.read(path)
+        return files_of_programs.read(path, archives.most_bytes(path.name))
     except files_of_programs.BadSubmission as error:
         # With the path in the submission instead of the one on this machine.
         raise files_of_programs.BadSubmission(str(error).replace(str(path), relative)) from None
@@ -250,23 +268,28 @@ class _Archive:
         def is_wanted(name):
             return is_program(name) or archives.is_archive(name) or name.rpartition("/")[2] == _GRADESCOPE
 
+        refused = {}
         try:
-            found, others = archives.read(path, path.name, is_wanted, archives.OF_A_CLASS)
+            found, others = archives.read(path, path.name, is_wanted, archives.OF_A_CLASS, refused)
         except archives.BadArchive as error:
-            raise BadFolder("%s %s" % (path, error)) from error
-        names = [*found, *others]
+            raise BadFolder("%s %s; unpack it yourself, and name the folder" % (path, error)) from error
+        names = [*found, *others, *refused]
         tops = {name.partition("/")[0] for name in names}
         # Many platforms and all Macs put a folder around everything.
         around = next(iter(tops)) + "/" if len(tops) == 1 and all(name.count("/") > 1 or archives.is_archive(name)
                                                                    for name in names) else ""
         self._found = {name[len(around):]: content for name, content in found.items()}
         self._others = [name[len(around):] for name in others]
+        self._refused = {name[len(around):]: sentence for name, sentence in refused.items()}
 
     def names(self):
-        return sorted({name.partition("/")[0] for name in (*self._found, *self._others)})
+        return sorted({name.partition("/")[0] for name in self._paths()})
 
     def is_folder(self, name):
-        return any(path.startswith(name + "/") for path in (*self._found, *self._others))
+        return any(path.startswith(name + "/") for path in self._paths())
+
+    def _paths(self):
+        return (*self._found, *self._others, *self._refused)
 
     def is_link(self, name):
         return False
@@ -275,6 +298,9 @@ class _Archive:
         return self._found.get(name, b"").decode("utf-8", "replace")
 
     def read(self, name):
+        for path, sentence in self._refused.items():
+            if path == name or path.startswith(name + "/"):
+                raise files_of_programs.BadSubmission(sentence)
         if self.is_folder(name):
             start = len(name) + 1
             return ({path[start:]: content for path, content in self._found.items() if path.startswith(name + "/")},

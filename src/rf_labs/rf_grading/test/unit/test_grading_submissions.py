@@ -55,6 +55,30 @@ def test_moodles_folders_and_its_flat_form(tmp_path):
     assert found["Di_15_assignsubmission_onlinetext_"].problem == "holds no Python file, only onlinetext.html"
 
 
+def test_pictures_in_notebooks_and_films_in_archives_are_no_hindrance(tmp_path):
+    notebook, film = "{" + " " * (3 << 20), os.urandom(20 << 20)
+    packed = zipped({"wave.ipynb": notebook, "film.mp4": film})
+    put(tmp_path / "class", {"a/wave.ipynb": notebook, "b/w.zip": packed, "c.zip": packed})
+    (tmp_path / "class.zip").write_bytes(zipped({"a/wave.ipynb": notebook, "b/w.zip": packed, "c.zip": packed}))
+    for path in (tmp_path / "class", tmp_path / "class.zip"):
+        assert {entry: (list(one.files), one.problem) for entry, one in by_entry(path).items()} == {
+            "a": (["wave.ipynb"], ""), "b": (["w/wave.ipynb"], ""), "c": (["wave.ipynb"], "")}
+
+
+def test_a_file_that_is_too_large_is_its_students_problem_alone(tmp_path):
+    large = "#" * (2 << 20)
+    put(tmp_path / "class", {"a/wave.py": large, "b/wave.py": "1"})
+    (tmp_path / "class.zip").write_bytes(zipped({"a/wave.py": large, "b/wave.py": "1"}))
+    for path in (tmp_path / "class", tmp_path / "class.zip"):
+        found = by_entry(path)
+        assert "1048576" in found["a"].problem and found["b"].files == {"wave.py": b"1"}
+
+
+def test_many_archives_hold_no_more_than_one(tmp_path):
+    put(tmp_path, {"a/%d.zip" % k: zipped({"%d.ipynb" % n: " " * (4 << 20) for n in range(3)}) for k in range(2)})
+    assert by_entry(tmp_path)["a"].problem == "holds more than 200 programs, or 16 MiB of them"
+
+
 def test_gradescopes_export_has_names(tmp_path):
     put(tmp_path, {"submission_7/wave.py": "1", "submission_8/wave.py": "2", "submission_metadata.yml": (
         "submission_7:\n  :submitters:\n  - :name: Anna Groß\n    :sid: 'a12'\n    :email: anna@example.org\n"

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Texts that Python's parser cannot take apart, or not in bounded time, and those that it can."""
+import signal
+
+import pytest
+
+from rf_grading import plan, programs, reading
+from rf_grading.submissions import Submission
+
+EXERCISES = programs.exercises_of("lab2", ["wave"])
+
+
+def of(text):
+    return {"wave.py": text.encode()}
+
+
+@pytest.mark.parametrize("text", [
+    "print(1)\n", "f'%s'" % ("{1}" * 100), "x = [%s]\n" % ", ".join(map(str, range(20_000))), "def f(:\n" * 10_000,
+    "x = %s1" % ("-" * 100_000), "x = %s" % ("(" * 100_000), "x = 1%s" % ("()" * 50_000)])
+def test_other_programs_are_read(text):
+    # Too deep expressions are for the judge, which says so.
+    assert reading.problem(of(text), EXERCISES) == ""
+
+
+@pytest.mark.parametrize("text", ["x = f'%s'" % ("{1}" * 100_000), "import %sa" % ("a." * 400_000)])
+def test_a_text_that_takes_the_parser_minutes_is_refused_in_time(text):
+    one = Submission("li", "li")
+    one.files = of(text)
+    assert "more than 1 s of processor time" in reading.problem(one.files, EXERCISES, cpu_s=1)
+
+
+def test_a_parser_that_ends_its_process_ends_no_other(monkeypatch):
+    monkeypatch.setattr(programs, "assign", lambda files, exercises: signal.raise_signal(signal.SIGSYS))
+    assert "nested too deeply" in reading.problem(of("#" * 100_000), EXERCISES)
+
+
+def test_such_a_submission_gets_its_sentence_and_the_others_are_planned(monkeypatch, tmp_path):
+    monkeypatch.setattr(reading, "problem", lambda files, exercises: "is not read" if b"bad" in files["wave.py"] else "")
+    sent = [Submission(name, name, files=of(name)) for name in ("bad", "good")]
+    _, entries, tasks = plan.make(sent, EXERCISES, "v", {}, tmp_path)
+    assert [entry.problems for entry in entries] == [{"wave": "is not read"}, {}] and len(tasks) == 1
