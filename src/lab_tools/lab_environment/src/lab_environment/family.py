@@ -4,6 +4,16 @@ import contextlib
 import os
 
 
+def with_parent(command, sign="KILL"):
+    """The command (list) that runs another one and ends it by a signal at the end of the process that starts it.
+
+    Also where that process ends before the signal is ordered: then the command does not begin. sign: the signal's name.
+    To be called by the process that starts it; of its threads, the one that starts it must last as long.
+    """
+    return ["setpriv", "--pdeathsig", sign, "--", "/bin/sh", "-c", '[ "$PPID" = "$0" ] && exec "$@"', str(os.getpid()),
+            *command]
+
+
 def direct_children(pid):
     """Process ids of the children of one process."""
     found = set()

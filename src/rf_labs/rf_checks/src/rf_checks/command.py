@@ -18,6 +18,7 @@ from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
 from rf_checks.graph import LabFailed
 from rf_checks.judge import WALL_LIMIT_S, Judge
 from rf_checks.lab import WhichRobot
+from rf_checks.work_folder import work_folder
 
 PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
 
@@ -163,7 +164,7 @@ def main(argv=None):
         which = WhichRobot(options.profile, options.serial)
         # In the lab of a class no second sandbox can be made; what the program may do there, its author may do, too.
         trusted = options.trusted or isolation.WALLED in os.environ
-        with Judge(options.wall_limit, trusted, which) as judge:
+        with work_folder("lab-check-"), Judge(options.wall_limit, trusted, which) as judge:
             result = judge.check(exercise, program, options.seed)
     except NotIsolated as refusal:
         print("the program was not run: it is checked in a sandbox, and this machine allows none: %s" % refusal,

@@ -24,7 +24,7 @@ from roslib.packages import find_node
 
 from baxter_model import SIDES
 from lab_environment import isolation
-from lab_environment.family import children_of, direct_children, is_running
+from lab_environment.family import children_of, direct_children, is_running, with_parent
 from lab_environment.ports import free_port
 from rf_checks import hidden
 from rf_checks.graph import Graph, LabFailed
@@ -267,9 +267,9 @@ class Lab:
                                           hidden.SOLVED, not isolation.has_own_network()), *command]
         with open(self._folder / "output.txt", "ab") as output:
             # It ends with the judge in any case.
-            command = ["setpriv", "--pdeathsig", "INT", "--", *command]
-            self._processes.append(subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=output,
-                                                    stderr=subprocess.STDOUT, start_new_session=True))
+            self._processes.append(subprocess.Popen(with_parent(command, "INT"), env=environment,
+                                                    stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+                                                    start_new_session=True))
 
     def _pids(self):
         """All processes of this lab."""

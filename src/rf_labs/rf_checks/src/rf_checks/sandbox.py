@@ -19,7 +19,7 @@ from pathlib import Path
 
 import lab_environment
 from lab_environment import isolation, system_calls
-from lab_environment.family import children_of, direct_children, is_running
+from lab_environment.family import children_of, direct_children, is_running, with_parent
 from rf_checks import hidden, submission
 
 CPU_S = 120
@@ -123,8 +123,9 @@ class Student:
                        PYTHONPATH=startup.python_path(folder, environment.get("PYTHONPATH", "")))
         limits = ["prlimit", "--cpu=%d" % CPU_S, "--as=%d" % ADDRESS_BYTES, "--fsize=%d" % FILE_BYTES, "--core=0",
                   "--nofile=%d" % FILES, "--"]
-        return subprocess.Popen([*enter, *limits, python(), "%s/%s" % (home, program.name), *arguments], env=own,
-                                cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        # Bubblewrap itself orders its end with this process's, too late where this one is killed meanwhile.
+        command = with_parent([*enter, *limits, python(), "%s/%s" % (home, program.name), *arguments])
+        return subprocess.Popen(command, env=own, cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                 stderr=subprocess.PIPE, start_new_session=True,
                                 pass_fds=(*descriptors, *(startup.descriptors if startup else ())))
 

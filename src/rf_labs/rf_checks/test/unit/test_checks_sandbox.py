@@ -371,9 +371,12 @@ def test_a_walled_program_does_not_outlive_a_judge_that_is_killed(walled):
            "s = Student(sys.argv[1], [], dict(os.environ))\nprint(s.pid, flush=True)\nimport signal; signal.pause()"
     program = walled.workspace / "sleeps.py"
     program.write_text("import signal\nsignal.pause()")
-    with subprocess.Popen([sandbox.python(), "-c", code, str(program)], stdout=subprocess.PIPE, text=True) as judge:
+    # The killed judge leaves its folder.
+    own = {**os.environ, "TMPDIR": str(walled.workspace)}
+    with subprocess.Popen([sandbox.python(), "-c", code, str(program)], env=own, stdout=subprocess.PIPE,
+                          text=True) as judge:
         root = int(judge.stdout.readline())
-        wait_until(lambda: any(_command(pid).startswith("python") for pid in family.children_of([root])),
+        wait_until(lambda: any(_command(pid).startswith("python") for pid in family.children_of([root]) - {root}),
                    "the program to run")
         processes = family.children_of([root])
         judge.kill()

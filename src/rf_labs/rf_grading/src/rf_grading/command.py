@@ -2,13 +2,10 @@
 """The command line of `./baxter.sh grade`."""
 import argparse
 import contextlib
-import fcntl
 import json
 import os
-import shutil
 import signal
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -20,6 +17,7 @@ from rf_checks.command import write_report
 from rf_checks.exercises import LABS, UnknownExercise
 from rf_checks.judge import WALL_LIMIT_S
 from rf_checks.sandbox import MEMORY_BYTES
+from rf_checks.work_folder import work_folder
 from rf_grading import alike, archives, formats, keys, pages, plan, programs, results
 from rf_grading.ledger import Ledger, LedgerError
 from rf_grading.submissions import BadFolder, read_class
@@ -31,7 +29,6 @@ LAB_BYTES = 1 << 30
 _GRACE_S = 120.0
 #: Judges keep memory: a worker is replaced after so many checks.
 _CHECKS_OF_A_WORKER = 50
-_WORK = "lab-grade-"
 _JOB = "rf_grading.job:Grade"
 
 
@@ -102,33 +99,6 @@ def _places(options):
     return folder, out
 
 
-@contextlib.contextmanager
-def _work_folder():
-    """A folder for programs and labs, which becomes TMPDIR; removed at the end. Those of killed gradings are, too."""
-    top = Path(tempfile.gettempdir())
-    for old in top.glob(_WORK + "*"):
-        with contextlib.suppress(OSError):
-            if old.is_symlink() or old.stat().st_uid != os.getuid():
-                continue
-            with open(old / "lock", "rb") as lock:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                shutil.rmtree(old, ignore_errors=True)
-    folder = Path(tempfile.mkdtemp(prefix=_WORK))
-    before = os.environ.get("TMPDIR")
-    try:
-        with open(folder / "lock", "wb") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            os.environ["TMPDIR"] = str(folder)
-            tempfile.tempdir = None
-            yield folder
-    finally:
-        os.environ.pop("TMPDIR")
-        if before is not None:
-            os.environ["TMPDIR"] = before
-        tempfile.tempdir = None
-        shutil.rmtree(folder, ignore_errors=True)
-
-
 class _Grading:
     """One start of the command."""
 
@@ -148,7 +118,7 @@ class _Grading:
         if not sent:
             raise BadFolder("%s has no submissions: no folder, archive or program of a student" % self._folder)
         (self._out / "motions").mkdir(parents=True, exist_ok=True)
-        with Ledger(self._out / "verdicts.jsonl") as ledger, _work_folder() as work:
+        with Ledger(self._out / "verdicts.jsonl") as ledger, work_folder("lab-grade-") as work:
             exercises, entries, tasks = plan.make(sent, exercises, version, {**conditions, "walls": walls},
                                                   work / "programs", only_used=not options.exercises)
             if not exercises:
