@@ -6,7 +6,7 @@ import json
 import re
 from xml.etree import ElementTree
 
-from rf_grading.results import GRADED, NOT_GRADED, POINTS, as_data
+from rf_grading.results import GRADED, NOT_GRADED, POINTS, as_data, held_back
 
 #: The columns that nbgrader's own export of grades has.
 NBGRADER_COLUMNS = ("assignment", "duedate", "timestamp", "student_id", "last_name", "first_name", "email", "raw_score",
@@ -90,6 +90,13 @@ def as_junit(results):
     return ElementTree.tostring(top, encoding="unicode", xml_declaration=True) + "\n"
 
 
+def _criteria(run):
+    lines = ["%s: %g of %g (%s)" % (one["name"], round(one["points"], 2), round(one["of"], 2), one["found"])
+             for one in run["criteria"]]
+    said = held_back(run)
+    return "\n".join([*lines, "%g points%s" % (round(run["points"], 1), said)] if said else lines)
+
+
 def as_gradescope(row):
     """One student's results.json: a test for each run, with the points that count.
 
@@ -108,8 +115,7 @@ def as_gradescope(row):
         tests += [{"number": "%d.%d" % (number, place), "name": plain(" ".join([name, *run["arguments"]])),
                    "score": round(run["points"] / len(runs), 2), "max_score": round(POINTS / len(runs), 2),
                    "status": "passed" if run["points"] >= cell.verdict["pass_mark"] else "failed",
-                   "output": plain("\n".join("%s: %g of %g (%s)" % (one["name"], one["points"], one["of"], one["found"])
-                                             for one in run["criteria"]))} for place, run in enumerate(runs, 1)]
+                   "output": plain(_criteria(run))} for place, run in enumerate(runs, 1)]
     found = {"output": plain("\n".join(row.sentences)), "output_format": "text", "test_output_format": "text",
              "visibility": "visible", "stdout_visibility": "hidden", "tests": tests,
              "execution_time": round(sum((cell.verdict or {}).get("wall_s", 0.0) for cell in row.cells.values()))}

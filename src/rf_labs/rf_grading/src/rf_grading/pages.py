@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from rf_grading import drawing
 from rf_grading.formats import plain
-from rf_grading.results import GRADED, NOT_GRADED, POINTS
+from rf_grading.results import GRADED, NOT_GRADED, POINTS, held_back
 
 _STYLE = """
 :root { color-scheme: light dark; --text: #1c1f22; --page: #fff; --small: #5b6167; --line: #e3e6e8; --box: #f2f3f4;
@@ -27,7 +27,7 @@ td.n, th.n { text-align: right; white-space: nowrap; } td.why { min-width: 18rem
 padding: 0.6rem; overflow: auto; max-height: 16rem; font-size: 13px; } svg { max-width: 100%; height: auto; }
 .small { color: var(--small); font-size: 13px; } .bar { background: #0b6e99; height: 0.8rem; display: inline-block; }
 @media print { body { margin: 0; max-width: none; } pre { max-height: none; white-space: pre-wrap; }
-h2, h3 { break-after: avoid; } tr, svg, .hint { break-inside: avoid; } .bar { print-color-adjust: exact; } }
+h2, h3, .before { break-after: avoid; } tr, svg, .hint { break-inside: avoid; } .bar { print-color-adjust: exact; } }
 """
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -95,24 +95,25 @@ def _exercise(results, exercise, cell, motions):
         yield _criteria(run)
         shown = motions.get(cell.key, [])
         if number < len(shown) and shown[number]:
-            yield ('<p class="small">What the robot did, in a loop: left arm blue, right arm orange, both at the '
+            yield ('<p class="small before">What the robot did, in a loop: left arm blue, right arm orange, both at the '
                    "start grey, the hands' paths thin.</p>")
             yield drawing.of_run(shown[number])
         for title, name in (("It printed", "output"), ("Its errors", "errors")):
             if run.get(name):
                 yield "<details open><summary>%s</summary><pre>%s</pre></details>" % (title, _text(run[name]))
-    yield "<p>The same check on your own machine:</p><pre>%s</pre>" % _text(_command(results, exercise, cell))
+    yield '<p class="before">The same check on your own machine:</p>' "<pre>%s</pre>" % _text(_command(results, exercise, cell))
 
 
 def _criteria(run):
     rows = "".join('<tr><td>%s</td><td class="n">%g</td><td class="n">%g</td><td>%s</td></tr>' % (
-        _text(one["name"]), round(one["points"], 1), one["of"], _text(one["found"])) for one in run["criteria"])
+        _text(one["name"]), round(one["points"], 1), round(one["of"], 1), _text(one["found"]))
+        for one in run["criteria"])
     end = ""
     if run["end"]:
         end = '<p class="small">The run: %s, after %.1f s of simulated time.</p>' % (
             _text(run["end"]["how"]), run["end"]["simulated_s"])
     return ('<table><tr><th>criterion</th><th class="n">points</th><th class="n">of</th><th>found</th></tr>%s</table>'
-            "<p>%g points for this run.</p>%s" % (rows, round(run["points"], 1), end))
+            "<p>%g points for this run%s.</p>%s" % (rows, round(run["points"], 1), _text(held_back(run)), end))
 
 
 def _command(results, exercise, cell):

@@ -28,6 +28,12 @@ class Cell:
         return bool(self.verdict and self.verdict["passed"])
 
 
+def held_back(run):
+    """The words behind the points of a verdict's run whose fault costs more than its criteria, or ""."""
+    total = sum(one["points"] for one in run["criteria"])
+    return ", and not %g, because of the fault" % round(total, 1) if total - run["points"] > 0.05 else ""
+
+
 @dataclass(frozen=True)
 class Row:
     """One student: a Submission, and {exercise's name: Cell}."""

@@ -101,6 +101,16 @@ def test_a_students_page_is_about_that_student_alone(found):
     assert not any(word in page for word in ("SECRET", "chen", "cmd", "took too long"))
 
 
+def test_a_run_whose_fault_costs_more_than_its_criteria_says_so(found):
+    run = found.rows[1].cells["wave"].verdict["runs"][0]
+    run["criteria"] = [{"name": "base -> hand", "points": 100 / 3, "of": 100 / 3, "found": "right"}] * 2
+    said = "30 points%s, and not 66.7, because of the fault"
+    assert said % " for this run" in pages.feedback(found, found.rows[1], {})
+    assert said % "" in json.loads(formats.as_gradescope(found.rows[1]))["tests"][1]["output"]
+    assert "because of the fault" not in pages.feedback(found, found.rows[0], {})
+    assert "33.333" not in pages.feedback(found, found.rows[1], {}) + formats.as_gradescope(found.rows[1])
+
+
 def test_pages_hold_no_code_of_a_student(found):
     for page in (pages.feedback(found, found.rows[1], {}), pages.overview(found, 1.0, lambda row: "a b/ü%.html")):
         assert "<script" not in page and "&lt;script&gt;" in page
