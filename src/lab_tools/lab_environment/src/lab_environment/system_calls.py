@@ -18,10 +18,12 @@ import struct
 _MACHINES = {
     "x86_64": (0xC000003E, {"memfd_create": 319, "memfd_secret": 447, "shmget": 29, "semget": 64, "msgget": 68,
                             "io_uring_setup": 425, "clone3": 435, "setns": 308, "add_key": 248,
-                            "request_key": 249, "keyctl": 250, "unshare": 272, "clone": 56, "socket": 41, "fallocate": 285, "ioctl": 16}),
+                            "request_key": 249, "keyctl": 250, "unshare": 272, "clone": 56, "socket": 41,
+                            "fallocate": 285, "ioctl": 16}),
     "aarch64": (0xC00000B7, {"memfd_create": 279, "memfd_secret": 447, "shmget": 194, "semget": 190, "msgget": 186,
                              "io_uring_setup": 425, "clone3": 435, "setns": 268, "add_key": 217,
-                             "request_key": 218, "keyctl": 219, "unshare": 97, "clone": 220, "socket": 198, "fallocate": 47, "ioctl": 29})}
+                             "request_key": 218, "keyctl": 219, "unshare": 97, "clone": 220, "socket": 198,
+                             "fallocate": 47, "ioctl": 29})}
 # Refused only where their first argument has this bit; of clone3 a filter cannot see the flags.
 _BY_FLAG = ("unshare", "clone")
 _CLONE_NEWUSER = 0x10000000

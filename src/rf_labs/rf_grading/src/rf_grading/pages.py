@@ -95,13 +95,14 @@ def _exercise(results, exercise, cell, motions):
         yield _criteria(run)
         shown = motions.get(cell.key, [])
         if number < len(shown) and shown[number]:
-            yield ('<p class="small before">What the robot did, in a loop: left arm blue, right arm orange, both at the '
-                   "start grey, the hands' paths thin.</p>")
+            yield ('<p class="small before">What the robot did, in a loop: left arm blue, right arm orange, both at '
+                   "the start grey, the hands' paths thin.</p>")
             yield drawing.of_run(shown[number])
         for title, name in (("It printed", "output"), ("Its errors", "errors")):
             if run.get(name):
                 yield "<details open><summary>%s</summary><pre>%s</pre></details>" % (title, _text(run[name]))
-    yield '<p class="before">The same check on your own machine:</p>' "<pre>%s</pre>" % _text(_command(results, exercise, cell))
+    yield '<p class="before">The same check on your own machine:</p>'
+    yield "<pre>%s</pre>" % _text(_command(results, exercise, cell))
 
 
 def _criteria(run):

@@ -30,8 +30,8 @@ def problem(files, exercises, cpu_s=CPU_S):
     if os.waitstatus_to_exitcode(status) == 0:
         return ""
     if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
-        return ("is not read: Python needs more than %d s of processor time for its programs; no program written by hand "
-                "needs that" % cpu_s)
+        return ("is not read: Python needs more than %d s of processor time for its programs; no program written by "
+                "hand needs that" % cpu_s)
     return "is not read: Python cannot take its programs apart, as an expression in them is nested too deeply"
 
 

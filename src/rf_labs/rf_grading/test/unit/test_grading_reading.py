@@ -35,7 +35,7 @@ def test_a_parser_that_ends_its_process_ends_no_other(monkeypatch):
 
 
 def test_such_a_submission_gets_its_sentence_and_the_others_are_planned(monkeypatch, tmp_path):
-    monkeypatch.setattr(reading, "problem", lambda files, exercises: "is not read" if b"bad" in files["wave.py"] else "")
+    monkeypatch.setattr(reading, "problem", lambda files, _: "is not read" if b"bad" in files["wave.py"] else "")
     sent = [Submission(name, name, files=of(name)) for name in ("bad", "good")]
     _, entries, tasks = plan.make(sent, EXERCISES, "v", {}, tmp_path)
     assert [entry.problems for entry in entries] == [{"wave": "is not read"}, {}] and len(tasks) == 1
