@@ -21,8 +21,8 @@ LINGER = Path("/var/lib/systemd/linger")
 CONTROLLERS = ("cpu", "memory", "pids")
 #: The front door's weight at the processors, in labs.
 DOOR_WEIGHT = 10
-#: Version 1 counts buffers of network sockets beside the memory, and only where they have a limit. Beyond it, Linux gives
-#: each socket little, but something, so thousands of them may hold more [bytes].
+#: Version 1 counts buffers of network sockets beside the memory, and only where they have a limit. Beyond it, Linux
+#: gives each socket little, but something, so thousands of them may hold more [bytes].
 SOCKET_BYTES = 128 << 20
 _SOCKETS_USED = "memory.kmem.tcp.usage_in_bytes"
 #: Time for a group's last process to go [s].
