@@ -58,7 +58,9 @@ def write_texture(path, folder):
                 raise TextureError("it has %d x %d pixels; expected at most %d million"
                                    % (*picture.size, _MOST_READ // 1_000_000))
             reduced = save_reduced(picture, Path(folder) / "picture.png")
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+    except Image.DecompressionBombError:
+        raise TextureError("it has more pixels than expected, at most %d million" % (_MOST_READ // 1_000_000)) from None
+    except (OSError, SyntaxError, ValueError) as error:
         raise TextureError("it is no picture in one of the formats %s: %s" % (", ".join(_FORMATS), error)) from None
     pixels = np.asarray(reduced, dtype=float)[..., :3]
     colour = (pixels.mean(axis=(0, 1)) / 255.0).round(3).tolist()

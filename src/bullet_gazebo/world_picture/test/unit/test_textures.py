@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pictures on surfaces: their files, and meshes in levels of detail that keep them."""
+import struct
+import zlib
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -83,6 +86,10 @@ def test_what_is_no_picture_is_named(tmp_path, monkeypatch):
     Image.new("L", (200, 100)).save(path)
     monkeypatch.setattr(textures, "_MOST_READ", 10_000)
     with pytest.raises(textures.TextureError, match="200 x 100 pixels"):
+        textures.write_texture(path, tmp_path)
+    header = b"IHDR" + struct.pack(">IIBBBBB", 20_000, 20_000, 8, 0, 0, 0, 0)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header)))
+    with pytest.raises(textures.TextureError, match="it has more pixels than expected, at most 0 million"):
         textures.write_texture(path, tmp_path)
 
 
