@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sensor_renderer.mirror import MOST_UNUSED
 from sensor_renderer.sides import indexed
 from world_picture.reduction import reduced
 from world_picture.results import ResultCache
@@ -60,6 +61,19 @@ class Arrays(NamedTuple):
     textured: tuple = ()
 
 
+class VertexArray:
+    """A vertex array with its buffers, which it does not release by itself; ``vertices``: the number of corners."""
+
+    def __init__(self, array, buffers):
+        self.render, self.vertices = array.render, array.vertices
+        self._held = array, *buffers
+
+    def release(self):
+        """Give back their memory."""
+        for held in self._held:
+            held.release()
+
+
 class Links:
     """The vertex arrays of one context, one set for each different link."""
 
@@ -78,11 +92,7 @@ class Links:
     def clear(self):
         """Release all arrays."""
         for link in self._links.values():
-            arrays = link.by_level.values()
-            textured = (array for level in arrays for _, array in level.textured)
-            for array in {link.caster, *textured, *(array for level in arrays for array in level[:2])}:
-                if array is not None:
-                    array.release()
+            _release(link)
         self._links = {}
         self._links_of.clear()
 
@@ -102,9 +112,20 @@ class Links:
     def _of(self, body):
         links = self._links_of.get(body)
         if links is None:
+            self._forget_unused()
             links = self._links_of[body] = [self._link(parts) if parts else None for parts in body.parts]
         packed = np.ascontiguousarray(body.matrices.transpose(0, 2, 1), dtype=np.float32)
         return zip(links, body.matrices, packed, strict=True)
+
+    def _forget_unused(self):
+        """Release the links of models that are gone, if they are many: with other sizes or colours, each was another
+        one. A few stay, for models that come again."""
+        if len(self._links) <= MOST_UNUSED:
+            return
+        used = {id(link) for links in self._links_of.values() for link in links}
+        unused = [key for key, link in self._links.items() if id(link) not in used]
+        for key in unused[:max(len(unused) - MOST_UNUSED, 0)]:
+            _release(self._links.pop(key))
 
     def arrays(self, link, distance, pinhole, depth=False):
         """The :class:`Arrays` of the level of detail that the ``distance`` of the link's sphere asks for; finer ones
@@ -196,10 +217,18 @@ class Links:
         """Of the corners ``rows``, and after them those numbered ``backs`` again. The GPU processes shared vertices
         once."""
         unique, index = indexed(rows)
-        index = np.concatenate((index, index[np.asarray(backs, dtype=int)]))
-        context = self._context
-        return context.vertex_array(program, [(context.buffer(unique.tobytes()), layout, *names)],
-                                    context.buffer(index.astype(np.int32).tobytes()))
+        index = np.concatenate((index, index[np.asarray(backs, dtype=int)])).astype(np.int32)
+        buffers = self._context.buffer(unique.tobytes()), self._context.buffer(index.tobytes())
+        return VertexArray(self._context.vertex_array(program, [(buffers[0], layout, *names)], buffers[1]), buffers)
+
+
+def _release(link):
+    """Release all arrays of a :class:`Link`."""
+    arrays = link.by_level.values()
+    textured = (array for level in arrays for _, array in level.textured)
+    for array in {link.caster, *textured, *(array for level in arrays for array in level[:2])}:
+        if array is not None:
+            array.release()
 
 
 def _thinned(rows):

@@ -20,6 +20,8 @@ DEFAULT_COLOUR = (0.7, 0.7, 0.7, 1.0)
 _WHITE = (1.0, 1.0, 1.0, 1.0)
 #: Gloss of what does not say: paint and plastic.
 GLOSS = 0.3
+#: So many shapes of models that are gone are kept, for models that come again.
+MOST_UNUSED = 100
 #: How far the floor reaches [m]; its colour.
 FLOOR_HALF_M = 50.0
 FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
@@ -219,8 +221,16 @@ class Mirror:
             old = known.get(name)
             self._bodies[name] = old if old is not None and old[0] == key else (key, self._build(entry))
         self.bodies = {name: body for name, (_, body) in self._bodies.items()}
+        self._forget_unused()
         self._light_up()
         self.version += 1
+
+    def _forget_unused(self):
+        if len(self._parts) > MOST_UNUSED:
+            used = {part.key for body in self.bodies.values() for parts in body.parts for part in parts}
+            unused = [key for key in self._parts if key not in used]
+            for key in unused[:max(len(unused) - MOST_UNUSED, 0)]:
+                del self._parts[key]
 
     def set_state(self, values):
         """Move all bodies to the poses in a snapshot's ``values``."""

@@ -2,6 +2,7 @@
 """Pictures with known sizes, places and colours."""
 import subprocess
 import sys
+import weakref
 
 import numpy as np
 import pybullet
@@ -12,7 +13,7 @@ from lab_testing.meshes import sphere
 from sensor_renderer import triangles
 from sensor_renderer.errors import SensorError
 from sensor_renderer.gl_renderer import GlRenderer
-from sensor_renderer.mirror import Mirror
+from sensor_renderer.mirror import MOST_UNUSED, Mirror
 from sensor_renderer.pinhole import OPTICAL, Pinhole
 from sensor_renderer.tiny_renderer import TinyRenderer
 from urdf_model import Box, Cylinder, Sphere
@@ -160,6 +161,26 @@ def test_the_camera_looks_along_z_with_x_to_the_right_and_y_down(renderer, tmp_p
         rows, columns = np.nonzero(reddish(picture))
         assert columns.mean() == pytest.approx(column, abs=4.0) and rows.mean() == pytest.approx(row, abs=4.0)
         assert np.isnan(depth[5, 5]), "nothing is there"
+
+
+def test_models_that_come_and_go_leave_little_behind(tmp_path):
+    """As in a data set with other sizes and colours in each picture."""
+    renderer, mirror = GlRenderer(), Mirror(DrawingCache(tmp_path), lambda uri: None, pytest.fail)
+    pinhole = Pinhole.from_field_of_view(40, 30, 1.0, 0.05, 20.0)
+    first = None
+    for number in range(MOST_UNUSED + 30):
+        urdf = CUBE.replace("0.1 0.1 0.1", "%g 0.1 0.1" % (0.11 + 0.001 * number)).replace("0.9 0 0", "0.9 %g 0" % (
+            0.001 * number))
+        mirror.set_scene([{"name": name, "urdf": text, "joints": []} for name, text in (
+            ("stays", CUBE), ("cube%d" % number, urdf))])
+        mirror.set_state(np.array([5.0, 0, 0, 0, 0, 0, 1] + [0, 0, 0, 0, 0, 0, 1.0]))
+        picture, _ = renderer.render(mirror, pinhole, pose_matrix((-0.5, 0, 0)) @ OPTICAL)
+        assert picture[15, 20, 0] > 50
+        first = first or weakref.ref(mirror.bodies["cube0"].parts[0][0].triangles)
+        shown = {part.key for body in mirror.bodies.values() for parts in body.parts for part in parts}
+        assert shown <= mirror._parts.keys()
+    assert first() is None and len(mirror._parts) <= MOST_UNUSED + 2 >= len(renderer._links._links) - 1
+    renderer.close()
 
 
 def test_forward_kinematics_and_camera_links(tmp_path):
