@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Diagnosis of a program from one run: the first fault that explains the others. Free of ROS."""
 import ast
+import io
 import re
+import tokenize
 
 import numpy as np
 
@@ -24,8 +26,14 @@ STRAY_RAD = 0.05
 _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
 
 
-def check_syntax(text, name):
-    """A Fault for a program that Python cannot read, or None."""
+def check_syntax(source, name):
+    """A Fault for a program (bytes, as Python itself reads it) that Python cannot read, or that is empty; or None."""
+    try:
+        encoding = tokenize.detect_encoding(io.BytesIO(source).readline)[0]
+        text = source.decode(encoding)
+    except (SyntaxError, UnicodeDecodeError, LookupError):
+        return Fault("syntax", "Python cannot read the file, which is not in UTF-8: choose UTF-8 where your editor saves "
+                     "it", 0.0)
     try:
         compile(text, name, "exec", dont_inherit=True)
     except SyntaxError as error:
@@ -40,6 +48,8 @@ def check_syntax(text, name):
         return Fault("syntax", "the file is not a Python program: %s" % error, 0.0)
     except (RecursionError, MemoryError):
         return Fault("syntax", "Python cannot read the file: an expression in it is nested too deeply", 0.0)
+    if not ast.parse(text).body:
+        return Fault("empty", "the file is empty, or holds nothing but remarks: was another one saved?", 0.0)
     return None
 
 

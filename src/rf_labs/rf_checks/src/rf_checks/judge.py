@@ -122,7 +122,7 @@ class Judge:
         program = program.parent.resolve() / program.name
         calls = exercise.task.calls(np.random.default_rng(seed))
         texts = submission.texts(program)
-        fault = diagnosis.check_syntax(texts[program.name], program.name)
+        fault = diagnosis.check_syntax(submission.read(program), program.name)
         results, not_graded = [], ""
         not_run = (Criterion("not run", 0.0, 100.0, "because of the fault"),)
         for call in calls:

@@ -54,8 +54,13 @@ def files(program):
 
 
 def texts(program):
-    """As `files`, decoded; invalid UTF-8 is replaced."""
-    return {name: content.decode("utf-8", errors="replace") for name, content in files(program).items()}
+    """As `files`, decoded."""
+    return {name: decoded(content) for name, content in files(program).items()}
+
+
+def decoded(content):
+    """The text of a program (bytes), without the mark that Windows puts before UTF-8; other bytes are replaced."""
+    return content.decode("utf-8-sig", errors="replace")
 
 
 def imported(source):

@@ -133,13 +133,29 @@ def test_an_arm_left_on_its_way_is_told():
     ("try:\n    pass\nexcept OSError, e:\n    pass\n", ["line 3", "except Error as e"]),
     ("def f(:\n", ["line 1"]),
     ("x = '\0'", ["Python"]),
+    ("# für Anna\n".encode("latin-1"), ["UTF-8", "editor"]),
+    ("import rospy\n\n\nname = 'für'\n".encode("latin-1"), ["UTF-8", "editor"]),
+    ("print(1)\n".encode("utf-16"), ["UTF-8", "editor"]),
+    ("# coding: nothing\nprint(1)\n", ["UTF-8"]),
     ("x = " + "-" * 100_000 + "1", ["nested too deeply"]),
     ("x" + "()" * 100_000, ["nested too deeply"]),
 ])
 def test_what_python_cannot_read_is_told(text, words):
-    fault = diagnosis.check_syntax(text, "me.py")
+    fault = diagnosis.check_syntax(text if isinstance(text, bytes) else text.encode(), "me.py")
     assert fault.key == "syntax"
     assert all(word in fault.sentence for word in words), fault.sentence
+
+
+@pytest.mark.parametrize("source", [
+    "# für Anna\r\nprint(1)\r\n".encode("utf-8-sig"), "# coding: latin-1\nprint('ü')\n".encode("latin-1")])
+def test_files_as_editors_on_windows_save_them_are_read(source):
+    assert diagnosis.check_syntax(source, "me.py") is None
+
+
+@pytest.mark.parametrize("source", [b"", b"\n\n", b"# exercise: wave\n"])
+def test_an_empty_file_is_told(source):
+    fault = diagnosis.check_syntax(source, "me.py")
+    assert (fault.key, fault.cap) == ("empty", 0.0) and "empty" in fault.sentence
 
 
 def test_the_sheets_quaternion_that_is_a_message_is_told():
@@ -149,7 +165,7 @@ def test_the_sheets_quaternion_that_is_a_message_is_told():
 
 
 def test_the_sheets_return_at_the_margin_is_told():
-    fault = diagnosis.check_syntax("def generate_posemsg():\n    a = 1\nreturn a\n", "me.py")
+    fault = diagnosis.check_syntax(b"def generate_posemsg():\n    a = 1\nreturn a\n", "me.py")
     assert fault.key == "syntax"
     assert "line 3" in fault.sentence and "generate_posemsg" in fault.sentence
 

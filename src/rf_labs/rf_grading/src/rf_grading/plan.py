@@ -68,7 +68,7 @@ def make(submissions, exercises, version, conditions, folder, only_used=False):
             entry.keys[exercise.name], entry.paths[exercise.name] = key, found.path
             entry.notes[exercise.name] = found.note
             parent = Path(found.path).parent
-            entry.texts.update({(parent / name).as_posix(): content.decode("utf-8", "replace")
+            entry.texts.update({(parent / name).as_posix(): files_of_programs.decoded(content)
                                 for name, content in used.items()})
             tasks.setdefault(key, Task(key, exercise, str(path)))
     return exercises, entries, tasks

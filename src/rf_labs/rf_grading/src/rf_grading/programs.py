@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 
 from rf_checks.exercises import EXERCISES, UnknownExercise, choose
-from rf_checks.submission import imported
+from rf_checks.submission import decoded, imported
 
 _MARK = re.compile(r"^\s*#\s*exercise\s*:\s*(\w+)", re.MULTILINE | re.IGNORECASE)
 #: Lines of cells that are for the notebook alone.
@@ -118,7 +118,7 @@ def _one_of(paths, exercise, files, notes, reasons):
 
 def _exercise_of(path, content, exercises, alone):
     """(the Exercise that a file is for, or None; the exercise that it names itself, or "")."""
-    text = content.decode("utf-8", errors="replace")
+    text = decoded(content)
     mark = _MARK.search(text)
     by_name = {exercise.name: exercise for exercise in exercises}
     if mark:

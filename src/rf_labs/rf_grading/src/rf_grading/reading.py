@@ -10,6 +10,7 @@ import resource
 import signal
 
 from rf_checks import diagnosis, similarity
+from rf_checks.submission import decoded
 from rf_grading import alike, programs
 
 #: Processor time for all programs of a submission [s]; a megabyte of ordinary code takes half of it.
@@ -30,9 +31,9 @@ def problem(files, exercises, cpu_s=CPU_S):
     if os.waitstatus_to_exitcode(status) == 0:
         return ""
     if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
-        return ("is not read: Python needs more than %d s of processor time for its programs; no program written by "
-                "hand needs that" % cpu_s)
-    return "is not read: Python cannot take its programs apart, as an expression in them is nested too deeply"
+        return ("the submission is not read: Python needs more than %d s of processor time for its programs; no program "
+                "written by hand needs that" % cpu_s)
+    return "the submission is not read: an expression in its programs is nested too deeply for Python"
 
 
 def _try(files, exercises, cpu_s):
@@ -46,8 +47,8 @@ def _try(files, exercises, cpu_s):
         resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
         programs.assign(files, exercises)
         for name, content in programs.with_notebooks_as_programs(files)[0].items():
-            text = content.decode("utf-8", "replace")
-            diagnosis.check_syntax(text, name)
+            text = decoded(content)
+            diagnosis.check_syntax(content, name)
             alike.fingerprints(text)
             similarity.opaque_calls(text)
             similarity.judges_own(text)

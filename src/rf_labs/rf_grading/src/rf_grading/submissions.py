@@ -149,7 +149,7 @@ def _unpacked(files, others):
 def _limit(files):
     """Raises BadSubmission where {path: bytes} of programs are too many or too large."""
     if len(files) > archives.MOST_FILES or sum(map(len, files.values())) > archives.MOST_TAKEN_BYTES:
-        raise files_of_programs.BadSubmission("holds more than %d programs, or %d MiB of them" % (
+        raise files_of_programs.BadSubmission("the submission holds more than %d programs, or %d MiB of them" % (
             archives.MOST_FILES, archives.MOST_TAKEN_BYTES >> 20))
 
 
@@ -164,9 +164,9 @@ def _finish(one, assignment):
     if packed:
         one.refuse("%s is an archive of a kind that is not read; zip and tar are" % packed[0])
     elif there:
-        one.refuse("holds no Python file, only %s" % ", ".join(sorted(there)[:3]))
+        one.refuse("the submission holds no Python file, only %s" % ", ".join(sorted(there)[:3]))
     else:
-        one.refuse("is empty")
+        one.refuse("the submission is empty")
 
 
 def _name_by_gradescope(top, collected):
@@ -242,7 +242,7 @@ def _walk(top):
                     others.append(relative)
         _limit(files)
         if sum(map(len, packed.values())) > archives.MOST_ARCHIVE_BYTES:
-            raise files_of_programs.BadSubmission("holds archives of more than %d MiB" % (
+            raise files_of_programs.BadSubmission("the submission holds archives of more than %d MiB" % (
                 archives.MOST_ARCHIVE_BYTES >> 20))
         below.sort()
     return {**files, **packed}, others
@@ -300,7 +300,7 @@ class _Archive:
     def read(self, name):
         for path, sentence in self._refused.items():
             if path == name or path.startswith(name + "/"):
-                raise files_of_programs.BadSubmission(sentence)
+                raise files_of_programs.BadSubmission("the submission " + sentence)
         if self.is_folder(name):
             start = len(name) + 1
             return ({path[start:]: content for path, content in self._found.items() if path.startswith(name + "/")},

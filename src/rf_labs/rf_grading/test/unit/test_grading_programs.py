@@ -21,6 +21,8 @@ def assign(files, exercises=BOTH):
     ({"my_wave.py": "", "tf_listener.py": ""}, {"wave": "my_wave.py", "tf_listener": "tf_listener.py"}),
     ({"a.py": "# exercise: wave\n", "b.py": "import rospy\ntf.lookup_transform()"},
      {"wave": "a.py", "tf_listener": "b.py"}),
+    # As Windows saves it.
+    ({"a.py": "\ufeff# exercise: wave\r\n"}, {"wave": "a.py", "tf_listener": "no program for tf_listener"}),
     # What another file imports is no program.
     ({"wave.py": "import wave_tools", "wave_tools.py": "x = 1"}, {"wave": "wave.py"}),
     ({"wave.py": "from lib import wave_b", "lib/wave_b.py": "x = 1"}, {"wave": "wave.py"}),

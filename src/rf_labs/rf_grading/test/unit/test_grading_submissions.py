@@ -52,7 +52,7 @@ def test_moodles_folders_and_its_flat_form(tmp_path):
     assert (anna.student, anna.name, anna.files) == ("12", "Anna Groß", {"wave.py": b"1"})
     assert (bo.student, bo.name, bo.files) == ("13", "Bo", {"wave.py": b"2", "help.py": b"3"})
     assert found["Cy_14_assignsubmission_file_"].files == {"w.py": b"4"}
-    assert found["Di_15_assignsubmission_onlinetext_"].problem == "holds no Python file, only onlinetext.html"
+    assert found["Di_15_assignsubmission_onlinetext_"].problem == "the submission holds no Python file, only onlinetext.html"
 
 
 def test_pictures_in_notebooks_and_films_in_archives_are_no_hindrance(tmp_path):
@@ -76,7 +76,7 @@ def test_a_file_that_is_too_large_is_its_students_problem_alone(tmp_path):
 
 def test_many_archives_hold_no_more_than_one(tmp_path):
     put(tmp_path, {"a/%d.zip" % k: zipped({"%d.ipynb" % n: " " * (4 << 20) for n in range(3)}) for k in range(2)})
-    assert by_entry(tmp_path)["a"].problem == "holds more than 200 programs, or 16 MiB of them"
+    assert by_entry(tmp_path)["a"].problem == "the submission holds more than 200 programs, or 16 MiB of them"
 
 
 def test_gradescopes_export_has_names(tmp_path):
@@ -96,7 +96,7 @@ def test_nbgraders_folders_with_one_assignment_chosen(tmp_path):
                    "bo/ps2/wave.py": "3"})
     found = by_entry(tmp_path, assignment="ps1")
     assert found["anna"].files == {"ps1/wave.ipynb": b"1"}
-    assert found["bo"].problem == "is empty"
+    assert found["bo"].problem == "the submission is empty"
 
 
 def test_an_export_that_is_an_archive_itself(tmp_path):
@@ -106,7 +106,7 @@ def test_an_export_that_is_an_archive_itself(tmp_path):
     found = by_entry(tmp_path / "all.zip")
     assert {one.name: one.files for one in found.values()} == {"Anna": {"wave.py": b"1"}, "Bo": {"w/wave.py": b"2"},
                                                                "Cy": {}}
-    assert [one.problem for one in found.values()][2] == "holds no Python file, only report.pdf"
+    assert [one.problem for one in found.values()][2] == "the submission holds no Python file, only report.pdf"
 
 
 def test_two_submissions_of_one_name_stay_two(tmp_path):
