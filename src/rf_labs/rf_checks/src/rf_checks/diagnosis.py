@@ -27,13 +27,13 @@ _FRAME = re.compile(r'File "([^"]+)", line (\d+)')
 
 
 def check_syntax(source, name):
-    """A Fault for a program (bytes, as Python itself reads it) that Python cannot read, or that is empty; or None."""
+    """A Fault for a program (bytes, as Python itself reads it) that cannot be read or is empty, or None."""
     try:
         encoding = tokenize.detect_encoding(io.BytesIO(source).readline)[0]
         text = source.decode(encoding)
     except (SyntaxError, UnicodeDecodeError, LookupError):
-        return Fault("syntax", "Python cannot read the file, which is not in UTF-8: choose UTF-8 where your editor saves "
-                     "it", 0.0)
+        return Fault("syntax", "Python cannot read the file, which is not in UTF-8: choose UTF-8 where your editor "
+                     "saves it", 0.0)
     try:
         compile(text, name, "exec", dont_inherit=True)
     except SyntaxError as error:

@@ -31,8 +31,8 @@ def problem(files, exercises, cpu_s=CPU_S):
     if os.waitstatus_to_exitcode(status) == 0:
         return ""
     if os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL):
-        return ("the submission is not read: Python needs more than %d s of processor time for its programs; no program "
-                "written by hand needs that" % cpu_s)
+        return ("the submission is not read: Python needs more than %d s of processor time for its programs; no "
+                "program written by hand needs that" % cpu_s)
     return "the submission is not read: an expression in its programs is nested too deeply for Python"
 
 

@@ -25,10 +25,20 @@ with Gradebook("sqlite:///" + sys.argv[1]) as book:
     book.db.commit()
 """
 
+COMMENTS = """
+import sys
+from nbgrader.api import Gradebook
+with Gradebook("sqlite:///" + sys.argv[1]) as book:
+    print([(one.notebook.student.id, one.notebook.name, one.auto_comment)
+           for submission in book.assignment_submissions("ps3") for notebook in submission.notebooks
+           for one in notebook.comments if one.auto_comment])
+"""
+
 
 def student(name, status="graded", **points):
     return {"student": name, "name": "Anna Maria Groß" if name == "anna" else "", "email": "", "status": status,
-            "exercises": {exercise: {"points": value} for exercise, value in points.items()}}
+            "exercises": {exercise: {"points": value, "sentence": "" if value == 100.0 else "%s is off" % exercise}
+                          for exercise, value in points.items()}}
 
 
 @pytest.fixture
@@ -78,4 +88,8 @@ def test_points_are_in_the_gradebook_and_what_was_there_stays(results, tmp_path)
         rows = {row["student_id"]: row for row in csv.DictReader(table.open(encoding="utf-8"))}
         assert {name: (float(row["score"]), float(row["max_score"])) for name, row in rows.items()} == {
             "anna": (198.5, 210.0), "bo": (30.0, 210.0), "chen": (50.0, 210.0), "dan": (0.0, 210.0)}
+        told = run(python, "-c", COMMENTS, book)
+        assert told.stdout.strip() == str([
+            ("anna", "wave", "wave is off"), ("bo", "tf_listener", "tf_listener is off"), ("bo", "wave", "wave is off"),
+            ("chen", "tf_listener", "tf_listener is off")]), told.stderr
         assert (rows["anna"]["first_name"], rows["anna"]["last_name"]) == ("Anna Maria", "Groß")

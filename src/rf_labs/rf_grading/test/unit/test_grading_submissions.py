@@ -52,7 +52,8 @@ def test_moodles_folders_and_its_flat_form(tmp_path):
     assert (anna.student, anna.name, anna.files) == ("12", "Anna Groß", {"wave.py": b"1"})
     assert (bo.student, bo.name, bo.files) == ("13", "Bo", {"wave.py": b"2", "help.py": b"3"})
     assert found["Cy_14_assignsubmission_file_"].files == {"w.py": b"4"}
-    assert found["Di_15_assignsubmission_onlinetext_"].problem == "the submission holds no Python file, only onlinetext.html"
+    assert found["Di_15_assignsubmission_onlinetext_"].problem == (
+        "the submission holds no Python file, only onlinetext.html")
 
 
 def test_pictures_in_notebooks_and_films_in_archives_are_no_hindrance(tmp_path):
