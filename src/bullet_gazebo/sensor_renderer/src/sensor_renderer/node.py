@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The /sensor_renderer node: follows the simulator's snapshot and draws the pictures of topics with subscribers."""
+import contextlib
 import importlib
 import os
 import signal
@@ -32,6 +33,9 @@ FAILURES, FAILURES_WITHIN_S = 3, 10.0
 
 # The node has ended so long after it was asked to [s]; roslaunch waits for 15 s.
 LEAVES_WITHIN_S = 5.0
+
+# A scene that takes longer to read is announced [s].
+READS_WITHIN_S = 5.0
 
 # Parameter that groups models into classes for masks.
 CLASSES = "/sensor_renderer/semantic_classes"
@@ -83,7 +87,8 @@ class SensorRenderer:
             if scene.revision != snapshot.revision:
                 return  # a state of the new scene follows
             self._finder.forget_missing()
-            self._mirror.set_scene(scene.bodies, scene.light)
+            with _told(READS_WITHIN_S, "cameras wait while meshes of new models are simplified; this is done once"):
+                self._mirror.set_scene(scene.bodies, scene.light)
             self._world.forget()
             self._set_sensors(scene.bodies)
             self._revision = scene.revision
@@ -161,6 +166,18 @@ class SensorRenderer:
             raise SensorError("%s: plugin '%s' is not known here; known plugins: %s"
                               % (entry, entry.filename, ", ".join(sorted(self._drivers)))) from None
         return getattr(importlib.import_module(module), name)(entry)
+
+
+@contextlib.contextmanager
+def _told(after_s, text):
+    """Log ``text`` if the block takes longer than ``after_s``."""
+    timer = threading.Timer(after_s, rospy.loginfo, (text,))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 def _find_snapshot(stop):

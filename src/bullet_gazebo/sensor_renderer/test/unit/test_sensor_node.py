@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from lab_testing.waiting import wait_until
+from sensor_renderer import node
 from sensor_renderer.node import SensorRenderer, leave_anyway
 from sim_time.pace import Pace
 from world_picture.snapshot import SnapshotReader, SnapshotWriter
@@ -85,6 +86,24 @@ def test_a_mesh_of_a_package_that_came_later_is_drawn(simulator, tmp_path, monke
     (tmp_path / "made_later" / "package.xml").write_text("<package><name>made_later</name></package>")
     (tmp_path / "made_later" / "part.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert corners(STAND.replace(box, '<mesh filename="package://made_later/part.obj" scale="2 2 2"/>')) == 3
+
+
+def test_cameras_that_wait_for_meshes_say_so(simulator, monkeypatch):
+    monkeypatch.setattr("importlib.import_module", lambda name: types.SimpleNamespace(Eye=Eye))
+    said, texts = threading.Event(), []
+    monkeypatch.setattr(node.rospy, "loginfo", lambda text: (texts.append(text), said.set()))
+    renderer = SensorRenderer(lambda: None, {"libeye.so": "eyes:Eye"})
+    monkeypatch.setattr(renderer._mirror, "set_scene", lambda *_: said.wait(30.0))
+    monkeypatch.setattr(node, "READS_WITHIN_S", 0.0)
+    simulator.write(1, 0.0, [AT_ORIGIN])
+    renderer._turn(SnapshotReader(simulator.folder))
+    assert len(texts) == 1 and "cameras wait while meshes" in texts[0]
+    monkeypatch.setattr(node, "READS_WITHIN_S", 1000.0)
+    monkeypatch.setattr(renderer._mirror, "set_scene", lambda *_: None)
+    simulator.write_scene([with_sensor(STAND)])
+    simulator.write(2, 0.1, [AT_ORIGIN])
+    renderer._turn(SnapshotReader(simulator.folder))
+    assert len(texts) == 1
 
 
 def test_a_sensor_that_fails_restarts_and_is_left_out_at_the_third_time_until_a_reset(simulator, monkeypatch):
