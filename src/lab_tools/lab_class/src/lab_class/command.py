@@ -74,7 +74,9 @@ def _parser():
                     "none: every student can then do what you can")
     up.add_argument("--no-wait", action="store_true", help="do not wait until the labs run")
     up.set_defaults(run=_up)
-    commands.add_parser("list", help="the labs, and what they use").set_defaults(run=_list)
+    labs = commands.add_parser("list", help="the labs, and what they use")
+    labs.add_argument("--addresses", action="store_true", help="the addresses of instructor and students instead")
+    labs.set_defaults(run=_list)
     for verb, help_text in (("start", "start stopped or failed labs, wake paused ones"),
                             ("pause", "pause labs; a click on its page wakes one"), ("stop", "end labs")):
         one = commands.add_parser(verb, help=help_text)
@@ -238,8 +240,11 @@ def _await_labs(store):
         return _DONE
 
 
-def _list(_options, store):
+def _list(options, store):
     overview = control.call(store, "GET", "/labs")
+    if options.addresses:
+        _print_addresses(store.read(), store)
+        return _DONE
     print(_COLUMNS % ("LAB", "STATE", "PAGES", "FACTOR", "MEMORY", "FILES", "UNUSED", "NAME"))
     for lab in overview["labs"]:
         print((_COLUMNS % (lab["name"], lab["state"], lab["pages"], _shown(lab["factor"], "%.2f"),

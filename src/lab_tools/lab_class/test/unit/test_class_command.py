@@ -11,7 +11,8 @@ from types import SimpleNamespace
 import pytest
 
 from lab_class import command
-from lab_class.store import Options, StoreError
+from lab_class.roster import Student
+from lab_class.store import ClassRecord, Options, Store, StoreError
 from lab_class.supervisor import Supervisor
 
 
@@ -54,3 +55,16 @@ def test_a_roster_of_another_encoding_says_where_and_what_to_do(tmp_path, capsys
     (tmp_path / "roster.csv").write_bytes("name\nAnna\nJürgen\n".encode("latin-1"))
     assert command.main(["--folder", str(tmp_path / "class"), "up", str(tmp_path / "roster.csv")]) == 2
     assert 'roster.csv is not UTF-8 (line 3); in a spreadsheet, save it as "CSV UTF-8"' in capsys.readouterr().err
+
+
+def test_addresses_are_shown_again_while_the_class_runs(tmp_path, monkeypatch, capsys):
+    store = Store(tmp_path / "class")
+    store.make()
+    record = ClassRecord.made(Options(), [Student("anna", "Anna Müller")])
+    store.write(record)
+    store.write_running({"port": 8123})
+    monkeypatch.setattr(command.control, "call", lambda *_: {"labs": []})
+    assert command.main(["--folder", str(store.folder), "list", "--addresses"]) == 0
+    said = capsys.readouterr().out
+    assert "http://localhost:8123/instructor/?token=" + record.instructor in said
+    assert "Anna Müller" in said and "http://localhost:8123/anna/?token=" + record.tokens["anna"].act in said
