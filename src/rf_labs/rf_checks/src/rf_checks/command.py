@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import os
+import re
 import shutil
 import signal
 import sys
@@ -21,6 +22,8 @@ from rf_checks.lab import WhichRobot
 from rf_checks.work_folder import work_folder
 
 PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
+# Of a report: its name, and what tempfile puts behind it.
+_DRAFT = re.compile(r"\..+\.(json|xml|csv|html|py)-[a-z0-9_]{8}")
 
 
 def _listing():
@@ -139,6 +142,13 @@ def write_report(path, text):
         draft.write(text)
     os.chmod(draft.name, 0o666 & ~_umask())
     os.replace(draft.name, path)
+
+
+def remove_drafts(folder):
+    """Remove what write_report has left in a folder (Path) where it was killed. Raises OSError."""
+    for path in folder.glob(".*"):
+        if _DRAFT.fullmatch(path.name) and path.is_file() and not path.is_symlink():
+            path.unlink()
 
 
 def _umask():

@@ -13,7 +13,7 @@ from lab_batch import JobError, Spec
 from lab_batch.processes import Limits, map_seeds
 from lab_environment import isolation
 from rf_checks import similarity
-from rf_checks.command import write_report
+from rf_checks.command import remove_drafts, write_report
 from rf_checks.exercises import LABS, UnknownExercise
 from rf_checks.judge import WALL_LIMIT_S
 from rf_checks.sandbox import MEMORY_BYTES
@@ -119,6 +119,8 @@ class _Grading:
             raise BadFolder("%s has no submissions: no folder, archive or program of a student" % self._folder)
         (self._out / "motions").mkdir(parents=True, exist_ok=True)
         with Ledger(self._out / "verdicts.jsonl") as ledger, work_folder("lab-grade-") as work:
+            for place in (self._out, self._out / "motions", *self._out.glob("feedback/*/")):
+                remove_drafts(place)
             exercises, entries, tasks = plan.make(sent, exercises, version, {**conditions, "walls": walls},
                                                   work / "programs", only_used=not options.exercises)
             if not exercises:

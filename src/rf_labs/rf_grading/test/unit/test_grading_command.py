@@ -117,6 +117,25 @@ def test_a_stopped_grading_writes_what_it_has_and_goes_on(judge, class_folder, c
     assert judge.judged == ["# right", "# wrong", "# right, too"]
 
 
+def test_half_written_files_of_a_killed_grading_go_and_others_stay(judge, class_folder, monkeypatch):
+    command.main(["class", "lab2"])
+    out = Path("class-graded")
+    before = set(out.rglob("*"))
+
+    def dies(*_):
+        raise SystemExit  # as by kill -9: nothing is tidied up
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", dies)
+        for place in (out, out / "motions", out / "feedback" / "bo"):
+            with pytest.raises(SystemExit):
+                command.write_report(place / "results.json", "{")
+    (out / ".mine.json").touch()
+    assert len(set(out.rglob("*")) - before) == 4
+    assert command.main(["class", "lab2"]) == command.GRADED
+    assert set(out.rglob("*")) - before == {out / ".mine.json"}
+
+
 @pytest.mark.parametrize(("text", "words"), [("# dies", "worker died twice"), ("# slow", "0.01 of real time")])
 def test_what_the_judge_cannot_grade_is_told_and_tried_again(judge, class_folder, capsys, text, words):
     (class_folder / "bo" / "wave.py").write_text(text)
