@@ -22,11 +22,13 @@ VENV=$LAB_ROOT/.venv
 NOETIC=/opt/ros/noetic/setup.bash
 DESCRIPTION=$LAB_ROOT/src/baxter/baxter_common/baxter_description
 GRIPPERS=$LAB_ROOT/src/baxter/baxter_common/rethink_ee_description
-STEPS=(apt venv pip meshes overlay build urdf kernels)
+STEPS=(apt venv pip meshes overlay build urdf kernels pictures)
 # Python packages with compiled inner loops: `python3 -m NAME` fills their cache.
 COMPILED=(baxter_sim_kinematics baxter_sim_hardware motion_planning)
 # Robots whose collision spheres are computed in advance, so that the first plan need not wait.
 PLANNED_FOR=("$DESCRIPTION/urdf/baxter.urdf.xacro" "$LAB_ROOT/src/probot/probot_description/urdf/probot_anno.xacro")
+# Robots whose meshes are made ready for pictures.
+PICTURED=("${PLANNED_FOR[@]}" "$LAB_ROOT/src/cwru_baxter/cwru_baxter_sim/cwru_baxter.urdf.xacro")
 declare -A TITLES=(
     [apt]="Debian packages"
     [venv]="virtual environment"
@@ -36,6 +38,7 @@ declare -A TITLES=(
     [build]="catkin_make"
     [urdf]="baxter.urdf"
     [kernels]="compiled inner loops"
+    [pictures]="robots for pictures"
 )
 # shellcheck source=setup_run.bash
 source "$LAB_ROOT/tools/setup_run.bash"
@@ -274,6 +277,30 @@ step_kernels() {
     # would compile it at every start: a second, and 20 MB.
     if [[ -d devel/lib/python3/dist-packages ]]; then
         run "$VENV/bin/python3" -m compileall -q -j "$(nproc)" devel/lib/python3/dist-packages
+    fi
+}
+
+# Without this, the first pictures wait for the meshes' levels of detail: half a minute, on a busy machine some. The
+# levels are in the user's cache.
+step_pictures() {
+    local cache=${XDG_CACHE_HOME:-${HOME:-}/.cache}/bullet_gazebo key
+    if [[ ! -d src/bullet_gazebo/sensor_renderer ]]; then
+        note="skipped: no bullet_gazebo/sensor_renderer in src/"
+        return
+    fi
+    key="$cache $(find src/bullet_gazebo/{sensor_renderer,world_picture}/src "$DESCRIPTION" "$GRIPPERS" \
+        src/{probot/probot_description,cwru_baxter/cwru_baxter_sim} -type f ! -name '*.pyc' -print0 2>/dev/null |
+        LC_ALL=C sort -z | xargs -0 sha256sum | sha256sum)"
+    if stamp_is "$key" && [[ -d $cache/results ]]; then
+        note="up to date"
+        return
+    fi
+    # A machine that cannot draw needs no pictures; one that can makes them at the first start.
+    if timeout 900 bash -c 'source "$1/tools/environment.bash" && use_build && shift &&
+        python3 -m sensor_renderer.prepare "$@"' prepare "$LAB_ROOT" "${PICTURED[@]}" >>"$step_log" 2>&1 </dev/null; then
+        stamp "$key"
+    else
+        note="not made, see $step_log; the first start makes them"
     fi
 }
 

@@ -143,6 +143,12 @@ class GlRenderer:
         raw = np.frombuffer(depth_texture.read(alignment=1), np.float32).reshape(size)
         return numbers, links, pinhole.depth_from_buffer(raw)
 
+    def prepare(self, mirror):
+        """Make all levels of detail of what ``mirror`` shows; what takes long is then on disk."""
+        if mirror.light != self._lit_by:
+            self._light_by(mirror.light)
+        self._links.prepare(mirror)
+
     def close(self):
         """Release the context."""
         self._context.release()

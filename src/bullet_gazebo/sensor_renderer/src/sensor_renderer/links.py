@@ -127,6 +127,12 @@ class Links:
         for key in unused[:max(len(unused) - MOST_UNUSED, 0)]:
             _release(self._links.pop(key))
 
+    def prepare(self, mirror):
+        """Make all levels of detail of all links."""
+        for link, _, _ in self.everything(mirror):
+            for error_m in (0.0, *link.steps):
+                self._level(link, error_m)
+
     def arrays(self, link, distance, pinhole, depth=False):
         """The :class:`Arrays` of the level of detail that the ``distance`` of the link's sphere asks for; finer ones
         for a picture of ``depth``."""
