@@ -12,6 +12,7 @@ from model_files.resources import ResourceFinder
 from sensor_renderer.errors import RenderingError
 from sensor_renderer.gl_renderer import GlRenderer
 from sensor_renderer.mirror import Mirror
+from urdf_model import description_text
 from world_picture.drawing import DrawingCache
 
 
@@ -24,7 +25,7 @@ def main(arguments=None):
     failed = False
     for path in parser.parse_args(arguments).urdf:
         try:
-            prepare(_text(path))
+            prepare(description_text(path))
         except (ValueError, OSError) as error:
             failed = True
             print("sensor_renderer.prepare: %s: %s" % (path, error), file=sys.stderr)
@@ -45,17 +46,6 @@ def prepare(urdf):
             renderer.prepare(mirror)
         finally:
             renderer.close()
-
-
-def _text(path):
-    if path.suffix != ".xacro":
-        return path.read_text(encoding="utf-8")
-    import xacro
-
-    try:
-        return xacro.process_file(str(path)).toxml()
-    except Exception as error:  # its expressions are Python, which can raise any exception
-        raise ValueError("xacro cannot expand it: %s" % " ".join(str(error).split())) from None
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 
 from .bounds import OutOfBounds, check_robot
 from .errors import UrdfError
-from .files import read_file
+from .files import description_text, read_file
 from .merge import MergedFrame, MergedLink, MergedRobot, merge_fixed
 from .model import (
     Box,
@@ -49,6 +49,7 @@ __all__ = [
     "UrdfError",
     "XmlRefused",
     "check_robot",
+    "description_text",
     "drawing_urdf",
     "merge_fixed",
     "parse_urdf",

@@ -5,6 +5,8 @@ import errno
 import os
 import stat
 
+from .errors import UrdfError
+
 
 def read_file(path, most_bytes):
     """Return the content (bytes) of a regular file. Raises OSError for anything else, and for a larger one.
@@ -25,6 +27,22 @@ def read_file(path, most_bytes):
                 str(path),
             )
         return content
+
+
+def description_text(path):
+    """Return the text of a description in a file (a ``Path``), URDF or SRDF; of xacro, what it expands to.
+
+    Raises OSError for a file that cannot be read, ValueError for one that is not UTF-8, and :class:`UrdfError`, a
+    ValueError, if xacro cannot expand it.
+    """
+    if path.suffix != ".xacro":
+        return path.read_text(encoding="utf-8")
+    import xacro
+
+    try:
+        return xacro.process_file(str(path)).toprettyxml(indent="  ")
+    except Exception as error:  # its expressions are Python, which can raise any exception
+        raise UrdfError("xacro cannot expand %s: %s" % (path, " ".join(str(error).split()))) from None
 
 
 def kind_of(mode):

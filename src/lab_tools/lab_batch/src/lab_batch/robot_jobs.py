@@ -13,8 +13,8 @@ def _package_file(package, file):
 
 
 def _expanded(package, file):
-    import xacro
-    return xacro.process_file(str(_package_file(package, file))).toxml()
+    from urdf_model import description_text
+    return description_text(_package_file(package, file))
 
 
 class ReachPart(Job):

@@ -25,15 +25,14 @@ class InverseKinematics(Job):
     def start(self):
         import rospkg
 
-        import xacro
         from baxter_model import BASE_FRAME, SIDES, tip_of
         from baxter_sim_kinematics import Chain, warm_up
-        from urdf_model import parse_urdf
+        from urdf_model import description_text, parse_urdf
 
         if self._side not in SIDES:
             raise ValueError("side is %r, not left or right" % (self._side,))
         file = Path(rospkg.RosPack().get_path("baxter_description")) / "urdf" / "baxter.urdf.xacro"
-        robot = parse_urdf(xacro.process_file(str(file)).toxml(), source=str(file))
+        robot = parse_urdf(description_text(file), source=str(file))
         self._chain = Chain.from_robot(robot, BASE_FRAME, tip_of(self._side))
         warm_up(self._chain)
 

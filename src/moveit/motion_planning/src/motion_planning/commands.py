@@ -8,11 +8,11 @@ from pathlib import Path
 
 from model_files.resources import ResourceFinder
 from motion_planning.collision_pairs import ALWAYS_SHARE, TRIALS, disabled_pairs, summary
-from motion_planning.errors import PlanningError
 from motion_planning.exact import ExactChecker
 from motion_planning.model import MeshReader, PlanningModel
 from motion_planning.planners.planning import prepare, sphere_model_of
 from motion_planning.srdf import element_of, with_disabled_pairs
+from urdf_model import description_text
 
 
 def collisions_updater(arguments=None):
@@ -34,8 +34,8 @@ def collisions_updater(arguments=None):
     if options.srdf.suffix == ".xacro" and options.output is None and not options.lines:
         parser.error("%s is xacro; name the SRDF file to write with --output" % options.srdf)
     try:
-        text = _text(options.srdf)
-        model = PlanningModel.from_xml(_text(options.urdf), text)
+        text = description_text(options.srdf)
+        model = PlanningModel.from_xml(description_text(options.urdf), text)
         for warning in model.srdf.warnings:
             print("warning: " + warning, file=sys.stderr)
         pairs = disabled_pairs(model, MeshReader(ResourceFinder()), trials=options.trials, share=options.share,
@@ -44,7 +44,7 @@ def collisions_updater(arguments=None):
             print("\n".join(map(element_of, pairs)))
         else:
             (options.output or options.srdf).write_text(with_disabled_pairs(text, pairs), encoding="utf-8")
-    except (PlanningError, OSError) as error:
+    except (ValueError, OSError) as error:
         print("collisions_updater: %s" % error, file=sys.stderr)
         return 1
     print(summary(pairs), file=sys.stderr)
@@ -68,7 +68,7 @@ def prepare_robots(arguments=None):
 def _prepare_one(path):
     """Prepare the robot of a file; return None, or the reason of a failure."""
     try:
-        model = PlanningModel.from_xml(_text(path), "")
+        model = PlanningModel.from_xml(description_text(path), "")
         exact = ExactChecker(model, MeshReader(ResourceFinder()))
         prepare(exact)
         left = sphere_model_of(exact).not_kept()
@@ -78,14 +78,3 @@ def _prepare_one(path):
         return "%s: the spheres of %d links cannot be kept on disk, '%s' is the first; make room or let the cache be " \
                "written" % (path, len(left), left[0])
     return None
-
-
-def _text(path):
-    if path.suffix != ".xacro":
-        return path.read_text(encoding="utf-8")
-    import xacro
-
-    try:
-        return xacro.process_file(str(path)).toprettyxml(indent="  ")
-    except Exception as error:  # its expressions are Python, which can raise any exception
-        raise PlanningError("xacro cannot expand %s: %s" % (path, " ".join(str(error).split()))) from None

@@ -13,7 +13,7 @@ from baxter_sim_kinematics.errors import KinematicsError, NoSolution
 from baxter_sim_kinematics.ik import solve_all
 from baxter_sim_kinematics.reach import yoshikawa
 from baxter_sim_kinematics.target import Target, pose_from_quaternion
-from urdf_model import UrdfError, parse_urdf
+from urdf_model import UrdfError, description_text, parse_urdf
 from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
 
 
@@ -22,15 +22,7 @@ def read_robot(path):
     if path is None:
         import rospkg
         path = Path(rospkg.RosPack().get_path("baxter_description")) / "urdf" / "baxter.urdf.xacro"
-    path = Path(path)
-    if path.suffix == ".xacro":
-        import xacro
-        try:
-            text = xacro.process_file(str(path)).toxml()
-        except Exception as error:  # its expressions are Python: they can raise anything
-            raise UrdfError("xacro cannot expand %s: %s" % (path, " ".join(str(error).split()))) from None
-        return parse_urdf(text, source=str(path))
-    return parse_urdf(path.read_text(), source=str(path))
+    return parse_urdf(description_text(Path(path)), source=str(path))
 
 
 def new_parser(description):
