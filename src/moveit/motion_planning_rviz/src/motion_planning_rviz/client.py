@@ -50,12 +50,14 @@ class Touch(NamedTuple):
 
 class Snapshot(NamedTuple):
     """values: {joint: value} of the robot; objects: CollisionObjects; attached: AttachedCollisionObjects; colours:
-    {object: r g b a}."""
+    {object: r g b a}; is_measured: whether move_group has heard from the joints, which otherwise stand at their
+    defaults."""
 
     values: dict
     objects: list
     attached: list
     colours: dict
+    is_measured: bool = True
 
 
 class Outcome(NamedTuple):
@@ -90,7 +92,8 @@ class MoveGroupClient:
         colours = {entry.id: (entry.color.r, entry.color.g, entry.color.b, entry.color.a)
                    for entry in scene.object_colors}
         return Snapshot(state_values(scene.robot_state), list(scene.world.collision_objects),
-                        list(scene.robot_state.attached_collision_objects), colours)
+                        list(scene.robot_state.attached_collision_objects), colours,
+                        not scene.robot_state.joint_state.header.stamp.is_zero())
 
     def posture(self, handle, pose, state, avoid):
         """Return {joint: value} that put a handle's link to ``pose`` (4, 4) in the root link, near ``state``.

@@ -16,7 +16,7 @@ from visualization_msgs.msg import InteractiveMarkerFeedback
 from motion_planning.errors import PlanningError
 from motion_planning.model import PlanningModel
 from motion_planning_rviz import handles, interaction
-from motion_planning_rviz.client import MoveGroupClient
+from motion_planning_rviz.client import MoveGroupClient, NoAnswer
 from motion_planning_rviz.interaction import WHICH, InteractionError
 from motion_planning_rviz.messages import matrix_of, state_values, tells_joints_alone
 from motion_planning_rviz.panel import Panel
@@ -27,6 +27,9 @@ from rospy_start import MissingParameter, end_on_signals, wait_for_param
 
 # Wall time to wait for the robot's model, and between two log lines about waiting for move_group [s].
 _DESCRIPTION_TIMEOUT_S, _TOLD_EVERY_S = 60.0, 10.0
+# Wall time from the first answer of a move_group that has not heard from the joints [s]. Another one than ours may
+# never say that it has.
+_JOINTS_TIMEOUT_S = 30.0
 _TF_TIMEOUT_S = 1.0
 #: MoveIt's defaults, if robot_description_planning has no value.
 _SPEED = "default_velocity_scaling_factor"
@@ -57,14 +60,17 @@ class PanelNode:
         """Wait for move_group, then serve. description: name of the parameter that holds the URDF."""
         speed = rospy.get_param("~speed", rospy.get_param("%s_planning/%s" % (description, _SPEED), _USUAL_SPEED))
         group = rospy.get_param("~group", "")
-        told = -_TOLD_EVERY_S
+        told, answered = -_TOLD_EVERY_S, None
         while not rospy.is_shutdown():
             try:
-                self._panel.begin(group, float(speed))
+                late = answered is not None and time.monotonic() - answered >= _JOINTS_TIMEOUT_S
+                self._panel.begin(group, float(speed), measured=not late)
                 break
             except InteractionError:
                 raise
             except PlanningError as error:
+                if not isinstance(error, NoAnswer) and answered is None:
+                    answered = time.monotonic()
                 if time.monotonic() - told >= _TOLD_EVERY_S:
                     rospy.loginfo("waiting for move_group: %s", error)
                     told = time.monotonic()

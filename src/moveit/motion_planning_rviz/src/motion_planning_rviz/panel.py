@@ -42,9 +42,12 @@ class Panel:
 
     # -- what is shown ------------------------------------------------------------------------------------------
 
-    def begin(self, group, speed):
-        """Set the goal to the robot's present state. Raises PlanningError if move_group does not answer."""
+    def begin(self, group, speed, measured=False):
+        """Set the goal to the robot's present state. Raises PlanningError if move_group does not answer, and with
+        ``measured`` if it has not heard where the joints are."""
         self._look()
+        if measured and not self._snapshot.is_measured:
+            raise PlanningError("it has not heard where the joints are")
         goal = interaction.with_known(self.query.goal, self._snapshot.values)
         self.query = replace(self.query, goal=goal, speed=speed)
         self.view.scene(self._snapshot)

@@ -57,16 +57,17 @@ def probot():
 
 
 class FakeClient:
-    """A move_group that is asked directly. touching: Touches of every state; robot: {joint: value}."""
+    """A move_group that is asked directly. touching: Touches of every state; robot: {joint: value},
+    and whether they are measured."""
 
     def __init__(self, model):
         self.model, self.robot = model, {}
         self.touching, self.objects, self.attached = [], [], []
-        self.sent, self.stopped, self.missing, self.asked = [], 0, False, []
+        self.sent, self.stopped, self.missing, self.asked, self.is_measured = [], 0, False, [], True
 
     def snapshot(self):
         self._check()
-        return Snapshot(self.robot, list(self.objects), list(self.attached), {})
+        return Snapshot(self.robot, list(self.objects), list(self.attached), {}, self.is_measured)
 
     def _check(self):
         if self.missing:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from motion_planning.errors import PlanningError
 from motion_planning_rviz import interaction
 from motion_planning_rviz.client import NoAnswer, Outcome, Touch
 from motion_planning_rviz.interaction import InteractionError
@@ -42,6 +43,17 @@ def test_the_goal_begins_where_the_robot_is(twins, panel_of):
     assert (goal.positions["left_turn"], goal.positions["left_reach"]) == (0.4, 0.2)
     np.testing.assert_allclose(panel.view.poses[("goal", "left_tip")], twins.frame_of(goal.q, "left_tip"))
     assert set(panel.view.ghosts) == {"goal"} and panel.view.lines == []
+
+
+def test_a_goal_waits_until_the_joints_were_heard_of(twins, panel_of):
+    panel = panel_of(twins)
+    panel.client.robot, panel.client.is_measured = {"left_turn": 0.0}, False
+    with pytest.raises(PlanningError, match="it has not heard where the joints are"):
+        panel.begin("left_arm", 0.5, measured=True)
+    panel.begin("left_arm", 0.5)
+    panel.client.robot, panel.client.is_measured = {"left_turn": 0.4}, True
+    panel.begin("left_arm", 0.5, measured=True)
+    assert panel.view.ghosts["goal"][0].positions["left_turn"] == 0.4
 
 
 def test_joints_follow_a_handle_that_is_dragged(probot, panel_of):
