@@ -8,6 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+#: Most results that are kept. Models of ever other sizes, as for data sets, would fill the disk.
+MOST_KEPT = 5000
+
 
 def cache_folder(name):
     """The path of a folder below ``$XDG_CACHE_HOME/bullet_gazebo``, by default ``~/.cache/bullet_gazebo``."""
@@ -17,7 +20,8 @@ def cache_folder(name):
 
 class ResultCache:
     """Arrays on disk, under a hash of what they were calculated from. Several processes may use a folder at a time; a
-    folder that cannot be written to keeps nothing."""
+    folder that cannot be written to keeps nothing. Of more than :data:`MOST_KEPT` results, those that were used last
+    are kept."""
 
     def __init__(self, folder=None):
         """``folder``: default ``$XDG_CACHE_HOME/bullet_gazebo/results``."""
@@ -30,7 +34,9 @@ class ResultCache:
         path = self._folder / ("%s-%s.npy" % (calculation, _digest(inputs)))
         # Missing, cut short, or of something else: it is calculated again.
         with contextlib.suppress(OSError, ValueError, EOFError):
-            return np.load(path, allow_pickle=False)
+            found = np.load(path, allow_pickle=False)
+            os.utime(path)
+            return found
         found = calculate()
         with contextlib.suppress(OSError):
             self._write(path, found)
@@ -46,6 +52,18 @@ class ResultCache:
         except BaseException:
             os.unlink(draft)
             raise
+        self._make_room()
+
+    def _make_room(self):
+        used_at = []
+        for entry in os.scandir(self._folder):
+            with contextlib.suppress(FileNotFoundError):  # another process makes room as well
+                used_at.append((entry.stat().st_mtime_ns, entry.path))
+        # A tenth at once, so that the next ones find room.
+        if len(used_at) > MOST_KEPT:
+            for _, path in sorted(used_at)[:len(used_at) - MOST_KEPT + MOST_KEPT // 10]:
+                with contextlib.suppress(FileNotFoundError):
+                    os.unlink(path)
 
 
 def _digest(inputs):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Results of calculations on disk."""
+import os
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,20 @@ def test_a_damaged_file_is_replaced(tmp_path, calculate, content):
     path.write_bytes(whole[:-1] if content is None else content)
     assert cache.array("sum-1", (), calculate).tolist() == [True, False, True]
     assert calculate.calls == 2 and path.read_bytes() == whole
+
+
+def test_those_that_were_used_last_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr("world_picture.results.MOST_KEPT", 20)
+    cache = ResultCache(tmp_path)
+    for number in range(20):
+        cache.array("sum-1", (number,), Counted(np.array([number])))
+        path = max(tmp_path.iterdir(), key=lambda path: path.stat().st_mtime_ns)
+        os.utime(path, (number, number))
+    cache.array("sum-1", (0,), pytest.fail)
+    cache.array("sum-1", (20,), Counted(np.array([20])))
+    assert len(list(tmp_path.iterdir())) == 18
+    for number in (0, *range(4, 21)):
+        assert cache.array("sum-1", (number,), pytest.fail).tolist() == [number]
 
 
 def test_without_a_folder_it_is_calculated_each_time(tmp_path, calculate):
