@@ -104,7 +104,7 @@ def load_scene(path, part=WHOLE, textures=False):
         farthest_m = np.abs(vertices).max(initial=0.0) * unit_m
         if not farthest_m <= bounds.POSITION.high:
             raise MeshError("a corner is at %g; expected at most %g" % (farthest_m, bounds.POSITION.high))
-    if unit_m != 1.0:
+    if unit_m != 1.0 and scene.geometry:
         scene.apply_transform(np.diag([unit_m, unit_m, unit_m, 1.0]))
     if is_centred and scene.bounds is not None:
         middle = np.eye(4)
@@ -163,12 +163,14 @@ def _collada(content, part):
     stays if its material is broken, as there."""
     from lxml import etree
 
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False,
+                             remove_comments=True)
     root = etree.fromstring(content, parser)
     refuse_entities(root)
     if part:
         _keep_part(root, part)
-    if _mend_materials(root) or part:
+    # pycollada leaves out geometry with comments in it.
+    if _mend_materials(root) or part or b"<!--" in content:
         content = etree.tostring(root)
     unit = root.find("{*}asset/{*}unit")
     try:

@@ -269,3 +269,19 @@ def test_geometry_stays_where_its_material_is_broken(tmp_path, broken):
     path.write_text(text)
     to_wavefront(str(path), str(tmp_path / "triangle.obj"), ())
     assert points_of(tmp_path / "triangle.obj")[1] == 1
+
+
+def test_comments_in_geometry_do_not_count(tmp_path):
+    path = tmp_path / "triangle.dae"
+    path.write_text(COLLADA % ("", TRIANGLE.replace("<mesh>", "<!-- a --><mesh><!-- b -->")))
+    to_wavefront(str(path), str(tmp_path / "triangle.obj"), ())
+    assert points_of(tmp_path / "triangle.obj")[1] == 1
+
+
+@pytest.mark.parametrize("unit", ["", '<unit meter="0.1"/>'])
+def test_a_collada_file_without_geometry_says_so(tmp_path, unit):
+    path = tmp_path / "nothing.dae"
+    path.write_text((COLLADA % ("", TRIANGLE.replace('<instance_geometry url="#g"/>', ""))).replace(
+        "<up_axis>", unit + "<up_axis>"))
+    with pytest.raises(MeshError, match="it holds no triangles"):
+        to_wavefront(str(path), str(tmp_path / "nothing.obj"), ())
