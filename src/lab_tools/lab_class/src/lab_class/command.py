@@ -311,6 +311,10 @@ def _logs(options, store):
     else:
         raise ClassError("%r is no name of a lab; ./baxter.sh labs list shows them" % options.name)
     if not path.exists():
+        record = store.read()
+        names = [student.name for student in record.students] if record else []
+        if names and options.name not in (None, *names):
+            raise ClassError("there is no lab %s; there are: %s" % (options.name, ", ".join(names)))
         raise ClassError("there is no %s; only a class that runs has logs" % path)
     with open(path, "rb") as stream:
         shutil.copyfileobj(stream, sys.stdout.buffer)

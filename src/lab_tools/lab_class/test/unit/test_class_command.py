@@ -68,3 +68,12 @@ def test_addresses_are_shown_again_while_the_class_runs(tmp_path, monkeypatch, c
     said = capsys.readouterr().out
     assert "http://localhost:8123/instructor/?token=" + record.instructor in said
     assert "Anna Müller" in said and "http://localhost:8123/anna/?token=" + record.tokens["anna"].act in said
+
+
+def test_logs_of_a_lab_that_the_class_has_not_names_those_that_it_has(tmp_path, capsys):
+    store = Store(tmp_path / "class")
+    store.make()
+    store.write(ClassRecord.made(Options(), [Student("anna", "Anna"), Student("ben", "Ben")]))
+    for name, text in (("bem", "there is no lab bem; there are: anna, ben"), ("ben", "a class that runs has logs")):
+        assert command.main(["--folder", str(store.folder), "logs", name]) == 1
+        assert text in capsys.readouterr().err
