@@ -41,7 +41,8 @@ def _reach_parser():
     parser.add_argument("--starts", type=int, default=40, help="random starts before a pose counts as out of reach")
     parser.add_argument("--self-collision", action="store_true",
                         help="only postures count in which the robot does not touch itself")
-    parser.add_argument("--hdf5", action="store_true", help="write reach.h5 as well, in the layout of Reuleaux")
+    parser.add_argument("--hdf5", action="store_true",
+                        help="write reach.h5 and capability.h5 as well, in the layouts of Reuleaux")
     parser.add_argument("--out", type=Path, default=Path("reach"), help="folder (default: reach)")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes (default: all cores)")
     return parser
@@ -92,6 +93,7 @@ def _reach(options):
     found.write_csv(options.out / "reach.csv")
     if options.hdf5:
         found.write_hdf5(options.out / "reach.h5")
+        found.write_capabilities(options.out / "capability.h5")
     draw(share, settings, options.out / "reach.png")
     print("%d of %d cells are reached, %.1f %% of all poses; see %s" % (
         (share > 0).sum(), share.size, 100.0 * share.mean(), options.out))

@@ -4,6 +4,7 @@ import csv
 import math
 import os
 import zipfile
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,11 @@ from urdf_model.transforms import quaternion_from_matrix
 
 # Rows that are written to HDF5 at a time.
 _ROWS = 65536
+# A capability map has a cone for a cell with at most this share of its orientations, and a sphere for one with more.
+_MOST_IN_CONE = 0.2
+# Reuleaux's measures of a cone: its opening angle is pi divided by one of these.
+_CONES = np.arange(2.0, 10.5, 0.5)
+_CONE, _SPHERE = 1.0, 2.0
 _REQUIRED = ("reached", "manipulability", "lower", "cell_m", "rotations", "base", "tip", "self_collision")
 
 
@@ -53,14 +59,12 @@ class ReachMap:
 
     def write(self, path):
         """Write ``path`` (.npz), complete or not at all. Raises OSError."""
-        path = Path(path)
-        unfinished = path.with_name(".%s.%d.npz" % (path.stem, os.getpid()))
         count = len(self.rotations)
-        np.savez_compressed(unfinished, share=self.share, manipulability=self.manipulability, lower=self.lower,
-                            upper=self.lower + self.cell_m * np.array(self.shape), cell_m=self.cell_m,
-                            orientations=count, rotations=self.rotations, base=self.base, tip=self.tip,
-                            reached=np.packbits(self.reached, axis=3), self_collision=self.self_collision)
-        unfinished.rename(path)
+        with _complete(path) as unfinished:
+            np.savez_compressed(unfinished, share=self.share, manipulability=self.manipulability, lower=self.lower,
+                                upper=self.lower + self.cell_m * np.array(self.shape), cell_m=self.cell_m,
+                                orientations=count, rotations=self.rotations, base=self.base, tip=self.tip,
+                                reached=np.packbits(self.reached, axis=3), self_collision=self.self_collision)
 
     @classmethod
     def read(cls, path):
@@ -117,12 +121,10 @@ class ReachMap:
         """
         import h5py
 
-        path = Path(path)
-        unfinished = path.with_name(".%s.%d.h5" % (path.stem, os.getpid()))
         quaternions = np.array([quaternion_from_matrix(rotation) for rotation in self.rotations])
         flat = self.reached.reshape(-1, len(self.rotations))
         centres = self.centres.reshape(-1, 3).astype(np.float32)
-        with h5py.File(unfinished, "w") as file:
+        with _complete(path) as unfinished, h5py.File(unfinished, "w") as file:
             poses = file.create_dataset("Poses/poses_dataset", (0, 10), "float32", maxshape=(None, 10),
                                         chunks=(4096, 10))
             step = max(1, _ROWS // len(self.rotations))
@@ -136,7 +138,66 @@ class ReachMap:
             spheres = file.create_dataset(
                 "Spheres/sphere_dataset", data=np.column_stack((centres[some], 100.0 * flat[some].mean(axis=1))))
             spheres.attrs["Resolution"] = np.array([self.cell_m], dtype="float32")
-        unfinished.rename(path)
+
+    def write_capabilities(self, path):
+        """Write from where each cell is reached, in the layout of Reuleaux's capability maps. Raises OSError.
+
+        /Capability/capability_dataset: rows as of :meth:`capabilities`; its attribute Resolution [m].
+        """
+        import h5py
+
+        with _complete(path) as unfinished, h5py.File(unfinished, "w") as file:
+            data = file.create_dataset("Capability/capability_dataset", data=self.capabilities())
+            data.attrs["Resolution"] = np.array([self.cell_m], dtype="float32")
+
+    def capabilities(self):
+        """Return a row (10,) for each reached cell: kind, reached percentage, cone, centre (x y z), quaternion.
+
+        Kind 1, where at most a fifth of the orientations are reached: a cone whose tip is at the centre and out of
+        which the tip of the arm comes, along the quaternion's x axis; ``cone`` is pi divided by its opening angle. The
+        axis is the mean of the directions that are reached; of the opening angles that one is chosen with which the
+        fewest orientations are reached outside of it or not reached inside. Kind 2: a sphere. After Zacharias, Borst
+        and Hirzinger, Capturing robot workspace structure (2007), with the directions of the tip's z axis.
+        """
+        flat, centres = self.reached.reshape(-1, len(self.rotations)), self.centres.reshape(-1, 3)
+        step = max(1, _ROWS // len(self.rotations))
+        rows = [self._capabilities(flat[first:first + step], centres[first:first + step])
+                for first in range(0, len(flat), step)]
+        return np.concatenate([np.empty((0, 10)), *rows])
+
+    def _capabilities(self, reached, centres):
+        some = reached.any(axis=1)
+        reached, centres = reached[some], centres[some]
+        rows = np.zeros((len(reached), 10))
+        rows[:, 0], rows[:, 1], rows[:, 3:6], rows[:, 9] = _SPHERE, 100.0 * reached.mean(axis=1), centres, 1.0
+        thin = reached.mean(axis=1) <= _MOST_IN_CONE
+        reached, directions = reached[thin], self.rotations[:, :, 2]
+        axes = reached @ directions
+        lengths = np.linalg.norm(axes, axis=1)
+        # Directions that are opposite have no mean: the first of them.
+        axes = np.where(lengths[:, None] > 1e-6, axes / np.maximum(lengths, 1e-6)[:, None],
+                        directions[reached.argmax(axis=1)])
+        cosines = axes @ directions.T
+        wrong = [(reached != (cosines >= math.cos(0.5 * math.pi / cone) - 1e-9)).sum(axis=1) for cone in _CONES]
+        rows[thin, 0], rows[thin, 2] = _CONE, _CONES[np.argmin(np.reshape(wrong, (len(_CONES), -1)), axis=0)]
+        rows[thin, 6:] = _quaternions_to(axes)
+        return rows
+
+
+def _quaternions_to(axes):
+    """The shortest turns (n, 4), x y z w, of the x axis to unit vectors ``axes`` (n, 3)."""
+    turns = np.column_stack((np.zeros(len(axes)), -axes[:, 2], axes[:, 1], 1.0 + axes[:, 0]))
+    turns[axes[:, 0] < -1.0 + 1e-9] = 0.0, 0.0, 1.0, 0.0
+    return turns / np.linalg.norm(turns, axis=1)[:, None]
+
+
+@contextmanager
+def _complete(path):
+    """The path of a draft that becomes the file at ``path`` when it is complete."""
+    path = Path(path)
+    draft = path.with_name(".%s.%d%s" % (path.stem, os.getpid(), path.suffix))
+    yield draft
+    draft.rename(path)
 
 
 @dataclass(frozen=True, eq=False)

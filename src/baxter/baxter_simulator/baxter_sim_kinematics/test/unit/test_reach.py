@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from baxter_sim_kinematics import Chain, reach, solve
+from baxter_sim_kinematics.reach import MapSettings
 from baxter_sim_kinematics.reach_map import ReachMap, overlap
 from baxter_sim_kinematics.reach_places import Region, best_places, table_poses
-from urdf_model.transforms import quaternion_from_matrix, rigid, rpy_matrix
+from urdf_model.transforms import matrix_from_quaternion, quaternion_from_matrix, rigid, rpy_matrix
 
 pytestmark = pytest.mark.once
 
@@ -202,6 +203,43 @@ def test_hdf5_has_the_rows_of_reuleaux(tmp_path, monkeypatch):
         # Reuleaux's loader finds the poses of a sphere by exact comparison of the centres.
         assert {tuple(row) for row in spheres[:, :3]} == {tuple(row) for row in poses[:, :3].astype(float)}
         assert spheres.attrs["Resolution"] == pytest.approx([0.1])
+
+
+def test_a_capability_is_a_cone_where_little_is_reached_and_a_sphere_elsewhere(tmp_path):
+    rotations = MapSettings((0, 0, 0), (1, 1, 1), 1.0, 20000, None, 1, "").rotations()
+    axis = np.array([0.6, 0.0, -0.8])
+    reached = np.zeros((4, 1, 1, 20000), dtype=bool)
+    reached[0, 0, 0] = rotations[:, :, 2] @ axis >= math.cos(0.5 * math.pi / 4.5)
+    reached[1, 0, 0] = rotations[:, 2, 2] > 0.0
+    reached[3, 0, 0, 7] = True
+    found = small_map(reached, rotations)
+    found.write_capabilities(tmp_path / "capability.h5")
+    with h5py.File(tmp_path / "capability.h5") as file:
+        data = file["Capability/capability_dataset"]
+        assert data.attrs["Resolution"] == pytest.approx([0.1]) and data.dtype == float
+        cone, sphere, single = data[:]
+    assert cone[:3].tolist() == [1.0, pytest.approx(100.0 * reached[0].mean()), pytest.approx(4.5, abs=0.5)]
+    assert cone[3:6] == pytest.approx([0.25, -0.05, 0.05])
+    np.testing.assert_allclose(matrix_from_quaternion(cone[6:])[:, 0], axis, atol=0.02)
+    assert sphere.tolist() == [2.0, pytest.approx(100.0 * reached[1].mean()), 0.0,
+                               *pytest.approx([0.35, -0.05, 0.05]), 0.0, 0.0, 0.0, 1.0]
+    assert single[0] == 1.0 and single[2] == 10.0
+    np.testing.assert_allclose(matrix_from_quaternion(single[6:])[:, 0], rotations[7, :, 2], atol=1e-9)
+
+
+@pytest.mark.parametrize("directions", [[(1, 0, 0)], [(-1, 0, 0)], [(0, 0, 1), (0, 0, -1)]])
+def test_the_axis_of_a_cone_is_known_in_every_direction(directions):
+    rotations = np.array([rpy_matrix(0.1 * k, 0.3, 0.0) for k in range(20)])
+    for k, direction in enumerate(directions):
+        rotations[k, :, 2] = direction
+    reached = np.zeros((1, 1, 1, 20), dtype=bool)
+    reached[..., :len(directions)] = True
+    row, = small_map(reached, rotations).capabilities()
+    np.testing.assert_allclose(matrix_from_quaternion(row[6:])[:, 0], directions[0], atol=1e-9)
+
+
+def test_a_map_in_which_nothing_is_reached_has_no_capabilities():
+    assert small_map(np.zeros((2, 2, 2, 2), dtype=bool)).capabilities().shape == (0, 10)
 
 
 def test_points_are_the_reached_cells_in_colours():
