@@ -221,8 +221,7 @@ def test_a_capability_is_a_cone_where_little_is_reached_and_a_sphere_elsewhere(t
     assert cone[:3].tolist() == [1.0, pytest.approx(100.0 * reached[0].mean()), pytest.approx(4.5, abs=0.5)]
     assert cone[3:6] == pytest.approx([0.25, -0.05, 0.05])
     np.testing.assert_allclose(matrix_from_quaternion(cone[6:])[:, 0], axis, atol=0.02)
-    assert sphere.tolist() == [2.0, pytest.approx(100.0 * reached[1].mean()), 0.0,
-                               *pytest.approx([0.35, -0.05, 0.05]), 0.0, 0.0, 0.0, 1.0]
+    assert sphere == pytest.approx([2.0, 100.0 * reached[1].mean(), 0.0, 0.35, -0.05, 0.05, 0.0, 0.0, 0.0, 1.0])
     assert single[0] == 1.0 and single[2] == 10.0
     np.testing.assert_allclose(matrix_from_quaternion(single[6:])[:, 0], rotations[7, :, 2], atol=1e-9)
 
