@@ -43,8 +43,9 @@ class GlRenderer:
     def __init__(self, still=False):
         """``still``: for pictures that may take a second each, with smoother edges and finer shadows. Raises
         :class:`RenderingError` if EGL is not available."""
-        # In software one thread: physics and the user's own programs need the other processors.
-        os.environ.setdefault("LP_NUM_THREADS", "1")
+        # In software no threads but this one: physics and the user's own programs need the other processors, and
+        # beside them each picture would wait for a second thread to be woken.
+        os.environ.setdefault("LP_NUM_THREADS", "0")
         try:
             import moderngl
 
