@@ -52,7 +52,8 @@ def test_meshes_of_one_colour_are_one_piece_whether_they_have_places_in_a_pictur
 
 
 def test_a_picture_inside_of_a_file_is_kept_beside_the_parts(tmp_path):
-    trimesh = pytest.importorskip("trimesh")
+    import trimesh
+
     pixels = np.zeros((8, 8, 3), dtype=np.uint8)
     pixels[:4], pixels[4:] = (200, 0, 0), (0, 0, 200)
     material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(pixels),
