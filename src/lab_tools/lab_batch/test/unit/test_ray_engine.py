@@ -15,6 +15,7 @@ import pytest
 from lab_batch import Spec, ray_engine
 from lab_batch.job import Outcome
 from lab_batch.processes import Limits, map_seeds
+from lab_testing.waiting import wait_until
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[4]
@@ -77,12 +78,14 @@ class LateRay:
         return time.monotonic() - self._began[id(given)] >= self._start_s
 
     def wait(self, references, num_returns, timeout):
-        end = time.monotonic() + (60.0 if timeout is None else timeout)
-        while not (ready := [one for one in references if self._is_ready(one)]):
-            if time.monotonic() > end:
-                return [], references
-            time.sleep(0.005)
-        return [ready[self._first]], references
+        def ready():
+            return [one for one in references if self._is_ready(one)]
+
+        try:
+            done = wait_until(ready, "an outcome", 60.0 if timeout is None else timeout, 0.005)[self._first]
+        except AssertionError:
+            return [], references
+        return [done], [one for one in references if one != done]
 
     def get(self, reference):
         if self._deadly in self._of[reference]:
