@@ -12,7 +12,7 @@ from pathlib import Path
 import rospkg
 
 from lab_class import control, control_groups, roster
-from lab_class.disk import room
+from lab_class.disk import ENTRIES, entries_left, room
 from lab_class.labs import ClassError, State
 from lab_class.roster import RosterError
 from lab_class.store import ClassRecord, Options, Store, StoreError
@@ -193,6 +193,10 @@ def _up(options, store):
     if free < needed:
         print("The disk has %.1f GB free, and the students' files may have %.1f GB (--disk). Labs that fill it are "
               "ended.\n" % (free / 2**30, needed / 2**30), flush=True)
+    files = entries_left(store.folder)
+    if files is not None and files < len(record.students) * ENTRIES:
+        print("The disk has room for %d more files and folders, and each student may have %d.\n" % (files, ENTRIES),
+              flush=True)
     return _DONE if options.no_wait else _await_labs(store)
 
 

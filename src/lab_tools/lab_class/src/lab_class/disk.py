@@ -19,16 +19,37 @@ PERIOD_S = 30.0
 _STEP = 1.0 / 16.0
 #: Below this number of limits the free space is nearly used up.
 RESERVE = 2
+#: Most files and folders of a student. A disk has a number of them that no file's size shows, on ext4 by default one
+#: for each 16 kB.
+ENTRIES = 200_000
+
+
+class _Limit:
+    """Of one quantity of each lab. A lab that was ended for what stays may have it at its next start."""
+
+    def __init__(self, most):
+        self.most = most
+        self._allowed = {}
+
+    def is_exceeded(self, name, used, stays):
+        """used: what the lab has; stays: the part of it that does not go with its processes."""
+        if used <= self.most:
+            self._allowed.pop(name, None)
+        if used <= self._allowed.get(name, self.most):
+            return False
+        self._allowed[name] = max(self.most, stays + self.most * _STEP)
+        return True
 
 
 class Quota:
-    """The limit of each lab's files. ``limit_bytes``; ``folder``: one on the disk of the labs' files [Path]."""
+    """The limits of each lab's files. ``limit_bytes``; ``folder``: one on the disk of the labs' files [Path];
+    ``entries``: of files and folders."""
 
-    def __init__(self, limit_bytes, folder):
-        self._limit, self._folder = limit_bytes, folder
+    def __init__(self, limit_bytes, folder, entries=ENTRIES):
+        self._bytes, self._entries, self._folder = _Limit(limit_bytes), _Limit(entries), folder
         #: What the files of each lab that was measured occupy {name: bytes}.
         self.used = {}
-        self._allowed, self._written = {}, {}
+        self._written = {}
         self._free, self._due, self._took = None, 0.0, 0.0
 
     def is_due(self, now):
@@ -36,7 +57,9 @@ class Quota:
         if now >= self._due or self._free is None:
             return True
         # As long as measuring takes on a disk that somebody else fills, half of the time goes to other things.
-        return now >= self._due - PERIOD_S + self._took and self._free - self._space() > self._limit * _STEP
+        return now >= self._due - PERIOD_S + self._took and any(
+            before - free > limit.most * _STEP
+            for before, free, limit in zip(self._free, self._space(), (self._bytes, self._entries), strict=True))
 
     def looked(self, start, now):
         """The files of all labs have been measured, from the time ``start`` to ``now`` [s]."""
@@ -45,7 +68,7 @@ class Quota:
 
     def _space(self):
         found = os.statvfs(self._folder)
-        return found.f_bavail * found.f_frsize + found.f_favail * _INODE_BYTES
+        return found.f_bavail * found.f_frsize, found.f_favail
 
     def measured(self, name, folder, pids):
         """Measure one lab; why it is to end, or "".
@@ -54,19 +77,19 @@ class Quota:
         open after they have removed them. A lab that was ended for files in the folder may have these at its next
         start, so that its student can delete some. Raises OSError if they cannot be measured.
         """
-        named = disk_bytes(folder)
+        named, entries = occupied(folder)
         used = self.used[name] = named + nameless_bytes(pids, os.stat(folder).st_dev)
         written, before = written_bytes(pids), self._written.get(name, 0)
         self._written[name] = written
-        if used <= self._limit:
-            self._allowed.pop(name, None)
-        if used > self._allowed.get(name, self._limit):
-            self._allowed[name] = max(self._limit, named + self._limit * _STEP)
+        if self._bytes.is_exceeded(name, used, named):
             return ("its files have %.2f GB, and may have %.2f GB. Some of them must be deleted once it runs again"
-                    % (used / 2**30, self._limit / 2**30))
+                    % (used / 2**30, self._bytes.most / 2**30))
+        if self._entries.is_exceeded(name, entries, entries):
+            return ("it has %d files and folders, and may have %d. Some of them must be deleted once it runs again"
+                    % (entries, self._entries.most))
         # Removed files can be open without a descriptor, by a map of memory alone; what was written shows them.
-        free = room(self._folder)
-        if free < RESERVE * self._limit and written - before > self._limit * _STEP and written > self._limit:
+        free, limit = room(self._folder), self._bytes.most
+        if free < RESERVE * limit and written - before > limit * _STEP and written > limit:
             return "the disk is nearly full (%.2f GB are free), and this lab has written %.2f GB" % (
                 free / 2**30, written / 2**30)
         return ""
@@ -80,6 +103,12 @@ def room(folder):
     """Free space of a folder's disk for this user [bytes]."""
     found = os.statvfs(folder)
     return found.f_bavail * found.f_frsize
+
+
+def entries_left(folder):
+    """How many files and folders a folder's disk has room for; None where it has no fixed number."""
+    found = os.statvfs(folder)
+    return found.f_favail if found.f_files else None
 
 
 def nameless_bytes(pids, device):
@@ -114,10 +143,13 @@ def written_bytes(pids):
     return total
 
 
-def disk_bytes(folder):
-    """What the files below a folder occupy, empty ones too; links are followed nowhere. A folder that its student has
-    locked is unlocked. Raises OSError if it cannot be found out."""
-    return _total("--block-size=1", folder) + _INODE_BYTES * _total("--inodes", folder)
+def occupied(folder):
+    """(bytes, number) of the files and folders below a folder, empty ones too; links are followed nowhere.
+
+    A folder that its student has locked is unlocked. Raises OSError if it cannot be found out.
+    """
+    entries = _total("--inodes", folder)
+    return _total("--block-size=1", folder) + _INODE_BYTES * entries, entries
 
 
 def _total(unit, folder):

@@ -84,18 +84,22 @@ class LabProcess:
             self._process.stdin.close()
         self._process.wait()
 
-    def memory_bytes(self):
-        """Memory of all processes, shared pages divided among their users."""
-        return sum(map(_share_of_memory, self.family()))
+    def memory_bytes(self, files_bytes=0):
+        """Memory of all processes, shared pages divided among their users; files_bytes: of files in memory, which
+        processes may have mapped."""
+        shares = [_share_of_memory(pid) for pid in self.family()]
+        return sum(own for own, _ in shares) + max(files_bytes, sum(shared for _, shared in shares))
 
 
 def _share_of_memory(pid):
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/%d/smaps_rollup" % pid).read_text(encoding="ascii").splitlines():
-            if line.startswith("Pss:"):
-                return int(line.split()[1]) << 10
+    """(own, of files in memory) [bytes]."""
+    with contextlib.suppress(OSError, KeyError):
+        rows = dict(line.split(":") for line in
+                    Path("/proc/%d/smaps_rollup" % pid).read_text(encoding="ascii").splitlines()[1:])
+        share, in_files = (int(rows[name].split()[0]) << 10 for name in ("Pss", "Pss_Shmem"))
+        return share - in_files, in_files
     # Of a process in a user namespace that this user may not look into.
     with contextlib.suppress(OSError, IndexError, ValueError):
         words = Path("/proc/%d/statm" % pid).read_text(encoding="ascii").split()
-        return (int(words[1]) - int(words[2])) * _PAGE_BYTES
-    return 0
+        return (int(words[1]) - int(words[2])) * _PAGE_BYTES, 0
+    return 0, 0

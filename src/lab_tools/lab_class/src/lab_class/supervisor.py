@@ -23,6 +23,7 @@ from lab_class.disk import Quota, remove
 from lab_class.factors import Factors
 from lab_class.lab_process import END_S, LabProcess
 from lab_class.labs import Action, ClassError, Labs, State
+from lab_class.scratch import Scratch, too_many_sockets
 from lab_class.settling import Settling, demand_s
 from lab_class.store import HOME, Store, StoreError
 from lab_class.verdicts import Verdicts
@@ -56,7 +57,7 @@ class Supervisor:
         self._runtime = Path(tempfile.mkdtemp(prefix="lab-class-"))
         self._factors = Factors(self.socket_of, record.tokens)
         self._verdicts = {name: Verdicts(store.lab(name), store.lab(name) / HOME) for name in names}
-        self._quota = Quota(options.disk_bytes, store.folder)
+        self._quota, self._scratch = Quota(options.disk_bytes, store.folder), Scratch()
         self._class_groups = control_groups.found(self._runtime.name, len(names))
 
     # For the front door.
@@ -119,7 +120,8 @@ class Supervisor:
                 self._do(self.labs.start(lab.name, self._now()))
             watches = [asyncio.ensure_future(watch) for watch in (
                 self._every(_TICK_S, self._tick), self._every(_MEMORY_S, self._look_at_memory),
-                self._every(_TICK_S, self._look_at_disk), self._every(_VERDICTS_S, self._look_at_verdicts))]
+                self._every(_TICK_S, self._look_at_disk), self._every(_TICK_S, self._look_at_scratch),
+                self._every(_VERDICTS_S, self._look_at_verdicts))]
             await self._end.wait()
             for watch in watches:
                 watch.cancel()
@@ -267,6 +269,7 @@ class Supervisor:
         del self._processes[name]
         self._memory.pop(name, None)
         self._quota.ended(name)
+        self._scratch.ended(name)
         await asyncio.get_running_loop().run_in_executor(None, self._groups.pop(name).remove)
         await asyncio.get_running_loop().run_in_executor(None, remove, self._store.lab(name) / "caches")
 
@@ -298,15 +301,29 @@ class Supervisor:
                 continue
             used = group.memory_bytes()
             if used is None:
-                used = await asyncio.get_running_loop().run_in_executor(None, process.memory_bytes)
+                used, too_many = await asyncio.get_running_loop().run_in_executor(
+                    None, self._without_group, name, process)
+                self._exceed(name, too_many)
             self._memory[name] = used
             if used > most or group.has_run_out():
                 self._exceed_memory(name)
 
+    def _without_group(self, name, process):
+        """What no control group counts: (memory [bytes], why the lab is to end for something else or "")."""
+        return (process.memory_bytes(self._scratch.bytes(name, process.family)),
+                too_many_sockets(process.family()))
+
     def _exceed_memory(self, name):
-        if self.labs[name].has_processes:
-            self._do(self.labs.exceeded(name, "it used all of its memory, %.1f GB"
-                                        % (self._record.options.memory_bytes / 2**30), self._now()))
+        self._exceed(name, "it used all of its memory, %.1f GB" % (self._record.options.memory_bytes / 2**30))
+
+    def _exceed(self, name, why):
+        if why and self.labs[name].has_processes:
+            self._do(self.labs.exceeded(name, why, self._now()))
+
+    async def _look_at_scratch(self):
+        for name, process in list(self._processes.items()):
+            if self.labs[name].state is not State.PAUSED:
+                self._exceed(name, self._scratch.exceeded(name, process.family))
 
     async def _look_at_verdicts(self):
         for name in self._processes:
@@ -323,8 +340,7 @@ class Supervisor:
             except OSError as error:
                 # Files that cannot be measured could be of any size.
                 why = "its files could not be measured: %s" % error
-            if why and self.labs[name].has_processes:
-                self._do(self.labs.exceeded(name, why, self._now()))
+            self._exceed(name, why)
         self._quota.looked(start, self._now())
 
 

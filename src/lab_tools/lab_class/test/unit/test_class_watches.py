@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from lab_class import disk
-from lab_class.disk import Quota, disk_bytes, nameless_bytes, remove
+from lab_class.disk import Quota, nameless_bytes, occupied, remove
 from lab_class.labs import Labs, State
 from lab_class.supervisor import Supervisor, _end_of
 
@@ -38,28 +38,29 @@ def deep_folder(tmp_path):
 
 
 def test_a_file_in_a_very_deep_folder_counts_and_can_be_removed(deep_folder):
-    assert disk_bytes(deep_folder) > 2**20
+    assert occupied(deep_folder)[0] > 2**20
     remove(deep_folder)
     assert not deep_folder.exists()
 
 
 def test_empty_files_count(tmp_path):
-    before = disk_bytes(tmp_path)
+    before = occupied(tmp_path)
     for number in range(1000):
         (tmp_path / str(number)).touch()
-    assert disk_bytes(tmp_path) >= before + 256 * 1000
+    after = occupied(tmp_path)
+    assert after[0] >= before[0] + 256 * 1000 and after[1] == before[1] + 1000
 
 
 def test_files_behind_links_do_not_count(tmp_path):
     (tmp_path / "home").mkdir()
     (tmp_path / "large").write_bytes(b"x" * 2**20)
     (tmp_path / "home/link").symlink_to(tmp_path / "large")
-    assert disk_bytes(tmp_path / "home") < 2**20
+    assert occupied(tmp_path / "home")[0] < 2**20
 
 
 def test_a_folder_that_is_gone_is_an_error_that_names_it(tmp_path):
     with pytest.raises(OSError, match="gone"):
-        disk_bytes(tmp_path / "gone")
+        occupied(tmp_path / "gone")
 
 
 def _as_a_student(function):
@@ -87,7 +88,7 @@ def _locked(folder):
 
 
 def test_files_in_a_locked_folder_count():
-    assert _as_a_student(lambda folder: disk_bytes(_locked(folder)) > 2**20)
+    assert _as_a_student(lambda folder: occupied(_locked(folder))[0] > 2**20)
 
 
 def test_a_locked_folder_is_removed():
@@ -100,7 +101,7 @@ def test_a_locked_folder_is_removed():
 
 
 def test_a_folder_that_cannot_be_measured_ends_its_lab_and_the_others_are_looked_at(tmp_path, monkeypatch):
-    monkeypatch.setattr(disk, "disk_bytes", _either)
+    monkeypatch.setattr(disk, "occupied", _either)
     labs = Labs(["anna", "ben", "cleo"], 3, None)
     watcher = SimpleNamespace(labs=labs, done=[], _quota=Quota(2**20, tmp_path))
     for name in ("anna", "ben", "cleo"):
@@ -108,6 +109,7 @@ def test_a_folder_that_cannot_be_measured_ends_its_lab_and_the_others_are_looked
     watcher._processes = dict.fromkeys(["anna", "ben", "cleo"], SimpleNamespace(family=set))
     watcher._store = SimpleNamespace(lab=lambda name: tmp_path / name)
     watcher._now, watcher._do = lambda: 0.0, watcher.done.append
+    watcher._exceed = lambda name, why: Supervisor._exceed(watcher, name, why)
     for lab in labs:
         lab.state = State.RUNNING
     asyncio.run(Supervisor._look_at_disk(watcher))
@@ -119,7 +121,7 @@ def test_a_folder_that_cannot_be_measured_ends_its_lab_and_the_others_are_looked
 def _either(folder):
     if folder.name == "anna":
         raise OSError("du cannot read anna")
-    return 2**21 if folder.name == "cleo" else 1
+    return 2**21 if folder.name == "cleo" else 1, 1
 
 
 def test_removed_files_that_are_open_count_once(tmp_path):
@@ -128,7 +130,7 @@ def test_removed_files_that_are_open_count_once(tmp_path):
         stream.flush()
         (tmp_path / "hidden").unlink()
         second = os.dup(stream.fileno())
-        assert disk_bytes(tmp_path) < 2**20
+        assert occupied(tmp_path)[0] < 2**20
         assert 2**20 <= nameless_bytes([os.getpid()], tmp_path.stat().st_dev) < 2**21
         assert nameless_bytes([os.getpid()], -1) == 0
         os.close(second)
@@ -137,7 +139,7 @@ def test_removed_files_that_are_open_count_once(tmp_path):
 @pytest.fixture
 def free(monkeypatch):
     """The free space of the disk, which a test can set."""
-    found = SimpleNamespace(f_bavail=10000, f_frsize=2**20, f_favail=0)
+    found = SimpleNamespace(f_bavail=10000, f_frsize=2**20, f_favail=0, f_files=0)
     monkeypatch.setattr(os, "statvfs", lambda folder: found)
     return found
 
@@ -160,13 +162,26 @@ def test_many_empty_files_fill_the_disk_too(free, tmp_path):
     free.f_favail = 10**7
     quota = Quota(2**30, tmp_path)
     quota.looked(0.0, 0.0)
-    free.f_favail -= 10**6
+    free.f_favail -= disk.ENTRIES // 20
+    assert not quota.is_due(1.0)
+    free.f_favail -= disk.ENTRIES // 20
     assert quota.is_due(1.0)
+
+
+def test_a_lab_with_too_many_empty_files_is_ended_and_may_run_again_to_delete_some(free, tmp_path):
+    quota = Quota(2**30, tmp_path, entries=100)
+    for number in range(100):
+        (tmp_path / str(number)).touch()
+    assert quota.measured("anna", tmp_path, ()).startswith("it has 101 files and folders, and may have 100. Some")
+    assert quota.measured("anna", tmp_path, ()) == ""
+    for number in range(7):
+        (tmp_path / ("more-%d" % number)).touch()
+    assert quota.measured("anna", tmp_path, ())
 
 
 def test_a_lab_with_too_many_files_may_run_again_to_delete_some(free, tmp_path, monkeypatch):
     used = {"files": 2000}
-    monkeypatch.setattr(disk, "disk_bytes", lambda folder: used["files"])
+    monkeypatch.setattr(disk, "occupied", lambda folder: (used["files"], 1))
     quota = Quota(1000, tmp_path)
     assert "may have" in quota.measured("anna", tmp_path, ())
     assert quota.used == {"anna": 2000}
@@ -181,7 +196,7 @@ def test_a_lab_with_too_many_files_may_run_again_to_delete_some(free, tmp_path, 
 
 def test_on_a_disk_that_is_nearly_full_the_lab_that_writes_ends(free, tmp_path, monkeypatch):
     written = {"writes": 0, "idle": 0}
-    monkeypatch.setattr(disk, "disk_bytes", lambda folder: 0)
+    monkeypatch.setattr(disk, "occupied", lambda folder: (0, 1))
     monkeypatch.setattr(disk, "nameless_bytes", lambda pids, device: 0)
     monkeypatch.setattr(disk, "written_bytes", lambda name: written[name])
     limit = 100 * 2**20

@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 import lab_environment
-from lab_environment import isolation, system_calls
+from lab_environment import isolation, system_calls, usage
 from lab_environment.family import children_of, direct_children, is_running, with_parent
 from rf_checks import hidden, submission
 
@@ -169,7 +169,7 @@ class Student:
             return "processes"
         if _count_threads(family) > THREADS:
             return "threads"
-        if _count_sockets(family) > SOCKETS:
+        if usage.sockets(family) > SOCKETS:
             return "sockets"
         if self._has_walls and _count_entries(family) > ENTRIES:
             return "files"
@@ -225,26 +225,11 @@ def _count_threads(pids):
     return count
 
 
-def _count_sockets(pids):
-    found = set()
-    for pid in pids:
-        with contextlib.suppress(OSError), os.scandir("/proc/%d/fd" % pid) as files:
-            for file in files:
-                with contextlib.suppress(OSError):
-                    found.add(os.readlink(file.path))
-    return sum(name.startswith("socket:") for name in found)
-
-
 def _count_entries(pids):
     """Files and folders in the writable folders of the sandbox that these processes are in."""
-    outside = os.stat("/")
-    for pid in pids:
-        root = "/proc/%d/root" % pid
-        with contextlib.suppress(OSError):
-            # Bubblewrap itself stays outside.
-            if not os.path.samestat(os.stat(root), outside):
-                found = [os.statvfs(root + folder) for folder in isolation.FOLDERS]
-                return sum(one.f_files - one.f_ffree for one in found)
+    with contextlib.suppress(OSError):
+        root = usage.root_of(pids)
+        return usage.files_in_memory(root, isolation.FOLDERS)[0] if root else 0
     return 0
 
 
