@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Run by every Python that starts in the lab's environment: amends some modules when they are imported.
+"""Run by every Python that starts in the lab's environment: amends some modules when they are imported, and lets a
+program whose output nobody reads any more end without an error.
 
-It imports nothing itself, so other programs are not slowed down. docs/decisions/0008 says why it is done this way.
+It imports only what Python has loaded or built in, so other programs are not slowed down. docs/decisions/0008 says why
+it is done this way.
 """
+import atexit
 import os
 import sys
 
@@ -59,5 +62,29 @@ def _run_the_next():
             return
 
 
+def _report(kind, error, trace):
+    """An uncaught exception: as Python does, but `program | head` ends without one, as other programs of Unix do."""
+    if not issubclass(kind, BrokenPipeError) or not _has_lost_reader():
+        sys.__excepthook__(kind, error, trace)
+
+
+def _has_lost_reader():
+    """Whether nobody reads the standard output any more; what is still to be written is then dropped."""
+    from lab_environment import lost_reader
+    return lost_reader.is_lost()
+
+
+def _flush():
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _has_lost_reader()
+    except (AttributeError, OSError, ValueError):
+        pass  # there is none, or it is closed; Python itself reports what else is wrong with it
+
+
 sys.meta_path.insert(0, AmendingFinder)
+sys.excepthook = _report
+# The first function that is registered is the last one that runs.
+atexit.register(_flush)
 _run_the_next()

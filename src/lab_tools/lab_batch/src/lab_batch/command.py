@@ -226,6 +226,8 @@ def main(argv=None):
             list_jobs()
             return 0
         return run(options)
+    except BrokenPipeError:
+        raise  # of the standard output: lab_environment ends the program without a word
     except (JobError, RecordsError, OSError) as error:
         print("batch: %s" % error, file=sys.stderr)
         return 1

@@ -34,6 +34,8 @@ def main(arguments=None):
     store = Store(options.folder)
     try:
         return options.run(options, store)
+    except BrokenPipeError:
+        raise  # of the standard output: lab_environment ends the program without a word
     except (RosterError, StoreError, ClassError, LibrariesError, OSError) as error:
         print("labs: %s" % error, file=sys.stderr)
         return _WRONG_WORDS if isinstance(error, RosterError) else _FAILED

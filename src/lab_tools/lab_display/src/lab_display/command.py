@@ -76,6 +76,8 @@ def main():
             print(arguments.out)
         else:
             print(shown)
+    except BrokenPipeError:
+        raise  # of the standard output: lab_environment ends the program without a word
     except (OSError, ValueError, show.ShowError, rospy.ROSException) as error:
         print("show: %s" % (getattr(error, "strerror", None) or error), file=sys.stderr)
         return 1

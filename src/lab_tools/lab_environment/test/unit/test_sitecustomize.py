@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The start-up module of the lab's Python amends rospy, does not slow others down, and hides no other sitecustomize."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -45,3 +46,38 @@ def test_the_sitecustomize_that_is_hidden_runs_once(tmp_path):
     (tmp_path / "sitecustomize.py").write_text("print('the next,', __name__, __file__)\n")
     done = run("pass", tmp_path)
     assert done.stdout == f"the next, sitecustomize {tmp_path}/sitecustomize.py\n"
+
+
+def without_reader(program, *options):
+    """(exit code, errors) of a program whose output nobody reads."""
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        done = subprocess.run([sys.executable, *options, "-c", program], stdout=write, stderr=subprocess.PIPE,
+                              text=True, env={"PYTHONPATH": str(OURS), "PATH": "/usr/bin:/bin"})
+    finally:
+        os.close(write)
+    return done.returncode, done.stderr
+
+
+def test_a_program_whose_output_nobody_reads_any_more_ends_without_a_word():
+    # At once, at the end, and by argparse's way out.
+    assert without_reader("while True: print('line')") == (1, "")
+    assert without_reader("print('line')") == (0, "")
+    assert without_reader("import sys; print('line'); sys.exit(3)") == (3, "")
+    assert without_reader("while True: print('line')", "-u") == (1, "")
+
+
+def test_other_errors_are_reported_as_python_does():
+    broken = "import socket; one, two = socket.socketpair(); two.close(); one.send(b'x')"
+    for program in (broken, "1 / 0"):
+        errors = run(program).stderr
+        plain = subprocess.run([sys.executable, "-I", "-c", program], capture_output=True, text=True)
+        assert errors == plain.stderr != "" and plain.returncode == 1
+    assert "ZeroDivisionError" in without_reader("print(1, flush=False); 1 / 0")[1]
+
+
+def test_a_closed_output_is_no_error():
+    for program in ("import sys; sys.stdout.close()", "import sys; sys.stdout = None"):
+        done = run(program)
+        assert (done.returncode, done.stderr) == (0, "")

@@ -44,6 +44,8 @@ def collisions_updater(arguments=None):
             print("\n".join(map(element_of, pairs)))
         else:
             (options.output or options.srdf).write_text(with_disabled_pairs(text, pairs), encoding="utf-8")
+    except BrokenPipeError:
+        raise  # of the standard output: lab_environment ends the program without a word
     except (ValueError, OSError) as error:
         print("collisions_updater: %s" % error, file=sys.stderr)
         return 1
@@ -72,6 +74,8 @@ def _prepare_one(path):
         exact = ExactChecker(model, MeshReader(ResourceFinder()))
         prepare(exact)
         left = sphere_model_of(exact).not_kept()
+    except BrokenPipeError:
+        raise  # of the standard output: lab_environment ends the program without a word
     except (ValueError, OSError) as error:
         return "%s: %s" % (path, error)
     if left:

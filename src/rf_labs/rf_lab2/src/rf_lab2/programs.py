@@ -23,6 +23,8 @@ def run(node_name, body):
         body()
     except rospy.ROSInterruptException:
         return 130
+    except BrokenPipeError:
+        raise  # of the standard output: lab_environment ends the program without a word
     except (ProgramFailed, OSError, ValueError, rospy.ROSException, rospy.ServiceException) as error:
         print("%s: %s" % (os.path.basename(sys.argv[0]), getattr(error, "strerror", None) or error), file=sys.stderr)
         return 1

@@ -53,6 +53,8 @@ def run_command(main):
     """Run a command; its own errors become one line and exit status 1."""
     try:
         return main()
+    except BrokenPipeError:
+        raise  # of the standard output: lab_environment ends the program without a word
     except (KinematicsError, UrdfError, OSError, ValueError) as error:
         print("%s: %s" % (Path(sys.argv[0]).name, error), file=sys.stderr)
         return 1
