@@ -135,9 +135,10 @@ def subscribe(master, topic, message_class, caller):
     """Open one TCPROS connection to the publisher of ``topic``; all subscribers in a rospy process would share one.
 
     ``caller`` is the name of a node that does not exist, a new one each time: rospy keeps one connection per node.
+    Waits until the topic is published.
     """
-    published = dict(master.getSystemState("/bench")[2][0])
-    uri = master.lookupNode("/bench", published[topic][0])[2]
+    publishers = wait_until(lambda: dict(master.getSystemState("/bench")[2][0]).get(topic), topic, START_LIMIT_S, 0.02)
+    uri = master.lookupNode("/bench", publishers[0])[2]
     _, host, port = xmlrpc.client.ServerProxy(uri).requestTopic("/bench", topic, [["TCPROS"]])[2]
     connection = socket.create_connection((host, port))
     fields = {"callerid": caller, "topic": topic, "type": message_class._type, "md5sum": message_class._md5sum,

@@ -35,13 +35,14 @@ class Pace:
         return time_s >= self._next_s - _TOLERANCE_S or time_s < self._last_s
 
     def took(self, time_s):
-        """Note that the work was done at ``time_s`` [s]. A late caller does not catch up: periods that have passed are
-        left out, and the others begin when they would have begun."""
+        """Note that the work was done at ``time_s`` [s]. A caller that is late by one period makes up for it: it is due
+        again at once. When more have passed, they are left out. Later periods begin when they would have begun."""
         begin = self._next_s
         if math.isinf(begin) or time_s < max(self._last_s, begin - _TOLERANCE_S):
             begin = time_s
         if self.period_s:
-            begin += self.period_s * (math.floor((time_s - begin + _TOLERANCE_S) / self.period_s) + 1)
+            passed = math.floor((time_s - begin + _TOLERANCE_S) / self.period_s)
+            begin += self.period_s * (passed if passed == 1 else passed + 1)
         self._last_s, self._next_s = time_s, begin
 
     def take(self, time_s):

@@ -25,18 +25,29 @@ def test_a_rate_is_kept_on_average_at_ticks(rate, tick_s, expected, start):
     assert taken(Pace(rate), times) == [times[k] for k in expected]
 
 
-def test_who_was_late_does_not_catch_up():
+def test_who_was_late_by_many_periods_does_not_catch_up():
     pace = Pace(10.0)
     assert taken(pace, [0.0, 5.0, 5.05, 5.1]) == [0.0, 5.0, 5.1]
 
 
-def test_who_was_late_loses_no_more_than_the_periods_that_have_passed():
-    # A camera of 60 Hz that sees the world at each 0.01 s, and was busy for 0.04 s once.
+@pytest.mark.parametrize(("busy", "begin", "lost"), [
+    (slice(6, 9), [0.0, 0.02, 0.04, 0.05, 0.09, 0.1, 0.11, 0.12, 0.14], 0),  # late by one period
+    (slice(6, 10), [0.0, 0.02, 0.04, 0.05, 0.1, 0.12, 0.14], 2),
+])
+def test_who_was_late_loses_no_more_than_the_periods_that_have_passed(busy, begin, lost):
+    # A camera of 60 Hz that sees the world at each 0.01 s, and was busy for 0.04 or 0.05 s once.
     times = [round(0.01 * k, 2) for k in range(30)]
-    del times[6:9]
+    in_time = taken(Pace(60.0), times)
+    del times[busy]
     late = taken(Pace(60.0), times)
-    assert late[:7] == [0.0, 0.02, 0.04, 0.05, 0.09, 0.1, 0.12]
-    assert len(late) == len(taken(Pace(60.0), [0.01 * k for k in range(30)])) - 1
+    assert late[:len(begin)] == begin
+    assert len(late) == len(in_time) - lost
+
+
+def test_who_is_late_each_time_does_no_more_than_can_be_done():
+    # Pictures of 60 Hz that take 0.02 s each.
+    times = [round(0.02 * k, 2) for k in range(30)]
+    assert taken(Pace(60.0), times) == times
 
 
 def test_time_that_goes_back_restarts():
