@@ -61,21 +61,31 @@ class VirtualScreen:
         part: function that returns the relevant part of a picture, or None while it does not exist yet.
         Raises AssertionError after timeout_s.
         """
-        last, since = None, time.monotonic()
+        last, since, moved = None, time.monotonic(), "nothing was seen"
 
         def still_picture():
-            nonlocal last, since
+            nonlocal last, since, moved
             picture = self.picture()
             seen = part(picture)
             if seen is None or last is None or not np.array_equal(seen, last):
+                moved = _difference(last, seen)
                 last, since = seen, time.monotonic()
             elif time.monotonic() - since > still_s:
                 return (picture,)
             return None
 
-        return wait_until(still_picture, "the screen to come to rest", timeout_s, 0.25)[0]
+        return wait_until(still_picture, lambda: "the screen to come to rest; %s" % moved, timeout_s, 0.25)[0]
 
     def close(self):
         self._server.terminate()
         self._server.wait(10.0)
         self._folder.cleanup()
+
+
+def _difference(before, after):
+    """Where two pictures differ, for an error."""
+    if before is None or after is None or before.shape != after.shape:
+        return "it came or went"
+    rows, columns = np.nonzero((before != after).reshape(*before.shape[:2], -1).any(axis=2))
+    return ("%d pixels differed last, in rows %d to %d and columns %d to %d"
+            % (len(rows), rows.min(), rows.max(), columns.min(), columns.max()))
