@@ -31,14 +31,20 @@ void light_from(vec3 l, vec3 diffuse, vec3 shine, float part) {
 }
 
 // Ambient light comes from the sky and, weaker, from the floor; near the floor, less reaches what looks down.
-void begin_light(vec3 outward) {
+void begin_light(vec3 outward, vec3 paint) {
     to_eye = eye - there;
     // Thinned meshes are not closed everywhere: both sides of a triangle are outside.
     n = normalize(dot(outward, to_eye) < 0.0 ? -outward : outward);
     to_eye = normalize(to_eye);
     float close = exp2(-6.0 * abs(there.z));
     lit = ambient * ((1.1 + 0.3 * n.z) * (1.0 - (0.25 - 0.25 * n.z) * close));
-    glint = vec3(0.0);
+    // What is glossy mirrors the sky and, weaker, the floor, most where it is seen from the side: Schlick, "An
+    // inexpensive BRDF model for physically-based rendering", 1994. Only where hardly anything else is seen, on black
+    // paint and plastic: other colours stay what their materials say.
+    float dark = 1.0 - max(paint.r, max(paint.g, paint.b));
+    float ahead = dot(n, to_eye), aside = (1.0 - ahead) * (1.0 - ahead);
+    glint = ambient * (dark > 0.0 ? dark * dark * dark * dark * (1.6 + 0.8 * (2.0 * ahead * n.z - to_eye.z))
+                                    * (0.3 + 0.7 * aside * aside) : 0.0);
 }
 
 // Hue stays: all three colours are dimmed by the same factor, so that the brightest of them bends towards white.
@@ -130,7 +136,7 @@ void main() {
     vec4 placed = body * vec4(position, 1.0);
     there = placed.xyz;
     place = there.xy;
-    begin_light(mat3(body) * normal);
+    begin_light(mat3(body) * normal, colour.rgb);
     LAMPS
     dim = colour.rgb * lit + colour.a * glint;
     lit = glint = vec3(0.0);
@@ -222,7 +228,7 @@ in vec4 own;
 out vec4 seen;
 void main() {
     there = place;
-    begin_light(outward);
+    begin_light(outward, own.rgb);
     vec3 shadow_place = (to_shadow * vec4(there + margin * n, 1.0)).xyz;
     light_from(to_sun, sun, sun_shine, SUNLIT);
     LAMPS
@@ -269,7 +275,7 @@ void main() {
     vec4 texel = texture(picture, uv_there);
     if (texel.a < least) discard;
     there = place;
-    begin_light(outward);
+    begin_light(outward, vec3(1.0));
     vec3 shadow_place = (to_shadow * vec4(there + margin * n, 1.0)).xyz;
     light_from(to_sun, sun, sun_shine, SUNLIT);
     LAMPS

@@ -160,6 +160,23 @@ def test_glossy_things_have_a_highlight_where_the_mirror_image_of_the_lamp_is(re
     assert (with_it - without).max() > 15
 
 
+def test_black_glossy_things_show_their_shape_by_what_they_mirror(renderer, tmp_path):
+    level = pose_matrix((-2.0, 0.0, 0.6), (0.0, 0.0, 0.0)) @ OPTICAL
+
+    def column(gloss, ambient):
+        """Of a black ball of 0.4 m, from top to bottom in its middle."""
+        urdf = BALL.replace("0.9 0.9 0.9 1", "0 0 0 1").replace("</material>", '<gloss value="%s"/></material>' % gloss)
+        ball = {"name": "ball", "urdf": urdf, "joints": []}, [0, 0, 0.6, *UPRIGHT]
+        picture = seen(renderer, world(tmp_path, {"lights": [], "ambient": [ambient] * 3}, ball), level)
+        return picture[68:132, 100, 0]
+
+    glossy = column(0.3, 0.4)
+    assert glossy[0] > 1.5 * glossy.min() and glossy[:10].mean() > glossy[20:40].mean() + 5, "no edge is seen"
+    assert glossy[16] > glossy[-16] + 2, "the sky is brighter than the floor"
+    assert glossy.max() < 60, "it is still black"
+    assert not column(0.0, 0.4).any() and not column(0.3, 0.0).any()
+
+
 def test_the_sky_is_bright_at_the_horizon_and_blue_above(renderer, tmp_path):
     level = pose_matrix((0.0, 0.0, 2.0), (0.0, -0.4, 0.0)) @ OPTICAL
     picture = seen(renderer, world(tmp_path, {}), level)
