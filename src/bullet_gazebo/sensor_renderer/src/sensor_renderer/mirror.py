@@ -247,9 +247,9 @@ class Mirror:
         self.light = Light.of_scene(self._world_light, lights)
 
     @property
-    def has_new_pictures(self):
-        """Whether a screen shows another picture than the one that was read last."""
-        return any(screen.picture.has_news for body in self.bodies.values() for screen in body.screens)
+    def picture_versions(self):
+        """The numbers of the pictures that the screens show; one of them changes with each new picture."""
+        return tuple(screen.picture.version for body in self.bodies.values() for screen in body.screens)
 
     def _build(self, entry):
         if entry["urdf"] is None:

@@ -77,10 +77,9 @@ class PictureReader:
         self._seen = None
 
     @property
-    def has_news(self):
-        """Whether :meth:`read` would return a picture."""
-        sequence, = _SEQUENCE.unpack_from(self._memory, _SEQUENCE_AT)
-        return sequence != self._seen and sequence % 2 == 0
+    def version(self):
+        """The number of the newest picture that is complete; 0 is the first, black one."""
+        return _SEQUENCE.unpack_from(self._memory, _SEQUENCE_AT)[0] // 2
 
     def read(self):
         """The picture (height, width, 3), a copy, if it has changed since the last call; else None."""

@@ -272,11 +272,11 @@ def test_a_viewer_knows_of_another_picture_before_it_reads_it(tmp_path):
     writer = PictureWriter(tmp_path / "screen1", 4, 2)
     reader = PictureReader(tmp_path / "screen1")
     reader.read()
-    assert not reader.has_news and reader.read() is None
+    assert reader.version == 0 and reader.read() is None
     writer.show(np.full((2, 4, 3), 9, dtype=np.uint8))
-    assert reader.has_news and reader.has_news
+    assert reader.version == 1
     assert reader.read().max() == 9
-    assert not reader.has_news
+    assert reader.version == 1
 
 
 def test_a_picture_that_is_shorter_than_it_says_is_refused(tmp_path):

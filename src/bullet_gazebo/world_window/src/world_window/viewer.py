@@ -141,8 +141,9 @@ class Viewer(threading.Thread):
         stage, follower = self.stage, self._follower
         pixels = None
         if follower is not None and self._visible and follower.revision is not None:
-            state = (id(follower), follower.mirror.version, stage.version, stage.pinhole)
-            if state != self._drawn or follower.mirror.has_new_pictures:
+            mirror = follower.mirror
+            state = (id(follower), mirror.version, mirror.picture_versions, stage.version, stage.pinhole)
+            if state != self._drawn:
                 self._drawn = state
                 pixels = self._picture(now, self._sharpness.scale)
                 self._sharpness.take(time.monotonic() - now)

@@ -8,6 +8,7 @@ from window_worlds import BLOCK_AT, SCENE, snapshot, values
 
 from lab_testing.waiting import wait_until
 from sensor_renderer.best import best_renderer
+from world_picture.shared_picture import PictureWriter
 from world_window.clock import Clock
 from world_window.sharpness import GOAL_S, SCALES, Sharpness
 from world_window.stage import LEFT, Stage
@@ -75,6 +76,22 @@ def test_a_world_at_rest_is_not_drawn_again(tmp_path):
         seen.viewer.post(Stage.show, "names", True)
         seen.wait(lambda: len(seen.pictures()) > before, "another picture")
         assert seen.pictures()[-1].shapes
+
+
+@pytest.mark.parametrize("turned", [1.0, -1.0])
+def test_a_screen_is_drawn_again_when_its_picture_changes(tmp_path, turned):
+    """Also one that shows the viewer its back, whose picture is not read."""
+    picture = PictureWriter(tmp_path / "screen1", 4, 4)
+    shown = {"link": "top", "offset": [0, -1, 0, 0, 0, 0, turned, 0, -turned, 0, 0, 0.5, 0, 0, 0, 1],
+             "size": (0.5, 0.5), "picture": str(picture.path)}
+    scene = [{**entry, "screens": [shown]} if entry["name"] == "table" else entry for entry in SCENE]
+    with snapshot(tmp_path, scene) as simulator, watched(simulator.folder) as seen:
+        seen.wait(lambda: seen.pictures(), "a picture")
+        told, count = len(seen.frames), len(seen.pictures())
+        seen.wait(lambda: len(seen.frames) > told + 3, "further frames")
+        assert len(seen.pictures()) == count
+        picture.show(np.full((4, 4, 3), 255, np.uint8))
+        seen.wait(lambda: len(seen.pictures()) > count, "another picture")
 
 
 def test_a_hidden_window_draws_nothing(tmp_path):

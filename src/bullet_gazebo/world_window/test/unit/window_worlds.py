@@ -35,11 +35,11 @@ def values(block=BLOCK_AT, joint=0.0):
 
 
 @contextlib.contextmanager
-def snapshot(folder):
-    """A simulator's snapshot with SCENE in it."""
+def snapshot(folder, scene=SCENE):
+    """A simulator's snapshot with ``scene`` in it, which has SCENE's bodies."""
     writer = SnapshotWriter(folder)
     try:
-        writer.write_scene(SCENE)
+        writer.write_scene(scene)
         writer.write(0, 0.0, [values()])
         yield writer
     finally:
