@@ -187,8 +187,8 @@ class Window(QMainWindow):
     def _action(self, bar, text, key, tip, function, checkable=False):
         action = QAction(text, self, checkable=checkable, toolTip="%s (%s)" % (tip, key))
         action.setShortcut(QKeySequence(key))
-        (action.triggered if not checkable else action.toggled).connect(
-            function if checkable else lambda *_: function())
+        # Only what the user does counts: a frame from before the last click sets buttons back for a moment.
+        action.triggered.connect(function if checkable else lambda *_: function())
         self.addAction(action)
         if bar is not None:
             bar.addAction(action)
@@ -237,6 +237,7 @@ class Window(QMainWindow):
 
     def _stop(self):
         self._pulls.setChecked(False)
+        self._viewer.post(_set_pulls, False)
         self._viewer.post(Stage.let_go)
         self._viewer.post(Stage.select, None)
 
