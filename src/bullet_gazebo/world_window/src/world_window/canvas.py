@@ -19,7 +19,7 @@ class Canvas(QWidget):
     def __init__(self, events, parent=None):
         super().__init__(parent)
         self._events = events
-        self._image = self._pixels = None
+        self._image = None
         self._shapes = ()
         #: Words in the middle while there is no picture.
         self.words = "waiting for the simulator"
@@ -31,8 +31,10 @@ class Canvas(QWidget):
     def show_frame(self, pixels, shapes):
         """Show ``pixels`` (height, width, 3) with ``shapes`` of :mod:`world_window.overlay` over them."""
         height, width = pixels.shape[:2]
-        self._pixels, self._shapes = pixels, shapes  # QImage does not copy
-        self._image = QImage(pixels.data, width, height, 3 * width, QImage.Format_RGB888)
+        self._shapes = shapes
+        # Qt enlarges this format in half of the time, and the copy outlives the pixels.
+        self._image = QImage(pixels.data, width, height, 3 * width, QImage.Format_RGB888).convertToFormat(
+            QImage.Format_RGB32)
         self.update()
 
     def show_nothing(self, words):

@@ -146,7 +146,8 @@ class Viewer(threading.Thread):
             if state != self._drawn:
                 self._drawn = state
                 pixels = self._picture(now, self._sharpness.scale)
-                self._sharpness.take(time.monotonic() - now)
+                pinhole = stage.pinhole
+                self._sharpness.take(time.monotonic() - now, pinhole.width * pinhole.height)
             elif self._drawn_scale < 1.0 and now - self._drawn_at[-1] > _REST_S:
                 pixels = self._picture(now, 1.0)
         if pixels is None and self._shown_at is not None and now - self._shown_at < _STATUS_S:

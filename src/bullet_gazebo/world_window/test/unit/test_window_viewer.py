@@ -172,21 +172,30 @@ def test_the_clock_measures_the_last_second():
     assert clock.factor is None  # a reset does not either
 
 
-def test_slow_pictures_get_smaller_and_quick_ones_larger_again():
+@pytest.mark.parametrize("pixels, smallest", [(1000 * 680, 0.5), (1920 * 1040, 0.375), (3840 * 2080, 0.25)])
+def test_slow_pictures_get_smaller_and_quick_ones_larger_again(pixels, smallest):
     sharpness = Sharpness()
     for _ in range(2):
-        sharpness.take(2.0 * GOAL_S)
-    sharpness.take(0.9 * GOAL_S)
+        sharpness.take(2.0 * GOAL_S, pixels)
+    sharpness.take(0.9 * GOAL_S, pixels)
     assert sharpness.scale == SCALES[0]  # single ones do not count
     for _ in range(20):
-        sharpness.take(2.0 * GOAL_S)
-    assert sharpness.scale == SCALES[-1]
+        sharpness.take(2.0 * GOAL_S, pixels)
+    assert sharpness.scale == smallest
     for _ in range(100):
-        sharpness.take(0.5 * GOAL_S)  # larger ones would take too long
-    assert sharpness.scale == SCALES[-1]
+        sharpness.take(0.5 * GOAL_S, pixels)  # larger ones would take too long
+    assert sharpness.scale == smallest
     for _ in range(100):
-        sharpness.take(0.1 * GOAL_S)
+        sharpness.take(0.1 * GOAL_S, pixels)
     assert sharpness.scale == SCALES[0]
+
+
+def test_a_window_that_gets_small_keeps_half_of_its_pixels():
+    sharpness = Sharpness()
+    for _ in range(20):
+        sharpness.take(2.0 * GOAL_S, 3840 * 2080)
+    sharpness.take(2.0 * GOAL_S, 1000 * 680)
+    assert sharpness.scale == 0.5
 
 
 def test_a_picture_of_few_pixels_is_sharp_at_rest(tmp_path):
