@@ -12,10 +12,10 @@ from pathlib import Path
 import rospkg
 
 from lab_class import control, control_groups, roster
-from lab_class.disk import ENTRIES, entries_left, room
+from lab_class.disk import ENTRIES, entries_left, remove, room
 from lab_class.labs import ClassError, State
 from lab_class.roster import RosterError
-from lab_class.store import ClassRecord, Options, Store, StoreError
+from lab_class.store import RUNTIME, ClassRecord, Options, Store, StoreError
 from lab_environment import isolation
 from lab_environment.family import is_running
 from lab_web.libraries import LibrariesError, fetched
@@ -295,18 +295,23 @@ def _down(options, store):
     if options.delete:
         # Nothing is removed under a supervisor that is just starting.
         with store.locked():
-            shutil.rmtree(store.folder)
+            remove(store.folder)
     return _DONE
 
 
 def _remove_left_over(store):
-    """The files of a supervisor that was killed, or whose host lost power."""
-    if store.running():
-        with store.locked():
-            for folder in store.running().get("groups", ()):
-                control_groups.remove_left_over(folder)
-            shutil.rmtree(store.running().get("runtime", ""), ignore_errors=True)
-            store.remove_run()
+    """The files of a supervisor that was killed, or whose host lost power: it may have left any part of them. Raises
+    StoreError where one is just starting or ending."""
+    if not store.folder.is_dir():
+        return
+    with store.locked():
+        for folder in store.running().get("groups", ()):
+            control_groups.remove_left_over(folder)
+        runtime = Path(store.running().get("runtime", ""))
+        # After a restart of the host the name may be another user's.
+        if runtime.name.startswith(RUNTIME) and runtime.is_dir() and runtime.stat().st_uid == os.geteuid():
+            shutil.rmtree(runtime, ignore_errors=True)
+        store.remove_run()
 
 
 def _logs(options, store):

@@ -8,13 +8,17 @@ import fcntl
 import json
 import os
 import secrets
-import shutil
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
+from lab_class.disk import remove
 from lab_class.roster import Student
 
 _CLASS, _RUNNING, _LOCK = "class.json", "running.json", "lock"
+# Of a file that is being written.
+_NEW = ".new"
+#: Begins the name of a supervisor's folder of sockets, below the folder of temporary files.
+RUNTIME = "lab-class-"
 #: The files of one run in a lab's folder, and the folder of the student's files.
 RUN_FILES, HOME = ("output.txt", "caches"), "home"
 
@@ -98,11 +102,11 @@ class Store:
     def read(self):
         """The ClassRecord, or None where there is none. Raises StoreError for a broken file."""
         try:
-            text = (self.folder / _CLASS).read_text(encoding="utf-8")
+            data = (self.folder / _CLASS).read_bytes()
         except FileNotFoundError:
             return None
         try:
-            found = json.loads(text)
+            found = json.loads(data.decode("utf-8"))
             names = {one.name for one in fields(Options)}
             options = {name: value for name, value in found["options"].items() if name in names}
             options["launch"] = tuple(options["launch"])
@@ -119,18 +123,20 @@ class Store:
                              "instructor": record.instructor})
 
     def running(self):
-        """What the supervisor has written by `write_running`, or {}."""
+        """What the supervisor has written by `write_running`, or {}; also where a host that lost power has kept only a
+        part of it."""
         try:
-            return json.loads((self.folder / _RUNNING).read_text(encoding="utf-8"))
+            found = json.loads((self.folder / _RUNNING).read_text(encoding="utf-8"))
         except (FileNotFoundError, ValueError):
             return {}
+        return found if isinstance(found, dict) else {}
 
     def write_running(self, values):
         self._write(_RUNNING, values)
 
     def _write(self, name, values):
         # Whole or not at all, also where the host loses power.
-        temporary = self.folder / (name + ".new")
+        temporary = self.folder / (name + _NEW)
         with open(temporary, "w", encoding="utf-8") as stream:
             os.fchmod(stream.fileno(), 0o600)
             json.dump(values, stream, indent=1)
@@ -146,12 +152,9 @@ class Store:
 
     def remove_run(self):
         """Remove what one run leaves; the students' files, the roster and the tokens stay."""
-        for name in (_RUNNING, _LOCK):
+        for name in (_RUNNING, _LOCK, _CLASS + _NEW, _RUNNING + _NEW):
             (self.folder / name).unlink(missing_ok=True)
         for folder in self.folder.glob("labs/*"):
             for name in RUN_FILES:
                 path = folder / name
-                if path.is_dir() and not path.is_symlink():
-                    shutil.rmtree(path, ignore_errors=True)
-                else:
-                    path.unlink(missing_ok=True)
+                remove(path)

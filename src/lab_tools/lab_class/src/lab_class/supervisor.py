@@ -25,7 +25,7 @@ from lab_class.lab_process import END_S, LabProcess
 from lab_class.labs import Action, ClassError, Labs, State
 from lab_class.scratch import Scratch, too_many_sockets
 from lab_class.settling import Settling, demand_s
-from lab_class.store import HOME, Store, StoreError
+from lab_class.store import HOME, RUNTIME, Store, StoreError
 from lab_class.verdicts import Verdicts
 from lab_environment.isolation import NotIsolated
 from web_bridge.serving import IDLE_S, LARGEST_BODY, LimitedServer
@@ -54,7 +54,7 @@ class Supervisor:
         self._processes, self._listeners, self._tasks, self._memory, self._groups = {}, {}, {}, {}, {}
         self._end = asyncio.Event()
         # Short: the address of a socket has 107 bytes at most.
-        self._runtime = Path(tempfile.mkdtemp(prefix="lab-class-"))
+        self._runtime = Path(tempfile.mkdtemp(prefix=RUNTIME))
         self._factors = Factors(self.socket_of, record.tokens)
         self._verdicts = {name: Verdicts(store.lab(name), store.lab(name) / HOME) for name in names}
         self._quota, self._scratch = Quota(options.disk_bytes, store.folder), Scratch()

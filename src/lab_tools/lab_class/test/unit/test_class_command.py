@@ -77,3 +77,57 @@ def test_logs_of_a_lab_that_the_class_has_not_names_those_that_it_has(tmp_path, 
     for name, text in (("bem", "there is no lab bem; there are: anna, ben"), ("ben", "a class that runs has logs")):
         assert command.main(["--folder", str(store.folder), "logs", name]) == 1
         assert text in capsys.readouterr().err
+
+
+@pytest.fixture
+def after_power_cut(tmp_path):
+    """The folder of a class as a host that lost power may have left it."""
+    store = Store(tmp_path / "class")
+    store.make()
+    store.write(ClassRecord.made(Options(), [Student("anna", "Anna")]))
+    for name in ("home", "caches/cache-0"):
+        (store.lab("anna") / name).mkdir(parents=True, exist_ok=True)
+    (store.lab("anna") / "home/work.py").write_text("print()")
+    (store.lab("anna") / "output.txt").write_text("")
+    (store.folder / "supervisor.log").write_text("")
+    return store
+
+
+@pytest.mark.parametrize("text", ['{"pid": 1, "cont', "", None])
+def test_after_a_power_cut_the_end_leaves_students_files_alone(after_power_cut, text, capsys):
+    store = after_power_cut
+    if text is not None:
+        (store.folder / "running.json").write_text(text)
+    assert command.main(["--folder", str(store.folder), "list"]) == 1
+    assert "no class runs in" in capsys.readouterr().err
+    assert command.main(["--folder", str(store.folder), "down"]) == 0
+    assert sorted(path.name for path in store.folder.iterdir()) == ["class.json", "labs"]
+    assert [path.name for path in store.lab("anna").iterdir()] == ["home"]
+    assert (store.lab("anna") / "home/work.py").read_text() == "print()"
+
+
+def test_only_a_folder_that_is_a_supervisors_and_this_users_is_removed(after_power_cut, tmp_path, monkeypatch):
+    store = after_power_cut
+    for name, owner, stays in (("documents", os.geteuid(), True), ("lab-class-abc", os.geteuid() + 1, True),
+                               ("lab-class-abc", os.geteuid(), False)):
+        (tmp_path / name).mkdir(exist_ok=True)
+        # The number of the process is another program's by now.
+        store.write_running({"pid": os.getpid(), "control": str(tmp_path / name / "control"),
+                             "runtime": str(tmp_path / name), "groups": [str(tmp_path / "gone")]})
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "geteuid", lambda owner=owner: owner)
+            assert command.main(["--folder", str(store.folder), "down"]) == 0
+        assert (tmp_path / name).exists() is stays
+
+
+def test_what_a_student_has_locked_and_made_deep_is_deleted_with_the_class(after_power_cut):
+    here = after_power_cut.lab("anna") / "home"
+    fd = os.open(here, os.O_RDONLY)
+    for _ in range(2000):
+        os.mkdir("d", dir_fd=fd)
+        below = os.open("d", os.O_RDONLY, dir_fd=fd)
+        os.close(fd)
+        fd = below
+    os.close(fd)
+    assert command.main(["--folder", str(after_power_cut.folder), "down", "--delete"]) == 0
+    assert not after_power_cut.folder.exists()

@@ -32,8 +32,9 @@ def test_students_that_stay_keep_their_addresses():
 
 def test_no_class_and_broken_ones(store):
     assert store.read() is None
-    for text in ("", "[]", "{}", '{"options": {"launch": 3}}', '{"options": [], "students": [], "tokens": {}}'):
-        (store.folder / "class.json").write_text(text)
+    for data in (b"", b"[]", b"{}", b'{"options": {"launch": 3}}', b'{"options": [], "students": [], "tokens": {}}',
+                 b"\0" * 100, b"\xff\xfe\x80"):
+        (store.folder / "class.json").write_bytes(data)
         with pytest.raises(StoreError, match="class.json is not the record of a class"):
             store.read()
 
@@ -50,8 +51,17 @@ def test_the_end_of_a_run_leaves_the_students_files(store):
     (store.lab("anna") / "output.txt").write_text("x")
     (store.lab("anna") / "caches").mkdir()
     store.write_running({"pid": 1})
+    for name in ("class.json.new", "running.json.new"):
+        (store.folder / name).write_text("{")
     store.remove_run()
+    assert [path.name for path in store.folder.iterdir()] == ["labs"]
     assert [path.name for path in store.lab("anna").iterdir()] == ["home"] and work.exists()
+    assert store.running() == {}
+
+
+@pytest.mark.parametrize("data", [b"", b'{"pid": 1, "contr', b"[1]", b"null", b"\0" * 50, b"\xff\xfe"])
+def test_a_host_that_lost_power_has_kept_any_part_of_a_supervisors_file(store, data):
+    (store.folder / "running.json").write_bytes(data)
     assert store.running() == {}
 
 
