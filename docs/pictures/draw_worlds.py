@@ -36,7 +36,9 @@ BASE_M = 0.93  # the height of the robot's base above the floor
 SETTLE_S = 1.0
 # Angles of the left arm [rad]: its hand over a table. The right arm has them mirrored.
 OVER_TABLE = (-0.55, -0.75, -0.25, 1.35, 0.20, 0.95, 0.0)
+# The pose of the second lab [rad], where IK puts the left arm; and neutral.
 SHOWN = (-1.0051, -1.0358, -0.3310, 1.7034, 0.3051, 0.8611, -1.4742)
+NEUTRAL = tuple(poses().angles("neutral", "left")[name] for name in joint_names("left"))
 BAXTER = ("baxter_description", "urdf/baxter.urdf.xacro")
 WITH_KINECT = ("cwru_baxter_sim", "cwru_baxter.urdf.xacro")
 
@@ -58,6 +60,7 @@ class View(NamedTuple):
 
 VIEWS = {
     "robot": View("baxter", (3.5, 0.55, 1.5), (0.1, 0.0, 0.98), 0.93),
+    "lab2": View("baxter", (3.0, 1.3, 1.75), (0.25, 0.05, 0.93), 0.97, (SHOWN, NEUTRAL)),
     "hands": View("table", (1.95, 0.2, 1.42), (0.7, 0.0, 0.93), 0.8),
     "kinect": View("table", (1.35, -0.35, 1.45), (0.12, 0.0, 1.68), 0.7, robot=WITH_KINECT),
     "hand_camera": View("table", (), (), 1.2, camera="left_hand_camera"),
