@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # The one entry point: sets the workspace up, enters it, tests it. `./baxter.sh help` says how.
 
+# `sh baxter.sh` starts another shell, which cannot read the lines below.
+[ -n "${BASH_VERSION:-}" ] || exec bash "$0" "$@"
+
 LAB_ROOT=$(cd -P "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)
 export LAB_ROOT
 
@@ -62,9 +65,21 @@ needs_no_lab() {
     return 1
 }
 
+# With sudo, set-up and simulator would leave files of root in the user's own workspace, which then cannot be written.
+# Where root owns the workspace, as on a server, root may set it up.
+refuse_sudo() {
+    if [[ $(id -u) == 0 && ${SUDO_UID:-0} != 0 && $(stat -c %u "$LAB_ROOT") == "$SUDO_UID" ]]; then
+        echo "baxter.sh: start it without sudo: $LAB_ROOT is yours, and files of root in it would stop you from using it." \
+             "Set-up itself asks for sudo where it needs it. Files from an earlier try become yours again with:" \
+             "sudo chown -R ${SUDO_USER:-$SUDO_UID} '$LAB_ROOT'" >&2
+        return 2
+    fi
+}
+
 main() {
     local mode=${1:-sim}
     [[ $# -gt 0 ]] && shift
+    case $mode in help | -h | --help | doctor) ;; *) refuse_sudo || exit ;; esac
     case $mode in
         help | -h | --help)
             usage
@@ -115,7 +130,8 @@ main() {
             exec python3 -P -m lab_class "$@"
             ;;
         handout)
-            PYTHONPATH=$LAB_ROOT/src/rf_labs/rf_checks/src exec python3 -m rf_checks.handout "$@"
+            # Needs no set-up, so it takes the system's Python: the first one in PATH may be conda's.
+            PYTHONPATH=$LAB_ROOT/src/rf_labs/rf_checks/src exec /usr/bin/python3 -m rf_checks.handout "$@"
             ;;
         bench)
             bring_up_to_date || exit

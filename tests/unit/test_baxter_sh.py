@@ -331,3 +331,34 @@ def test_a_forgotten_sim_is_put_in_front_of_the_command():
                           capture_output=True, text=True)
     assert done.returncode == 2
     assert "./baxter.sh sim roslaunch baxter_gazebo baxter_world.launch?" in done.stderr
+
+
+def test_sh_instead_of_bash_works():
+    done = subprocess.run(["sh", str(ROOT / "baxter.sh"), "help"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.startswith("Usage:") and not done.stderr
+
+
+def as_root_by_sudo(folder, owner):
+    """The environment of a root shell that user 1234 has by sudo; the workspace belongs to ``owner``."""
+    for name, answer in (("id", 0), ("stat", owner)):
+        (folder / name).write_text(f"#!/bin/sh\necho {answer}\n")
+        (folder / name).chmod(0o755)
+    return {"PATH": f"{folder}:/usr/bin:/bin", "SUDO_UID": "1234", "SUDO_USER": "ann"}
+
+
+def test_sudo_in_ones_own_workspace_is_refused_with_what_mends_it(tmp_path):
+    done = baxter("sim", "true", env=as_root_by_sudo(tmp_path, owner=1234))
+    assert done.returncode == 2
+    assert "without sudo" in done.stderr and f"sudo chown -R ann '{ROOT}'" in done.stderr
+
+
+def test_sudo_in_a_workspace_of_root_is_not_refused(tmp_path):
+    done = baxter("--simulate", env=as_root_by_sudo(tmp_path, owner=0))
+    assert done.returncode == 2 and "unknown option" in done.stderr and "sudo chown" not in done.stderr
+
+
+def test_students_copy_does_not_run_on_the_first_python_in_path(tmp_path):
+    (tmp_path / "python3").write_text("#!/bin/sh\necho a stranger >&2; exit 3\n")
+    (tmp_path / "python3").chmod(0o755)
+    done = baxter("handout", env={"PATH": f"{tmp_path}:/usr/bin:/bin"})
+    assert done.returncode == 2 and "FOLDER" in done.stderr and "stranger" not in done.stderr
