@@ -36,7 +36,7 @@ BASE_M = 0.93  # the height of the robot's base above the floor
 SETTLE_S = 1.0
 # Angles of the left arm [rad]: its hand over a table. The right arm has them mirrored.
 OVER_TABLE = (-0.55, -0.75, -0.25, 1.35, 0.20, 0.95, 0.0)
-# The pose of the second lab [rad], where IK puts the left arm; and neutral.
+# The left arm at the pose of the second lab [rad]; and at neutral.
 SHOWN = (-1.0051, -1.0358, -0.3310, 1.7034, 0.3051, 0.8611, -1.4742)
 NEUTRAL = tuple(poses().angles("neutral", "left")[name] for name in joint_names("left"))
 BAXTER = ("baxter_description", "urdf/baxter.urdf.xacro")
