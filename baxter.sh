@@ -30,7 +30,7 @@ Usage: ./baxter.sh [MODE] [COMMAND…]
   check LAB PROGRAM     run a student's program in a separate lab and judge the result; --list, --help
   grade FOLDER [LAB [EXERCISE…]]
                         judge the submissions of a class, several at a time, and write results and pages; --help
-  labs up N | list | start | pause | stop | down | logs
+  labs up N | list | start | pause | stop | renew | down | logs
                         labs for a class on this machine, behind one front door; --help
   handout FOLDER        make the students' copy of this workspace: without solutions, and without what reveals them
   batch JOB --seeds A:B run a job once for each seed on all processors; --list names the jobs, --help the options

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`./baxter.sh labs up N | list | start | pause | stop | down | logs`: the command line."""
+"""`./baxter.sh labs up N | list | start | pause | stop | renew | down | logs`: the command line."""
 import argparse
 import os
 import shutil
@@ -11,11 +11,11 @@ from pathlib import Path
 
 import rospkg
 
-from lab_class import control, control_groups, roster
+from lab_class import control, control_groups, memory, roster
 from lab_class.disk import ENTRIES, entries_left, remove, room
 from lab_class.labs import ClassError, State
-from lab_class.roster import RosterError
-from lab_class.store import RUNTIME, ClassRecord, Options, Store, StoreError
+from lab_class.roster import INSTRUCTOR, RosterError
+from lab_class.store import HOME, RUNTIME, ClassRecord, Options, Store, StoreError
 from lab_environment import isolation
 from lab_environment.family import is_running
 from lab_web.libraries import LibrariesError, fetched
@@ -55,7 +55,7 @@ def _parser():
                                      "behind walls, with one address for each student; docs/class.md.")
     parser.add_argument("--folder", default=default_folder(), help="of the class: roster, tokens, students' files "
                         "(default: %(default)s)")
-    commands = parser.add_subparsers(required=True, metavar="up|list|start|pause|stop|down|logs")
+    commands = parser.add_subparsers(required=True, metavar="up|list|start|pause|stop|renew|down|logs")
     up = commands.add_parser("up", help="start a class, and print the addresses")
     up.add_argument("who", nargs="?", help="a number of students, or a CSV file with their names; without it the class "
                     "of last time")
@@ -84,6 +84,9 @@ def _parser():
         one = commands.add_parser(verb, help=help_text)
         one.add_argument("names", nargs="+", help="names of labs, or: all")
         one.set_defaults(run=_change, verb=verb)
+    renew = commands.add_parser("renew", help="give students new addresses; the old ones open nothing any more")
+    renew.add_argument("names", nargs="+", help="names of labs, all, or instructor")
+    renew.set_defaults(run=_renew)
     down = commands.add_parser("down", help="end the class; the students' files, addresses and roster stay")
     down.add_argument("--delete", action="store_true", help="delete these, too")
     down.set_defaults(run=_down)
@@ -127,13 +130,15 @@ def _students(who):
     if who.isdecimal():
         return roster.numbered(int(who))
     try:
-        return roster.read(Path(who).read_text(encoding="utf-8"))
-    except UnicodeDecodeError as error:
-        raise RosterError('%s is not UTF-8 (line %d); in a spreadsheet, save it as "CSV UTF-8"'
-                          % (who, 1 + error.object.count(b"\n", 0, error.start))) from error
+        data = Path(who).read_bytes()
     except OSError as error:
         raise RosterError("%s is neither a number of students nor a file that can be read: %s"
                           % (who, error.strerror)) from error
+    try:
+        text = roster.text_of(data)
+    except RosterError as error:
+        raise RosterError("%s %s" % (who, error)) from error
+    return roster.read(text)
 
 
 def _record(options, store):
@@ -175,6 +180,7 @@ def _up(options, store):
                          % isolation.problem())
     packages = rospkg.RosPack()
     libraries = fetched(Path(packages.get_path("lab_web")) / "page").parents[1]
+    _say_who_has_left(store.read(), record)
     store.write(record)
     log = store.folder / _LOG
     with open(log, "wb") as output:
@@ -195,11 +201,22 @@ def _up(options, store):
     if free < needed:
         print("The disk has %.1f GB free, and the students' files may have %.1f GB (--disk). Labs that fill it are "
               "ended.\n" % (free / 2**30, needed / 2**30), flush=True)
+    short = memory.forecast(len(record.students), memory.available_bytes(), record.options.memory_bytes)
+    if short:
+        print(short + "\n", flush=True)
     files = entries_left(store.folder)
     if files is not None and files < len(record.students) * ENTRIES:
         print("The disk has room for %d more files and folders, and each student may have %d.\n" % (files, ENTRIES),
               flush=True)
     return _DONE if options.no_wait else _await_labs(store)
+
+
+def _say_who_has_left(earlier, record):
+    names = {student.name for student in record.students}
+    for student in earlier.students if earlier else ():
+        if student.name not in names:
+            print("%s (%s) is not in the class any more, and the address opens nothing; the files stay in labs/%s/%s."
+                  % (student.full_name, student.name, student.name, HOME), flush=True)
 
 
 def _await_door(store, supervisor, log):
@@ -212,19 +229,26 @@ def _await_door(store, supervisor, log):
 
 
 def _print_addresses(record, store):
-    port = store.running()["port"]
-    host = os.environ.get("ROS_IP") or socket.gethostname() if record.options.public else "localhost"
-    print("The instructor's page:\n\n    http://%s:%d/instructor/?token=%s\n\nThe students' addresses:\n"
-          % (host, port, record.instructor))
+    print("The instructor's page:\n\n    %s\n\nThe students' addresses:\n" % _address(record, store, INSTRUCTOR))
     for student in record.students:
-        print("    %-24s http://%s:%d/%s/?token=%s"
-              % (student.full_name, host, port, student.name, record.tokens[student.name].act))
+        print("    %-24s %s" % (student.full_name, _address(record, store, student.name)))
     if record.options.public:
         print("\nPort %d is open to every machine of the network. The connection is not encrypted (docs/security.md)."
-              % port)
+              % _port(record, store))
     if record.options.trusted:
         print("\nThere are no walls: every student can do what you can on this machine.")
     print("\n./baxter.sh labs down ends the class.\n", flush=True)
+
+
+def _address(record, store, name):
+    """Of a student's lab, or of the instructor's page."""
+    host = os.environ.get("ROS_IP") or socket.gethostname() if record.options.public else "localhost"
+    token = record.instructor if name == INSTRUCTOR else record.tokens[name].act
+    return "http://%s:%d/%s/?token=%s" % (host, _port(record, store), name, token)
+
+
+def _port(record, store):
+    return store.running().get("port", record.options.port)
 
 
 def _await_labs(store):
@@ -234,7 +258,8 @@ def _await_labs(store):
         while True:
             labs = control.call(store, "GET", "/labs")["labs"]
             for lab in labs:
-                if lab["name"] not in shown and not lab["is_starting"] and lab["state"] != State.WAITING.value:
+                is_waiting = lab["state"] == State.WAITING.value and not lab["reason"]
+                if lab["name"] not in shown and not lab["is_starting"] and not is_waiting:
                     shown.add(lab["name"])
                     print("%s is %s%s" % (lab["name"], lab["state"], ": " + lab["reason"] if lab["reason"] else ""),
                           flush=True)
@@ -274,6 +299,24 @@ def _change(options, store):
         if roster.slug(name) != name:
             raise ClassError("%r is no name of a lab; ./baxter.sh labs list shows them" % name)
         control.call(store, "POST", "/labs/%s/%s" % (name, options.verb))
+    return _DONE
+
+
+def _renew(options, store):
+    record = store.read()
+    if record is None:
+        raise ClassError("there is no class in %s" % store.folder)
+    names = list(record.tokens) if options.names == ["all"] else options.names
+    for name in names:
+        record = record.renewed(name)
+    if _is_up(store):
+        for name in names:
+            control.call(store, "POST", "/renew/" + name)
+        record = store.read()
+    else:
+        store.write(record)
+    for name in names:
+        print("%-24s %s" % (name, _address(record, store, name)))
     return _DONE
 
 

@@ -25,10 +25,10 @@ class _ToSocket(netutil.Resolver):
 
 
 class Factors:
-    """``socket_of(name)``: the path of a lab's socket; ``tokens`` {name: store.Tokens}."""
+    """``socket_of(name)``: the path of a lab's socket; ``token_of(name)``: a token with which one may watch it."""
 
-    def __init__(self, socket_of, tokens):
-        self._socket_of, self._tokens = socket_of, tokens
+    def __init__(self, socket_of, token_of):
+        self._socket_of, self._token_of = socket_of, token_of
         self._tasks, self._factors = {}, {}
 
     def of(self, name):
@@ -48,7 +48,7 @@ class Factors:
         self._factors.pop(name, None)
 
     async def _listen(self, name):
-        address = "ws://localhost/rosbridge?token=" + self._tokens[name].view
+        address = "ws://localhost/rosbridge?token=" + self._token_of(name)
         while True:
             try:
                 connection = await websocket.websocket_connect(

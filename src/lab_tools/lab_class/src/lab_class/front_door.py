@@ -55,6 +55,8 @@ class Door:
 
     def words_of(self, lab):
         """What a lab that does not run says to its student."""
+        if lab.state is State.WAITING and lab.reason:
+            return "The lab is going to start. It waits: %s." % lab.reason
         if lab.state is State.WAITING:
             before = self.supervisor.labs.place_in_line(lab.name)
             return "The lab is going to start; %s." % ("%d start before it" % before if before else "it is the next")
@@ -211,6 +213,18 @@ class Change(_ForInstructor):
         self.set_status(204)
 
 
+class Renew(_ForInstructor):
+    """POST /renew/NAME: new tokens for a student or the instructor; at the control socket alone."""
+
+    def post(self, name):
+        try:
+            self.door.supervisor.renew(name)
+        except (ClassError, OSError) as error:
+            self.refuse(409, str(error))
+            return
+        self.set_status(204)
+
+
 class Down(_ForInstructor):
     """Ends the class; at the control socket alone."""
 
@@ -252,4 +266,5 @@ def control(door):
     """The same for the commands of the class's owner, at the control socket."""
     owner = {"door": door, "trusted": True}
     return web.Application([(r"/labs", Overview, owner), (r"/labs/([a-z0-9-]+)/([a-z]+)", Change, owner),
-                            (r"/down", Down, owner)], log_function=lambda handler: None)
+                            (r"/renew/([a-z0-9-]+)", Renew, owner), (r"/down", Down, owner)],
+                           log_function=lambda handler: None)

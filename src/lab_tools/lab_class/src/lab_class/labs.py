@@ -8,6 +8,8 @@ START_LIMIT_S = 180.0
 #: A lab that fails this often, each time within STEADY_S of its start, waits for the instructor.
 MOST_FAILURES = 3
 STEADY_S = 60.0
+#: Where memory is short, labs that nobody has visited give theirs to those with a visitor, one in this time [s].
+HAND_OVER_S = 15.0
 
 
 class State(enum.Enum):
@@ -90,6 +92,7 @@ class Labs:
         self._labs = {name: Lab(name) for name in names}
         self._at_once, self._idle_s = at_once, idle_s
         self._waits_paused = idle_s is not None and not keep_running
+        self._handed_over = -HAND_OVER_S
 
     def __iter__(self):
         return iter(self._labs.values())
@@ -183,8 +186,11 @@ class Labs:
         self[name].failures = MOST_FAILURES
         return [(Action.KILL, name)]
 
-    def due(self, now):
-        """Whatever time brings: the next starts, labs to be paused, starts that take too long."""
+    def due(self, now, shortage=""):
+        """Whatever time brings: the next starts, labs to be paused, starts that take too long.
+
+        shortage: why no further lab should start beside those that have started, or "".
+        """
         actions = []
         for lab in self:
             if lab.state is State.STARTING and now - lab.since > START_LIMIT_S:
@@ -193,10 +199,24 @@ class Labs:
                   and now - lab.used > self._idle_s):
                 actions += self.pause(lab.name, now)
         starting = sum(lab.is_starting for lab in self)
+        for lab in self._line():
+            # What those that are starting need is seen when they have started.
+            lab.reason = "" if starting else shortage
+        if shortage and any(lab.has_processes for lab in self):
+            return actions + self._hand_over(now)
         for lab in self._line()[:max(0, self._at_once - starting)]:
             self._set(lab, State.STARTING, now)
             actions.append((Action.START, lab.name))
         return actions
+
+    def _hand_over(self, now):
+        """A paused lab that nobody has visited ends, and waits, where another one has a visitor and may not start."""
+        unused = [lab for lab in self if lab.state is State.PAUSED and not lab.visited]
+        if not unused or not any(lab.asked for lab in self._line()) or now - self._handed_over < HAND_OVER_S:
+            return []
+        self._handed_over = now
+        self._enter_line(unused[-1], now)
+        return [(Action.END, unused[-1].name)]
 
     def _line(self):
         """Waiting labs: those with a waiting client first, then in the order of the roster."""

@@ -8,11 +8,12 @@ import fcntl
 import json
 import os
 import secrets
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 from lab_class.disk import remove
-from lab_class.roster import Student
+from lab_class.labs import ClassError
+from lab_class.roster import INSTRUCTOR, Student
 
 _CLASS, _RUNNING, _LOCK = "class.json", "running.json", "lock"
 # Of a file that is being written.
@@ -69,6 +70,14 @@ class ClassRecord:
         known = earlier.tokens if earlier else {}
         tokens = {student.name: known.get(student.name) or Tokens(_token(), _token()) for student in students}
         return ClassRecord(options, tuple(students), tokens, earlier.instructor if earlier else _token())
+
+    def renewed(self, name):
+        """This record with new tokens for one student, or for INSTRUCTOR. Raises ClassError."""
+        if name == INSTRUCTOR:
+            return replace(self, instructor=_token())
+        if name not in self.tokens:
+            raise ClassError("there is no lab %s; there are: %s" % (name, ", ".join(self.tokens)))
+        return replace(self, tokens={**self.tokens, name: Tokens(_token(), _token())})
 
 
 def _token():

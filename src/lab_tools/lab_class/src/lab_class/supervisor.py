@@ -18,7 +18,7 @@ from pathlib import Path
 from tornado import netutil
 from tornado.httpserver import HTTPServer
 
-from lab_class import control_groups, front_door, launching
+from lab_class import control_groups, front_door, launching, memory
 from lab_class.disk import Quota, remove
 from lab_class.factors import Factors
 from lab_class.lab_process import END_S, LabProcess
@@ -55,7 +55,7 @@ class Supervisor:
         self._end = asyncio.Event()
         # Short: the address of a socket has 107 bytes at most.
         self._runtime = Path(tempfile.mkdtemp(prefix=RUNTIME))
-        self._factors = Factors(self.socket_of, record.tokens)
+        self._factors = Factors(self.socket_of, lambda name: self._record.tokens[name].view)
         self._verdicts = {name: Verdicts(store.lab(name), store.lab(name) / HOME) for name in names}
         self._quota, self._scratch = Quota(options.disk_bytes, store.folder), Scratch()
         self._class_groups = control_groups.found(self._runtime.name, len(names))
@@ -84,6 +84,18 @@ class Supervisor:
         if verb not in verbs:
             raise ClassError("%s is nothing that can be done with a lab; expected %s" % (verb, ", ".join(verbs)))
         self._do(verbs[verb](name, self._now()))
+
+    def renew(self, name):
+        """New tokens for a student, or for the instructor: the old ones open nothing any more.
+
+        What they have opened in a lab ends, since the lab starts again. Raises ClassError, OSError.
+        """
+        record = self._record.renewed(name)
+        self._store.write(record)
+        self._record = self.door.record = record
+        if name in self.labs and self.labs[name].has_processes:
+            self._do(self.labs.stop(name, self._now()))
+            self._do(self.labs.start(name, self._now()))
 
     def overview(self):
         """The class as plain data, with the addresses' tokens: for the instructor alone."""
@@ -176,7 +188,9 @@ class Supervisor:
                     self._exceed_memory(name)
                 else:
                     self._do(self.labs.ended(name, self._last_words(name), self._now()))
-        self._do(self.labs.due(self._now()))
+        short = memory.shortage(memory.available_bytes(), self._record.options.memory_bytes,
+                                sum(lab.is_starting for lab in self.labs))
+        self._do(self.labs.due(self._now(), short))
 
     def _do(self, actions):
         for action, name in actions:

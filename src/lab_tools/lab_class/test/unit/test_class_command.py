@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 from lab_class import command
+from lab_class.disk import remove
 from lab_class.roster import Student
 from lab_class.store import ClassRecord, Options, Store, StoreError
 from lab_class.supervisor import Supervisor
@@ -120,9 +121,9 @@ def test_only_a_folder_that_is_a_supervisors_and_this_users_is_removed(after_pow
         assert (tmp_path / name).exists() is stays
 
 
-def test_what_a_student_has_locked_and_made_deep_is_deleted_with_the_class(after_power_cut):
-    here = after_power_cut.lab("anna") / "home"
-    fd = os.open(here, os.O_RDONLY)
+def test_what_a_student_has_made_deep_is_deleted_with_the_class(after_power_cut, request):
+    request.addfinalizer(lambda: remove(after_power_cut.folder))
+    fd = os.open(after_power_cut.lab("anna") / "home", os.O_RDONLY)
     for _ in range(2000):
         os.mkdir("d", dir_fd=fd)
         below = os.open("d", os.O_RDONLY, dir_fd=fd)
@@ -131,3 +132,27 @@ def test_what_a_student_has_locked_and_made_deep_is_deleted_with_the_class(after
     os.close(fd)
     assert command.main(["--folder", str(after_power_cut.folder), "down", "--delete"]) == 0
     assert not after_power_cut.folder.exists()
+
+
+def test_new_addresses_while_no_class_runs(tmp_path, capsys):
+    store = Store(tmp_path / "class")
+    store.make()
+    before = ClassRecord.made(Options(), [Student("anna", "Anna"), Student("ben", "Ben")])
+    store.write(before)
+    assert command.main(["--folder", str(store.folder), "renew", "anna", "instructor"]) == 0
+    after = store.read()
+    said = capsys.readouterr().out
+    assert after.tokens["anna"].act in said and after.instructor in said
+    assert before.tokens["anna"] != after.tokens["anna"] and before.instructor != after.instructor
+    assert after.tokens["ben"] == before.tokens["ben"]
+    assert command.main(["--folder", str(store.folder), "renew", "anna", "bem"]) == 1
+    assert "there is no lab bem; there are: anna, ben" in capsys.readouterr().err and store.read() == after
+
+
+def test_students_who_are_not_in_the_class_any_more_are_named(capsys):
+    earlier = ClassRecord.made(Options(), [Student("anna", "Anna"), Student("ben", "Ben")])
+    command._say_who_has_left(earlier, ClassRecord.made(Options(), [Student("anna", "Anna")], earlier))
+    assert capsys.readouterr().out == ("Ben (ben) is not in the class any more, and the address opens nothing; the "
+                                       "files stay in labs/ben/home.\n")
+    command._say_who_has_left(None, earlier)
+    assert capsys.readouterr().out == ""

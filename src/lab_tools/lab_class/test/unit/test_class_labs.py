@@ -181,3 +181,38 @@ def test_a_page_counts_once_with_all_of_its_connections():
         labs.serving("anna", kind, 1, 0.0)
     lab = labs["anna"]
     assert (lab.pages, lab.sockets, lab.busy) == (1, 3, 1)
+
+
+SHORT = "this machine has only 0.3 GB of memory free"
+
+
+def test_where_memory_is_short_labs_wait_and_say_so(labs):
+    # One lab may always start.
+    assert labs.due(0.0, SHORT) == [(Action.START, "anna")]
+    labs.due(1.0, SHORT)
+    assert labs["ben"].reason == "", "the first one is starting"
+    labs.answered("anna", 2.0)
+    labs["anna"].visited = True
+    labs.has_settled("anna", 3.0)
+    assert labs.due(4.0, SHORT) == [] and labs["ben"].reason == SHORT and labs["ben"].state is State.WAITING
+    assert labs.due(5.0) == [(Action.START, "ben")] and labs["ben"].reason == labs["cleo"].reason == ""
+
+
+def test_where_memory_is_short_an_unvisited_lab_gives_way_to_a_visitor(labs):
+    for name, now in (("anna", 0.0), ("ben", 10.0)):
+        assert labs.due(now) == [(Action.START, name)]
+        labs.answered(name, now)
+        assert labs.has_settled(name, now + 1.0) == [(Action.PAUSE, name)]
+    assert labs.due(20.0, SHORT) == []
+    labs.request("cleo", 21.0)
+    assert labs.due(22.0, SHORT) == [(Action.END, "ben")] and labs["ben"].state is State.WAITING
+    # Its memory is free a while later.
+    assert labs.due(23.0, SHORT) == []
+    assert labs.due(24.0) == [(Action.START, "cleo")]
+
+
+def test_where_memory_is_short_no_visited_lab_gives_way(labs):
+    run(labs, "anna")
+    labs.pause("anna", 1.0)
+    labs.request("ben", 2.0)
+    assert labs.due(3.0, SHORT) == [] and labs["anna"].state is State.PAUSED

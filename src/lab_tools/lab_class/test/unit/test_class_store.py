@@ -3,6 +3,7 @@
 import pytest
 
 from lab_class import roster
+from lab_class.labs import ClassError
 from lab_class.store import ClassRecord, Options, Store, StoreError
 
 
@@ -28,6 +29,17 @@ def test_students_that_stay_keep_their_addresses():
     assert second.tokens["student-01"] == first.tokens["student-01"]
     tokens = [token for pair in second.tokens.values() for token in (pair.act, pair.view)] + [second.instructor]
     assert len(set(tokens)) == 7 and min(map(len, tokens)) > 20
+
+
+def test_new_tokens_for_one_student_or_the_instructor():
+    first = ClassRecord.made(Options(), roster.numbered(2))
+    second = first.renewed("student-01")
+    assert second.tokens["student-01"] != first.tokens["student-01"]
+    assert (second.tokens["student-02"], second.instructor) == (first.tokens["student-02"], first.instructor)
+    third = first.renewed("instructor")
+    assert third.instructor != first.instructor and third.tokens == first.tokens
+    with pytest.raises(ClassError, match="there is no lab anna; there are: student-01, student-02"):
+        first.renewed("anna")
 
 
 def test_no_class_and_broken_ones(store):

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""New addresses for students who have lost theirs, or whose has become known."""
+from types import SimpleNamespace
+
+from lab_class import front_door, roster
+from lab_class.labs import Action, Labs, Role, State
+from lab_class.store import ClassRecord, Options
+from lab_class.supervisor import Supervisor
+
+
+def test_new_tokens_end_what_the_old_ones_opened():
+    record = ClassRecord.made(Options(), [roster.Student("anna", "Anna"), roster.Student("ben", "Ben")])
+    written, done = [], []
+    labs = Labs(["anna", "ben"], 2, None)
+    labs["anna"].state = State.RUNNING
+    found = SimpleNamespace(_record=record, labs=labs, _now=lambda: 0.0, _do=done.extend,
+                            _store=SimpleNamespace(write=written.append))
+    found.door = front_door.Door(record, found)
+    found.renew = lambda name: Supervisor.renew(found, name)
+    old = record.tokens["anna"].act
+    found.renew("anna")
+    new = found.door.record.tokens["anna"].act
+    assert written == [found.door.record] and new != old
+    assert found.door.role("anna", [old]) is None and found.door.role("anna", [new]) is Role.STUDENT
+    # The lab itself still knows the old ones, and pages are open.
+    assert done == [(Action.END, "anna")] and labs["anna"].state is State.WAITING
+    found.renew("ben")
+    found.renew("instructor")
+    assert len(done) == 1 and found.door.is_instructor(found.door.record.instructor)
+    assert not found.door.is_instructor(record.instructor)
