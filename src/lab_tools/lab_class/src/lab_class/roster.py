@@ -17,7 +17,7 @@ _LONGEST_NAME = 40
 # Headings of columns, as they are in exports of Moodle, Canvas and Google Classroom; English, and Moodle's German.
 _NAMES = ("name", "student", "full name", "student name", "vollständiger name")
 _FIRST_NAMES, _LAST_NAMES = ("first name", "firstname", "vorname"), ("last name", "lastname", "surname", "nachname")
-# Columns that tell students apart: the first of them that is there gives the addresses, of an e-mail address the part
+# Columns that tell students apart: the first of them that is there gives the addresses, of an email address the part
 # before the @. A column "id" is Canvas's own number where there is a login, too.
 _LOGINS = ("sis login id", "login id", "id", "username", "anmeldename", "email address", "e-mail address", "email",
            "e-mail-adresse", "e-mail", "id number", "id-nummer")
