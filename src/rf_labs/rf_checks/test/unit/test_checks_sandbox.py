@@ -132,7 +132,9 @@ def test_no_namespace_in_which_it_may_mount(walled):
                               "libc = ctypes.CDLL(None, use_errno=True)\n"
                               "print(libc.unshare(0x10000000), errno.errorcode[ctypes.get_errno()])\n"
                               "print(libc.unshare(0))\n"
-                              "threading.Thread(target=print, args=('threads',)).start()\n"
+                              "thread = threading.Thread(target=print, args=('threads',))\n"
+                              "thread.start()\n"
+                              "thread.join()\n"
                               "os.system('echo processes')"))
     assert student.output.splitlines()[0] == "-1 ENOSYS", student.errors
     assert sorted(student.output.splitlines()[1:]) == ["0", "processes", "threads"]
