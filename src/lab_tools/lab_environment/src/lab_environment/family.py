@@ -3,6 +3,10 @@
 import contextlib
 import os
 
+# How the kernel names shared memory without a file.
+_SHARED = b" /dev/zero (deleted)"
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+
 
 def with_parent(command, sign="KILL"):
     """The command (list) that runs another one and ends it by a signal at the end of the process that starts it.
@@ -45,3 +49,31 @@ def is_running(pid):
     except OSError:
         return False
     return text[text.rfind(b")") + 2:][:1] not in (b"Z", b"X")
+
+
+def memory_exceeds(pids, limit_bytes):
+    """Whether processes have more memory than ``limit_bytes`` together: their private pages, and what they share with
+    each other; pages of files do not count."""
+    private = reserved = 0
+    for pid in pids:
+        with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/%d/statm" % pid, "rb") as file:
+            words = file.read().split()
+            private += max(0, int(words[1]) - int(words[2])) * _PAGE_BYTES
+            reserved += int(words[0]) * _PAGE_BYTES
+    if private > limit_bytes:
+        return True
+    # Most programs need no look at their mappings.
+    return reserved > limit_bytes and private + _shared_bytes(pids) > limit_bytes
+
+
+def _shared_bytes(pids):
+    """Shared mappings without a file: their whole size, since pages that a process has given back stay in memory."""
+    mappings = {}
+    for pid in pids:
+        with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/%d/maps" % pid, "rb") as file:
+            for line in file:
+                if _SHARED in line:
+                    area, _, offset, device, inode = line.split()[:5]
+                    start, end = (int(part, 16) for part in area.split(b"-"))
+                    mappings[(device, inode, offset)] = max(end - start, mappings.get((device, inode, offset), 0))
+    return sum(mappings.values())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A temporary folder that does not stay for ever where its process is killed. Free of ROS; Linux only."""
+"""Temporary folders that do not stay for ever where their process is killed. Free of ROS; Linux only."""
 import contextlib
 import fcntl
 import os
@@ -11,38 +11,48 @@ _LOCK = "lock"
 
 
 @contextlib.contextmanager
-def work_folder(prefix):
-    """A new folder (Path), which is TMPDIR until the end and is then removed.
+def claimed_folder(prefix, end_users=lambda folder: None):
+    """A new temporary folder (Path), which is removed at the end.
 
     Before, those of the same prefix whose processes were killed are removed: each running one holds a lock in its own.
-    prefix: begins their names, such as "lab-check-". Raises OSError.
+    prefix: begins their names, such as "lab-check-". end_users: called with the path (Path) of each that is about to be
+    removed, to end what uses it. Raises OSError.
     """
     top = Path(tempfile.gettempdir())
     for old in top.glob(prefix + "*"):
-        _remove_if_left(old)
+        _remove_if_left(old, end_users)
     # Under a hidden name until it is locked: else another start could remove it as a left one.
-    hidden = Path(tempfile.mkdtemp(prefix="." + prefix))
-    before = os.environ.get("TMPDIR")
-    folder = hidden
+    folder = Path(tempfile.mkdtemp(prefix="." + prefix))
     try:
-        with open(hidden / _LOCK, "wb") as lock:
+        with open(folder / _LOCK, "wb") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
-            folder = hidden.rename(top / hidden.name[1:])
-            os.environ["TMPDIR"] = str(folder)
-            tempfile.tempdir = None
+            folder = folder.rename(top / folder.name[1:])
             yield folder
     finally:
-        os.environ.pop("TMPDIR", None)
-        if before is not None:
-            os.environ["TMPDIR"] = before
-        tempfile.tempdir = None
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _remove_if_left(folder):
+@contextlib.contextmanager
+def work_folder(prefix):
+    """A :func:`claimed_folder` that is TMPDIR until the end."""
+    before = os.environ.get("TMPDIR")
+    with claimed_folder(prefix) as folder:
+        try:
+            os.environ["TMPDIR"] = str(folder)
+            tempfile.tempdir = None
+            yield folder
+        finally:
+            os.environ.pop("TMPDIR", None)
+            if before is not None:
+                os.environ["TMPDIR"] = before
+            tempfile.tempdir = None
+
+
+def _remove_if_left(folder, end_users):
     with contextlib.suppress(OSError):
         if folder.is_symlink() or folder.stat().st_uid != os.getuid():
             return
         with open(folder / _LOCK, "rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            end_users(folder)
             shutil.rmtree(folder, ignore_errors=True)

@@ -8,10 +8,10 @@ import tempfile
 
 import pytest
 
-from rf_checks.work_folder import work_folder
+from lab_environment.work_folder import claimed_folder, work_folder
 
 HOLDS = """import os, sys
-from rf_checks.work_folder import work_folder
+from lab_environment.work_folder import work_folder
 with work_folder("lab-a-") as folder:
     (folder / "large").write_text("x")
     print(folder, flush=True)
@@ -42,8 +42,10 @@ def test_those_of_killed_processes_go_with_the_next_start_and_others_stay(top):
     killed, running = (os.path.basename(holder.stdout.readline().strip()) for holder in holders)
     holders[0].send_signal(signal.SIGKILL)
     holders[0].communicate()
+    left = []
     try:
-        with work_folder("lab-a-") as folder:
+        with claimed_folder("lab-a-", lambda one: left.append((one.name, one.is_dir()))) as folder:
+            assert left == [(killed, True)]
             assert sorted(os.listdir(top)) == sorted([folder.name, running, "lab-b-1", "lab-a-link"])
     finally:
         holders[1].communicate()

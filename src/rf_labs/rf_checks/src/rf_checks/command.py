@@ -14,12 +14,12 @@ import rospkg
 
 from lab_environment import isolation, page_files
 from lab_environment.isolation import NotIsolated
+from lab_environment.work_folder import work_folder
 from rf_checks import report, submission
 from rf_checks.exercises import EXERCISES, LABS, UnknownExercise, choose
 from rf_checks.graph import LabFailed
 from rf_checks.judge import WALL_LIMIT_S, Judge
 from rf_checks.lab import WhichRobot
-from rf_checks.work_folder import work_folder
 
 PASSED, NOT_PASSED, WRONG_WORDS, JUDGE_FAILED, NOT_GRADED = 0, 1, 2, 3, 4
 # Of a report: its name, and what tempfile puts behind it.

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import lab_environment
 from lab_environment import isolation, system_calls, usage
-from lab_environment.family import children_of, direct_children, is_running, with_parent
+from lab_environment.family import children_of, direct_children, is_running, memory_exceeds, with_parent
 from rf_checks import hidden, submission
 
 CPU_S = 120
@@ -47,9 +47,6 @@ _DRAIN_S = 0.2
 _KILL_ROUNDS = 20
 _SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 _STARTUP_FOLDER = "/run/startup"
-# How the kernel names shared memory without a file.
-_SHARED = b" /dev/zero (deleted)"
-_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
 def adopt_orphans():
@@ -173,7 +170,7 @@ class Student:
             return "sockets"
         if self._has_walls and _count_entries(family) > ENTRIES:
             return "files"
-        return "memory" if _memory_bytes(family) > MEMORY_BYTES else ""
+        return "memory" if memory_exceeds(family, MEMORY_BYTES) else ""
 
     def dump(self):
         """Make Python write its traceback to `errors`, which also ends it."""
@@ -231,31 +228,6 @@ def _count_entries(pids):
         root = usage.root_of(pids)
         return usage.files_in_memory(root, isolation.FOLDERS)[0] if root else 0
     return 0
-
-
-def _memory_bytes(pids):
-    """Memory of processes: their private pages, and what they share with each other; pages of files do not count."""
-    private = reserved = 0
-    for pid in pids:
-        with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/%d/statm" % pid, "rb") as file:
-            words = file.read().split()
-            private += max(0, int(words[1]) - int(words[2])) * _PAGE_BYTES
-            reserved += int(words[0]) * _PAGE_BYTES
-    # Most programs need no look at their mappings.
-    return private if reserved <= MEMORY_BYTES else private + _shared_bytes(pids)
-
-
-def _shared_bytes(pids):
-    """Shared mappings without a file: their whole size, since pages that a process has given back stay in memory."""
-    mappings = {}
-    for pid in pids:
-        with contextlib.suppress(OSError, ValueError, IndexError), open("/proc/%d/maps" % pid, "rb") as file:
-            for line in file:
-                if _SHARED in line:
-                    area, _, offset, device, inode = line.split()[:5]
-                    start, end = (int(part, 16) for part in area.split(b"-"))
-                    mappings[(device, inode, offset)] = max(end - start, mappings.get((device, inode, offset), 0))
-    return sum(mappings.values())
 
 
 def _reap(pids):

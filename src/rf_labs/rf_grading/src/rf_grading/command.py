@@ -12,12 +12,12 @@ from pathlib import Path
 from lab_batch import JobError, Spec
 from lab_batch.processes import Limits, map_seeds
 from lab_environment import isolation
+from lab_environment.work_folder import work_folder
 from rf_checks import similarity
 from rf_checks.command import remove_drafts, write_report
 from rf_checks.exercises import LABS, UnknownExercise
 from rf_checks.judge import WALL_LIMIT_S
 from rf_checks.sandbox import MEMORY_BYTES
-from rf_checks.work_folder import work_folder
 from rf_grading import alike, archives, formats, keys, pages, plan, programs, results
 from rf_grading.ledger import Ledger, LedgerError
 from rf_grading.submissions import BadFolder, read_class
