@@ -97,6 +97,31 @@ def _criteria(run):
     return "\n".join([*lines, "%g points%s" % (round(run["points"], 1), said)] if said else lines)
 
 
+def hundredths(points, total):
+    """[(score, most)] of each run in hundredths of a point, which add up to ``total`` and to POINTS exactly.
+
+    points: of each run, 0 to POINTS; total: their mean. The hundredths that are left when POINTS are shared equally go
+    to runs that need them; a run with all points has its most, one without points none.
+    """
+    whole = round(100 * POINTS)
+    least, extra = divmod(whole, len(points))
+    scores, most = [round(value * least / POINTS) for value in points], [least] * len(points)
+    missing, order = round(100 * total) - sum(scores), sorted(range(len(points)), key=lambda k: -points[k])
+    for place, k in enumerate(order):
+        if extra and (missing > 0 or len(order) - place <= extra):
+            most[k] += 1
+            extra -= 1
+        if points[k] >= POINTS:
+            step = most[k] - scores[k]
+        elif points[k] > 0:
+            step = max(-scores[k], min(missing, most[k] - scores[k]))
+        else:
+            step = 0
+        scores[k] += step
+        missing -= step
+    return list(zip(scores, most, strict=True))
+
+
 def as_gradescope(row):
     """One student's results.json: a test for each run, with the points that count.
 
@@ -112,10 +137,12 @@ def as_gradescope(row):
                           "output": plain(cell.sentence)})
             continue
         runs = cell.verdict["runs"]
+        shares = hundredths([run["points"] for run in runs], cell.points)
         tests += [{"number": "%d.%d" % (number, place), "name": plain(" ".join([name, *run["arguments"]])),
-                   "score": round(run["points"] / len(runs), 2), "max_score": round(POINTS / len(runs), 2),
+                   "score": score / 100, "max_score": most / 100,
                    "status": "passed" if run["points"] >= cell.verdict["pass_mark"] else "failed",
-                   "output": plain(_criteria(run))} for place, run in enumerate(runs, 1)]
+                   "output": plain(_criteria(run))} for place, (run, (score, most)) in enumerate(
+                       zip(runs, shares, strict=True), 1)]
     found = {"output": plain("\n".join(row.sentences)), "output_format": "text", "test_output_format": "text",
              "visibility": "visible", "stdout_visibility": "hidden", "tests": tests,
              "execution_time": round(sum((cell.verdict or {}).get("wall_s", 0.0) for cell in row.cells.values()))}

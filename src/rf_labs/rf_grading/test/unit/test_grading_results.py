@@ -4,6 +4,7 @@ import csv
 import dataclasses
 import io
 import json
+import random
 from xml.etree import ElementTree
 
 import pytest
@@ -78,6 +79,21 @@ def test_junit_counts(found):
     wave = next(suite for suite in root if suite.get("name") == "lab2.wave")
     assert (wave.get("tests"), wave.get("failures"), wave.get("errors")) == ("4", "2", "1")
     assert [case.get("name") for case in wave] == ["anna", "=cmd()", "chen", "dan"]
+
+
+def test_points_of_runs_add_up_exactly():
+    """Of runs with all, some and no points; three runs with all of them had 99.99."""
+    rng = random.Random(0)
+    cases = [[rng.choice((0.0, 100.0, round(rng.uniform(0, 100), 2))) for _ in range(count)]
+             for count in range(1, 12) for _ in range(200)]
+    for points in ([100.0] * 3, [0.0] * 3, [100.0, 0.0, 100.0], *cases):
+        total = round(sum(points) / len(points), 2)
+        shares = formats.hundredths(points, total)
+        assert sum(most for _, most in shares) == 10_000, points
+        assert sum(score for score, _ in shares) == round(100 * total), (points, shares)
+        for value, (score, most) in zip(points, shares, strict=True):
+            assert 0 <= score <= most and (score == most or value < 100.0) and (score == 0 or value > 0.0), shares
+            assert score == pytest.approx(value / len(points) * 100, abs=len(points)), (points, shares)
 
 
 def test_gradescope_has_scores_that_add_up_and_no_notes(found):
