@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from . import parquet, processes, ray_engine
+from . import keeping, parquet, processes, ray_engine
 from .job import JobError, Spec, class_of, parameters_of
 from .records import Records, RecordsError, summary, versions
 from .shipped import JOBS
@@ -17,6 +17,7 @@ ROOT = Path(os.environ.get("LAB_ROOT", Path.cwd()))
 # Between two lines of progress: on a terminal, where each replaces the last one, and in a file.
 PROGRESS_S, LINE_S = 0.5, 30.0
 BAR_WIDTH = 30
+LEAST_GB = 0.1
 ENGINES = {"processes": processes.map_seeds, "ray": ray_engine.map_seeds}
 
 
@@ -60,6 +61,14 @@ def positive(kind):
     return convert
 
 
+def memory(text):
+    """Gigabytes. Raises argparse.ArgumentTypeError."""
+    value = positive(float)(text)
+    if value < LEAST_GB:
+        raise argparse.ArgumentTypeError("Python itself needs %g GB of memory, not %s" % (LEAST_GB, text))
+    return value
+
+
 def parse(argv):
     parser = argparse.ArgumentParser(
         prog="./baxter.sh batch", description=__doc__,
@@ -76,6 +85,9 @@ def parse(argv):
     parser.add_argument("--workers", type=positive(int), default=os.cpu_count(), metavar="N",
                         help="processes at a time (default: one for each processor, %(default)s)")
     parser.add_argument("--time-limit", type=positive(float), metavar="S", help="longest wall time of an episode")
+    parser.add_argument("--memory", type=memory, metavar="GB",
+                        help="most memory of a worker with all its processes (default: its share of %d %% of this "
+                             "machine's; on a cluster: no limit but Ray's own)" % (100 * keeping.SHARE))
     parser.add_argument("--recycle", type=positive(int), default=200, metavar="N",
                         help="a worker is replaced after N episodes (default %(default)s)")
     parser.add_argument("--retry-failed", action="store_true", help="also run seeds again that failed before")
@@ -99,7 +111,16 @@ def repeating_line(options, seed):
         words += ["--set", text if setting_of(text) == (name, value) else "%s=%r" % (name, value)]
     if options.time_limit:
         words += ["--time-limit", "%g" % options.time_limit]
+    if memory_bytes_of(options) not in (None, keeping.default_memory_bytes(os.cpu_count())):
+        words += ["--memory", "%.3g" % (memory_bytes_of(options) / 1e9)]
     return shlex.join([*words, "--out", "/dev/null"])
+
+
+def memory_bytes_of(options):
+    """The limit of memory of each worker, or None: the machines of a cluster may have other ones."""
+    if options.memory:
+        return round(1e9 * options.memory)
+    return None if options.address else keeping.default_memory_bytes(options.workers)
 
 
 class Progress:
@@ -197,7 +218,8 @@ def changes(earlier, now):
 
 def _run_left(options, spec, left, records):
     progress = Progress(len(left))
-    limits = processes.Limits(min(options.workers, max(1, len(left))), options.time_limit, options.recycle)
+    limits = processes.Limits(min(options.workers, max(1, len(left))), options.time_limit, options.recycle,
+                              memory_bytes_of(options))
     extra = {"address": options.address} if options.engine == "ray" else {}
     try:
         for outcome in ENGINES[options.engine](spec, left, limits, **extra):

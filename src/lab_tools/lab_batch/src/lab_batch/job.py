@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A job: a class of which each instance runs episodes, one for each seed."""
+import errno
 import importlib
 import inspect
 import json
+import resource
 import time
 import traceback
 from dataclasses import dataclass, field
@@ -53,12 +55,14 @@ class Spec:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one episode ended. result is {} and error says why where it failed. seconds: wall time."""
+    """How one episode ended. result is {} and error says why where it failed. seconds: wall time. is_out_of_memory: its
+    worker should run no other one."""
 
     seed: int
     result: dict
     error: str = ""
     seconds: float = 0.0
+    is_out_of_memory: bool = False
 
     @property
     def is_done(self):
@@ -109,6 +113,7 @@ def load(spec):
 def run_episode(job, seed):
     """Return the Outcome of one episode; an exception of the job is its error, with the line where it was raised."""
     started = time.monotonic()
+    is_out_of_memory = False
     try:
         result, text = plain(job.run(seed)), ""
     except ResultError as error:
@@ -116,7 +121,8 @@ def run_episode(job, seed):
     except _OF_JOBS as error:
         where = traceback.extract_tb(error.__traceback__)[-1]
         result, text = {}, "%s (%s, line %d)" % (_text_of(error), where.filename, where.lineno)
-    return Outcome(seed, result, text, time.monotonic() - started)
+        is_out_of_memory = _is_of_memory(error)
+    return Outcome(seed, result, text, time.monotonic() - started, is_out_of_memory)
 
 
 def plain(result):
@@ -153,7 +159,20 @@ def _of_numpy(value):
 
 def _text_of(error):
     try:
-        return "%s: %s" % (type(error).__name__, error)
+        text = "%s: %s" % (type(error).__name__, error)
     # A job's exception may have a __str__ that fails.
     except Exception:
-        return type(error).__name__
+        text = type(error).__name__
+    limit = resource.getrlimit(resource.RLIMIT_DATA)[0]
+    if _is_of_memory(error) and limit != resource.RLIM_INFINITY:
+        text = "%s; the limit of memory is %s" % (text.removesuffix(": "), gigabytes(limit))
+    return text
+
+
+def _is_of_memory(error):
+    return isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
+
+
+def gigabytes(count):
+    """A number of bytes as text: 2.5 GB."""
+    return "%.3g GB" % (count / 1e9)

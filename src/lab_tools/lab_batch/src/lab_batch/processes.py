@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The engine that is always there: worker processes on this machine."""
-import ctypes
 import multiprocessing
 import os
 import signal
@@ -11,16 +10,15 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection
 
-import psutil
+from . import keeping
+from .job import JobError, Outcome, gigabytes, load, run_episode
 
-from .job import JobError, Outcome, load, run_episode
-
-_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 # A worker has its next seed while the answer to the last one is on its way.
 SEEDS_AHEAD = 2
 # An episode gets a second worker where its first one died, which may have been killed for another reason.
 TRIES = 2
-STOP_TIMEOUT_S = 5.0
+# Longer than a worker's keeper needs.
+STOP_TIMEOUT_S = keeping.STOP_TIMEOUT_S + 5.0
 # One thread each, as many workers as processors: with threads of their own, libraries would also make results depend on
 # the machine.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
@@ -29,11 +27,13 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 @dataclass(frozen=True)
 class Limits:
     """workers: processes at a time. episode_s: longest wall time of an episode, None: no limit. episodes: how many a
-    worker runs before a new one takes its place (physics engines keep memory), None: no limit."""
+    worker runs before a new one takes its place (physics engines keep memory), None: no limit. memory_bytes: of each
+    process, and of a worker and its processes together, None: no limit."""
 
     workers: int = 1
     episode_s: float | None = None
     episodes: int | None = 200
+    memory_bytes: int | None = None
 
 
 def map_seeds(spec, seeds, limits):
@@ -83,7 +83,7 @@ class _Pool:
             seed = self._next_seed()
             if seed is None:
                 return
-            worker = _Worker(self._spec)
+            worker = _Worker(self._spec, self._limits)
             self._workers.append(worker)
             worker.give(seed)
 
@@ -115,11 +115,19 @@ class _Pool:
             worker.seeds.popleft()
             worker.count += 1
             yield message
+            if message.is_out_of_memory:
+                # The job may still hold it.
+                self._lose(worker)
+                self._again.extend(worker.seeds)
+                return
         worker.began = time.monotonic()
 
     def _died(self, worker):
         """The episode that ran gets another try; those that had not begun count as untouched."""
+        has_excess = worker.process.exitcode == keeping.TOO_MUCH_MEMORY
         if worker.began is None:
+            if has_excess:
+                raise JobError("job %s cannot start: %s" % (self._spec.name, self._memory_text()))
             self._lost_at_start += 1
             if self._lost_at_start >= TRIES:
                 raise JobError("job %s: %d workers in a row died at the start: %s" % (
@@ -128,17 +136,25 @@ class _Pool:
             return
         seed = worker.seeds.popleft()
         self._again.extend(worker.seeds)
+        if has_excess:
+            yield Outcome(seed, {}, self._memory_text(), time.monotonic() - worker.began)
+            return
         self._tries[seed] = self._tries.get(seed, 1) + 1
         if self._tries[seed] <= TRIES:
             self._again.append(seed)
         else:
             yield Outcome(seed, {}, "its worker died twice: %s" % _cause(worker.process.exitcode), 0.0)
 
+    def _memory_text(self):
+        return "with its processes it took more than the limit of %s of memory" % gigabytes(self._limits.memory_bytes)
+
     def _lose(self, worker):
         self._workers.remove(worker)
         worker.kill()
 
     def stop(self):
+        for worker in self._workers:
+            worker.process.terminate()
         for worker in self._workers:
             worker.kill()
         self._workers.clear()
@@ -153,10 +169,11 @@ def _cause(code):
 
 
 class _Worker:
-    def __init__(self, spec):
+    def __init__(self, spec, limits):
         context = multiprocessing.get_context("spawn")
         self.link, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(spec, theirs, os.getpid()), daemon=False)
+        given = (spec, theirs, os.getpid(), limits.memory_bytes)
+        self.process = context.Process(target=_work, args=given, daemon=False)
         with _environment(ONE_THREAD):
             self.process.start()
         theirs.close()
@@ -189,47 +206,16 @@ class _Worker:
         self.kill()
 
     def kill(self):
-        """End it and all processes that it has started."""
-        family = _children(self.process.pid)
-        if self.process.pid is not None and self.process.exitcode is None:
-            for sign in (signal.SIGTERM, signal.SIGKILL):
-                _signal_group(self.process.pid, sign)
-                self.process.join(STOP_TIMEOUT_S)
-                if self.process.exitcode is not None:
-                    break
+        """End it; its keeper ends all processes that it has started."""
         if self.process.pid is not None:
-            _signal_group(self.process.pid, signal.SIGKILL)  # children that outlived it
-            _end(family)  # those in groups of their own
+            # A worker that has died is still followed by its keeper, for a moment.
+            if not connection.wait([self.process.sentinel], 0.0):
+                self.process.terminate()
             self.process.join(STOP_TIMEOUT_S)
+            if self.process.exitcode is None:
+                self.process.kill()
+                self.process.join()
         self.link.close()
-
-
-def _signal_group(pid, sign):
-    """Signal a worker's process group, or the worker alone while it has none of its own."""
-    try:
-        if os.getpgid(pid) != pid:
-            os.kill(pid, sign)
-            return
-    except ProcessLookupError:
-        pass  # the worker has been waited for; its group may still have members
-    try:
-        os.killpg(pid, sign)
-    except (ProcessLookupError, PermissionError):
-        pass
-
-
-def _children(pid):
-    """The psutil.Process of each process below ``pid``."""
-    try:
-        return psutil.Process(pid).children(recursive=True)
-    except psutil.Error:
-        return []
-
-
-def _end(processes):
-    for process in processes:
-        with suppress(psutil.Error):
-            process.kill()
 
 
 @contextmanager
@@ -246,23 +232,17 @@ def _environment(values):
                 os.environ[name] = value
 
 
-def _work(spec, link, parent):
+def _work(spec, link, parent, memory_bytes):
     """A worker's program: episodes until a None or the end of the link."""
-    os.setpgid(0, 0)  # a job's own processes end with it, and Ctrl-C goes to the parent alone
-    prctl = ctypes.CDLL(None).prctl
-    prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)  # children of its children stay below it
-    if os.getppid() != parent:
-        return
+    os.setpgid(0, 0)  # Ctrl-C goes to the parent alone
+    keeping.be_kept(parent, memory_bytes, link.close)
     # What jobs print is no result: it goes to the error output.
     os.dup2(2, 1)
-    try:
+    with suppress(_Stopped):
         signal.signal(signal.SIGTERM, _stop)
         _episodes(spec, link)
-    except _Stopped:
-        sys.exit(1)
-    finally:
-        _end(_children(os.getpid()))
+        return
+    sys.exit(1)
 
 
 def _episodes(spec, link):

@@ -2,15 +2,15 @@
 """The engine for several machines: Ray (https://ray.io), which is installed on first use."""
 import contextlib
 import os
-import shutil
-import tempfile
 import time
 from itertools import islice
 from pathlib import Path
 
 import psutil
 
-from . import on_first_use
+from lab_environment.work_folder import claimed_folder
+
+from . import keeping, on_first_use
 from .job import JobError, Outcome, load, run_episode
 from .processes import ONE_THREAD, SEEDS_AHEAD, TRIES
 
@@ -42,7 +42,10 @@ def has_token():
 class _Episodes:
     """A Ray actor: one worker with its job."""
 
-    def __init__(self, spec):
+    def __init__(self, spec, memory_bytes):
+        if memory_bytes is not None:
+            # Ray's own threads have some already.
+            keeping.limit_memory(keeping.own_memory_bytes() + memory_bytes)
         self._job = load(spec)
 
     def started(self):
@@ -81,8 +84,8 @@ def _start(ray, limits, address, ending):
     if address:
         options["address"], tries = address, 1
     else:
-        folder = tempfile.mkdtemp(prefix="ray-")  # for its logs and sockets, which it would keep
-        ending.callback(shutil.rmtree, folder, ignore_errors=True)
+        # For its logs and sockets, which it would keep.
+        folder = str(ending.enter_context(claimed_folder("ray-", lambda left: _end_left(str(left)))))
         ending.callback(end_processes, folder)
         # Ray opens its own folder to everybody; the one around it stays closed.
         options.update(num_cpus=limits.workers, _temp_dir=os.path.join(folder, "ray"))
@@ -102,10 +105,20 @@ def _start(ray, limits, address, ending):
 def end_processes(folder):
     """End the processes below this one that have ``folder`` in their command: ray.shutdown leaves those of a Ray whose
     start failed."""
+    _end_users(folder, psutil.Process().children(recursive=True))
+
+
+def _end_left(folder):
+    """End the processes of this user that have ``folder`` in their command: those of a batch that was killed."""
+    with contextlib.suppress(psutil.Error):
+        _end_users(folder, [one for one in psutil.process_iter() if one.pid != os.getpid()])
+
+
+def _end_users(folder, processes):
     found = []
-    for process in psutil.Process().children(recursive=True):
+    for process in processes:
         with contextlib.suppress(psutil.Error):
-            if any(folder in word for word in process.cmdline()):
+            if process.uids().real == os.getuid() and any(folder + "/" in word for word in process.cmdline()):
                 process.kill()
                 found.append(process)
     psutil.wait_procs(found, END_S)
@@ -132,6 +145,8 @@ class _Actors:
         self._ray, self._spec, self._limits = ray, spec, limits
         self._seeds, self._again, self._deaths = iter(seeds), [], {}
         self._kind = ray.remote(num_cpus=1, runtime_env={"env_vars": ONE_THREAD})(_Episodes)
+        # The second where Ray has ended the actor because its machine's memory runs out.
+        self._losses = (ray.exceptions.RayActorError, ray.exceptions.OutOfMemoryError)
         self._starting = {}  # {reference: actor}
         self._running = {}  # {reference: (actor, seed)}
 
@@ -151,7 +166,7 @@ class _Actors:
         """A new actor, where a seed is left for it."""
         following = self._following([])
         if following:
-            actor = _Actor(self._kind.remote(self._spec))
+            actor = _Actor(self._kind.remote(self._spec, self._limits.memory_bytes))
             self._starting[actor.handle.started.remote()] = actor
             self._give(actor, following)
 
@@ -175,7 +190,7 @@ class _Actors:
         actor = self._starting[reference] if reference in self._starting else self._running[reference][0]
         try:
             outcome = self._result(reference)
-        except self._ray.exceptions.RayActorError as error:
+        except self._losses as error:
             yield from self._died(actor, error)
             return
         if self._starting.pop(reference, None):
@@ -185,6 +200,12 @@ class _Actors:
         actor.began = time.monotonic()
         del self._running[reference]
         yield outcome
+        if outcome.is_out_of_memory:
+            # The job may still hold it.
+            self._again += self._forget(actor).values()
+            self._ray.kill(actor.handle)
+            self._start()
+            return
         self._give(actor, self._following(list(self._of(actor).values())))
 
     def _result(self, reference):
@@ -207,7 +228,7 @@ class _Actors:
             try:
                 yield self._result(reference)
                 continue
-            except self._ray.exceptions.RayActorError:
+            except self._losses:
                 self._deaths[seed] = self._deaths.get(seed, 0) + 1
             if self._deaths[seed] < TRIES:
                 self._again.append(seed)

@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from lab_environment.family import with_parent
 from lab_environment.ports import free_port
 
 from .job import Job
@@ -87,9 +88,9 @@ class Command(Job):
 
 def _run(words, environment, output):
     """Exit code of a program; its children end with it."""
-    # setpriv: Ctrl-C for a program whose worker has died.
-    child = subprocess.Popen(["setpriv", "--pdeathsig", "INT", "--", *words], env=environment, stdin=subprocess.DEVNULL,
-                             stdout=output, stderr=subprocess.STDOUT)
+    # Ctrl-C for a program whose worker has died.
+    child = subprocess.Popen(with_parent(words, "INT"), env=environment, stdin=subprocess.DEVNULL, stdout=output,
+                             stderr=subprocess.STDOUT)
     try:
         return child.wait()
     finally:

@@ -58,6 +58,28 @@ class Trouble(Job):
         return {"good": True, "drawn": random.Random(seed).random()}
 
 
+class Hog(Job):
+    """Takes 600 MB of memory, by the seed: at once, by itself for ever, or by three programs."""
+
+    def __init__(self, folder="", at_once=(), keeps=(), programs=()):
+        self._folder, self._kept = Path(folder), []
+        self._at_once, self._keeps, self._programs = at_once, keeps, programs
+
+    def run(self, seed):
+        import numpy as np
+
+        if seed in self._at_once:
+            return {"last": float(np.ones(75_000_000)[-1])}
+        while seed in self._keeps:
+            self._kept.append(bytes(1_000_000))
+        if seed in self._programs:
+            words = [sys.executable, "-c", "import signal; kept = bytes(range(200)) * 1_000_000; signal.pause()"]
+            started = [subprocess.Popen(words, start_new_session=True) for _ in range(3)]
+            (self._folder / "programs").write_text(" ".join(str(one.pid) for one in started))
+            signal.pause()
+        return {"good": True}
+
+
 class Leaves(Job):
     """Leaves a process that has a session of its own and whose parent has ended."""
 
@@ -99,6 +121,13 @@ class CannotStart(Job):
 
     def start(self):
         raise OSError("no such robot")
+
+
+class HogAtStart(Job):
+    """Takes 600 MB."""
+
+    def start(self):
+        self._kept = bytes(600_000_000)
 
 
 class DiesAtStart(Job):

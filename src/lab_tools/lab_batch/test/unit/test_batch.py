@@ -365,7 +365,7 @@ def test_a_batch_that_is_killed_leaves_no_worker(tmp_path):
     child.kill()
     child.wait()
     wait_until(lambda: not is_alive(worker), "the worker has ended")
-    os.kill(episode, signal.SIGKILL)
+    wait_until(lambda: not is_alive(episode), "the episode's own process has ended")
 
 
 # -- Ray's installation

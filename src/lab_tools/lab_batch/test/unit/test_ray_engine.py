@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,20 +21,23 @@ from lab_testing.waiting import wait_until
 HERE = Path(__file__).parent
 ROOT = HERE.parents[4]
 # In a separate process: Ray changes signal handlers and starts threads. It prints how each seed ended, then the
-# addresses that Ray's processes listened on meanwhile, and those processes that are left.
+# addresses that Ray's processes listened on meanwhile, and those processes that are left. Each is written at once, on a
+# separate line: Ray prints messages of its own.
 PROGRAM = """
-import contextlib, json, psutil, sys
+import contextlib, json, os, psutil, sys
 from lab_batch import Spec, ray_engine
 from lab_batch.job import Outcome
 from lab_batch.processes import Limits
+def say(value):
+    os.write(1, b"\\n%s\\n" % json.dumps(value).encode())
 spec, addresses = Spec(sys.argv[1], json.loads(sys.argv[2])), set()
 for one in ray_engine.map_seeds(spec, range(int(sys.argv[3])), Limits(2)):
-    print(json.dumps([one.seed, one.result, one.error]), flush=True)
+    say([one.seed, one.result, one.error])
     for child in psutil.Process().children(recursive=True):
         with contextlib.suppress(psutil.Error):
             addresses |= {one.laddr.ip for one in child.net_connections("inet") if one.status == psutil.CONN_LISTEN}
-print(json.dumps(sorted(addresses)))
-print(json.dumps([child.name() for child in psutil.Process().children(recursive=True)]))
+say(sorted(addresses))
+say([child.name() for child in psutil.Process().children(recursive=True)])
 """
 
 
@@ -46,17 +50,21 @@ class LateRay:
         class RayActorError(Exception):
             """An actor has died, before or at this seed."""
 
+        class OutOfMemoryError(Exception):
+            """The actor was ended because its machine's memory runs out."""
+
         class RayTaskError(Exception):
             """The actor's method has raised."""
 
-    def __init__(self, deadly=None, first=0, hanging=None, start_s=0.0):
+    def __init__(self, deadly=None, first=0, hanging=None, start_s=0.0, death="RayActorError"):
         self._deadly, self._first, self._hanging, self._start_s = deadly, first, hanging, start_s
+        self._death = getattr(self.exceptions, death)
         self._of, self._began, self.killed = {}, {}, []
 
     def remote(self, **_):
         return lambda kind: SimpleNamespace(remote=self._actor)
 
-    def _actor(self, _spec):
+    def _actor(self, _spec, _memory_bytes):
         given = []
 
         def give(seed):
@@ -89,10 +97,17 @@ class LateRay:
 
     def get(self, reference):
         if self._deadly in self._of[reference]:
-            raise self.exceptions.RayActorError("gone")
+            raise self._death("gone")
         return Outcome(reference[0], {}, "", 0.0)
 
 
+HOLDS = """import signal, sys, tempfile
+from lab_environment.work_folder import claimed_folder
+tempfile.tempdir = sys.argv[1]
+with claimed_folder("ray-") as folder:
+    print(folder, flush=True)
+    signal.pause()
+"""
 SLEEP = "import signal; print(flush=True); signal.pause()"
 pytestmark = pytest.mark.once
 
@@ -126,9 +141,10 @@ def test_ray_gives_what_processes_give_and_a_killed_worker_costs_its_episode_onl
         seed: result for seed, result in plain.items() if seed != 5}
 
 
+@pytest.mark.parametrize("death", ["RayActorError", "OutOfMemoryError"])
 @pytest.mark.parametrize("first", [0, -1])
-def test_a_killed_worker_costs_its_own_episode_only_whatever_waited_with_it(first):
-    outcomes = ray_engine._Actors(LateRay(5, first), Spec("any:Job"), range(8), Limits(2)).outcomes()
+def test_a_killed_worker_costs_its_own_episode_only_whatever_waited_with_it(first, death):
+    outcomes = ray_engine._Actors(LateRay(5, first, death=death), Spec("any:Job"), range(8), Limits(2)).outcomes()
     errors = {one.seed: one.error for one in outcomes}
     assert sorted(errors) == list(range(8))
     assert [seed for seed, error in errors.items() if error] == [5] and "died twice" in errors[5]
@@ -152,6 +168,33 @@ def test_other_users_cannot_open_the_folder_of_a_ray():
         around = Path(options["_temp_dir"]).parent
         assert around.stat().st_mode & 0o077 == 0 and around.name.startswith("ray-")
     assert not around.exists()
+
+
+def test_a_start_ends_and_removes_what_a_killed_batch_has_left(monkeypatch, tmp_path):
+    """Neither a Ray whose batch lives, nor a folder that is no batch's."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "ray-of-others").mkdir()
+    options, ray = {}, SimpleNamespace(init=lambda **_: None, shutdown=lambda: None)
+    with contextlib.ExitStack() as ending:
+        users = {}
+        for kind in ("living", "left"):
+            holder = subprocess.Popen([sys.executable, "-c", HOLDS, str(tmp_path)], stdout=subprocess.PIPE, text=True)
+            ending.callback(holder.communicate)
+            ending.callback(holder.kill)
+            folder = holder.stdout.readline().strip()
+            words = [sys.executable, "-c", SLEEP, "--logs=%s/ray/logs" % folder]
+            users[kind] = ending.enter_context(subprocess.Popen(words, stdout=subprocess.PIPE))
+            ending.callback(users[kind].kill)
+            users[kind].stdout.readline()
+            options[kind] = Path(folder)
+        holder.kill()
+        holder.wait()
+        with contextlib.ExitStack() as own:
+            ray_engine._start(ray, Limits(1), None, own)
+            assert len(list(tmp_path.iterdir())) == 3
+        assert not options["left"].exists() and users["left"].poll() is not None
+        assert options["living"].is_dir() and users["living"].poll() is None
+        assert (tmp_path / "ray-of-others").is_dir()
 
 
 def test_processes_of_a_start_that_failed_are_ended():
