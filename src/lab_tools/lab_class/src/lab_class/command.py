@@ -2,12 +2,14 @@
 """`./baxter.sh labs up N | list | start | pause | stop | renew | down | logs`: the command line."""
 import argparse
 import os
+import re
 import shutil
 import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import rospkg
 
@@ -62,6 +64,8 @@ def _parser():
     up.add_argument("--launch", help="what runs in a lab (default: \"%s\")" % " ".join(defaults.launch))
     up.add_argument("--port", type=int, help="of the front door (default: %d)" % defaults.port)
     up.add_argument("--public", action="store_true", default=None, help="open the front door to other machines")
+    up.add_argument("--address", type=_server, metavar="URL", help="of a server with TLS in front of the front door, "
+                    "such as https://labs.example/robots (docs/class.md)")
     up.add_argument("--idle", type=_minutes, metavar="MINUTES", help="a lab that nobody uses for so long is paused; 0: "
                     "never (default: %g)" % (defaults.idle_s / 60.0))
     up.add_argument("--keep-running", action=argparse.BooleanOptionalAction, help="do not pause labs that have started "
@@ -118,6 +122,15 @@ def _positive(text):
     return int(_number(text, "a whole number from 1", 0.5))
 
 
+def _server(text):
+    parts = urlsplit(text)
+    if parts.scheme not in ("http", "https") or not parts.hostname or parts.query or parts.fragment or \
+            not re.fullmatch(r"[A-Za-z0-9/._~-]*", parts.path):
+        raise argparse.ArgumentTypeError("%r; expected an address such as https://labs.example or "
+                                         "https://labs.example/robots" % text)
+    return text.rstrip("/")
+
+
 def _launch(text):
     """The words of a launch line. A file of this folder gets its whole path: labs run in another folder."""
     words = text.split()
@@ -149,7 +162,8 @@ def _record(options, store):
                           "CSV file with their names" % store.folder)
     given = {"launch": _launch(options.launch) if options.launch else None, "port": options.port,
              "public": options.public, "trusted": options.trusted, "memory_bytes": options.memory,
-             "disk_bytes": options.disk, "at_once": options.at_once, "keep_running": options.keep_running}
+             "disk_bytes": options.disk, "at_once": options.at_once, "keep_running": options.keep_running,
+             "address": options.address}
     values = {name: value for name, value in given.items() if value is not None}
     if options.idle is not None:
         values["idle_s"] = options.idle or None
@@ -178,6 +192,7 @@ def _up(options, store):
         raise ClassError("students are not let into labs without walls around them, and this machine allows none: %s. "
                          "A class whose students may do all that you can needs no walls: add --trusted"
                          % isolation.problem())
+    _refuse_launch_outside(record.options)
     packages = rospkg.RosPack()
     libraries = fetched(Path(packages.get_path("lab_web")) / "page").parents[1]
     _say_who_has_left(store.read(), record)
@@ -211,6 +226,15 @@ def _up(options, store):
     return _DONE if options.no_wait else _await_labs(store)
 
 
+def _refuse_launch_outside(options):
+    """Labs behind walls see the workspace, and no other folder of this user."""
+    file = Path(options.launch[0])
+    seen = [*isolation.workspaces(os.environ), "/usr", "/opt"]
+    if not options.trusted and file.is_absolute() and not any(file.is_relative_to(root) for root in seen):
+        raise ClassError("labs do not see %s; put the launch file into one of these folders: %s"
+                         % (file, ", ".join(seen)))
+
+
 def _say_who_has_left(earlier, record):
     names = {student.name for student in record.students}
     for student in earlier.students if earlier else ():
@@ -232,6 +256,9 @@ def _print_addresses(record, store):
     print("The instructor's page:\n\n    %s\n\nThe students' addresses:\n" % _address(record, store, INSTRUCTOR))
     for student in record.students:
         print("    %-24s %s" % (student.full_name, _address(record, store, student.name)))
+    if record.options.address:
+        print("\nThe server at %s is expected to pass requests on to port %d of this machine, with their whole path."
+              % (record.options.address, _port(record, store)))
     if record.options.public:
         print("\nPort %d is open to every machine of the network. The connection is not encrypted (docs/security.md)."
               % _port(record, store))
@@ -243,8 +270,9 @@ def _print_addresses(record, store):
 def _address(record, store, name):
     """Of a student's lab, or of the instructor's page."""
     host = os.environ.get("ROS_IP") or socket.gethostname() if record.options.public else "localhost"
+    server = record.options.address or "http://%s:%d" % (host, _port(record, store))
     token = record.instructor if name == INSTRUCTOR else record.tokens[name].act
-    return "http://%s:%d/%s/?token=%s" % (host, _port(record, store), name, token)
+    return "%s/%s/?token=%s" % (server, name, token)
 
 
 def _port(record, store):

@@ -6,6 +6,7 @@ It checks who asks before it wakes a lab or passes anything on.
 import hmac
 import html
 import json
+import re
 
 from tornado import web
 
@@ -77,8 +78,9 @@ class Start(_Handler):
     """The address without a name."""
 
     def get(self):
-        self.refuse(404, "Your lab has an address of this form, with your name and your token: http://%s/NAME/?token=..."
-                    % self.request.host)
+        options = self.door.record.options
+        self.refuse(404, "Your lab has an address of this form, with your name and your token: %s/NAME/?token=..."
+                    % (options.address or "http://" + self.request.host))
 
 
 def is_poll(method, uri):
@@ -110,7 +112,7 @@ class Passed(PassingHandler):
 
     async def prepare(self):
         self._name = self.path_args[0]
-        self._prefix = "/" + self._name
+        self._prefix = "%s/%s" % (self.door.record.options.prefix, self._name)
         path, _, query = self.request.uri.partition("?")
         below = path[len(self._prefix):] + ("?" + query if query else "")
         if not self._lets_in():
@@ -254,12 +256,13 @@ class InstructorPage(_Handler):
 
 def application(door, page):
     """The front door; ``page``: folder of the instructor's page [Path]."""
+    prefix = re.escape(door.record.options.prefix)
     return web.Application([
-        (r"/", Start, {"door": door}),
-        (r"/instructor/labs", Overview, {"door": door}),
-        (r"/instructor/labs/([a-z0-9-]+)/([a-z]+)", Change, {"door": door}),
-        (r"/instructor/([a-z.]*)", InstructorPage, {"door": door, "page": page}),
-        (r"/([a-z0-9-]+)(?:/.*)?", Passed, {"door": door})], log_function=lambda handler: None)
+        (prefix + r"/", Start, {"door": door}),
+        (prefix + r"/instructor/labs", Overview, {"door": door}),
+        (prefix + r"/instructor/labs/([a-z0-9-]+)/([a-z]+)", Change, {"door": door}),
+        (prefix + r"/instructor/([a-z.]*)", InstructorPage, {"door": door, "page": page}),
+        (prefix + r"/([a-z0-9-]+)(?:/.*)?", Passed, {"door": door})], log_function=lambda handler: None)
 
 
 def control(door):

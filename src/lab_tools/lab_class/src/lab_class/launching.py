@@ -44,7 +44,8 @@ def prepared(place, options, tokens, listener, refused):
     else:
         home, master, page = str(place.folder / HOME), ports.free_port(), ports.free_port()
     command = [sys.executable, "-P", "-m", "lab_class.inside", "--listener", str(listener), "--master", str(master),
-               "--page", str(page), "--below", "/" + place.folder.name, "--", *options.launch]
+               "--page", str(page), "--below", "%s/%s" % (options.prefix, place.folder.name), "--",
+               *options.launch]
     limits = limited(options.disk_bytes, TASKS if place.walls else None)
     environment = {**isolation.environment_of(os.environ), TOKEN: tokens.act, VIEW_TOKEN: tokens.view,
                    "ROS_MASTER_URI": "http://localhost:%d" % master, "ROS_HOSTNAME": "localhost", "HOME": home,

@@ -10,6 +10,7 @@ import os
 import secrets
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from lab_class.disk import remove
 from lab_class.labs import ClassError
@@ -32,7 +33,8 @@ class StoreError(Exception):
 class Options:
     """How a class runs. ``launch``: the words after roslaunch, by default with half of the messages of a lab's clock;
     ``idle_s``: None means never; ``keep_running``: labs do not wait for their first visitor paused; ``memory_bytes``,
-    ``disk_bytes``: of each lab; ``at_once``: labs that start at a time.
+    ``disk_bytes``: of each lab; ``at_once``: labs that start at a time; ``address``: of a server in front of the
+    front door, without a slash at the end, or "".
     """
 
     launch: tuple = ("baxter_gazebo", "baxter_world.launch", "gui:=false", "clock_rate:=250",
@@ -45,6 +47,12 @@ class Options:
     memory_bytes: int = 2 << 30
     disk_bytes: int = 1 << 30
     at_once: int = 1
+    address: str = ""
+
+    @property
+    def prefix(self):
+        """What the paths of all addresses begin with: the path of ``address``, mostly ""."""
+        return urlsplit(self.address).path
 
 
 @dataclass(frozen=True)
