@@ -28,8 +28,8 @@ FOLDER = Path(__file__).resolve().parent
 TILE, QUALITY = (480, 300), 80
 KINECT, HAND = "/kinect", "/cameras/left_hand_camera"
 TIMEOUT_S = 30.0
-# Of the left arm while it is looked at [rad/s].
-SWING = {"left_s0": 0.5}
+# Of the left arm while it is looked at [rad/s]; to and fro, so that it still moves when pictures come late.
+SWING, REVERSES_S = {"left_s0": 0.5}, 2.0
 # Flow [pixels] that is shown in full colour; depth [m] that is shown black and white.
 FULL_FLOW, DEPTH_M = 15.0, (0.6, 2.0)
 # Something moves by more than this [pixels].
@@ -38,10 +38,15 @@ MOVING = 2.0
 
 @contextlib.contextmanager
 def moving(velocities):
-    """The left arm moves so, and goes back where it was at the end."""
+    """The left arm moves so, to and fro, and goes back where it was at the end."""
     limb = Limb("left")
     start = limb.joint_angles()
-    timer = rospy.Timer(rospy.Duration(0.02), lambda _: limb.set_joint_velocities(velocities))
+    began = rospy.get_time()
+
+    def swing(_):
+        sign = (-1) ** int((rospy.get_time() - began) / REVERSES_S)
+        limb.set_joint_velocities({joint: sign * velocity for joint, velocity in velocities.items()})
+    timer = rospy.Timer(rospy.Duration(0.02), swing)
     try:
         yield
     finally:

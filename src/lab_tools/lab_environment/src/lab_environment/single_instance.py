@@ -124,5 +124,6 @@ def _refusal(what, node_name, who, stop, master_uri):
     address = urlsplit(master_uri)
     return ("%s (%s): node %s, %s. Nothing was started or changed.\n"
             "To stop it: press Ctrl-C in its terminal, or   %s\n"
-            "To run a second one beside it, give that a separate master: ROS_MASTER_URI=http://%s:%d"
+            "To run a second one beside it: export ROS_MASTER_URI=http://%s:%d in each of its terminals, "
+            "then start it again"
             % (what, master_uri, node_name, who, stop, address.hostname, (address.port or 11311) + 1))
