@@ -27,6 +27,9 @@ NO_SHAPE = -1
 _VERSION = b"4"
 #: Largest number for one body; with more, making it takes the loop more than 50 ms.
 _MOST_SHAPES_OF_BODY = 1000
+# Room [bytes] for a mesh as text, with its hull: so many times the file that it is made from, which may be binary,
+# between these bounds; larger meshes are thinned out.
+_GROWTH, _ROOM = 4, (100_000, 20_000_000)
 # A plane that is tilted, or one of several shapes, becomes a slab of this size [m]: Bullet's own plane must be the only
 # shape of its body.
 _SLAB_M = (200.0, 200.0, 1.0)
@@ -35,14 +38,16 @@ _SLAB_M = (200.0, 200.0, 1.0)
 class MeshCache:
     """Meshes in any format that trimesh reads, kept on disk as the Wavefront files that PyBullet reads.
 
-    The file name is a hash of the mesh's content, so a changed mesh is converted again and copies share a file.
+    The file name is a hash of the mesh's content, so a changed mesh is converted again and copies share a file. Where
+    the folder cannot be written, or its disk is full, files are made in a temporary folder that ends with the process.
     """
 
     def __init__(self, folder=None, warn=lambda text: None):
-        """``warn(text)`` is called for meshes that are simplified."""
+        """``warn(text)`` is called for meshes that are simplified, and once for a folder that cannot be written."""
         self._warn = warn
         base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
         self.folder = Path(folder or os.path.join(base, "bullet_sim", "meshes"))
+        self._temporary = None  # the folder instead, once it is needed
         self._known = {}  # (path, size, time of change, planes) -> Wavefront file
 
     def wavefront(self, path, planes=(), hollow=True, part=WHOLE):
@@ -59,7 +64,7 @@ class MeshCache:
                 asked = (repr(planes) if planes else "") + (repr(part) if part != WHOLE else "")
                 content = read_file(path, MOST_BYTES) + asked.encode() + _VERSION
                 target = self.folder / (hashlib.sha256(content).hexdigest()[:32] + ".obj")
-                self._known[key] = target if target.exists() else self._convert(path, target, planes, part)
+                self._known[key] = target if target.exists() else self._convert(path, target.name, planes, part)
         except OSError as error:
             raise BulletSimError("mesh %s cannot be read: %s" % (path, error.strerror)) from None
         hull = self._known[key].with_suffix(".hull.obj")
@@ -67,31 +72,39 @@ class MeshCache:
 
     def keep(self, key, lines):
         """Return the path of a file that holds the result of ``lines()``, cached under ``key`` (bytes)."""
-        name = hashlib.sha256(key + _VERSION).hexdigest()[:32] + ".obj"
-        target = self.folder / name
+        target = self.folder / (hashlib.sha256(key + _VERSION).hexdigest()[:32] + ".obj")
         if not target.exists():
-            self._make_folder()
-            target = self.folder / name
-            with self._draft_folder() as draft:
+            text = "\n".join(lines()) + "\n"
+            target = self._folder_with_room(len(text)) / target.name
+            with _draft_folder(target.parent) as draft:
                 part = Path(draft) / "gathered"
-                part.write_text("\n".join(lines()) + "\n", encoding="ascii")
+                part.write_text(text, encoding="ascii")
                 os.replace(part, target)
         return str(target)
 
-    def _make_folder(self):
+    def _folder_with_room(self, size):
+        """A folder in which a file of ``size`` bytes can be made. Raises BulletSimError where there is none."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            self.folder = Path(tempfile.mkdtemp(prefix="bullet_sim_meshes_"))
+            _try_room(self.folder, size)
+            return self.folder
+        except OSError as error:
+            refusal = "%s: %s" % (self.folder, error.strerror)
+        try:
+            if self._temporary is None:
+                self._temporary = tempfile.TemporaryDirectory(prefix="bullet_sim_meshes_")
+                self._warn("meshes cannot be kept (%s); they are made again at each start, which takes longer. Make "
+                           "room there, or make it yours if it is root's" % refusal)
+            _try_room(self._temporary.name, size)
+            return Path(self._temporary.name)
+        except OSError as error:
+            raise BulletSimError("there is no room for a converted mesh of up to %d kB, neither in %s, nor in %s: %s; "
+                                 "delete some files" % (size // 1000, refusal, tempfile.gettempdir(), error.strerror)
+                                 ) from None
 
-    def _draft_folder(self):
-        """Return a folder for drafts, which are renamed atomically: another simulator may make the same file."""
-        return tempfile.TemporaryDirectory(dir=str(self.folder), prefix="part_")
-
-    def _convert(self, path, target, planes, part):
-        self._make_folder()
-        target = self.folder / target.name
-        with self._draft_folder() as draft:
+    def _convert(self, path, name, planes, part):
+        target = self._folder_with_room(int(np.clip(_GROWTH * os.stat(path).st_size, *_ROOM))) / name
+        with _draft_folder(target.parent) as draft:
             copy = Path(draft) / "mesh"
             try:
                 remark = MESHES.call(to_wavefront, str(path), str(copy), planes, part)
@@ -104,6 +117,17 @@ class MeshCache:
         if remark:
             self._warn("mesh %s: %s" % (path, remark))
         return target
+
+
+def _draft_folder(folder):
+    """Return a folder for drafts, which are renamed atomically: another simulator may make the same file."""
+    return tempfile.TemporaryDirectory(dir=str(folder), prefix="part_")
+
+
+def _try_room(folder, size):
+    """Raises OSError where a file of ``size`` bytes cannot be made in the folder."""
+    with tempfile.TemporaryFile(dir=str(folder)) as file:
+        os.posix_fallocate(file.fileno(), 0, size)
 
 
 @contextlib.contextmanager

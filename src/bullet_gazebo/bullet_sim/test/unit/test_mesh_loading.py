@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Untrusted meshes: a hostile one is refused with an error that names the limit, a large one is simplified."""
 
+import errno
 import os
 import struct
+import tempfile
 import zipfile
 
 import numpy as np
@@ -285,3 +287,33 @@ def test_a_collada_file_without_geometry_says_so(tmp_path, unit):
         "<up_axis>", unit + "<up_axis>"))
     with pytest.raises(MeshError, match="it holds no triangles"):
         to_wavefront(str(path), str(tmp_path / "nothing.obj"), ())
+
+
+def small_mesh(path):
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n")
+    return path
+
+
+def full_disks(monkeypatch, *folders):
+    """No file can be made below these folders."""
+    def fallocate(number, offset, size):
+        if os.readlink("/proc/self/fd/%d" % number).startswith(tuple(map(str, folders))):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    monkeypatch.setattr(os, "posix_fallocate", fallocate)
+
+
+def test_without_room_in_the_cache_meshes_are_made_elsewhere_and_a_warning_says_so(tmp_path, cache, told, monkeypatch):
+    full_disks(monkeypatch, tmp_path / "cache")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    first = cache.wavefront(small_mesh(tmp_path / "a.obj"), hollow=False)
+    second = cache.keep(b"two", lambda: ["v 0 0 0"])
+    assert os.path.exists(first) and os.path.exists(second)
+    assert not {os.path.dirname(first), os.path.dirname(second)} & {str(tmp_path / "cache")}
+    assert len(told) == 1 and "%s: No space left on device" % (tmp_path / "cache") in told[0]
+
+
+def test_no_room_anywhere_is_said_as_such(tmp_path, cache, monkeypatch):
+    full_disks(monkeypatch, tmp_path)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with pytest.raises(BulletSimError, match="no room for a converted mesh .* No space left on device; delete some"):
+        cache.wavefront(small_mesh(tmp_path / "a.obj"))

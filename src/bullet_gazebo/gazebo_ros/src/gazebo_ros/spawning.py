@@ -148,8 +148,9 @@ class Spawner:
         self._library.files.forget_missing()
         robot, mended = with_stand_ins(robot, self._mesh_files)
         if mended:
-            self._log.warn("model '%s': %s (are the files there, and the packages in ROS_PACKAGE_PATH?)"
-                           % (name, mended))
+            if "cannot be found" in mended:
+                mended += " (are the files there, and the packages in ROS_PACKAGE_PATH?)"
+            self._log.warn("model '%s': %s" % (name, mended))
         options = {"static": urdf_extras.is_static(robot), **options}
         try:
             merged = merge_fixed(with_solids(robot, options.pop("solids", None)))
