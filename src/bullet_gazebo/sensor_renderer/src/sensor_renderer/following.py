@@ -11,11 +11,12 @@ class WorldFollower:
     number of the scene that it shows, None before the first; ``snapshot``: the state that it shows; ``warn(text)``.
     """
 
-    def __init__(self, folder, warn):
-        """Raises world_picture.snapshot.SnapshotError if there is no snapshot in ``folder``."""
+    def __init__(self, folder, warn, drawings=None):
+        """``drawings``: as for :class:`sensor_renderer.mirror.Mirror`; by default all meshes are waited for.
+        Raises world_picture.snapshot.SnapshotError if there is no snapshot in ``folder``."""
         self._reader = SnapshotReader(folder)
         self._finder = ResourceFinder()
-        self.mirror = Mirror(DrawingCache(), self._finder, warn)
+        self.mirror = Mirror(drawings or DrawingCache(), self._finder, warn)
         self.revision = self.snapshot = None
 
     @property
@@ -37,6 +38,7 @@ class WorldFollower:
             self._finder.forget_missing()
             self.mirror.set_scene(scene.bodies, scene.light)
             self.revision = scene.revision
+        self.mirror.complete()
         self.mirror.set_state(snapshot.values)
         self.snapshot = snapshot
         return True

@@ -11,6 +11,7 @@ from sensor_renderer import triangles
 from sensor_renderer.light import Light
 from urdf_model import Finish, Mesh, merge_fixed, parse_urdf
 from urdf_model.transforms import matrix_from_quaternion, rigid
+from world_picture.background import NotReady
 from world_picture.drawing import DrawingError, read_level, read_uv
 from world_picture.shared_picture import PictureReader
 from world_picture.snapshot import SnapshotError
@@ -22,6 +23,8 @@ _WHITE = (1.0, 1.0, 1.0, 1.0)
 GLOSS = 0.3
 #: So many shapes of models that are gone are kept, for models that come again.
 MOST_UNUSED = 100
+#: New models wait so long for their meshes [s]: most are ready by then, and are complete in their first picture.
+PATIENCE_S = 2.0
 #: How far the floor reaches [m]; its colour.
 FLOOR_HALF_M = 50.0
 FLOOR_COLOUR = (0.75, 0.77, 0.80, 1.0)
@@ -189,18 +192,31 @@ class Body:
         return self.matrices[self._index[name]]
 
 
+class _Built(NamedTuple):
+    """A body and the entry of the scene that it was made of; the same ``key`` means the same body. ``waits_for``: the
+    keys of meshes and pictures that were not ready for it."""
+
+    key: tuple
+    entry: dict
+    body: Body
+    waits_for: frozenset
+
+
 class Mirror:
     """All bodies of the world."""
 
     def __init__(self, drawings, find_mesh, warn):
-        """``drawings``: a ``world_picture.drawing.DrawingCache``; ``find_mesh(uri)`` -> path or None;
-        ``warn(text)``."""
+        """``drawings``: a ``world_picture.drawing.DrawingCache``, or a ``world_picture.background.BackgroundDrawings``,
+        with which large meshes appear later; ``find_mesh(uri)`` -> path or None; ``warn(text)``."""
         self._drawings = drawings
         self._find_mesh = find_mesh
         self._warn = warn
         self._warned = set()  # names of pictures
         self._parts = {}
-        self._bodies = {}
+        self._bodies = {}  # of _Built
+        self._not_ready = set()  # keys, while a body is being built
+        #: Names of the models whose meshes are not ready.
+        self.waiting = []
         #: Bodies by name, in the scene's order.
         self.bodies = {}
         #: The light: :class:`sensor_renderer.light.Light`.
@@ -212,16 +228,31 @@ class Mirror:
     def set_scene(self, listed, light=None):
         """Show what :meth:`world_picture.snapshot.SnapshotWriter.write_scene` lists; bodies that exist already stay."""
         self._world_light = light or {}
-        known = self._bodies
+        known, waited = self._bodies, bool(self.waiting)
         self._bodies = {}
         for entry in listed:
             name = entry["name"]
             key = (entry["urdf"], tuple(entry["joints"]), str(entry.get("screens")), bool(entry.get("static")),
                    str(entry.get("lights")))
             old = known.get(name)
-            self._bodies[name] = old if old is not None and old[0] == key else (key, self._build(entry))
-        self.bodies = {name: body for name, (_, body) in self._bodies.items()}
+            self._bodies[name] = old if old is not None and old.key == key else self._build(key, entry)
+        self._show_bodies()
+        if self.waiting and not waited:
+            self._drawings.wait(PATIENCE_S)
+            self.complete()
         self._forget_unused()
+
+    def complete(self):
+        """Show the models whose meshes have become ready. A state has to be set after it."""
+        ready = [name for name in self.waiting if not self._drawings.is_making(self._bodies[name].waits_for)]
+        if ready:
+            for name in ready:
+                self._bodies[name] = self._build(self._bodies[name].key, self._bodies[name].entry)
+            self._show_bodies()
+
+    def _show_bodies(self):
+        self.bodies = {name: built.body for name, built in self._bodies.items()}
+        self.waiting = [name for name, built in self._bodies.items() if built.waits_for]
         self._light_up()
         self.version += 1
 
@@ -251,7 +282,12 @@ class Mirror:
         """The numbers of the pictures that the screens show; one of them changes with each new picture."""
         return tuple(screen.picture.version for body in self.bodies.values() for screen in body.screens)
 
-    def _build(self, entry):
+    def _build(self, key, entry):
+        self._not_ready = set()
+        body = self._body(entry)
+        return _Built(key, entry, body, frozenset(self._not_ready))
+
+    def _body(self, entry):
         if entry["urdf"] is None:
             return Body([("", [_floor()])], [], static=True)
         merged = merge_fixed(parse_urdf(entry["urdf"], source=entry["name"]))
@@ -287,6 +323,9 @@ class Mirror:
             return []  # /gazebo has logged it
         try:
             found = self._drawings.parts(path, texture is not None, (geometry.submesh, geometry.centred))
+        except NotReady as error:
+            self._not_ready.add(error.key)
+            return []
         except DrawingError as error:
             self._warn(str(error))
             return []
@@ -323,6 +362,9 @@ class Mirror:
             if path is None:
                 raise DrawingError("picture %s does not exist; what it should be on is shown in one colour" % name)
             return self._drawings.texture(path)
+        except NotReady as error:
+            self._not_ready.add(error.key)
+            return None
         except DrawingError as error:
             if name not in self._warned:
                 self._warned.add(name)

@@ -22,7 +22,7 @@ from sensor_renderer.mirror import Mirror
 from sensor_renderer.moments import Moment, World
 from sensor_renderer.priority import DRAWING, give_way
 from sensor_renderer.sensor_element import SensorEntry
-from world_picture.drawing import DrawingCache
+from world_picture.background import BackgroundDrawings
 from world_picture.snapshot import SnapshotError, SnapshotReader
 
 # Polling periods [s]: of the snapshot with subscribers, of the snapshot without, and of the search for a simulator.
@@ -49,7 +49,7 @@ class SensorRenderer:
         {file name: "module:Class"}; ``labels``: :class:`sensor_renderer.labels.Labels`."""
         self._drivers = drivers
         self._finder = ResourceFinder()
-        self._mirror = Mirror(DrawingCache(), self._finder, rospy.logwarn)
+        self._mirror = Mirror(BackgroundDrawings(), self._finder, rospy.logwarn)
         self._world = World(self._mirror, make_renderer, labels)
         self._sensors = {}
         self._refused = set()
@@ -87,11 +87,15 @@ class SensorRenderer:
             if scene.revision != snapshot.revision:
                 return  # a state of the new scene follows
             self._finder.forget_missing()
-            with _told(READS_WITHIN_S, "cameras wait while meshes of new models are simplified; this is done once"):
+            with _told(READS_WITHIN_S, "cameras wait while the shapes of new models are read"):
                 self._mirror.set_scene(scene.bodies, scene.light)
+            if self._mirror.waiting:
+                rospy.loginfo("meshes are being simplified, which is done once; the cameras see all of %s after that"
+                              % ", ".join(self._mirror.waiting))
             self._world.forget()
             self._set_sensors(scene.bodies)
             self._revision = scene.revision
+        self._mirror.complete()
         if snapshot.resets != self._resets:
             self._resets, self._drawn_s = snapshot.resets, None
             self._world.forget()

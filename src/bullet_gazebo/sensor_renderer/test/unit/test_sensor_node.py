@@ -88,7 +88,7 @@ def test_a_mesh_of_a_package_that_came_later_is_drawn(simulator, tmp_path, monke
     assert corners(STAND.replace(box, '<mesh filename="package://made_later/part.obj" scale="2 2 2"/>')) == 3
 
 
-def test_cameras_that_wait_for_meshes_say_so(simulator, monkeypatch):
+def test_cameras_that_wait_for_shapes_say_so(simulator, monkeypatch):
     monkeypatch.setattr("importlib.import_module", lambda name: types.SimpleNamespace(Eye=Eye))
     said, texts = threading.Event(), []
     monkeypatch.setattr(node.rospy, "loginfo", lambda text: (texts.append(text), said.set()))
@@ -97,12 +97,53 @@ def test_cameras_that_wait_for_meshes_say_so(simulator, monkeypatch):
     monkeypatch.setattr(node, "READS_WITHIN_S", 0.0)
     simulator.write(1, 0.0, [AT_ORIGIN])
     renderer._turn(SnapshotReader(simulator.folder))
-    assert len(texts) == 1 and "cameras wait while meshes" in texts[0]
+    assert len(texts) == 1 and "cameras wait while the shapes" in texts[0]
     monkeypatch.setattr(node, "READS_WITHIN_S", 1000.0)
     monkeypatch.setattr(renderer._mirror, "set_scene", lambda *_: None)
     simulator.write_scene([with_sensor(STAND)])
     simulator.write(2, 0.1, [AT_ORIGIN])
     renderer._turn(SnapshotReader(simulator.folder))
+    assert len(texts) == 1
+
+
+def test_cameras_go_on_while_a_mesh_is_simplified(simulator, tmp_path, monkeypatch):
+    go_on, texts = threading.Event(), []
+
+    class Process:
+        """Simplifies the mesh when the test says so."""
+
+        def call(self, function, *arguments):
+            assert go_on.wait(30.0)
+            return function(*arguments)
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("world_picture.drawing._PROCESS", Process())
+    monkeypatch.setattr("sensor_renderer.mirror.PATIENCE_S", 0.0)
+    monkeypatch.setattr("importlib.import_module", lambda name: types.SimpleNamespace(Eye=Eye))
+    monkeypatch.setattr(node.rospy, "loginfo", texts.append)
+    renderer, reader = SensorRenderer(lambda: None, {"libeye.so": "eyes:Eye"}), SnapshotReader(simulator.folder)
+    mesh = tmp_path / "part.obj"
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="ascii")
+    box = STAND.split("<geometry>")[1].split("</geometry>")[0]
+    large = STAND.replace(box, '<mesh filename="file://%s"/>' % mesh)
+    simulator.write_scene([with_sensor(STAND), {"name": "large", "urdf": large, "joints": []}])
+    place = np.array([3.0, 0, 0, 0, 0, 0, 1])
+
+    def turn(number):
+        simulator.write(number, 0.2 * number, [AT_ORIGIN, place])
+        renderer._turn(reader)
+        renderer._world.show(0.2 * number)
+        body = renderer._mirror.bodies["large"]
+        assert body.link_matrix("eye")[0, 3] == 3.0
+        return len(body.parts[0])
+
+    try:
+        assert [turn(1), turn(2)] == [0, 0] and Eye.made.taken == [0.2, 0.4]
+        assert len(texts) == 1 and "large" in texts[0] and "stand" not in texts[0]
+    finally:
+        go_on.set()
+    renderer._mirror._drawings.wait(30.0)
+    assert turn(3) == 1 and len(Eye.made.taken) == 3 and not renderer._mirror.waiting
     assert len(texts) == 1
 
 

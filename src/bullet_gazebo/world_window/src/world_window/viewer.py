@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sensor_renderer.following import WorldFollower
+from world_picture.background import BackgroundDrawings
 from world_picture.snapshot import SnapshotError
 from world_window.clock import Clock
 from world_window.sharpness import Sharpness
@@ -111,7 +112,7 @@ class Viewer(threading.Thread):
         if folder is None:
             return None
         with contextlib.suppress(SnapshotError):  # left by an earlier simulator
-            follower = WorldFollower(folder, self._warn)
+            follower = WorldFollower(folder, self._warn, BackgroundDrawings())
             if follower.is_alive:
                 return follower
         return None
